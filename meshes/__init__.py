@@ -1,0 +1,1 @@
+"""Parametric meshes and the one mesh that is shipped."""

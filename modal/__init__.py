@@ -1,0 +1,1 @@
+"""Finite elements: mesh to matrices, modes and the calibrated rigid model."""

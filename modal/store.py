@@ -1,0 +1,149 @@
+"""Records on disk: one HDF5 layout for every result, readable by xarray and netCDF tools.
+
+The ground floor of the project: it knows h5py and nothing else of ours, so that every stage may write its records the
+same way. A record is a set of named variables with dimensions and units, and flat attributes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+
+SCHEMA_VERSION = 1
+
+
+class StoreError(ValueError):
+    """A record file that cannot be read: missing, damaged, of another kind or of a newer schema."""
+
+
+class Variable(NamedTuple):
+    """One array of a record: its values, the name of each dimension, and its unit ("1" if it has none)."""
+
+    values: Any
+    dims: Sequence[str] = ()
+    units: str = "1"
+
+
+@contextlib.contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; rename it to `path` on success, remove it on any failure.
+
+    A killed or failing writer thus leaves the old file or none, never half a file. The temporary file keeps the suffix.
+    """
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise StoreError(f"{target}: the folder {target.parent} does not exist; create it first")
+    handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        os.replace(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def save(
+    path: str | os.PathLike[str],
+    kind: str,
+    variables: Mapping[str, Variable],
+    attributes: Mapping[str, Any] | None = None,
+) -> None:
+    """Write a record of the given kind. A variable named like a dimension is that dimension's coordinate.
+
+    Strings and lists of strings become UTF-8 text; dictionaries among the attributes become JSON text.
+    """
+    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+        file.attrs["kind"] = kind
+        file.attrs["schema_version"] = SCHEMA_VERSION
+        for name, value in (attributes or {}).items():
+            file.attrs[name] = json.dumps(value, sort_keys=True) if isinstance(value, dict) else value
+        for name, variable in variables.items():
+            _create(file, name, variable)
+        lengths = _dimension_lengths(variables)
+        for dimension, length in lengths.items():
+            if dimension not in file:
+                # a dimension without coordinate, marked as netCDF-4 marks it
+                file.create_dataset(dimension, data=np.zeros(length, np.float32))
+                label = f"This is a netCDF dimension but not a netCDF variable.{length:10d}"
+                file[dimension].make_scale(label)
+            else:
+                file[dimension].make_scale(dimension)
+        for name, variable in variables.items():
+            for axis, dimension in enumerate(variable.dims):
+                if name != dimension:
+                    file[name].dims[axis].attach_scale(file[dimension])
+
+
+def load(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Read a record: (variables by name as arrays, attributes). Raises StoreError with the file and the reason."""
+    if not Path(path).is_file():
+        raise StoreError(f"{path}: no such file")
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise StoreError(f"{path}: not a readable HDF5 file ({error})") from error
+    with file:
+        found = file.attrs.get("kind")
+        if found != kind:
+            raise StoreError(f"{path}: holds {found or 'no record of ours'}, expected {kind}")
+        version = int(file.attrs["schema_version"])
+        if version > SCHEMA_VERSION:
+            raise StoreError(f"{path}: schema version {version} is newer than {SCHEMA_VERSION}; update vanedamp")
+        attributes = {name: _plain(value) for name, value in file.attrs.items()}
+        return {name: _read(item) for name, item in file.items() if isinstance(item, h5py.Dataset)}, attributes
+
+
+def frozen(array: Any, dtype: Any = float) -> np.ndarray:
+    """A contiguous read-only copy of an array: what frozen records hold."""
+    copy = np.array(array, dtype=dtype, order="C")
+    copy.setflags(write=False)
+    return copy
+
+
+def _dimension_lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
+    lengths: dict[str, int] = {}
+    for name, variable in variables.items():
+        shape = np.shape(variable.values)
+        if len(shape) != len(variable.dims):
+            raise ValueError(f"{name}: {len(variable.dims)} dimensions named for an array of shape {shape}")
+        for dimension, length in zip(variable.dims, shape, strict=True):
+            if lengths.setdefault(dimension, length) != length:
+                raise ValueError(f"{name}: dimension {dimension} has length {length} here and {lengths[dimension]} elsewhere")
+    return lengths
+
+
+def _create(file: h5py.File, name: str, variable: Variable) -> None:
+    values = np.asarray(variable.values)
+    if values.dtype.kind in "UO":
+        dataset = file.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype())
+    else:
+        options = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size > 4096 else {}
+        dataset = file.create_dataset(name, data=values, **options)
+    dataset.attrs["units"] = variable.units
+
+
+def _read(dataset: h5py.Dataset) -> Any:
+    if h5py.check_string_dtype(dataset.dtype):
+        return dataset.asstr()[()]
+    return dataset[()]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value

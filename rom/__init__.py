@@ -1,0 +1,1 @@
+"""Reduced models: interface coordinates and Craig-Bampton reduction."""

@@ -1,0 +1,1 @@
+"""Pipelines and the command `vanedamp`: they compose modal, rom and coupling."""
