@@ -1,0 +1,128 @@
+"""Input files at the border: TOML in, validated frozen records out, every error one line that says what would be right."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import ConfigDict, Strict, TypeAdapter, ValidationError
+
+T = TypeVar("T")
+
+#: Every record read from a file knows all its keys and holds finite numbers.
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+# numbers are numbers: no text, no booleans
+Real = Annotated[float, Strict()]
+Whole = Annotated[int, Strict()]
+
+
+class InputError(ValueError):
+    """Bad input. The message is one line: file, key, what is wrong and what would be right."""
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """The tables of a TOML file. Raises InputError if it is missing or not TOML."""
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+
+
+def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
+    """`data` as a `record`, or an InputError naming the source, the key and the remedy."""
+    adapter = _adapter(record)
+    try:
+        return adapter.validate_python(dict(data))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise InputError(f"{source}: {_explain(adapter, first, data)}") from None
+
+
+@lru_cache(maxsize=32)
+def _adapter(record: type[T]) -> TypeAdapter[T]:
+    return TypeAdapter(record)
+
+
+def nearest(word: str, known: list[str]) -> str:
+    """'; did you mean ...?' for a misspelt word, otherwise the list of what exists."""
+    close = difflib.get_close_matches(word, known, n=1)
+    return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(sorted(known))}"
+
+
+def _explain(adapter: TypeAdapter[Any], error: Any, data: Any) -> str:
+    kind = error["type"]
+    path = _path_in_data(error["loc"], data, names_absent_key="argument" in kind or "missing" in kind)
+    key = _dotted(path)
+    if kind in ("unexpected_keyword_argument", "extra_forbidden"):
+        known = _known_keys(adapter.json_schema(), error["loc"][:-1])
+        return f"{key}: unknown key; {nearest(str(path[-1]), known)}"
+    if kind in ("missing", "missing_argument"):
+        return f"{key}: missing; it is required here"
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        tag = error["ctx"]["discriminator"].strip("'")
+        expected = error["ctx"].get("expected_tags") or ", ".join(_tags(adapter.json_schema(), error["loc"], tag))
+        return f"{key}.{tag}: must be one of {expected}"
+    message = error["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    value = error["input"]
+    shown = f" (got {value!r})" if isinstance(value, str | int | float | bool) else ""
+    return f"{key}: {message}{shown}" if key else message
+
+
+def _path_in_data(location: tuple[Any, ...], data: Any, names_absent_key: bool) -> list[Any]:
+    """The part of pydantic's location that names the file's own keys: tags of unions are left out."""
+    path: list[Any] = []
+    for position, step in enumerate(location):
+        inside = isinstance(data, Mapping) and step in data
+        if inside or (isinstance(data, list) and isinstance(step, int) and step < len(data)):
+            data = data[step]
+            path.append(step)
+        elif names_absent_key and position == len(location) - 1:
+            path.append(step)
+    return path
+
+
+def _dotted(path: list[Any]) -> str:
+    text = ""
+    for step in path:
+        text += f"[{step}]" if isinstance(step, int) else (f".{step}" if text else str(step))
+    return text
+
+
+def _known_keys(schema: dict[str, Any], location: tuple[Any, ...]) -> list[str]:
+    return sorted({name for node in _nodes(schema, location) for name in node.get("properties", {})})
+
+
+def _tags(schema: dict[str, Any], location: tuple[Any, ...], tag: str) -> list[str]:
+    return [n["properties"][tag]["const"] for n in _nodes(schema, location) if tag in n.get("properties", {})]
+
+
+def _nodes(schema: dict[str, Any], location: tuple[Any, ...]) -> list[dict[str, Any]]:
+    """The JSON-schema objects that can stand at a location, unions spread out."""
+
+    def spread(node: dict[str, Any]) -> list[dict[str, Any]]:
+        if "$ref" in node:
+            return spread(schema["$defs"][node["$ref"].rsplit("/", 1)[1]])
+        options = node.get("anyOf", []) + node.get("oneOf", [])
+        return [deep for option in options for deep in spread(option)] if options else [node]
+
+    nodes = spread(schema)
+    for step in location:
+        inner: list[dict[str, Any]] = []
+        for node in nodes:
+            if isinstance(step, int) and "items" in node:
+                inner += spread(node["items"])
+            elif step in node.get("properties", {}):
+                inner += spread(node["properties"][step])
+            elif isinstance(node.get("additionalProperties"), dict):
+                inner += spread(node["additionalProperties"])
+        nodes = inner or nodes  # a union tag among the steps names no key
+    return nodes

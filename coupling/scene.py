@@ -1,0 +1,312 @@
+"""The scene: a structure, its cavities, the loose bodies in them and what excites it all (SI units throughout)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, TypeAdapter
+from pydantic.dataclasses import dataclass
+
+from coupling.inputs import STRICT, InputError, Real, Whole, nearest, read_toml, validate
+
+Positive = Annotated[Real, Field(gt=0)]
+NonNegative = Annotated[Real, Field(ge=0)]
+Fraction = Annotated[Real, Field(ge=0, le=1)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Prescribed:
+    """A shaker table: x = displacement_amplitude sin(2 pi f t), whatever the bodies do."""
+
+    model: Literal["prescribed"]
+    displacement_amplitude: Positive
+
+
+@dataclass(frozen=True, config=STRICT)
+class Rigid:
+    """One mode: mass (kg) on a spring (N/m) with viscous damping (ratio, or N s/m)."""
+
+    model: Literal["rigid"]
+    mass: Positive
+    stiffness: Positive
+    damping_ratio: NonNegative | None = None
+    damping: NonNegative | None = None
+
+    def __post_init__(self) -> None:
+        if (self.damping_ratio is None) == (self.damping is None):
+            raise ValueError("give one of damping_ratio and damping")
+
+    @property
+    def viscous(self) -> float:
+        """Viscous damping, N s/m."""
+        if self.damping is not None:
+            return self.damping
+        return 2 * (self.damping_ratio or 0.0) * math.sqrt(self.mass * self.stiffness)
+
+
+@dataclass(frozen=True, config=STRICT)
+class Rom:
+    """A reduced model from a file (`vanedamp reduce`), with its first `modes` fixed-interface modes (default: all)."""
+
+    model: Literal["rom"]
+    file: str
+    modes: Annotated[Whole, Field(ge=0)] | None = None
+
+
+Structure = Annotated[Prescribed | Rigid | Rom, Field(discriminator="model")]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Initial:
+    """Displacement (m) and velocity (m/s) of a rigid structure at time zero."""
+
+    displacement: Real = 0.0
+    velocity: Real = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class Excitation:
+    """Harmonic excitation at `frequency` (Hz): one of force (N), base_acceleration (m/s^2), resonance_amplitude (m).
+
+    resonance_amplitude is the displacement to which the force brings the resonance of the structure without bodies.
+    `at` is the interface label of force and response on a reduced model.
+    """
+
+    frequency: Positive
+    force: NonNegative | None = None
+    base_acceleration: NonNegative | None = None
+    resonance_amplitude: Positive | None = None
+    at: str | None = None
+
+    def __post_init__(self) -> None:
+        given = [self.force, self.base_acceleration, self.resonance_amplitude]
+        if sum(value is not None for value in given) > 1:
+            raise ValueError("give at most one of force, base_acceleration and resonance_amplitude")
+
+
+@dataclass(frozen=True, config=STRICT)
+class Gravity:
+    """Gravity: 0 degrees presses the bodies on the floor, 90 degrees pulls them along the cavity to its left wall."""
+
+    acceleration: NonNegative = 9.81
+    orientation_deg: Real = 0.0
+
+    @property
+    def normal(self) -> float:
+        """Acceleration across the cavity, pressing on its floor (m/s^2)."""
+        return self.acceleration * math.cos(math.radians(self.orientation_deg))
+
+    @property
+    def tangential(self) -> float:
+        """Acceleration along the cavity, positive to the right (m/s^2)."""
+        return -self.acceleration * math.sin(math.radians(self.orientation_deg))
+
+
+@dataclass(frozen=True, config=STRICT)
+class Cavity:
+    """A cavity with total free travel `gap` (m). On a reduced model left, right and floor name interface labels."""
+
+    name: str
+    gap: Positive
+    left: str | None = None
+    right: str | None = None
+    floor: str | None = None
+
+    def labels(self) -> tuple[str | None, str | None, str | None]:
+        """Labels of left wall, right wall and floor; one that is given alone serves all three."""
+        given = self.floor or self.left or self.right
+        return self.left or given, self.right or given, self.floor or given
+
+
+@dataclass(frozen=True, config=STRICT)
+class Damper:
+    """A loose body: mass (kg), Coulomb friction and restitution coefficients, state relative to the cavity."""
+
+    cavity: str
+    mass: Positive
+    friction: NonNegative = 0.0
+    restitution: Fraction = 1.0
+    position: Real = 0.0
+    velocity: Real = 0.0
+    normal_load: NonNegative | None = None
+
+
+@dataclass(frozen=True, config=STRICT)
+class Contact:
+    """The contact law at the walls."""
+
+    law: Literal["newton"] = "newton"
+
+
+@dataclass(frozen=True, config=STRICT)
+class Time:
+    """Excitation periods simulated, and how many of the first are left out of the evaluation."""
+
+    periods: Annotated[Whole, Field(gt=0)] = 1500
+    transient: Annotated[Whole, Field(ge=0)] = 1000
+
+    def __post_init__(self) -> None:
+        if self.transient >= self.periods:
+            raise ValueError(f"transient ({self.transient}) must be less than periods ({self.periods})")
+
+
+@dataclass(frozen=True, config=STRICT)
+class Solver:
+    """The method, and the budget of events after which a run ends with status 'event_budget'."""
+
+    method: Literal["exact"] = "exact"
+    max_events: Annotated[Whole, Field(gt=0)] = 20_000_000
+
+
+@dataclass(frozen=True, config=STRICT)
+class Range:
+    """`num` values from start to stop, both included."""
+
+    start: Real
+    stop: Real
+    num: Annotated[Whole, Field(gt=0)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Scene:
+    """Everything one run needs. Change a scene by making another: `scene.replace({"cavity.c1.gap": 1e-5})`."""
+
+    structure: Structure
+    excitation: Excitation
+    cavity: tuple[Cavity, ...] = ()
+    damper: tuple[Damper, ...] = ()
+    initial: Initial = field(default_factory=Initial)
+    gravity: Gravity = field(default_factory=Gravity)
+    contact: Contact = field(default_factory=Contact)
+    time: Time = field(default_factory=Time)
+    solver: Solver = field(default_factory=Solver)
+    sweep: dict[str, Range | Annotated[tuple[Real | Whole | str, ...], Field(min_length=1)]] = field(
+        default_factory=dict
+    )
+
+    def __post_init__(self) -> None:
+        names = [cavity.name for cavity in self.cavity]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"cavity: the name '{name}' is used twice; names must differ")
+        for index, damper in enumerate(self.damper):
+            if damper.cavity not in names:
+                raise ValueError(
+                    f"damper[{index}].cavity: no cavity '{damper.cavity}'; {nearest(damper.cavity, names)}"
+                )
+            self._check_load(index, damper)
+        for cavity in self.cavity:
+            self._check_row(cavity)
+        self._check_structure()
+
+    def _check_load(self, index: int, damper: Damper) -> None:
+        if (
+            damper.normal_load is None
+            and damper.friction > 0
+            and self.gravity.normal < -1e-12 * self.gravity.acceleration
+        ):
+            raise ValueError(
+                f"damper[{index}]: gravity lifts the body off the floor at gravity.orientation_deg = "
+                f"{self.gravity.orientation_deg:g}; give normal_load or turn it to -90..90"
+            )
+
+    def _check_row(self, cavity: Cavity) -> None:
+        row = [(index, damper.position) for index, damper in enumerate(self.damper) if damper.cavity == cavity.name]
+        for index, position in row:
+            if abs(position) > cavity.gap / 2:
+                raise ValueError(
+                    f"damper[{index}].position: {position:g} lies outside cavity '{cavity.name}'; "
+                    f"its free travel is -{cavity.gap / 2:g} to {cavity.gap / 2:g}"
+                )
+        for (_, left), (index, right) in itertools.pairwise(row):
+            if right < left:
+                raise ValueError(
+                    f"damper[{index}].position: overlaps the body before it in cavity '{cavity.name}'; "
+                    "bodies stand in file order from left to right"
+                )
+
+    def _check_structure(self) -> None:
+        if isinstance(self.structure, Rom):
+            if self.excitation.at is None:
+                raise ValueError("excitation.at: name the interface label of force and response on the reduced model")
+            for index, cavity in enumerate(self.cavity):
+                if cavity.labels()[2] is None:
+                    raise ValueError(f"cavity[{index}].floor: name an interface label of the reduced model")
+            if self.initial != Initial():
+                raise ValueError("initial: an initial state is for rigid structures; a reduced model starts at rest")
+        if isinstance(self.structure, Prescribed):
+            excitation = self.excitation
+            if excitation.force or excitation.base_acceleration or excitation.resonance_amplitude:
+                raise ValueError("excitation: a prescribed motion takes frequency alone; structure sets the amplitude")
+            if self.initial != Initial():
+                raise ValueError("initial: a prescribed motion has no initial state; remove the table")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Scene:
+        """The scene in a TOML file; a reduced model's file is taken relative to it. Raises InputError."""
+        data = read_toml(path)
+        structure = data.get("structure")
+        if isinstance(structure, dict) and isinstance(structure.get("file"), str):
+            structure["file"] = str(Path(path).parent / structure["file"])
+        return validate(cls, data, str(path))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain nested data as in the file, without what is None."""
+        data: dict[str, Any] = TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
+        return data
+
+    def replace(self, values: Mapping[str, Any]) -> Scene:
+        """Another scene with some values changed, by their dotted paths ("cavity.c1.gap", "damper.0.mass").
+
+        A path that names a list without index ("damper.mass") changes every entry. Raises InputError.
+        """
+        data = self.to_dict()
+        for path, value in values.items():
+            _assign(data, path.split("."), value, path)
+        return validate(Scene, data, "scene")
+
+    def sweep_points(self) -> tuple[dict[str, np.ndarray], Iterator[dict[str, Any]]]:
+        """The grid of the [sweep] table: (axes by path, the points of their product with the last axis fastest)."""
+        axes = {path: _axis_values(values) for path, values in self.sweep.items()}
+        points = (dict(zip(axes, combination, strict=True)) for combination in itertools.product(*axes.values()))
+        return {path: np.asarray(values) for path, values in axes.items()}, points
+
+
+def _axis_values(values: Range | Sequence[Any]) -> list[Any]:
+    if isinstance(values, Range):
+        return [float(value) for value in np.linspace(values.start, values.stop, values.num)]
+    return list(values)
+
+
+def _assign(node: Any, steps: list[str], value: Any, path: str) -> None:
+    head, rest = steps[0], steps[1:]
+    if isinstance(node, list):
+        entries, rest = _entries(node, head, steps, path)
+        for entry in entries:
+            _assign(entry, rest, value, path)
+    elif rest:
+        if head not in node:
+            raise InputError(f"scene: {path}: no table '{head}'; {nearest(head, list(node))}")
+        _assign(node[head], rest, value, path)
+    else:
+        node[head] = value
+
+
+def _entries(nodes: list[Any], head: str, steps: list[str], path: str) -> tuple[list[Any], list[str]]:
+    if head.isdigit():
+        if int(head) >= len(nodes):
+            raise InputError(f"scene: {path}: there are only {len(nodes)} entries, counted from 0")
+        return [nodes[int(head)]], steps[1:]
+    named = [node for node in nodes if node.get("name") == head]
+    if named:
+        return named, steps[1:]
+    if len(steps) > 1:
+        names = [str(node["name"]) for node in nodes if "name" in node]
+        raise InputError(f"scene: {path}: no entry '{head}'; {nearest(head, names) if names else 'use its index'}")
+    return nodes, steps
