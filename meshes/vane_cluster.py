@@ -1,0 +1,323 @@
+"""A parametric vane cluster: outer shroud, airfoils, and an inner shroud with cavities for damper bodies.
+
+The machine's axis is x. The cluster is centred on the z axis: there z is radial and y tangential, so that a bending of
+the airfoils moves the inner shroud along y. The casing holds the outer shroud on its outer surface.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import gmsh
+import numpy as np
+
+from modal import msh, store
+
+SHIPPED = Path(__file__).with_name("vane_cluster.msh")
+_TOLERANCE = 1e-7  # m
+
+
+class ParameterError(ValueError):
+    """A parameter of a mesh that is out of its range or does not fit the others; the message starts with its name."""
+
+
+@dataclass(frozen=True)
+class VaneCluster:
+    """Parameters of the cluster, SI units, angles in degrees. The defaults belong to the shipped `vane_cluster.msh`.
+
+    Facet groups: `clamp` (outer surface of the outer shroud), `shroud` (inner surface of the inner shroud: its average
+    tangential displacement is the response), and for every cavity i from 1 `c<i>_left` and `c<i>_right` (walls normal
+    to the tangential direction at its negative and positive end), `c<i>_floor` and `c<i>_roof` (walls at the smaller
+    and the larger radius). Volume groups: `outer_shroud`, `airfoils`, `inner_shroud`.
+
+    A cavity is a rectangular pocket, sunk from the axial end face at positive x into the middle of the inner shroud's
+    wall, as an electrode erodes it; the lid that keeps the bodies in is not modelled. Cavities are spread evenly.
+    """
+
+    airfoils: int = 4
+    pitch_deg: float = 4.0
+    inner_radius: float = 0.230
+    inner_thickness: float = 0.010
+    span: float = 0.025
+    outer_thickness: float = 0.008
+    axial_length: float = 0.024
+    chord: float = 0.022
+    thickness: float = 0.00371
+    edge_thickness: float = 0.0008
+    camber_deg: float = 20.0
+    stagger_deg: float = 12.0
+    cavities: int = 1
+    cavity_width: float = 0.014
+    cavity_height: float = 0.005
+    cavity_depth: float = 0.012
+    cavity_wall: float = 0.001
+    element_size: float = 0.0026
+    order: int = 1
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if item.name in ("airfoils", "cavities", "order"):
+                if value != int(value) or value < (0 if item.name == "cavities" else 1):
+                    raise ParameterError(f"{item.name}: expected a count, not {value}")
+            elif not math.isfinite(value):
+                raise ParameterError(f"{item.name}: expected a finite number, not {value}")
+            elif item.name not in ("camber_deg", "stagger_deg") and value <= 0.0:
+                raise ParameterError(f"{item.name}: expected a positive number, not {value}")
+        self._check_angles()
+        self._check_airfoils()
+        if self.cavities:
+            self._check_cavities()
+
+    @property
+    def sector_deg(self) -> float:
+        """Angle that the shrouds cover."""
+        return self.airfoils * self.pitch_deg
+
+    @property
+    def platform_radius(self) -> float:
+        """Outer radius of the inner shroud, where the airfoils end, m."""
+        return self.inner_radius + self.inner_thickness
+
+    @property
+    def casing_radius(self) -> float:
+        """Inner radius of the outer shroud, m."""
+        return self.platform_radius + self.span
+
+    @property
+    def outer_radius(self) -> float:
+        """Outer radius of the outer shroud, the clamped surface, m."""
+        return self.casing_radius + self.outer_thickness
+
+    @property
+    def cavity_radius(self) -> float:
+        """Radial position of the middle of the cavities, m."""
+        return self.inner_radius + 0.5 * self.inner_thickness
+
+    def cavity_angles(self) -> np.ndarray:
+        """(cavities,) angular position of the cavities, rad."""
+        slot = math.radians(self.sector_deg) / max(self.cavities, 1)
+        return (np.arange(self.cavities) - 0.5 * (self.cavities - 1)) * slot
+
+    def profile(self, points: int = 24) -> tuple[np.ndarray, np.ndarray]:
+        """Suction and pressure side of the airfoil, (points, 2) each, axial and tangential, from the leading edge, m.
+
+        Circular-arc camber line with the thickness of the NACA four-digit series (Abbott and von Doenhoff, Theory of
+        Wing Sections, 1959, section 6.4; closed trailing edge), widened linearly to the given edge thickness.
+        """
+        share = 0.5 * (1.0 - np.cos(np.linspace(0.0, math.pi, points)))
+        polynomial = np.polynomial.Polynomial([0.0, -0.1260, -0.3516, 0.2843, -0.1036])
+        half = 5.0 * self.thickness * (0.2969 * np.sqrt(share) + polynomial(share)) + 0.5 * self.edge_thickness * share
+        slope = math.radians(self.camber_deg) * (0.5 - share)
+        if abs(self.camber_deg) > 1e-6:
+            radius = 0.5 * self.chord / math.sin(0.5 * math.radians(self.camber_deg))
+            line = radius * np.column_stack([-np.sin(slope), np.cos(slope)])
+            line -= 0.5 * (line.min(axis=0) + line.max(axis=0))
+        else:
+            line = np.column_stack([self.chord * (share - 0.5), np.zeros(points)])
+        normal = np.column_stack([-np.sin(slope), np.cos(slope)])
+        stagger = math.radians(self.stagger_deg)
+        rotation = np.array([[math.cos(stagger), math.sin(stagger)], [-math.sin(stagger), math.cos(stagger)]])
+        return (line + half[:, None] * normal) @ rotation, (line - half[:, None] * normal) @ rotation
+
+    def _check_angles(self) -> None:
+        if self.order not in (1, 2):
+            raise ParameterError(f"order: expected 1 (straight) or 2 (curved elements), not {self.order}")
+        if self.sector_deg >= 180.0:
+            raise ParameterError(
+                f"pitch_deg: {self.airfoils} airfoils cover {self.sector_deg} degrees, 180 are too many"
+            )
+        if abs(self.camber_deg) > 90.0:
+            raise ParameterError(f"camber_deg: expected at most 90, not {self.camber_deg}")
+        if abs(self.stagger_deg) >= 90.0:
+            raise ParameterError(f"stagger_deg: expected less than 90, not {self.stagger_deg}")
+
+    def _check_airfoils(self) -> None:
+        if self.thickness + self.edge_thickness >= 0.5 * self.chord:
+            raise ParameterError(f"thickness: {self.thickness} m leaves no airfoil in a chord of {self.chord} m")
+        corners = np.vstack(self.profile())
+        axial, tangential = np.abs(corners).max(axis=0)
+        if axial >= 0.5 * self.axial_length:
+            raise ParameterError(
+                f"axial_length: the airfoil needs {2 * axial:.4g} m, the shrouds have {self.axial_length} m"
+            )
+        pitch = self.platform_radius * math.sin(0.5 * math.radians(self.pitch_deg))
+        if tangential >= pitch:
+            raise ParameterError(
+                f"pitch_deg: an airfoil needs {2 * tangential:.4g} m of circumference, the pitch gives {2 * pitch:.4g} m"
+            )
+        sag = self.platform_radius - math.sqrt(self.platform_radius**2 - tangential**2)
+        if sag >= 0.5 * self.inner_thickness:
+            raise ParameterError(f"inner_thickness: {self.inner_thickness} m cannot hold the foot of an airfoil")
+
+    def _check_cavities(self) -> None:
+        half, floor = 0.5 * self.cavity_width, self.cavity_radius - 0.5 * self.cavity_height
+        wall = self.cavity_wall
+        if self.cavity_depth > self.axial_length - wall:
+            raise ParameterError(
+                f"cavity_depth: {self.cavity_depth} m leaves no wall of {wall} m in an axial length of "
+                f"{self.axial_length} m"
+            )
+        corner = math.hypot(half, floor + self.cavity_height)
+        if floor - wall < self.inner_radius or corner + wall > self.platform_radius:
+            raise ParameterError(
+                f"cavity_height: {self.cavity_height} m by a cavity_width of {self.cavity_width} m leaves no wall of "
+                f"{wall} m in an inner shroud of {self.inner_thickness} m"
+            )
+        slot = floor * math.tan(0.5 * math.radians(self.sector_deg) / self.cavities) - wall
+        if half > slot:
+            raise ParameterError(
+                f"cavity_width: {self.cavities} cavities of {self.cavity_width} m do not fit, "
+                f"at most {2 * max(slot, 0.0):.4g} m each"
+            )
+
+
+def build(parameters: VaneCluster, path: str | os.PathLike[str]) -> Path:
+    """Mesh the cluster and write it as gmsh 4.1 text. Returns the path.
+
+    Raises ParameterError for a geometry that does not come out as it should, MeshError when groups overlap and
+    modal.store.StoreError when there is no folder to write to.
+    """
+    if Path(path).suffix != ".msh":
+        raise ParameterError(f"path: expected a file name ending in .msh, not {path}")
+    with msh.session("vane_cluster"):
+        volumes = _solids(parameters)
+        for name, tags in volumes.items():
+            gmsh.model.addPhysicalGroup(3, tags, name=name)
+        for name, tags in _facets(parameters).items():
+            gmsh.model.addPhysicalGroup(2, tags, name=name)
+        for option in ("Mesh.MeshSizeMin", "Mesh.MeshSizeMax"):
+            gmsh.option.setNumber(option, parameters.element_size)
+        gmsh.option.setNumber("Mesh.ElementOrder", parameters.order)
+        gmsh.option.setNumber("Mesh.HighOrderOptimize", int(parameters.order > 1))
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.optimize("Netgen")
+        gmsh.model.mesh.renumberNodes()
+        msh.check_disjoint(2, "facet")
+        gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+        with store.replacing(path) as temporary:
+            gmsh.write(str(temporary))
+    return Path(path)
+
+
+def _solids(parameters: VaneCluster) -> dict[str, list[int]]:
+    """Volume groups: shrouds with pockets, and the airfoils between them, with shared faces."""
+    occ = gmsh.model.occ
+    inner = _annular_sector(parameters, parameters.inner_radius, parameters.platform_radius)
+    outer = _annular_sector(parameters, parameters.casing_radius, parameters.outer_radius)
+    blades = [(3, _airfoil(parameters, angle)) for angle in _airfoil_angles(parameters)]
+    airfoils, _ = occ.cut(blades, [(3, inner), (3, outer)], removeTool=False)
+    if parameters.cavities:
+        pockets = [(3, _pocket(parameters, angle)) for angle in parameters.cavity_angles()]
+        occ.cut([(3, inner)], pockets)
+    _, pieces = occ.fragment([(3, outer), (3, inner)], airfoils)
+    occ.synchronize()
+    groups = {
+        "outer_shroud": [tag for _, tag in pieces[0]],
+        "airfoils": [tag for piece in pieces[2:] for _, tag in piece],
+        "inner_shroud": [tag for _, tag in pieces[1]],
+    }
+    counts = {name: len(tags) for name, tags in groups.items()}
+    if counts != {"outer_shroud": 1, "airfoils": parameters.airfoils, "inner_shroud": 1}:
+        raise ParameterError(f"span: the cluster falls into {counts} pieces; check span, stagger and chord")
+    return groups
+
+
+def _airfoil_angles(parameters: VaneCluster) -> np.ndarray:
+    pitch = math.radians(parameters.pitch_deg)
+    return (np.arange(parameters.airfoils) - 0.5 * (parameters.airfoils - 1)) * pitch
+
+
+def _annular_sector(parameters: VaneCluster, inner: float, outer: float) -> int:
+    occ = gmsh.model.occ
+    half = 0.5 * math.radians(parameters.sector_deg)
+    back = -0.5 * parameters.axial_length
+
+    def point(radius: float, angle: float) -> int:
+        return occ.addPoint(back, radius * math.sin(angle), radius * math.cos(angle))
+
+    centre = occ.addPoint(back, 0.0, 0.0)
+    corners = [point(inner, -half), point(inner, half), point(outer, half), point(outer, -half)]
+    edges = [
+        occ.addCircleArc(corners[0], centre, corners[1]),
+        occ.addLine(corners[1], corners[2]),
+        occ.addCircleArc(corners[2], centre, corners[3]),
+        occ.addLine(corners[3], corners[0]),
+    ]
+    face = occ.addPlaneSurface([occ.addCurveLoop(edges)])
+    solid = occ.extrude([(2, face)], parameters.axial_length, 0.0, 0.0)
+    occ.remove([(0, centre)])
+    return next(tag for dimension, tag in solid if dimension == 3)
+
+
+def _airfoil(parameters: VaneCluster, angle: float) -> int:
+    """A prism whose ends lie inside both shrouds."""
+    occ = gmsh.model.occ
+    foot = parameters.platform_radius - 0.5 * parameters.inner_thickness
+    tip = parameters.casing_radius + 0.5 * parameters.outer_thickness
+    suction, pressure = parameters.profile()
+    upper = [occ.addPoint(x, y, foot) for x, y in suction]
+    lower = [upper[0]] + [occ.addPoint(x, y, foot) for x, y in pressure[1:]]
+    edges = [occ.addSpline(upper), occ.addLine(upper[-1], lower[-1]), occ.addSpline(lower)]
+    face = occ.addPlaneSurface([occ.addCurveLoop(edges)])
+    solid = [entity for entity in occ.extrude([(2, face)], 0.0, 0.0, tip - foot) if entity[0] == 3]
+    occ.rotate(solid, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -angle)
+    return int(solid[0][1])
+
+
+def _pocket(parameters: VaneCluster, angle: float) -> int:
+    occ = gmsh.model.occ
+    front = 0.5 * parameters.axial_length
+    floor = parameters.cavity_radius - 0.5 * parameters.cavity_height
+    # reaching out of the end face keeps the cut free of coincident faces
+    length = parameters.cavity_depth + parameters.axial_length
+    box = occ.addBox(
+        front - parameters.cavity_depth,
+        -0.5 * parameters.cavity_width,
+        floor,
+        length,
+        parameters.cavity_width,
+        parameters.cavity_height,
+    )
+    occ.rotate([(3, box)], 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -angle)
+    return int(box)
+
+
+def _facets(parameters: VaneCluster) -> dict[str, list[int]]:
+    """Facet groups, found by where their surfaces lie."""
+    surfaces = [tag for _, tag in gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)]
+    found = {
+        "clamp": [tag for tag in surfaces if _on_cylinder(tag, parameters.outer_radius)],
+        "shroud": [tag for tag in surfaces if _on_cylinder(tag, parameters.inner_radius)],
+    }
+    axial = 0.5 * (parameters.axial_length - parameters.cavity_depth)
+    half_width, half_height = 0.5 * parameters.cavity_width, 0.5 * parameters.cavity_height
+    walls = {
+        "left": (-half_width, parameters.cavity_radius),
+        "right": (half_width, parameters.cavity_radius),
+        "floor": (0.0, parameters.cavity_radius - half_height),
+        "roof": (0.0, parameters.cavity_radius + half_height),
+    }
+    centres = {tag: np.array(gmsh.model.occ.getCenterOfMass(2, tag)) for tag in surfaces}
+    for number, angle in enumerate(parameters.cavity_angles(), start=1):
+        sine, cosine = math.sin(angle), math.cos(angle)
+        for side, (y, z) in walls.items():
+            target = np.array([axial, y * cosine + z * sine, -y * sine + z * cosine])
+            found[f"c{number}_{side}"] = [
+                tag for tag, centre in centres.items() if np.linalg.norm(centre - target) < _TOLERANCE
+            ]
+    empty = [name for name, tags in found.items() if not tags]
+    if empty:
+        raise ParameterError(f"cavity_width: no surface found for facet groups {', '.join(empty)}")
+    return found
+
+
+def _on_cylinder(surface: int, radius: float) -> bool:
+    """Whether a surface lies on the cylinder of that radius about the machine's axis."""
+    lower, upper = (np.array(bound) for bound in gmsh.model.getParametrizationBounds(2, surface))
+    shares = np.array([[0.5, 0.5], [0.2, 0.3], [0.9, 0.6]])
+    points = np.array(gmsh.model.getValue(2, surface, (lower + shares * (upper - lower)).ravel())).reshape(-1, 3)
+    return bool(np.all(np.abs(np.hypot(points[:, 1], points[:, 2]) - radius) < _TOLERANCE))

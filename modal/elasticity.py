@@ -1,0 +1,144 @@
+"""Linear elasticity on a mesh: stiffness and mass with supports and patches, and stresses of a displacement field."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+import ufl
+
+from modal import fenicsx
+from modal.matrices import Patch, SystemMatrices
+
+DEFAULT = "default"
+_COMPONENTS = "xyz"
+
+
+class ElasticityError(ValueError):
+    """A material, support or displacement field that does not fit; the message names it and the remedy."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear elasticity: young (Pa), poisson (1), density (kg/m^3)."""
+
+    young: float
+    poisson: float
+    density: float
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            if not math.isfinite(getattr(self, item.name)):
+                raise ElasticityError(f"{item.name}: expected a finite number, not {getattr(self, item.name)}")
+        if self.young <= 0.0:
+            raise ElasticityError(f"young: expected a positive modulus in Pa, not {self.young}")
+        if not -1.0 < self.poisson < 0.5:
+            raise ElasticityError(f"poisson: expected -1 < ratio < 0.5, not {self.poisson}")
+        if self.density <= 0.0:
+            raise ElasticityError(f"density: expected a positive density in kg/m^3, not {self.density}")
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lame's first parameter and the shear modulus, Pa."""
+        shear = 0.5 * self.young / (1.0 + self.poisson)
+        return 2.0 * shear * self.poisson / (1.0 - 2.0 * self.poisson), shear
+
+
+class Solid:
+    """An elastic body on a mesh: its forms, and what needs the mesh after the matrices are made.
+
+    materials  volume group -> Material; the key "default" serves every group that is not named
+    degree     of the displacements, 1 or more; 2 is right for bending
+
+    Raises modal.msh.MeshError for the mesh and ElasticityError for the rest.
+    """
+
+    def __init__(self, mesh: str | os.PathLike[str], materials: Mapping[str, Material], degree: int = 2) -> None:
+        if degree not in (1, 2, 3):
+            raise ElasticityError(f"degree: expected 1, 2 or 3, not {degree}")
+        self.domain = fenicsx.read(mesh)
+        self.degree = degree
+        self.materials = _by_group(materials, self.domain)
+        self.space = fenicsx.vector_space(self.domain, degree)
+        self._lame = fenicsx.cell_constants(self.domain, {name: m.lame[0] for name, m in self.materials.items()})
+        self._shear = fenicsx.cell_constants(self.domain, {name: m.lame[1] for name, m in self.materials.items()})
+        self._density = fenicsx.cell_constants(self.domain, {name: m.density for name, m in self.materials.items()})
+
+    def stress(self, displacement: Any) -> Any:
+        """UFL stress tensor of a UFL displacement, Pa."""
+        strain = ufl.sym(ufl.grad(displacement))
+        return self._lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * self._shear * strain
+
+    def assemble(self, clamped: Mapping[str, str], damping_ratio: float) -> SystemMatrices:
+        """Unconstrained matrices, every facet group as a patch, and the supports {facet group: "xyz" or components}."""
+        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        patches = {name: self._patch(facets) for name, facets in self.domain.facets.items()}
+        return SystemMatrices(
+            stiffness=fenicsx.matrix(ufl.inner(self.stress(trial), ufl.sym(ufl.grad(test))) * ufl.dx),
+            mass=fenicsx.matrix(self._density * ufl.inner(trial, test) * ufl.dx),
+            coordinates=fenicsx.node_coordinates(self.space),
+            fixed=self._fixed(clamped),
+            patches=patches,
+            damping_ratio=damping_ratio,
+            provenance={
+                "mesh": os.path.basename(self.domain.path),
+                "mesh_sha256": self.domain.sha256,
+                "degree": self.degree,
+                "materials": {name: asdict(material) for name, material in self.materials.items()},
+                "clamped": dict(clamped),
+                "versions": fenicsx.versions(),
+            },
+        )
+
+    def von_mises(self, displacement: np.ndarray) -> np.ndarray:
+        """Von Mises stress, Pa, of displacements (N,) at the corners of all cells, each cell from its own side."""
+        if np.shape(displacement) != (3 * len(fenicsx.node_coordinates(self.space)),):
+            raise ElasticityError(f"displacement: shape {np.shape(displacement)} is not that of this mesh and degree")
+        deviator = ufl.dev(self.stress(fenicsx.field(self.space, displacement)))
+        equivalent = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
+        return np.array(fenicsx.evaluate(equivalent, fenicsx.scalar_space(self.domain, "DG", 1)).x.array)
+
+    def vtk_mesh(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Cells, VTK cell types and points, the points in the order of the nodes; for pyvista.UnstructuredGrid."""
+        return fenicsx.vtk_mesh(self.space)
+
+    def _patch(self, facets: np.ndarray) -> Patch:
+        nodes = fenicsx.group_nodes(self.space, facets)
+        return Patch(nodes, fenicsx.facet_weights(self.domain, self.space, facets)[nodes])
+
+    def _fixed(self, clamped: Mapping[str, str]) -> np.ndarray:
+        fixed = [np.empty(0, dtype=np.int64)]
+        for name, components in clamped.items():
+            if not components or set(components) - set(_COMPONENTS):
+                raise ElasticityError(f"support {name!r}: expected components out of 'xyz', not {components!r}")
+            nodes = fenicsx.group_nodes(self.space, self.domain.facet_group(name)).astype(np.int64)
+            fixed.extend(3 * nodes + _COMPONENTS.index(component) for component in components)
+        return np.unique(np.concatenate(fixed))
+
+
+def assemble(
+    mesh: str | os.PathLike[str],
+    materials: Mapping[str, Material],
+    clamped: Mapping[str, str],
+    degree: int = 2,
+    damping_ratio: float = 0.0,
+) -> SystemMatrices:
+    """Matrices of the elastic body on a gmsh mesh; see Solid for the arguments and the errors raised."""
+    return Solid(mesh, materials, degree).assemble(clamped, damping_ratio)
+
+
+def _by_group(materials: Mapping[str, Material], domain: fenicsx.Domain) -> dict[str, Material]:
+    unknown = sorted(set(materials) - set(domain.volumes) - {DEFAULT})
+    if unknown:
+        raise ElasticityError(
+            f"material {unknown[0]!r}: {domain.path} has no such volume group; "
+            f"there are: {', '.join(sorted(domain.volumes))}"
+        )
+    missing = sorted(set(domain.volumes) - set(materials))
+    if missing and DEFAULT not in materials:
+        raise ElasticityError(f"material: volume group {missing[0]!r} has none; name it or give a {DEFAULT!r} material")
+    return {name: materials.get(name, materials.get(DEFAULT)) for name in domain.volumes}

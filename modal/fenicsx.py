@@ -1,0 +1,321 @@
+"""The one file that knows dolfinx's and petsc4py's API, from dolfinx 0.5.2 to 0.11, in serial.
+
+What differs between the versions is settled here; the rest of the package sees meshes with named groups, UFL forms that
+become scipy matrices, and factorisations that solve with numpy arrays.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import logging
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import dolfinx
+import dolfinx.fem.petsc
+import gmsh
+import numpy as np
+import petsc4py
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+from modal import msh
+from modal.msh import MeshError
+
+try:
+    from dolfinx.io import gmsh as gmshio
+except ImportError:
+    from dolfinx.io import gmshio
+
+_UNNAMED = "unnamed"
+
+
+class FactorizationError(ValueError):
+    """A matrix that cannot be factorised: singular, or not of the kind that was promised."""
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """A tetrahedral or hexahedral mesh with named groups.
+
+    mesh           dolfinx.mesh.Mesh, metres
+    volumes        volume group name -> cell indices; cells outside every group are in the group "unnamed"
+    facets         facet group name -> indices of boundary facets
+    path, sha256   the file and its hash
+    """
+
+    mesh: Any
+    volumes: Mapping[str, np.ndarray]
+    facets: Mapping[str, np.ndarray]
+    path: str
+    sha256: str
+
+    def facet_group(self, name: str) -> np.ndarray:
+        """Facet indices of a group. Raises MeshError with the groups that exist."""
+        if name not in self.facets:
+            known = ", ".join(sorted(self.facets)) or "none"
+            raise MeshError(f"{self.path}: no facet group {name!r}; there are: {known}")
+        return self.facets[name]
+
+
+def versions() -> dict[str, str]:
+    """Versions of the libraries behind this file, for provenance."""
+    return {"dolfinx": dolfinx.__version__, "petsc4py": petsc4py.__version__, "gmsh": gmsh.__version__}
+
+
+def read(path: str | os.PathLike[str]) -> Domain:
+    """Read a gmsh mesh. Raises MeshError: no file, not a mesh, no or mixed volume elements, overlapping groups."""
+    file = Path(path)
+    with msh.session("read"):
+        msh.merge(file)
+        try:
+            _prepare_groups()
+        except MeshError as error:
+            raise MeshError(f"{file}: {error}") from error
+        names = {dimension: msh.groups(dimension) for dimension in (2, 3)}
+        with _quiet():
+            result = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=3)
+    # 0.5 to 0.9 give a tuple, later versions a record
+    mesh, cells, facets = (getattr(result, "mesh", None) or result[0]), result[1], result[2]
+    domain = Domain(
+        mesh=mesh,
+        volumes=_members(cells, names[3]),
+        facets=_members(facets, names[2]),
+        path=str(file),
+        sha256=hashlib.sha256(file.read_bytes()).hexdigest(),
+    )
+    _check_boundary(domain)
+    return domain
+
+
+def vector_space(domain: Domain, degree: int) -> Any:
+    """Continuous Lagrange displacements of a degree, three components a node."""
+    with _quiet():
+        if hasattr(fem, "functionspace"):
+            return fem.functionspace(domain.mesh, ("Lagrange", degree, (3,)))
+        return fem.VectorFunctionSpace(domain.mesh, ("Lagrange", degree))
+
+
+def scalar_space(domain: Domain, family: str, degree: int) -> Any:
+    """Scalar space of a family such as "DG"."""
+    with _quiet():
+        create = getattr(fem, "functionspace", None) or fem.FunctionSpace
+        return create(domain.mesh, (family, degree))
+
+
+def cell_constants(domain: Domain, values: Mapping[str, float]) -> Any:
+    """A function that is constant in every cell, its value given by volume group."""
+    function = fem.Function(scalar_space(domain, "DG", 0))
+    dofs = _array(function.function_space.dofmap.list)
+    for name, value in values.items():
+        function.x.array[dofs[domain.volumes[name]]] = value
+    return function
+
+
+def field(space: Any, values: np.ndarray) -> Any:
+    """A function from the values of its DOFs."""
+    function = fem.Function(space)
+    function.x.array[:] = values
+    return function
+
+
+def node_coordinates(space: Any) -> np.ndarray:
+    """(n_nodes, 3) m, in the order of the DOF blocks."""
+    return np.array(space.tabulate_dof_coordinates())
+
+
+def group_nodes(space: Any, facets: np.ndarray) -> np.ndarray:
+    """Sorted indices of the nodes on facets."""
+    return np.sort(fem.locate_dofs_topological(space, 2, facets))
+
+
+def matrix(form: Any) -> sparse.csr_array:
+    """Assemble a bilinear UFL form, without boundary conditions, to CSR without stored zeros."""
+    with _quiet():
+        compiled = fem.form(form)
+    assembled = fem.petsc.assemble_matrix(compiled)
+    try:
+        assembled.assemble()
+        row_start, columns, values = assembled.getValuesCSR()
+        result = sparse.csr_array((values, columns, row_start), shape=assembled.getSize(), copy=True)
+    finally:
+        assembled.destroy()
+    result.eliminate_zeros()
+    return result
+
+
+def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
+    """(n_nodes,) m^2, integral of every nodal shape function over the facets."""
+    # one tag value for all groups, so that one compiled form serves them all
+    tags = dolfinx.mesh.meshtags(domain.mesh, 2, facets, np.ones_like(facets))
+    surface = ufl.Measure("ds", domain=domain.mesh, subdomain_data=tags)
+    along_x = fem.Constant(domain.mesh, np.array([1.0, 0.0, 0.0]))
+    with _quiet():
+        compiled = fem.form(ufl.inner(along_x, ufl.TestFunction(space)) * surface(1))
+    return np.array(fem.assemble_vector(compiled).array.reshape(-1, 3)[:, 0])
+
+
+def evaluate(expression: Any, space: Any) -> Any:
+    """The function of a space that takes the values of a UFL expression at the space's own points."""
+    points = space.element.interpolation_points
+    function = fem.Function(space)
+    with _quiet():
+        function.interpolate(fem.Expression(expression, points() if callable(points) else points))
+    return function
+
+
+def vtk_mesh(space: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells, VTK cell types and points of the nodes of a space, as pyvista.UnstructuredGrid takes them."""
+    import dolfinx.plot
+
+    create = getattr(dolfinx.plot, "vtk_mesh", None) or dolfinx.plot.create_vtk_mesh
+    cells, types, points = create(space)
+    return np.asarray(cells), np.asarray(types), np.asarray(points)
+
+
+class Factorization:
+    """A symmetric matrix factorised once (MUMPS, LDL^T), solved for many right-hand sides; a context manager.
+
+    Raises FactorizationError for a matrix that is singular to working precision.
+    """
+
+    def __init__(self, symmetric: sparse.csr_array, *, inertia: bool = False) -> None:
+        self.size = symmetric.shape[0]
+        self._matrix = petsc_matrix(symmetric)
+        self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        try:
+            self._ksp.setOperators(self._matrix)
+            configure_direct(self._ksp)
+            self._ksp.setUp()
+            self._factor = self._ksp.getPC().getFactorMatrix()
+            self._check(inertia)
+        except BaseException:
+            self.destroy()
+            raise
+
+    def _check(self, inertia: bool) -> None:
+        status, pivots = self._factor.getMumpsInfog(1), self._factor.getMumpsInfog(28)
+        if status < 0 or (pivots > 0 and not inertia):
+            raise FactorizationError(
+                f"the matrix of size {self.size} is singular ({pivots} zero pivots, MUMPS INFOG(1) = {status}): "
+                "is the structure held against every rigid motion?"
+            )
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """Solution, of the shape (n,) or (n, k) of the right-hand side."""
+        columns = np.asfortranarray(np.asarray(rhs, dtype=float).reshape(self.size, -1))
+        solution = np.zeros_like(columns, order="F")
+        given = PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)
+        found = PETSc.Mat().createDense(columns.shape, array=solution, comm=PETSc.COMM_SELF)
+        try:
+            given.assemble()
+            found.assemble()
+            self._factor.matSolve(given, found)
+            return np.array(found.getDenseArray()).reshape(np.shape(rhs))
+        finally:
+            given.destroy()
+            found.destroy()
+
+    def negative_eigenvalues(self) -> int:
+        """Number of negative eigenvalues of the matrix (Sylvester's law of inertia)."""
+        return int(self._factor.getInertia()[0])
+
+    def destroy(self) -> None:
+        """Free the memory of the factors."""
+        self._ksp.destroy()
+        self._matrix.destroy()
+
+    def __enter__(self) -> Factorization:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.destroy()
+
+
+def petsc_matrix(symmetric: sparse.csr_array) -> Any:
+    """A PETSc matrix from a symmetric CSR one; the caller destroys it."""
+    index = PETSc.IntType
+    csr = (symmetric.indptr.astype(index), symmetric.indices.astype(index), np.array(symmetric.data))
+    created = PETSc.Mat().createAIJ(size=symmetric.shape, csr=csr, comm=PETSc.COMM_SELF)
+    created.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    return created
+
+
+def configure_direct(ksp: Any) -> None:
+    """Make a Krylov solver a direct one: MUMPS LDL^T that reports zero pivots, which inertia counts need too."""
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    pc = ksp.getPC()
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType("mumps")
+    pc.setFactorSetUpSolverType()
+    pc.getFactorMatrix().setMumpsIcntl(24, 1)
+
+
+def _prepare_groups() -> None:
+    """Refuse what dolfinx's reader keeps silent about, and bring the model to what every version of it takes."""
+    check_kinds()
+    lower = gmsh.model.getPhysicalGroups(0) + gmsh.model.getPhysicalGroups(1)
+    if lower:  # an empty list would remove every group
+        gmsh.model.removePhysicalGroups(lower)
+    grouped = {
+        entity for tag in msh.groups(3).values() for entity in gmsh.model.getEntitiesForPhysicalGroup(3, tag).tolist()
+    }
+    rest = [tag for _, tag in gmsh.model.getEntities(3) if tag not in grouped]
+    if rest:
+        gmsh.model.addPhysicalGroup(3, rest, name=_UNNAMED)
+    msh.check_disjoint(2, "facet")
+    msh.check_disjoint(3, "volume")
+    gmsh.model.mesh.renumberNodes()
+
+
+def check_kinds() -> None:
+    """Raise MeshError unless the current model holds volume elements of one kind."""
+    kinds = gmsh.model.mesh.getElementTypes(3)
+    if len(kinds) == 0:
+        raise MeshError("no volume elements; mesh the volumes and save them (a volume outside all groups is not saved)")
+    if len(kinds) > 1:
+        names = ", ".join(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
+        raise MeshError(f"mixed volume elements ({names}); use one kind, tetrahedra or hexahedra")
+
+
+def _members(tags: Any, names: Mapping[str, int]) -> dict[str, np.ndarray]:
+    if tags is None:
+        return {}
+    return {name: np.sort(tags.indices[tags.values == tag]).astype(np.int32) for name, tag in names.items()}
+
+
+def _check_boundary(domain: Domain) -> None:
+    topology = domain.mesh.topology
+    topology.create_connectivity(2, 3)
+    neighbours = np.diff(topology.connectivity(2, 3).offsets)
+    for name, facets in domain.facets.items():
+        if facets.size == 0 or np.any(neighbours[facets] != 1):
+            raise MeshError(
+                f"{domain.path}: facet group {name!r} is not on the boundary of the meshed volumes; "
+                "interfaces and supports act on outer faces"
+            )
+
+
+def _array(adjacency: Any) -> np.ndarray:
+    return np.asarray(getattr(adjacency, "array", adjacency)).ravel()
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Silence the log of the form compiler, which writes at INFO to the root logger."""
+    before = logging.root.manager.disable
+    logging.disable(max(before, logging.INFO))
+    try:
+        yield
+    finally:
+        logging.disable(before)
