@@ -1,4 +1,4 @@
-"""Input files at the border: TOML in, validated frozen records out, every error one line that says what would be right."""
+"""Input files at the border: TOML in, validated frozen records out, errors of one line that say what would be right."""
 
 from __future__ import annotations
 

@@ -1,0 +1,196 @@
+"""The exact engine: a scene in, a response out. Event-driven, closed-form between events, no time step."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupling import automaton as auto
+from coupling.flow import Flows, Rows, add_flow, empty_flows, rows_of
+from coupling.response import ENERGIES, Event, Response, Status, classify
+from coupling.scene import Scene
+from coupling.structure import linear_structure
+
+_STATUS = {
+    auto.DONE: Status.OK,
+    auto.EVENT_BUDGET: Status.EVENT_BUDGET,
+    auto.ACCURACY_LOST: Status.ACCURACY_LOST,
+    auto.UNDECIDED: Status.UNDECIDED,
+}
+_KINDS = ("impact", "stick", "slip", "detach", "rest")
+
+
+def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) -> Response:
+    """Run a scene from time zero over `scene.time.periods` excitation periods.
+
+    events: keep the list of events; samples_per_period: keep that many equidistant samples of each period.
+    Raises InputError for a scene that the model does not allow; numerical trouble is a status of the response.
+    """
+    started = time.perf_counter()
+    run = _Run(scene, events, samples_per_period)
+    code = run.go(scene.time.periods, scene.solver.max_events)
+    return _response(scene, run, _STATUS[code], time.perf_counter() - started)
+
+
+@dataclass
+class _Log:
+    """Events as they come: chunks of the compiled log, kept or thrown away."""
+
+    keep: bool
+    chunks: list[np.ndarray]
+
+    def take(self, log: np.ndarray, count: int) -> None:
+        if self.keep and count:
+            self.chunks.append(log[:count].copy())
+
+
+class _Run:
+    """The mutable state of one run and the subsystems it has met."""
+
+    def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
+        structure = linear_structure(scene)
+        self.rows, displacement, velocity = rows_of(scene, structure)
+        self.flows = empty_flows(self.rows)
+        self.log = _Log(events, [])
+        self.state = _initial_state(self.rows, self.flows, displacement, velocity)
+        self.state.coordinates[:] = np.r_[structure.displacement, structure.velocity]
+        self.channels = _channels(self.rows, self.flows)
+        self.records = _records(self.rows, scene.time.periods, samples_per_period)
+
+    def go(self, periods: int, max_events: int) -> int:
+        """Advance to the end of `periods`. Returns the automaton's code."""
+        if not auto.begin(self.rows, self.flows, self.state, self.records):
+            return auto.UNDECIDED
+        self._advance(0, max_events)
+        auto.record_section(self.rows, self.flows, self.state, self.records)
+        return self._advance(periods, max_events)
+
+    def _advance(self, periods: int, max_events: int) -> int:
+        while True:
+            code = int(
+                auto.advance(self.rows, self.flows, self.state, self.channels, self.records, periods, max_events)
+            )
+            if code == auto.NEEDS_FLOW:
+                key = (int(self.state.key[0]), int(self.state.key[1]))
+                self.flows = add_flow(self.flows, self.rows, key)
+                continue
+            self.log.take(self.records.log, int(self.state.counters[auto.LOGGED]))
+            self.state.counters[auto.LOGGED] = 0
+            if code != auto.LOG_FULL:
+                return code
+
+
+def _initial_state(rows: Rows, flows: Flows, displacement: np.ndarray, velocity: np.ndarray) -> auto.State:
+    r, m, n, b = len(rows.delassus), flows.eigenvalue.shape[1], len(rows.stiffness), len(rows.mass)
+    state = auto.State(
+        counters=np.zeros(9, np.int64), time=np.zeros(1), key=np.zeros(2, np.int64),
+        amplitude=np.zeros(m, complex), awake=np.zeros(m, np.int64), coordinates=np.zeros(2 * n),
+        constant=np.zeros(n), displacement=displacement.copy(), velocity=velocity.copy(), drift=np.zeros(r),
+        body_drift=np.zeros(b), held=np.zeros(r), level=np.zeros(r), state=np.zeros(r, np.int64),
+        released=np.zeros(r, np.bool_), ledger=np.zeros(len(ENERGIES)), settling=np.zeros(r),
+    )  # fmt: skip
+    state.amplitude[0] = 1.0
+    return state
+
+
+def _channels(rows: Rows, flows: Flows) -> auto.Channels:
+    k = len(rows.delassus) + rows.friction_rows
+    whole = lambda: np.zeros(k, np.int64)  # noqa: E731
+    real = lambda: np.zeros(k)  # noqa: E731
+    return auto.Channels(
+        whole(), whole(), whole(), real(), real(), real(), real(), real(), real(),
+        np.zeros((k, flows.eigenvalue.shape[1]), complex),
+    )  # fmt: skip
+
+
+def _records(rows: Rows, periods: int, samples: int) -> auto.Records:
+    b = len(rows.mass)
+    return auto.Records(
+        peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
+        momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),
+        section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
+        samples=np.zeros((periods * samples, 1 + b)), log=np.zeros((4096 + 4 * len(rows.delassus), 7)),
+    )  # fmt: skip
+
+
+def _response(scene: Scene, run: _Run, status: Status, wall_time: float) -> Response:
+    rows, records, counters = run.rows, run.records, run.state.counters
+    done = int(counters[auto.PERIOD])
+    first = min(scene.time.transient, max(done - 1, 0))
+    window = slice(first, done)
+    span = max(done - first, 1) * rows.period
+    ledger = records.ledger[: done + 1] - records.ledger[first]
+    b = len(rows.mass)
+    section = records.section[: done + 1]
+    harmonic = 2 / span * records.harmonic[window].sum()
+    evaluated = {name: float(value) for name, value in zip(ENERGIES, ledger[-1], strict=True)}
+    peaks = records.peak[window]
+    samples = len(records.samples) // scene.time.periods
+    return Response(
+        status=status,
+        frequency=scene.excitation.frequency,
+        amplitude_max=float(peaks.max(initial=0.0)),
+        amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
+        amplitude_rms=float(np.sqrt(max(records.square[window].sum() / span, 0.0))),
+        amplitude_harmonic=float(abs(harmonic)),
+        phase=float(np.angle(1j * harmonic)),
+        impacts_per_period=float(records.impacts[window].sum() / max(done - first, 1)),
+        events=int(counters[auto.EVENTS]),
+        classification=classify(section[first:], records.impacts[window], evaluated["friction"]),
+        energy=evaluated,
+        energy_residual=_residual(records.ledger[: done + 1]),
+        attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
+        wall_time_s=wall_time,
+        periods=done,
+        transient=first,
+        counters={
+            "impacts": int(counters[auto.IMPACTS]),
+            "segments": int(counters[auto.SEGMENTS]),
+            "evaluations": int(counters[auto.EVALUATIONS]),
+            "subsystems": int(np.count_nonzero(run.flows.modes)),
+        },
+        peak=records.peak[:done].copy(),
+        section=section[:, :2].copy(),
+        slip=section[:, 3 : 3 + b].copy(),
+        slip_velocity=section[:, 3 + b :].copy(),
+        event_list=_events(rows, run.log.chunks),
+        time=np.arange(done * samples) * (rows.period / max(samples, 1)),
+        displacement=records.samples[: done * samples, 0].copy(),
+        body_displacement=records.samples[: done * samples, 1:].copy(),
+    )
+
+
+def _residual(ledger: np.ndarray) -> float:
+    """Imbalance of the energy ledger (periods + 1, 6), relative to its largest term."""
+    change = ledger[-1] - ledger[0]
+    imbalance = change[auto.EXCITATION] - change[auto.VISCOUS : auto.STORED].sum() - change[auto.STORED]
+    largest = max(np.abs(change).max(), np.abs(ledger[:, auto.STORED]).max())
+    return float(abs(imbalance) / largest) if largest > 0 else 0.0
+
+
+def _attached(
+    rows: Rows, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
+) -> float | None:
+    """Share of the bodies' mass that the structure feels: Re(F / (omega^2 X)) / sum m, F all contact forces on it."""
+    if not len(rows.mass) or abs(harmonic) == 0 or len(section) <= first + 1:
+        return None
+    change = section[-1, 2] - section[first, 2]
+    on_bodies = 2 / span * (change + 1j * rows.omega * momentum) - rows.inertia.sum()
+    return float((-on_bodies / (rows.omega**2 * harmonic)).real / rows.mass.sum())
+
+
+def _events(rows: Rows, chunks: list[np.ndarray]) -> list[Event]:
+    events = []
+    for entry in np.concatenate(chunks) if chunks else ():
+        row = int(entry[2])
+        bodies = np.flatnonzero(rows.bodies[row])
+        side = "floor"
+        if row >= rows.friction_rows:
+            side = "body" if len(bodies) == 2 else "left" if rows.bodies[row, bodies[0]] > 0 else "right"
+        # speeds of the gap, turned into speeds of the body relative to what it meets
+        sign = 1.0 if side in ("left", "floor") else -1.0
+        before, after, impulse = sign * float(entry[4]) + 0.0, sign * float(entry[5]) + 0.0, float(entry[6])
+        events.append(Event(float(entry[0]), _KINDS[int(entry[1])], int(bodies[0]), side, before, after, impulse))
+    return events

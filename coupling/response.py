@@ -1,0 +1,136 @@
+"""The answer of a run: amplitudes, classification, energy ledger, events and samples (SI units)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modal.store import Variable, save
+
+
+class Status(StrEnum):
+    """How a run ended. Everything but OK means that the figures cover only the periods that were completed."""
+
+    OK = "ok"
+    EVENT_BUDGET = "event_budget"
+    ACCURACY_LOST = "accuracy_lost"
+    UNDECIDED = "undecided_contact"
+
+
+#: entries of the energy ledger, J
+ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event: time (s), kind, body, side ("left", "right", "body" or "floor"), speeds (m/s), impulse (N s)."""
+
+    time: float
+    kind: str
+    damper: int
+    side: str
+    relative_velocity_before: float
+    relative_velocity_after: float
+    impulse: float
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a structure with loose bodies did. Amplitudes and energies are those of the evaluated periods.
+
+    amplitude_*: of the displacement at excitation.at (m); energy: J over the evaluated time, `stored` its change;
+    energy_residual: imbalance of the whole run's ledger relative to its largest term; attached_mass_fraction: share
+    of the bodies' mass that the structure feels (None without bodies or motion); peak: (periods,) largest |x| of each
+    period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
+    time, displacement, body_displacement: samples, empty if none were asked for.
+    """
+
+    status: Status
+    frequency: float
+    amplitude_max: float
+    amplitude_mean: float
+    amplitude_rms: float
+    amplitude_harmonic: float
+    phase: float
+    impacts_per_period: float
+    events: int
+    classification: str
+    energy: dict[str, float]
+    energy_residual: float
+    attached_mass_fraction: float | None
+    wall_time_s: float
+    periods: int
+    transient: int
+    counters: dict[str, int]
+    peak: np.ndarray
+    section: np.ndarray
+    slip: np.ndarray
+    slip_velocity: np.ndarray
+    event_list: Sequence[Event]
+    time: np.ndarray
+    displacement: np.ndarray
+    body_displacement: np.ndarray
+
+    def to_json(self, events: bool = False) -> dict[str, Any]:
+        """The result as plain data, with the list of events if wanted."""
+        names = (
+            "frequency", "amplitude_max", "amplitude_mean", "amplitude_rms", "amplitude_harmonic", "phase",
+            "impacts_per_period", "events", "classification", "energy", "energy_residual", "attached_mass_fraction",
+            "wall_time_s", "periods", "transient", "counters",
+        )  # fmt: skip
+        data: dict[str, Any] = {"status": self.status.value} | {name: getattr(self, name) for name in names}
+        if events:
+            data["event_list"] = [vars(event) for event in self.event_list]
+        return data
+
+    def save(self, path: str | Path, provenance: dict[str, Any] | None = None) -> None:
+        """Write HDF5 that xarray opens: per-period series, samples and events."""
+        variables = {
+            "period": Variable(np.arange(len(self.section)), ("period",)),
+            "section": Variable(self.section, ("period", "state"), "m, m/s"),
+            "slip": Variable(self.slip, ("period", "damper"), "m"),
+            "slip_velocity": Variable(self.slip_velocity, ("period", "damper"), "m/s"),
+            "peak": Variable(self.peak, ("full_period",), "m"),
+        }
+        if len(self.time):
+            variables["time"] = Variable(self.time, ("time",), "s")
+            variables["displacement"] = Variable(self.displacement, ("time",), "m")
+            variables["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
+        if self.event_list:
+            variables |= self._event_variables()
+        attributes = {k: v for k, v in self.to_json().items() if v is not None}
+        save(path, "response", variables, attributes | {"provenance": provenance or {}})
+
+    def _event_variables(self) -> dict[str, Variable]:
+        units = {"time": "s", "relative_velocity_before": "m/s", "relative_velocity_after": "m/s", "impulse": "N s"}
+        return {
+            f"event_{name}": Variable(
+                [getattr(event, name) for event in self.event_list], ("event",), units.get(name, "1")
+            )
+            for name in Event.__dataclass_fields__
+        }
+
+
+def classify(section: np.ndarray, impacts: np.ndarray, friction_loss: float, longest: int = 16) -> str:
+    """ "periodic-k", "non-periodic", "no-contact" or "stuck" from the section (periods + 1, states) of a steady state.
+
+    A response has period k if the last section equals those k, 2k, ... periods before it within 1e-6 of each
+    state's range of values, over at least 8 repetitions or half of what there is.
+    """
+    if not impacts.any():
+        return "no-contact" if friction_loss > 0 else "stuck"
+    scale = np.abs(section).max(axis=0) + np.finfo(float).tiny
+    available = len(section) - 1
+    for k in range(1, longest + 1):
+        span = min(8 * k, available - k)
+        if span < k:
+            break
+        late, early = section[-span:], section[-span - k : -k]
+        if np.max(np.abs(late - early) / scale) < 1e-6:
+            return f"periodic-{k}"
+    return "non-periodic"

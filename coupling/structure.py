@@ -1,0 +1,197 @@
+"""The linear structure of a scene in its real modes: what every method of this package starts from.
+
+Coordinates p are mass-normalised: p'' + D p' + diag(omega^2) p = loads; every displacement is a functional of p.
+All motion is relative to the base. A prescribed motion is a structure without modes on a moving base.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.optimize import minimize_scalar
+
+from coupling.inputs import InputError
+from coupling.scene import Prescribed, Rigid, Rom, Scene
+from modal.store import frozen
+from rom.reduced import ReducedModel
+
+
+@dataclass(frozen=True)
+class LinearStructure:
+    """A structure with n real modes (n may be 0), excited at angular frequency `omega`.
+
+    stiffness: (n,) squared undamped angular frequencies; damping: (n, n); response: (n,) functional of the response;
+    floor, left, right: (cavities, n) functionals of the cavities' surfaces; force: (n,) complex modal load and
+    base_acceleration: complex acceleration of the base, both amplitudes of exp(i omega t); displacement and velocity:
+    (n,) initial state; table: complex displacement amplitude of the base that counts as response (prescribed motion).
+    """
+
+    omega: float
+    stiffness: np.ndarray
+    damping: np.ndarray
+    response: np.ndarray
+    floor: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    force: np.ndarray
+    base_acceleration: complex
+    displacement: np.ndarray
+    velocity: np.ndarray
+    table: complex = 0.0
+
+    @property
+    def modes(self) -> int:
+        """Number of modes n."""
+        return len(self.stiffness)
+
+
+@dataclass(frozen=True)
+class _ModalBasis:
+    """Modes of a structure without bodies: squared frequencies, damping, functionals and base loads by label."""
+
+    stiffness: np.ndarray
+    damping: np.ndarray
+    rows: dict[str, np.ndarray]
+    base: dict[str, np.ndarray]
+
+
+def linear_structure(scene: Scene) -> LinearStructure:
+    """The structure of a scene with its excitation. Raises InputError for an unknown label or an unusable model."""
+    omega = 2 * np.pi * scene.excitation.frequency
+    cavities = len(scene.cavity)
+    if isinstance(scene.structure, Prescribed):
+        amplitude = -1j * scene.structure.displacement_amplitude
+        none = np.zeros((cavities, 0))
+        flat = np.zeros(0)
+        return LinearStructure(
+            omega, flat, np.zeros((0, 0)), flat, none, none, none, flat.astype(complex),
+            -(omega**2) * amplitude, flat, flat, table=amplitude,
+        )  # fmt: skip
+    basis = _basis(scene)
+    at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
+    response = _row(basis, at, "excitation.at")
+    surfaces = np.array([_surfaces(basis, scene, index) for index in range(cavities)])
+    left, right, floor = surfaces.reshape(cavities, 3, len(response)).swapaxes(0, 1)
+    base = -1j * (scene.excitation.base_acceleration or 0.0)
+    force = -1j * response * _force_amplitude(scene, basis, response) - basis.base[str(at)] * base
+    # the initial state belongs to the rigid model, whose single mode has the functional `response`
+    scale = 1 / response[0] if isinstance(scene.structure, Rigid) else 0.0
+    displacement = np.full(len(response), scene.initial.displacement * scale)
+    velocity = np.full(len(response), scene.initial.velocity * scale)
+    return LinearStructure(
+        omega, basis.stiffness, basis.damping, response, floor, left, right, force, base, displacement, velocity
+    )
+
+
+def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np.ndarray:
+    """Complex displacement of the response per newton at `excitation.at`, m/N, shape (f,).
+
+    Without bodies, or (`fixed`) with every body glued to its cavity's floor.
+    """
+    basis = _basis(scene)
+    at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
+    response = _row(basis, at, "excitation.at")
+    mass = np.eye(len(response))
+    if fixed:
+        names = [cavity.name for cavity in scene.cavity]
+        for damper in scene.damper:
+            _, _, floor = _surfaces(basis, scene, names.index(damper.cavity))
+            mass += damper.mass * np.outer(floor, floor)
+    return _receptance(basis.stiffness, basis.damping, mass, response, 2 * np.pi * np.asarray(frequencies))
+
+
+def excitation_force(scene: Scene) -> float:
+    """Amplitude of the exciting force, N (resonance_amplitude resolved)."""
+    if isinstance(scene.structure, Prescribed):
+        return 0.0
+    basis = _basis(scene)
+    at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
+    return _force_amplitude(scene, basis, _row(basis, at, "excitation.at"))
+
+
+def _receptance(
+    stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, response: np.ndarray, omega: np.ndarray
+) -> np.ndarray:
+    dynamic = np.diag(stiffness) + 1j * omega[:, None, None] * damping - omega[:, None, None] ** 2 * mass
+    loads = np.broadcast_to(response[:, None], (len(omega), len(response), 1))
+    return np.linalg.solve(dynamic, loads)[:, :, 0] @ response
+
+
+def _force_amplitude(scene: Scene, basis: _ModalBasis, response: np.ndarray) -> float:
+    excitation = scene.excitation
+    if excitation.resonance_amplitude is None:
+        return excitation.force or 0.0
+    zeta = np.diag(basis.damping) / (2 * np.sqrt(basis.stiffness))
+    if np.any(zeta <= 0):
+        raise InputError(
+            "excitation.resonance_amplitude: an undamped resonance has no amplitude; give damping or force"
+        )
+    peak = int(np.argmax(response**2 / (2 * zeta * basis.stiffness)))
+    resonance = np.sqrt(basis.stiffness[peak])
+
+    def negative(omega: float) -> float:
+        mass = np.eye(len(response))
+        return -float(abs(_receptance(basis.stiffness, basis.damping, mass, response, np.array([omega]))[0]))
+
+    width = min(3 * zeta[peak], 0.5)
+    bounds = (resonance * (1 - width), resonance * (1 + width))
+    found = minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-9 * resonance})
+    return float(excitation.resonance_amplitude / -found.fun)
+
+
+def _row(basis: _ModalBasis, label: str | None, key: str) -> np.ndarray:
+    try:
+        return basis.rows[str(label)]
+    except KeyError:
+        raise InputError(f"{key}: no interface label '{label}'; it has {', '.join(basis.rows)}") from None
+
+
+def _surfaces(basis: _ModalBasis, scene: Scene, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    if isinstance(scene.structure, Rigid):
+        return (basis.rows["structure"],) * 3
+    left, right, floor = scene.cavity[index].labels()
+    key = f"cavity[{index}]"
+    return _row(basis, left, f"{key}.left"), _row(basis, right, f"{key}.right"), _row(basis, floor, f"{key}.floor")
+
+
+def _basis(scene: Scene) -> _ModalBasis:
+    structure = scene.structure
+    if isinstance(structure, Rigid):
+        root = np.sqrt(structure.mass)
+        row = frozen([1 / root])
+        return _ModalBasis(
+            frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
+            {"structure": row}, {"structure": frozen([root])},
+        )  # fmt: skip
+    assert isinstance(structure, Rom)
+    path = Path(structure.file)
+    stamp = path.stat().st_mtime_ns if path.is_file() else 0
+    return _rom_basis(structure.file, stamp, structure.modes)
+
+
+@lru_cache(maxsize=8)
+def _rom_basis(file: str, _stamp: int, modes: int | None) -> _ModalBasis:
+    model = ReducedModel.load(file)
+    return modal_basis(model if modes is None else model.truncated(modes))
+
+
+def modal_basis(model: ReducedModel) -> _ModalBasis:
+    """Real modes of a reduced model. Raises InputError if the structure can move freely (no support)."""
+    squares, shapes = eigh(model.stiffness, model.mass)
+    if squares[0] <= 1e-10 * squares[-1]:
+        raise InputError("structure: the reduced model has rigid-body motion; support it before reduction")
+    damping = shapes.T @ model.damping @ shapes
+    damping = (damping + damping.T) / 2
+    noise = np.abs(damping - np.diag(np.diag(damping))).max(initial=0.0)
+    if noise < 1e-9 * np.abs(damping).max(initial=0.0):  # proportional damping: keep it exactly so
+        damping = np.diag(np.diag(damping))
+    rows = {label: frozen(model.row(label) @ shapes) for label in model.interface}
+    base = {
+        label: frozen(shapes.T @ model.base_load @ direction)
+        for label, direction in zip(model.interface, model.directions, strict=True)
+    }
+    return _ModalBasis(frozen(squares), frozen(damping), rows, base)
