@@ -147,7 +147,7 @@ class VaneCluster:
         pitch = self.platform_radius * math.sin(0.5 * math.radians(self.pitch_deg))
         if tangential >= pitch:
             raise ParameterError(
-                f"pitch_deg: an airfoil needs {2 * tangential:.4g} m of circumference, the pitch gives {2 * pitch:.4g} m"
+                f"pitch_deg: an airfoil needs {2 * tangential:.4g} m of circumference, a pitch has {2 * pitch:.4g} m"
             )
         sag = self.platform_radius - math.sqrt(self.platform_radius**2 - tangential**2)
         if sag >= 0.5 * self.inner_thickness:

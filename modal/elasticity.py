@@ -141,4 +141,4 @@ def _by_group(materials: Mapping[str, Material], domain: fenicsx.Domain) -> dict
     missing = sorted(set(domain.volumes) - set(materials))
     if missing and DEFAULT not in materials:
         raise ElasticityError(f"material: volume group {missing[0]!r} has none; name it or give a {DEFAULT!r} material")
-    return {name: materials.get(name, materials.get(DEFAULT)) for name in domain.volumes}
+    return {name: materials[name if name in materials else DEFAULT] for name in domain.volumes}

@@ -1,19 +1,19 @@
-"""The one file that knows dolfinx's and petsc4py's API, from dolfinx 0.5.2 to 0.11, in serial.
+"""The one file that knows dolfinx's API, from 0.5.2 to 0.11, in serial.
 
-What differs between the versions is settled here; the rest of the package sees meshes with named groups, UFL forms that
-become scipy matrices, and factorisations that solve with numpy arrays.
+What differs between the versions is settled here; the rest of the package sees meshes with named groups, and UFL forms
+that become scipy matrices.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib
 import logging
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import dolfinx
@@ -24,22 +24,17 @@ import petsc4py
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 from scipy import sparse
 
 from modal import msh
 from modal.msh import MeshError
 
 try:
-    from dolfinx.io import gmsh as gmshio
-except ImportError:
-    from dolfinx.io import gmshio
+    gmshio: Any = importlib.import_module("dolfinx.io.gmsh")
+except ImportError:  # its name before 0.10
+    gmshio = importlib.import_module("dolfinx.io.gmshio")
 
 _UNNAMED = "unnamed"
-
-
-class FactorizationError(ValueError):
-    """A matrix that cannot be factorised: singular, or not of the kind that was promised."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,86 +174,6 @@ def vtk_mesh(space: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     create = getattr(dolfinx.plot, "vtk_mesh", None) or dolfinx.plot.create_vtk_mesh
     cells, types, points = create(space)
     return np.asarray(cells), np.asarray(types), np.asarray(points)
-
-
-class Factorization:
-    """A symmetric matrix factorised once (MUMPS, LDL^T), solved for many right-hand sides; a context manager.
-
-    Raises FactorizationError for a matrix that is singular to working precision.
-    """
-
-    def __init__(self, symmetric: sparse.csr_array, *, inertia: bool = False) -> None:
-        self.size = symmetric.shape[0]
-        self._matrix = petsc_matrix(symmetric)
-        self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-        try:
-            self._ksp.setOperators(self._matrix)
-            configure_direct(self._ksp)
-            self._ksp.setUp()
-            self._factor = self._ksp.getPC().getFactorMatrix()
-            self._check(inertia)
-        except BaseException:
-            self.destroy()
-            raise
-
-    def _check(self, inertia: bool) -> None:
-        status, pivots = self._factor.getMumpsInfog(1), self._factor.getMumpsInfog(28)
-        if status < 0 or (pivots > 0 and not inertia):
-            raise FactorizationError(
-                f"the matrix of size {self.size} is singular ({pivots} zero pivots, MUMPS INFOG(1) = {status}): "
-                "is the structure held against every rigid motion?"
-            )
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution, of the shape (n,) or (n, k) of the right-hand side."""
-        columns = np.asfortranarray(np.asarray(rhs, dtype=float).reshape(self.size, -1))
-        solution = np.zeros_like(columns, order="F")
-        given = PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)
-        found = PETSc.Mat().createDense(columns.shape, array=solution, comm=PETSc.COMM_SELF)
-        try:
-            given.assemble()
-            found.assemble()
-            self._factor.matSolve(given, found)
-            return np.array(found.getDenseArray()).reshape(np.shape(rhs))
-        finally:
-            given.destroy()
-            found.destroy()
-
-    def negative_eigenvalues(self) -> int:
-        """Number of negative eigenvalues of the matrix (Sylvester's law of inertia)."""
-        return int(self._factor.getInertia()[0])
-
-    def destroy(self) -> None:
-        """Free the memory of the factors."""
-        self._ksp.destroy()
-        self._matrix.destroy()
-
-    def __enter__(self) -> Factorization:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.destroy()
-
-
-def petsc_matrix(symmetric: sparse.csr_array) -> Any:
-    """A PETSc matrix from a symmetric CSR one; the caller destroys it."""
-    index = PETSc.IntType
-    csr = (symmetric.indptr.astype(index), symmetric.indices.astype(index), np.array(symmetric.data))
-    created = PETSc.Mat().createAIJ(size=symmetric.shape, csr=csr, comm=PETSc.COMM_SELF)
-    created.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    return created
-
-
-def configure_direct(ksp: Any) -> None:
-    """Make a Krylov solver a direct one: MUMPS LDL^T that reports zero pivots, which inertia counts need too."""
-    ksp.setType(PETSc.KSP.Type.PREONLY)
-    pc = ksp.getPC()
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType("mumps")
-    pc.setFactorSetUpSolverType()
-    pc.getFactorMatrix().setMumpsIcntl(24, 1)
 
 
 def _prepare_groups() -> None:

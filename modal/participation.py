@@ -1,0 +1,68 @@
+"""How modes take part in rigid translations: effective masses, MAC, and which mode is the first bending."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import sparse
+
+from modal.eigen import Modes
+from modal.matrices import SystemMatrices, unit_direction
+
+NOTABLE_SHARE = 0.1
+
+
+class ParticipationError(ValueError):
+    """No mode moves in the direction asked for; the message tells what the modes do."""
+
+
+def participation_factors(modes: Modes, matrices: SystemMatrices) -> np.ndarray:
+    """(m, 3) kg^(1/2), phi^T M r of mass-normalised modes along x, y and z, r the translation of the free DOFs."""
+    return modes.shapes @ (matrices.mass @ matrices.movable_translations())
+
+
+def effective_masses(modes: Modes, matrices: SystemMatrices) -> np.ndarray:
+    """(m, 3) kg, (phi^T M r)^2 / (phi^T M phi); over all modes they sum to `matrices.movable_mass`."""
+    return participation_factors(modes, matrices) ** 2
+
+
+def effective_mass_shares(
+    modes: Modes, matrices: SystemMatrices, direction: Sequence[float] | np.ndarray
+) -> np.ndarray:
+    """(m,) effective mass of every mode along one direction, as a share of the mass that can move along it."""
+    translation = matrices.movable_translations() @ unit_direction(direction)
+    inertia = matrices.mass @ translation
+    return (modes.shapes @ inertia) ** 2 / (translation @ inertia)
+
+
+def first_bending(
+    modes: Modes, matrices: SystemMatrices, direction: Sequence[float] | np.ndarray, least_share: float = NOTABLE_SHARE
+) -> int:
+    """Index of the mode with the largest effective mass along a direction, the lowest one of equals.
+
+    In the first bending of a held cluster or beam all parts move the same way, so no other mode carries as much mass
+    along. Torsion, or bending about the other axis, may lie lower; it carries little mass in this direction and is
+    passed over. Raises ParticipationError when no mode carries `least_share` of the movable mass: the first bending is
+    then not among the modes.
+    """
+    shares = effective_mass_shares(modes, matrices, direction)
+    largest = shares.max()
+    if not largest >= least_share:
+        listed = ", ".join(f"{f:.5g} Hz: {share:.2g}" for f, share in zip(modes.frequencies_hz, shares, strict=True))
+        raise ParticipationError(
+            f"direction {list(direction)}: no mode carries {least_share:.0%} of the movable mass along it ({listed}); "
+            "compute more modes or check the direction"
+        )
+    # symmetric structures have pairs whose shares differ by round-off alone
+    return int(np.flatnonzero(shares > (1.0 - 1e-6) * largest)[0])
+
+
+def modal_assurance(first: np.ndarray, second: np.ndarray, mass: sparse.csr_array | None = None) -> np.ndarray:
+    """(m1, m2) modal assurance criterion of shapes (m1, N) and (m2, N), weighted by a mass matrix if one is given.
+
+    |a^T W b|^2 / ((a^T W a)(b^T W b)), 1 for shapes that agree up to a factor (Allemang and Brown 1982).
+    """
+    weigh = (lambda shapes: shapes) if mass is None else (lambda shapes: shapes @ mass)
+    norms = [np.einsum("ij,ij->i", shapes, weigh(shapes)) for shapes in (first, second)]
+    return (first @ weigh(second).T) ** 2 / np.outer(*norms)

@@ -1,0 +1,26 @@
+"""Expensive records that several test files share."""
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def cluster_solid():
+    """The shipped cluster in degree 2, with the material of the reference case."""
+    from meshes.vane_cluster import SHIPPED
+    from modal.elasticity import Material, Solid
+
+    return Solid(SHIPPED, {"default": Material(young=2.0e11, poisson=0.3, density=8190.0)}, degree=2)
+
+
+@pytest.fixture(scope="session")
+def cluster(cluster_solid):
+    """SystemMatrices of the shipped cluster, held at the casing."""
+    return cluster_solid.assemble(clamped={"clamp": "xyz"}, damping_ratio=0.002)
+
+
+@pytest.fixture(scope="session")
+def cluster_modes(cluster):
+    """The ten lowest modes of the shipped cluster."""
+    from modal.eigen import solve_modes
+
+    return solve_modes(cluster, count=10)
