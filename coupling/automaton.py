@@ -14,8 +14,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from coupling.compiled import kernel
 from coupling.complementarity import AT_HIGH, AT_LOW, DEPENDENT, FREE, solve_box
 from coupling.events import (
     FORCE,
@@ -104,7 +104,7 @@ class Records(NamedTuple):
     log: np.ndarray  # (capacity, 7): time, kind, row, 0, velocity before, after, impulse
 
 
-@njit(cache=True)
+@kernel
 def advance(rows, flows, st, ch, rec, periods, max_events):
     """Run until all periods are done or something is needed. Returns one of the codes above."""
     while True:
@@ -134,7 +134,7 @@ def advance(rows, flows, st, ch, rec, periods, max_events):
             return ACCURACY_LOST
 
 
-@njit(cache=True)
+@kernel
 def begin(rows, flows, st, rec):
     """Decide the contact states of the initial state. Returns False if the pivots run out."""
     r = rows.friction_rows
@@ -152,7 +152,7 @@ def begin(rows, flows, st, rec):
     return _settle(rows, st, rec, forced)
 
 
-@njit(cache=True)
+@kernel
 def record_section(rows, flows, st, rec):
     """Section and ledger at the start of a period."""
     s, n, b = st.counters[FLOW], len(st.constant), len(rows.mass)
@@ -172,7 +172,7 @@ def record_section(rows, flows, st, rec):
     rec.ledger[st.counters[PERIOD]] = st.ledger
 
 
-@njit(cache=True)
+@kernel
 def _body_velocity(rows, st, y, b):
     velocity = st.velocity[b]
     for i in range(len(st.constant)):
@@ -180,7 +180,7 @@ def _body_velocity(rows, st, y, b):
     return velocity
 
 
-@njit(cache=True)
+@kernel
 def stored_energy(rows, y, st):
     """Kinetic and elastic energy of the structure, kinetic energy and height of the bodies, J."""
     n = len(st.constant)
@@ -195,7 +195,7 @@ def stored_energy(rows, y, st):
     return energy
 
 
-@njit(cache=True)
+@kernel
 def _find_flow(flows, key):
     for s in range(len(flows.modes)):
         if flows.modes[s] > 0 and flows.key[s, 0] == key[0] and flows.key[s, 1] == key[1]:
@@ -203,13 +203,13 @@ def _find_flow(flows, key):
     return -1
 
 
-@njit(cache=True)
+@kernel
 def _phase(rows, st):
     angle = rows.omega * st.time[0]
     st.amplitude[0] = complex(math.cos(angle), math.sin(angle))
 
 
-@njit(cache=True)
+@kernel
 def _coordinates(flows, st, s, n):
     """(p, p') at the segment's start."""
     y = np.zeros(2 * n)
@@ -221,7 +221,7 @@ def _coordinates(flows, st, s, n):
     return y
 
 
-@njit(cache=True)
+@kernel
 def _enter(rows, flows, st, s):
     """Begin subsystem s with the structure at st.coordinates and the row states as they are."""
     n, r, b = len(st.constant), len(st.state), len(rows.mass)
@@ -264,7 +264,7 @@ def _enter(rows, flows, st, s):
     _wake(flows, st, s)
 
 
-@njit(cache=True)
+@kernel
 def _wake(flows, st, s):
     """Put modes to sleep whose acceleration is negligible beside the largest."""
     largest = 0.0
@@ -281,14 +281,14 @@ def _wake(flows, st, s):
     st.counters[WAKING] = count
 
 
-@njit(cache=True)
+@kernel
 def _acceleration(flows, st, s, j):
     rate = flows.eigenvalue[s, j]
     c = st.amplitude[j]
     return (abs(c.real) + abs(c.imag)) * flows.size[s, j] * (rate.real * rate.real + rate.imag * rate.imag)
 
 
-@njit(cache=True)
+@kernel
 def _constant_loads(rows, st):
     """Constant loads on structure and bodies: weight, sliding friction, forces of rows that others hold."""
     on_structure, on_bodies = np.zeros(len(st.constant)), rows.weight.copy()
@@ -301,7 +301,7 @@ def _constant_loads(rows, st):
     return on_structure, on_bodies
 
 
-@njit(cache=True)
+@kernel
 def _next_event(rows, flows, st, ch):
     """Time to the next event and its channel, or to the period's end and -1."""
     s = st.counters[FLOW]
@@ -329,7 +329,7 @@ def _next_event(rows, flows, st, ch):
         ch.safe[k] = tau + step
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _step(f, slope, curvature, noise, second, third, left, shortest):
     """Safe step from a point of an event function; 0 where the function is at its root and falls."""
     if f <= noise:
@@ -344,7 +344,7 @@ def _step(f, slope, curvature, noise, second, third, left, shortest):
     return step
 
 
-@njit(cache=True)
+@kernel
 def _watch(rows, flows, st, ch, s, left):
     """Set up the event functions of the segment with their first safe steps. Returns how many."""
     count = 0
@@ -364,7 +364,7 @@ def _watch(rows, flows, st, ch, s, left):
     return count
 
 
-@njit(cache=True)
+@kernel
 def _surely_opens(rows, st, r):
     """Whether a gap can only widen in this segment: the body slides away from a wall that rides on its floor."""
     body = -1
@@ -381,7 +381,7 @@ def _surely_opens(rows, st, r):
     return True
 
 
-@njit(cache=True)
+@kernel
 def _watch_motion(rows, flows, st, ch, s, r, order, sign, k, left):
     """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r for its first root."""
     ch.row[k], ch.order[k], ch.side[k] = r, order, 0
@@ -417,7 +417,7 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, k, left):
     return k + 1
 
 
-@njit(cache=True)
+@kernel
 def _watch_force(rows, flows, st, ch, s, r, side, limit, k, left):
     """Watch the force of a closed row for reaching its low (AT_LOW) or high (AT_HIGH) bound."""
     ch.row[k], ch.order[k], ch.side[k] = r, FORCE, side
@@ -442,7 +442,7 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k, left):
     return k + 1
 
 
-@njit(cache=True)
+@kernel
 def _move(rows, flows, st, tau):
     """Carry rows and amplitudes over tau."""
     s, count = st.counters[FLOW], st.counters[WAKING]
@@ -471,7 +471,7 @@ def _move(rows, flows, st, tau):
         st.released[r] = False
 
 
-@njit(cache=True)
+@kernel
 def _begin_period(rows, flows, st, rec):
     st.counters[PERIOD] += 1
     st.time[0] = 0.0
@@ -480,7 +480,7 @@ def _begin_period(rows, flows, st, rec):
     record_section(rows, flows, st, rec)
 
 
-@njit(cache=True)
+@kernel
 def _within_walls(rows, st):
     """Whether round-off has kept every body inside its cavity."""
     r = rows.friction_rows
@@ -490,7 +490,7 @@ def _within_walls(rows, st):
     return True
 
 
-@njit(cache=True)
+@kernel
 def _happen(rows, flows, st, rec, r, order, side):
     """The event of row r: jump of velocities, new states. Returns False if it cannot be decided."""
     s, n = st.counters[FLOW], len(st.constant)
@@ -513,7 +513,7 @@ def _happen(rows, flows, st, rec, r, order, side):
     return _settle(rows, st, rec, forced)
 
 
-@njit(cache=True)
+@kernel
 def _collide(rows, st, rec, jump):
     """Newton's impact law at all touching contacts at once: v+ + k v- >= 0 and P >= 0 complement each other.
 
@@ -562,7 +562,7 @@ def _collide(rows, st, rec, jump):
     return True
 
 
-@njit(cache=True)
+@kernel
 def _touching(rows, st):
     friction = rows.friction_rows
     count = 0
@@ -575,7 +575,7 @@ def _touching(rows, st):
     return found[:count]
 
 
-@njit(cache=True)
+@kernel
 def _log(rows, st, rec, kind, r, before, after, impulse):
     entry = rec.log[st.counters[LOGGED]]
     st.counters[LOGGED] += 1
@@ -583,7 +583,7 @@ def _log(rows, st, rec, kind, r, before, after, impulse):
     entry[1], entry[2], entry[3], entry[4], entry[5], entry[6] = kind, r, 0.0, before, after, impulse
 
 
-@njit(cache=True)
+@kernel
 def _settle(rows, st, rec, forced):
     """States of all rows from velocities and, where these vanish, from the complementarity problem on accelerations.
 
@@ -626,7 +626,7 @@ def _settle(rows, st, rec, forced):
     return True
 
 
-@njit(cache=True)
+@kernel
 def _decide(rows, st, rest, forced):
     """Solve for the rows at rest: which are closed, stick, slip or open."""
     friction, k = rows.friction_rows, len(rest)
@@ -660,7 +660,7 @@ def _decide(rows, st, rest, forced):
     return True
 
 
-@njit(cache=True)
+@kernel
 def _free_acceleration(rows, st):
     """Acceleration of each row under the known forces, with no row closed, at st.coordinates."""
     n, b = len(st.constant), len(rows.mass)
@@ -684,7 +684,7 @@ def _free_acceleration(rows, st):
     return acceleration
 
 
-@njit(cache=True)
+@kernel
 def _update_chatter(rows, st):
     """Rebound speed below which the next impact of a contact ends a chatter: its flight is too short to matter."""
     acceleration = _free_acceleration(rows, st)
@@ -692,7 +692,7 @@ def _update_chatter(rows, st):
         st.settling[r] = max(0.0, -acceleration[r]) * 0.5 * _CHATTER * rows.period
 
 
-@njit(cache=True)
+@kernel
 def _log_changes(rows, st, rec, old):
     friction = rows.friction_rows
     for r in range(len(st.state)):
@@ -708,7 +708,7 @@ def _log_changes(rows, st, rec, old):
             _log(rows, st, rec, DETACHES, r, 0.0, st.velocity[r], 0.0)
 
 
-@njit(cache=True)
+@kernel
 def _account(rows, flows, st, rec, tau):
     """Energy, harmonic, mean square, momentum and peak of the segment [0, tau], by closed-form integrals."""
     s, count = st.counters[FLOW], st.counters[WAKING]
@@ -729,7 +729,7 @@ def _account(rows, flows, st, rec, tau):
         _sample(rows, flows, st, rec, s, tau, constant)
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _integral(rate, last, tau):
     """Integral of exp(rate t) over [0, tau], given last = exp(rate tau) - 1."""
     z = rate * tau
@@ -738,13 +738,13 @@ def _integral(rate, last, tau):
     return last / rate
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _product(x, y):
     """exp(u + v) - 1 from x = exp(u) - 1 and y = exp(v) - 1."""
     return x * y + x + y
 
 
-@njit(cache=True)
+@kernel
 def _work(rows, flows, st, s, first, tau):
     """Work of the harmonic loads, whose amplitude is that of the sine: Im exp(i omega t)."""
     rate0, phase = flows.eigenvalue[s, 0], st.amplitude[0]
@@ -764,7 +764,7 @@ def _work(rows, flows, st, s, first, tau):
     return total
 
 
-@njit(cache=True)
+@kernel
 def _free_speed(rows, flows, st, s, b):
     """Constant part of a free body's velocity at the segment's start; 0 for a body that rides on the structure."""
     if flows.body_acceleration[s, b, b] == 0.0:
@@ -776,7 +776,7 @@ def _free_speed(rows, flows, st, s, b):
     return speed
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _line_integrals(rate, last, tau):
     """Integrals of exp(rate t) and of t exp(rate t) over [0, tau]."""
     i0 = _integral(rate, last, tau)
@@ -786,7 +786,7 @@ def _line_integrals(rate, last, tau):
     return i0, (tau * (last + 1.0) - i0) / rate
 
 
-@njit(cache=True)
+@kernel
 def _viscous(flows, st, s, first, tau):
     """Energy lost in the structure's dampers: integral of p' D p'."""
     total = 0.0
@@ -808,7 +808,7 @@ def _viscous(flows, st, s, first, tau):
     return total
 
 
-@njit(cache=True)
+@kernel
 def _harmonic(row, eigenvalue, st, first, tau, constant, drift):
     """Integral over the segment of (constant + drift t + Re sum row_j c_j exp(lambda_j t)) exp(-i omega t)."""
     back, turn = st.amplitude[0].conjugate(), first[0].conjugate()
@@ -825,7 +825,7 @@ def _harmonic(row, eigenvalue, st, first, tau, constant, drift):
     return back * total
 
 
-@njit(cache=True)
+@kernel
 def _square(flows, st, s, first, tau, constant):
     """Integral of the squared response; pairs of modes below 1e-9 of the largest are left out."""
     largest = 0.0
@@ -853,7 +853,7 @@ def _square(flows, st, s, first, tau, constant):
     return total
 
 
-@njit(cache=True)
+@kernel
 def _momentum(rows, flows, st, s, first, tau):
     """Integral of the bodies' momentum times exp(-i omega t)."""
     total = 0.0j
@@ -867,7 +867,7 @@ def _momentum(rows, flows, st, s, first, tau):
     return total
 
 
-@njit(cache=True)
+@kernel
 def _response_at(flows, st, s, t, constant):
     """Response, its slope and curvature at t."""
     x, v, w = constant, 0.0, 0.0
@@ -882,7 +882,7 @@ def _response_at(flows, st, s, t, constant):
     return x, v, w
 
 
-@njit(cache=True)
+@kernel
 def _peak(flows, st, s, tau, constant, peak):
     """Largest |response| on [0, tau] and before.
 
@@ -927,7 +927,7 @@ def _peak(flows, st, s, tau, constant, peak):
     return peak
 
 
-@njit(cache=True)
+@kernel
 def _sample(rows, flows, st, rec, s, tau, constant):
     """Response and slips at the equidistant sampling times within [time, time + tau)."""
     each = len(rec.samples) // (len(rec.section) - 1)

@@ -11,14 +11,15 @@ The principal pivoting of Dantzig and of Baraff (1994) brings in one row after t
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from coupling.compiled import kernel
 
 OUT, FREE, AT_LOW, AT_HIGH, DEPENDENT = 0, 1, 2, 3, 4
 _ROUND_OFF = 1e-11
 _DEPENDENCE = 1e-9
 
 
-@njit(cache=True)
+@kernel
 def solve_box(a_matrix, b, lo, hi, forced, f, a, state):
     """Solve in place: forces f and accelerations a (both shape (k,)), state FREE, AT_LOW, AT_HIGH or DEPENDENT.
 
@@ -52,7 +53,7 @@ def solve_box(a_matrix, b, lo, hi, forced, f, a, state):
     return done
 
 
-@njit(cache=True)
+@kernel
 def _drive(a_matrix, lo, hi, forced, f, a, state, i, tolerance):
     """Move f_i until row i obeys its condition, keeping the conditions of all rows that are in."""
     k = len(f)
@@ -112,7 +113,7 @@ def _drive(a_matrix, lo, hi, forced, f, a, state, i, tolerance):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _response(a_matrix, state, i, way, df, da):
     """Change of all forces and accelerations as f_i moves by `way` and the FREE rows keep their acceleration."""
     k = len(df)
@@ -133,7 +134,7 @@ def _response(a_matrix, state, i, way, df, da):
         da[i] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def _free(state, but):
     count = 0
     for j in range(len(state)):
@@ -148,12 +149,12 @@ def _free(state, but):
     return free
 
 
-@njit(cache=True)
+@kernel
 def _dependent(a_matrix, state, i):
     return _schur(a_matrix, _free(state, i), i) <= _DEPENDENCE * a_matrix[i, i]
 
 
-@njit(cache=True)
+@kernel
 def _dependent_with(a_matrix, state, j, i):
     """Whether row j would depend on the FREE rows together with row i."""
     free = _free(state, j)
@@ -165,7 +166,7 @@ def _dependent_with(a_matrix, state, j, i):
     return _schur(a_matrix, both, j) <= _DEPENDENCE * a_matrix[j, j]
 
 
-@njit(cache=True)
+@kernel
 def _schur(a_matrix, free, i):
     rest = a_matrix[i, i]
     if len(free):
@@ -175,7 +176,7 @@ def _schur(a_matrix, free, i):
     return rest
 
 
-@njit(cache=True)
+@kernel
 def _solve(a_matrix, free, right):
     """A_ff x = right_f by Cholesky; the free rows are independent by construction."""
     m = len(free)

@@ -12,13 +12,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from coupling.compiled import kernel
 
 # how often the exponentials of a function are differentiated: what is left of exp(z) at t = 0
 POSITION, VELOCITY, FORCE = 2, 1, 0
 
 
-@njit(cache=True, inline="always")
+@kernel
 def exp_minus_one(z):
     """exp(z) - 1 of a complex number with full relative accuracy, Re z <= 0."""
     growth = math.expm1(z.real)
@@ -27,7 +28,7 @@ def exp_minus_one(z):
     return complex(growth * (1.0 - turn) - turn, (1.0 + growth) * 2.0 * sine * cosine)
 
 
-@njit(cache=True, inline="always")
+@kernel
 def exp_minus_line(z, first):
     """exp(z) - 1 - z given first = exp(z) - 1, with full relative accuracy."""
     if abs(z.real) + abs(z.imag) > 0.25:
@@ -39,7 +40,7 @@ def exp_minus_line(z, first):
     return 0.5 * z * z * total
 
 
-@njit(cache=True, inline="always")
+@kernel
 def first_root_of_parabola(f, slope, curvature):
     """Smallest s >= 0 with f + slope s + curvature s^2/2 = 0 for f >= 0; inf if there is none."""
     if f == 0.0 and slope < 0.0:
@@ -52,7 +53,7 @@ def first_root_of_parabola(f, slope, curvature):
     return 2.0 * f / (math.sqrt(square) - slope)
 
 
-@njit(cache=True)
+@kernel
 def safe_step(f, slope, curvature, second, third, longest):
     """A step without root: f >= 0, its slope and curvature here, bounds of |f''| and |f'''| from here on."""
     if third == 0.0:
@@ -76,7 +77,7 @@ def safe_step(f, slope, curvature, second, third, longest):
     return step
 
 
-@njit(cache=True)
+@kernel
 def evaluate(order, k0, k1, k2, g, eigenvalue, awake, t):
     """Value, slope, curvature and round-off of an event function at time t.
 
@@ -112,7 +113,7 @@ def evaluate(order, k0, k1, k2, g, eigenvalue, awake, t):
     return value, slope, curvature, 4.0 * np.finfo(np.float64).eps * noise
 
 
-@njit(cache=True)
+@kernel
 def bounds(order, k2, g, eigenvalue, awake):
     """Bounds of the second and third derivative of an event function over all later times."""
     second = abs(k2) if order == POSITION else 0.0

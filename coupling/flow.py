@@ -91,8 +91,8 @@ def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray,
             # two bodies of different restitution meet with the geometric mean
             restitution.append(float(np.prod([scene.damper[i].restitution for i in pair]) ** (1 / len(pair))))
             gaps.append(cavity.gap)
-    j_structure = np.vstack([-floor, np.array(on_structure).reshape(-1, n)])
-    j_bodies = np.vstack([unit, np.array(on_bodies).reshape(-1, bodies)])
+    j_structure = np.vstack([-floor, np.array(on_structure).reshape(len(gaps), n)])
+    j_bodies = np.vstack([unit, np.array(on_bodies).reshape(len(gaps), bodies)])
     mass = np.array([damper.mass for damper in scene.damper])
     base = structure.base_acceleration
     rows = Rows(
