@@ -191,10 +191,9 @@ def build(parameters: VaneCluster, path: str | os.PathLike[str]) -> Path:
             gmsh.model.addPhysicalGroup(2, tags, name=name)
         for option in ("Mesh.MeshSizeMin", "Mesh.MeshSizeMax"):
             gmsh.option.setNumber(option, parameters.element_size)
-        gmsh.option.setNumber("Mesh.ElementOrder", parameters.order)
-        gmsh.option.setNumber("Mesh.HighOrderOptimize", int(parameters.order > 1))
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.optimize("Netgen")
+        gmsh.model.mesh.setOrder(parameters.order)
         gmsh.model.mesh.renumberNodes()
         msh.check_disjoint(2, "facet")
         gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)

@@ -178,7 +178,7 @@ def vtk_mesh(space: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _prepare_groups() -> None:
     """Refuse what dolfinx's reader keeps silent about, and bring the model to what every version of it takes."""
-    check_kinds()
+    _check_kinds()
     lower = gmsh.model.getPhysicalGroups(0) + gmsh.model.getPhysicalGroups(1)
     if lower:  # an empty list would remove every group
         gmsh.model.removePhysicalGroups(lower)
@@ -193,14 +193,18 @@ def _prepare_groups() -> None:
     gmsh.model.mesh.renumberNodes()
 
 
-def check_kinds() -> None:
-    """Raise MeshError unless the current model holds volume elements of one kind."""
+def _check_kinds() -> None:
+    """Raise MeshError unless the current model holds volume elements of one kind, with facets of the same order."""
     kinds = gmsh.model.mesh.getElementTypes(3)
     if len(kinds) == 0:
         raise MeshError("no volume elements; mesh the volumes and save them (a volume outside all groups is not saved)")
     if len(kinds) > 1:
         names = ", ".join(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
         raise MeshError(f"mixed volume elements ({names}); use one kind, tetrahedra or hexahedra")
+    order = gmsh.model.mesh.getElementProperties(kinds[0])[2]
+    for kind in gmsh.model.mesh.getElementTypes(2):
+        if gmsh.model.mesh.getElementProperties(kind)[2] != order:
+            raise MeshError(f"facets are not of the volume elements' order {order}; set the order of the whole mesh")
 
 
 def _members(tags: Any, names: Mapping[str, int]) -> dict[str, np.ndarray]:

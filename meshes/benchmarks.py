@@ -1,0 +1,95 @@
+"""Rods, beams and plates for verification: blocks along x, of constant or tapering width, with named faces."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import gmsh
+
+from meshes.vane_cluster import ParameterError
+from modal import msh, store
+
+_FACES = ("root", "tip", "left", "right", "bottom", "top")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block from x = 0 to `length`, symmetric about y = 0, from z = 0 to `thickness`; metres.
+
+    Facet groups: `root` (x = 0), `tip` (x = length), `left` and `right` (the faces of negative and positive y),
+    `bottom` (z = 0) and `top`. Volume group: `block`.
+
+    tip_width     width at x = length; left out: constant width
+    divisions     elements along x, y and z of a structured mesh
+    hexahedra     of a structured mesh; else its cells are split into tetrahedra
+    element_size  left out: structured; given: unstructured tetrahedra of about this size, `divisions` is not used
+    order         of the elements' geometry
+    """
+
+    length: float
+    width: float
+    thickness: float
+    tip_width: float | None = None
+    divisions: tuple[int, int, int] = (8, 1, 1)
+    hexahedra: bool = False
+    element_size: float | None = None
+    order: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("length", "width", "thickness", "tip_width", "element_size"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(f"{name}: expected a positive number of metres, not {value}")
+        if len(self.divisions) != 3 or any(count < 1 for count in self.divisions):
+            raise ParameterError(f"divisions: expected three counts of at least 1, not {self.divisions}")
+        if self.hexahedra and self.element_size is not None:
+            raise ParameterError("hexahedra: an unstructured mesh is of tetrahedra; leave out element_size")
+
+
+def build(block: Block, path: str | os.PathLike[str]) -> Path:
+    """Mesh the block and write it as gmsh 4.1 text. Returns the path."""
+    with msh.session("block"):
+        volume = _solid(block)
+        gmsh.model.addPhysicalGroup(3, [volume], name="block")
+        for name, surface in zip(_FACES, _faces(block, volume), strict=True):
+            gmsh.model.addPhysicalGroup(2, [surface], name=name)
+        if block.element_size is not None:
+            gmsh.option.setNumber("Mesh.MeshSizeMin", block.element_size)
+            gmsh.option.setNumber("Mesh.MeshSizeMax", block.element_size)
+        gmsh.option.setNumber("Mesh.ElementOrder", block.order)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.renumberNodes()
+        gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+        with store.replacing(path) as temporary:
+            gmsh.write(str(temporary))
+    return Path(path)
+
+
+def _solid(block: Block) -> int:
+    geo = gmsh.model.geo
+    root, tip = 0.5 * block.width, 0.5 * (block.tip_width or block.width)
+    corners = [geo.addPoint(x, y, 0.0) for x, y in ((0, -root), (block.length, -tip), (block.length, tip), (0, root))]
+    edges = [geo.addLine(corners[i], corners[(i + 1) % 4]) for i in range(4)]
+    face = geo.addPlaneSurface([geo.addCurveLoop(edges)])
+    along_x, along_y, along_z = block.divisions
+    if block.element_size is None:
+        for edge, count in zip(edges, (along_x, along_y, along_x, along_y), strict=True):
+            geo.mesh.setTransfiniteCurve(edge, count + 1)
+        geo.mesh.setTransfiniteSurface(face)
+        if block.hexahedra:
+            geo.mesh.setRecombine(2, face)
+    layers = [along_z] if block.element_size is None else []
+    solid = geo.extrude([(2, face)], 0.0, 0.0, block.thickness, numElements=layers, recombine=block.hexahedra)
+    geo.synchronize()
+    return next(tag for dimension, tag in solid if dimension == 3)
+
+
+def _faces(block: Block, volume: int) -> list[int]:
+    """Surfaces in the order of `_FACES`, told apart by the middles of their bounding boxes."""
+    surfaces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
+    boxes = {tag: gmsh.model.getBoundingBox(2, tag) for tag in surfaces}
+    middles = {tag: [0.5 * (box[axis] + box[axis + 3]) for axis in range(3)] for tag, box in boxes.items()}
+    return [choose(surfaces, key=lambda tag: middles[tag][axis]) for axis in range(3) for choose in (min, max)]
