@@ -1,0 +1,294 @@
+"""The engine against closed forms: every row has its source. Energy balances to round-off in each."""
+
+import numpy as np
+import pytest
+
+from coupling.engine import simulate
+from coupling.inputs import InputError, validate
+from coupling.response import Status
+from coupling.scene import Scene
+from coupling.structure import receptance
+
+
+def scene(**tables) -> Scene:
+    return validate(Scene, tables, "scene")
+
+
+def cluster(frequency_ratio=0.995, gap_ratio=0.5, mass_ratio=0.02, **changes) -> Scene:
+    """One mode at 2414 Hz with a resonance of 30 um, one body: the regime of impact mistuning."""
+    data = {
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": (2 * np.pi * 2414) ** 2, "damping_ratio": 0.002},
+        "excitation": {"frequency": 2414.0 * frequency_ratio, "resonance_amplitude": 30e-6},
+        "cavity": [{"name": "c1", "gap": 30e-6 * gap_ratio}],
+        "damper": [{"cavity": "c1", "mass": mass_ratio, "friction": 0.4, "restitution": 0.7}],
+    }
+    return scene(**(data | changes))
+
+
+def table(acceleration, frequency=1.0, **damper) -> Scene:
+    """A body on a shaking table with acceleration amplitude `acceleration`, g = 10, horizontal, no walls near."""
+    return scene(
+        structure={"model": "prescribed", "displacement_amplitude": acceleration / (2 * np.pi * frequency) ** 2},
+        excitation={"frequency": frequency},
+        gravity={"acceleration": 10.0},
+        cavity=[{"name": "c", "gap": 1e3}],
+        damper=[{"cavity": "c", "mass": 1.0, "friction": 0.1} | damper],
+        time={"periods": 12, "transient": 4},
+    )
+
+
+def ball(restitution, acceleration_ratio, velocity=0.0, periods=400, height=0.0, **changes) -> Scene:
+    """A ball on a vertically shaken table: the left wall, gravity 10 pulling to it."""
+    omega = 2 * np.pi
+    data = {
+        "structure": {"model": "prescribed", "displacement_amplitude": acceleration_ratio * 10.0 / omega**2},
+        "excitation": {"frequency": 1.0},
+        "gravity": {"acceleration": 10.0, "orientation_deg": 90.0},
+        "cavity": [{"name": "c", "gap": 2e3}],
+        "damper": [{"cavity": "c", "mass": 1.0, "restitution": restitution, "position": -1e3 + height,
+                    "velocity": velocity}],
+        "time": {"periods": periods, "transient": periods - 50},
+    }  # fmt: skip
+    return scene(**(data | changes))
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.5, 0.9])
+def test_ball_comes_to_rest(restitution):
+    """Chatter ends at 2 v0/(g (1 - e)) after the launch with v0; the ball has then lost all its energy."""
+    response = simulate(
+        ball(restitution, 1e-20, velocity=1.0, periods=3, time={"periods": 3, "transient": 0}), events=True
+    )
+    rest = [event for event in response.event_list if event.kind == "rest"]
+    assert [event.time for event in rest] == [pytest.approx(2 / (10 * (1 - restitution)), rel=1e-8)]
+    assert response.energy["impact"] == pytest.approx(0.5, rel=1e-12)
+    impacts = [event for event in response.event_list if event.kind == "impact"]
+    for n, event in enumerate(impacts[:10]):
+        assert event.relative_velocity_before == pytest.approx(-(restitution**n), rel=1e-10)
+        assert event.time == pytest.approx(0.2 * sum(restitution**i for i in range(n + 1)), rel=1e-12)
+
+
+@pytest.mark.parametrize(("acceleration", "moves"), [(0.999, False), (1.001, True)])
+def test_shaking_table_sticks_below_its_friction(acceleration, moves):
+    """Code_Aster SDND104: the body sticks for a0 < mu g."""
+    response = simulate(table(acceleration))
+    assert response.classification == ("no-contact" if moves else "stuck")
+    assert (response.energy["friction"] > 0) == moves
+    assert response.energy_residual < 1e-10
+
+
+def test_shaking_table_dissipation():
+    """Code_Aster SDND104: mean of N |v_rel| over 4 to 12 s at a0 = 1.01 is 2.26164e-4 W (0.1 %)."""
+    response = simulate(table(1.01))
+    assert response.energy["friction"] / 0.1 / 8 == pytest.approx(2.26164e-4, rel=1e-3)
+
+
+@pytest.mark.parametrize(("factor", "stops"), [(0.999, True), (1.001, False)])
+def test_shaking_table_slides_without_stop(factor, stops):
+    """Code_Aster SDND104: sliding without stop above sqrt(1 + pi^2/4) mu g."""
+    limit = np.sqrt(1 + np.pi**2 / 4)
+    data = table(factor * limit).replace({"time.periods": 40, "time.transient": 30})
+    response = simulate(data, events=True)
+    late = [event for event in response.event_list if event.time > 30 and event.kind == "stick"]
+    assert bool(late) == stops
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.7])
+def test_bouncing_ball_period_one(restitution):
+    """Period one exists above A w^2/g = pi (1-e)/(1+e); its impacts come once a period with speed pi g/w... (g T/2).
+
+    Holmes (1982): the phase obeys cos = pi (1-e)/(1+e) g/(A w^2), the ball leaves with g T/2 relative to rest.
+    """
+    threshold = np.pi * (1 - restitution) / (1 + restitution)
+    doubling = np.sqrt(threshold**2 + (2 * (1 + restitution**2) / (1 + restitution) ** 2) ** 2)
+    for ratio, kind in ((0.5 * (threshold + doubling), "periodic-1"), (doubling * 1.02, "periodic-2")):
+        response = simulate(period_one_start(restitution, ratio), events=True)
+        assert response.classification == kind
+        assert response.energy_residual < 1e-10
+        if kind == "periodic-1":
+            speeds = [e.relative_velocity_before for e in response.event_list if e.kind == "impact"][-20:]
+            # relative approach speed: fall speed g T/2 and table velocity (1-e)/(1+e) g T/2 together
+            assert speeds == pytest.approx([-(5.0 + 5.0 * (1 - restitution) / (1 + restitution))] * 20, rel=1e-6)
+
+
+def period_one_start(restitution, ratio) -> Scene:
+    """Starts near the periodic orbit: at t = 0 the ball is where the orbit with impact phase t0 has it."""
+    threshold = np.pi * (1 - restitution) / (1 + restitution)
+    omega, amplitude = 2 * np.pi, ratio * 10.0 / (2 * np.pi) ** 2
+    t0 = np.arccos(threshold / ratio) / omega
+    flight = 1.0 - t0  # since the last impact
+    height = amplitude * np.sin(omega * t0) + 5.0 * flight - 5.0 * flight**2
+    velocity = 5.0 - 10.0 * flight - amplitude * omega
+    return ball(restitution, ratio, velocity=velocity, height=height)
+
+
+@pytest.mark.parametrize("ratio", [0.9, 1.1])
+def test_bouncing_ball_needs_its_threshold(ratio):
+    """Below pi (1-e)/(1+e) no period-one orbit exists: started where it would be, the ball does not stay on it."""
+    restitution = 0.5
+    threshold = np.pi / 3
+    data = ball(restitution, ratio * threshold) if ratio < 1 else period_one_start(restitution, ratio * threshold)
+    assert (simulate(data).classification == "periodic-1") == (ratio > 1)
+
+
+ONE_TO_ONE = [(xi, r) for xi in (0.3, 0.45, 0.6, 0.66) for r in (0.985, 0.99, 1.0, 1.005)]
+
+
+@pytest.mark.parametrize(("xi", "r"), ONE_TO_ONE)
+def test_one_to_one_impact_regime(xi, r):
+    """Two symmetric impacts a period: amplitude and attached mass fraction (Theurich and Krack; code of tobiaswdm/CC).
+
+    Frequencies beside the backbone too; within 0.5 % at a body of 0.5 % of the mass, where the regime is stable.
+    """
+    eps, damping, e = 0.005, 0.005, 0.7
+    rho = 2 / np.pi * (1 - e) / (1 + e)
+    theta = (1 + np.sqrt((1 + rho**2) * xi**2 - rho**2)) / (1 + rho**2)
+    assert 1 / (1 + rho**2) < theta < 1 / (1 - 4 / np.pi**2)
+    turn = (theta - 1) / xi - 1j * rho * theta / xi
+    loads = (-(1 - eps) * r**2 + 2j * damping * r + 1) * xi - 8 * eps * theta * turn * r**2 / np.pi**2
+    half_gap = 1 / abs(loads)
+    response = simulate(
+        scene(
+            structure={"model": "rigid", "mass": 1 - eps, "stiffness": 1.0, "damping": 2 * damping},
+            excitation={"frequency": r / (2 * np.pi), "force": 1.0},
+            gravity={"acceleration": 0.0},
+            cavity=[{"name": "c", "gap": 2 * half_gap}],
+            damper=[{"cavity": "c", "mass": eps, "restitution": e, "position": -half_gap}],
+            time={"periods": 1500, "transient": 1400},
+        )
+    )
+    assert response.classification == "periodic-1"
+    assert response.impacts_per_period == 2
+    assert response.amplitude_harmonic / half_gap == pytest.approx(xi, rel=5e-3)
+    assert response.attached_mass_fraction == pytest.approx(8 * theta * (theta - 1) / (np.pi * xi) ** 2, rel=1e-2)
+    assert response.energy_residual < 1e-10
+
+
+def test_stuck_body_is_attached_mass():
+    """A heavy normal load glues the body: the fixed curve, its frequency f_1/sqrt(1 + m_i/m), attached mass 1."""
+    data = cluster(frequency_ratio=1 / np.sqrt(1.02), damper=[
+        {"cavity": "c1", "mass": 0.02, "friction": 1.0, "normal_load": 1e6, "restitution": 0.7}
+    ], time={"periods": 3000, "transient": 2900})  # fmt: skip
+    response = simulate(data)
+    force = 30e-6 / abs(receptance(data, np.array([2414.0 * np.sqrt(1 - 2 * 0.002**2)]))[0])
+    fixed = force * abs(receptance(data, np.array([data.excitation.frequency]), fixed=True)[0])
+    assert response.classification == "stuck"
+    assert response.amplitude_max == pytest.approx(fixed, rel=1e-9)
+    assert response.amplitude_harmonic == pytest.approx(fixed, rel=1e-9)
+    assert response.amplitude_rms == pytest.approx(fixed / np.sqrt(2), rel=1e-9)
+    assert response.attached_mass_fraction == pytest.approx(1.0, rel=1e-9)
+    frequencies = np.linspace(0.98, 1.0, 20001) * 2414.0
+    peak = frequencies[np.argmax(np.abs(receptance(data, frequencies, fixed=True)))]
+    assert peak == pytest.approx(2414.0 / np.sqrt(1.02), rel=1e-5)
+
+
+def test_undamped_structure_is_its_receptance():
+    """No body at all: the transient decays to the linear response."""
+    data = cluster(damper=[], cavity=[], time={"periods": 3000, "transient": 2990})
+    response = simulate(data)
+    force = 30e-6 / abs(receptance(data, np.array([2414.0 * np.sqrt(1 - 2 * 0.002**2)]))[0])
+    linear = force * abs(receptance(data, np.array([data.excitation.frequency]))[0])
+    assert response.amplitude_max == pytest.approx(linear, rel=1e-9)
+    assert response.attached_mass_fraction is None
+
+
+def test_free_decay_is_closed_form():
+    """Free vibration from an initial displacement, no force: x = x0 exp(-z w t) (cos + z/sqrt(1-z^2) sin)."""
+    data = scene(
+        structure={"model": "rigid", "mass": 2.0, "stiffness": 50.0, "damping_ratio": 0.05},
+        initial={"displacement": 0.3},
+        excitation={"frequency": 1.0},
+        time={"periods": 5, "transient": 0},
+    )
+    response = simulate(data, samples_per_period=10)
+    zeta, omega = 0.05, 5.0
+    damped = omega * np.sqrt(1 - zeta**2)
+    t = response.time
+    exact = 0.3 * np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
+    assert response.displacement == pytest.approx(exact, abs=1e-14)
+    assert response.energy["viscous"] == pytest.approx(-response.energy["stored"], rel=1e-12)
+
+
+def test_base_acceleration_equals_an_inertial_force():
+    """A base that shakes a structure without bodies is the force -m a on it; a body feels the base as well."""
+    shaken = cluster(excitation={"frequency": 2414.0 * 0.99, "base_acceleration": 3.0})
+    pushed = cluster(excitation={"frequency": 2414.0 * 0.99, "force": 3.0})
+    bare = {"damper": [], "cavity": [], "time": {"periods": 50, "transient": 40}}
+    by_base = simulate(validate(Scene, shaken.to_dict() | bare, "s"))
+    by_force = simulate(validate(Scene, pushed.to_dict() | bare, "s"))
+    assert by_base.amplitude_harmonic == pytest.approx(by_force.amplitude_harmonic, rel=1e-12)
+    assert simulate(shaken).energy_residual < 1e-10
+
+
+@pytest.mark.parametrize("frequency_ratio", [0.96, 0.985, 0.99, 1.0, 1.01])
+@pytest.mark.parametrize("gap_ratio", [1.0, 0.5, 0.1])
+def test_energy_balances(frequency_ratio, gap_ratio):
+    response = simulate(cluster(frequency_ratio, gap_ratio))
+    assert response.status == Status.OK
+    assert response.energy_residual < 1e-10
+    assert min(response.energy[name] for name in ("viscous", "friction", "impact")) >= 0
+
+
+def test_restitution_at_every_impact():
+    response = simulate(cluster(), events=True)
+    impacts = [event for event in response.event_list if event.kind == "impact"]
+    assert len(impacts) == response.counters["impacts"] > 1000
+    before = np.array([event.relative_velocity_before for event in impacts])
+    after = np.array([event.relative_velocity_after for event in impacts])
+    plastic = after == 0  # the last impact of a chatter
+    assert np.all(np.abs(after + 0.7 * before)[~plastic] <= 1e-15 * np.abs(before[~plastic]))
+    assert np.all(np.abs(before[plastic]) < 1e-8 * np.abs(before).max())
+    effective = 1 / (1 / 0.02 + 1 / 1.0)
+    impulse = np.array([event.impulse for event in impacts])
+    assert impulse[~plastic] == pytest.approx(1.7 * effective * np.abs(before[~plastic]), rel=1e-12)
+    side = np.array([event.side == "left" for event in impacts])
+    assert np.all((before < 0) == side)
+
+
+def test_bodies_stay_in_their_cavity():
+    response = simulate(cluster(gap_ratio=0.2), samples_per_period=64)
+    assert np.abs(response.body_displacement).max() <= 0.1 * 30e-6 * (1 + 1e-12)
+
+
+def test_time_shift_and_samples_agree_with_the_section():
+    response = simulate(cluster(), samples_per_period=4)
+    assert response.displacement[::4] == pytest.approx(response.section[:-1, 0], abs=1e-18)
+    assert response.peak.max() >= np.abs(response.displacement).max() - 1e-18
+
+
+def test_event_budget_ends_a_run():
+    response = simulate(cluster(solver={"max_events": 100}))
+    assert response.status == Status.EVENT_BUDGET
+    assert response.events == 100
+    assert response.periods < 1500
+    assert response.energy_residual < 1e-10
+
+
+def test_frictionless_and_plastic_limits():
+    for restitution in (0.0, 1.0):
+        data = cluster(damper=[{"cavity": "c1", "mass": 0.02, "restitution": restitution}])
+        response = simulate(data)
+        assert response.status == Status.OK
+        assert response.energy_residual < 1e-10
+        assert (response.energy["impact"] > 1e-12) == (restitution == 0.0)
+        assert response.energy["friction"] == 0
+
+
+def test_mistakes_of_the_model_are_named():
+    with pytest.raises(InputError, match="an undamped resonance has no amplitude"):
+        simulate(cluster(structure={"model": "rigid", "mass": 1.0, "stiffness": 1e8, "damping_ratio": 0.0}))
+    with pytest.raises(InputError, match="critically damped"):
+        simulate(cluster(structure={"model": "rigid", "mass": 1.0, "stiffness": 1e8, "damping_ratio": 1.0}))
+
+
+def test_overdamped_structure_decays_without_oscillation():
+    data = scene(
+        structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 2.0},
+        initial={"displacement": 1.0},
+        excitation={"frequency": 1.0},
+        time={"periods": 4, "transient": 0},
+    )
+    response = simulate(data, samples_per_period=8)
+    fast, slow = -2 - np.sqrt(3), -2 + np.sqrt(3)
+    exact = (slow * np.exp(fast * response.time) - fast * np.exp(slow * response.time)) / (slow - fast)
+    assert response.displacement == pytest.approx(exact, abs=1e-13)
+    assert response.energy_residual < 1e-12
