@@ -100,7 +100,7 @@ class Solid:
             raise ElasticityError(f"displacement: shape {np.shape(displacement)} is not that of this mesh and degree")
         deviator = ufl.dev(self.stress(fenicsx.field(self.space, displacement)))
         equivalent = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
-        return np.array(fenicsx.evaluate(equivalent, fenicsx.scalar_space(self.domain, "DG", 1)).x.array)
+        return np.array(fenicsx.evaluate(equivalent, fenicsx.discontinuous_space(self.domain, 1)).x.array)
 
     def vtk_mesh(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Cells, VTK cell types and points, the points in the order of the nodes; for pyvista.UnstructuredGrid."""

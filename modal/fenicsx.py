@@ -99,8 +99,9 @@ def vector_space(domain: Domain, degree: int) -> Any:
         return fem.VectorFunctionSpace(domain.mesh, ("Lagrange", degree))
 
 
-def scalar_space(domain: Domain, family: str, degree: int) -> Any:
-    """Scalar space of a family such as "DG"."""
+def discontinuous_space(domain: Domain, degree: int) -> Any:
+    """Scalar polynomials of a degree in every cell, without continuity."""
+    family = "DQ" if domain.mesh.topology.cell_name() == "hexahedron" else "DG"
     with _quiet():
         create = getattr(fem, "functionspace", None) or fem.FunctionSpace
         return create(domain.mesh, (family, degree))
@@ -108,7 +109,7 @@ def scalar_space(domain: Domain, family: str, degree: int) -> Any:
 
 def cell_constants(domain: Domain, values: Mapping[str, float]) -> Any:
     """A function that is constant in every cell, its value given by volume group."""
-    function = fem.Function(scalar_space(domain, "DG", 0))
+    function = fem.Function(discontinuous_space(domain, 0))
     dofs = _array(function.function_space.dofmap.list)
     for name, value in values.items():
         function.x.array[dofs[domain.volumes[name]]] = value

@@ -128,7 +128,10 @@ class SystemMatrices:
 
     @property
     def movable_mass(self) -> np.ndarray:
-        """(3,) kg, r^T M r of the free DOFs: what the effective masses of all modes sum to along x, y and z."""
+        """(3,) kg along x, y and z, r^T M r of the free DOFs: what the effective masses of all modes sum to.
+
+        Less than the total mass by the share of the elements at the supports that their fixed nodes carry.
+        """
         translations = self.movable_translations()
         return np.einsum("ij,ij->j", translations, self.mass @ translations)
 

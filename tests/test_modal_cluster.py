@@ -1,0 +1,115 @@
+"""The shipped cluster: the mode it was drawn for, and the same frequencies from an independent finite element code."""
+
+import gmsh
+import numpy as np
+import pytest
+import skfem
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigsh
+from skfem.helpers import dot
+from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+from meshes.vane_cluster import SHIPPED, VaneCluster, build
+from modal.calibrate import rigid_model
+from modal.eigen import count_below, factorize, solve_modes
+from modal.elasticity import Material, assemble
+from modal.matrices import patch_average
+from modal.msh import session
+from modal.participation import effective_mass_shares, effective_masses, first_bending
+
+YOUNG, POISSON, DENSITY = 2.0e11, 0.3, 8190.0
+MATERIALS = {"default": Material(YOUNG, POISSON, DENSITY)}
+
+
+@pytest.fixture(scope="module")
+def coarse(tmp_path_factory):
+    """A cluster of two airfoils, quadratic, a few thousand DOFs: path and matrices."""
+    path = build(VaneCluster(airfoils=2, element_size=0.006), tmp_path_factory.mktemp("coarse") / "cluster.msh")
+    return path, assemble(path, MATERIALS, {"clamp": "xyz"}, degree=2, damping_ratio=0.002)
+
+
+def test_first_bending_of_the_shipped_cluster(cluster, cluster_modes):
+    first = first_bending(cluster_modes, cluster, [0, 1, 0])
+    assert first == 0
+    assert cluster_modes.frequencies_hz[0] == pytest.approx(2414.0, rel=0.02)
+    assert cluster_modes.frequencies_hz[1] > 1.3 * cluster_modes.frequencies_hz[0]
+    assert effective_mass_shares(cluster_modes, cluster, [0, 1, 0])[0] > 0.4
+
+
+def test_modes_of_the_shipped_cluster_are_accurate_and_complete(cluster, cluster_modes):
+    assert cluster_modes.residuals.max() < 1e-8
+    frequencies = cluster_modes.frequencies_hz
+    assert count_below(cluster, 0.5 * (frequencies[8] + frequencies[9])) == 9
+
+
+def test_rigid_models_at_shroud_and_cavity_are_alike(cluster, cluster_modes):
+    """The inner shroud moves nearly as one body, so the mass hardly depends on where it is seen."""
+    masses = []
+    for label in ("shroud", "c1_left", "c1_right", "c1_floor"):
+        functional = patch_average(cluster, label, [0, 1, 0])
+        masses.append(rigid_model(cluster_modes, 0, functional, label, cluster.damping_ratio).mass)
+    assert max(masses) < 1.1 * min(masses)
+    # a translation of everything that moves gives the effective mass; what lags behind makes the mass smaller
+    assert min(masses) == pytest.approx(effective_masses(cluster_modes, cluster)[0, 1], rel=0.1)
+
+
+def test_frequencies_and_effective_masses_equal_arpack(coarse):
+    _, matrices = coarse
+    free = matrices.free
+    stiffness, mass = matrices.stiffness[free][:, free], matrices.mass[free][:, free]
+    eigenvalues, vectors = eigsh(stiffness.tocsc(), 10, mass.tocsc(), sigma=0.0)
+    modes = solve_modes(matrices, 10)
+    assert modes.frequencies_hz == pytest.approx(np.sqrt(eigenvalues) / (2 * np.pi), rel=1e-8)
+    expected = (vectors.T @ (mass @ matrices.movable_translations()[free])) ** 2
+    assert effective_masses(modes, matrices) == pytest.approx(expected, abs=1e-8 * matrices.movable_mass[0])
+
+
+def test_sixty_modes_fill_the_movable_mass_from_below(coarse):
+    _, matrices = coarse
+    carried = np.cumsum(effective_masses(solve_modes(matrices, 60), matrices), axis=0) / matrices.movable_mass
+    assert np.all(np.diff(carried, axis=0) >= 0.0)
+    assert np.all(carried[-1] < 1.0)
+    assert np.all(carried[-1] > [0.9, 0.9, 0.6])
+
+
+def independent_frequencies(path, count):
+    """Natural frequencies (Hz) by scikit-fem from the mesh file, the outer radius held."""
+    with session("read"):
+        gmsh.merge(str(path))
+        tags, points, _ = gmsh.model.mesh.getNodes()
+        cells = gmsh.model.mesh.getElementsByType(4)[1].reshape(-1, 4)
+    tags, cells = tags.astype(np.int64), cells.astype(np.int64)
+    number = np.empty(tags.max() + 1, dtype=np.int64)
+    number[tags] = np.arange(tags.size)
+    mesh = skfem.MeshTet(points.reshape(-1, 3).T.copy(), number[cells].T.copy())
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTetP2()), intorder=4)
+    stiffness = skfem.asm(linear_elasticity(*lame_parameters(YOUNG, POISSON)), basis).tocsr()
+    mass = skfem.asm(skfem.BilinearForm(lambda u, v, _: DENSITY * dot(u, v)), basis).tocsr()
+    # middles of flat facets lie inside the arc by less than a tenth of a millimetre
+    outer = mesh.facets_satisfying(
+        lambda x: np.hypot(x[1], x[2]) > VaneCluster().outer_radius - 4e-4, boundaries_only=True
+    )
+    free = np.setdiff1d(np.arange(basis.N), basis.get_dofs(outer).all())
+    stiffness, mass = (sparse.csr_array(matrix[free][:, free]) for matrix in (stiffness, mass))
+    with factorize(stiffness) as factors:
+        inverse = LinearOperator(stiffness.shape, factors.solve, dtype=float)
+        eigenvalues = eigsh(stiffness, count, mass, sigma=0.0, OPinv=inverse, return_eigenvectors=False)
+    return np.sqrt(np.sort(eigenvalues)) / (2 * np.pi)
+
+
+def test_coarse_cluster_equals_scikit_fem(coarse):
+    path, matrices = coarse
+    assert solve_modes(matrices, 4).frequencies_hz == pytest.approx(independent_frequencies(path, 4), rel=1e-8)
+
+
+@pytest.mark.slow
+def test_shipped_cluster_equals_scikit_fem(cluster_modes):
+    assert cluster_modes.frequencies_hz[:4] == pytest.approx(independent_frequencies(SHIPPED, 4), rel=1e-8)
+
+
+@pytest.mark.slow
+def test_refined_cluster_keeps_its_first_mode(cluster_modes, tmp_path):
+    """Straight elements of the shipped size are stiffer than finer ones, by less than 2 %."""
+    path = build(VaneCluster(element_size=0.0016), tmp_path / "fine.msh")
+    fine = solve_modes(assemble(path, MATERIALS, {"clamp": "xyz"}), 1).frequencies_hz[0]
+    assert 0.0 < cluster_modes.frequencies_hz[0] / fine - 1.0 < 0.02
