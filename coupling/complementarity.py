@@ -2,10 +2,12 @@
 
 Accelerations (or velocities) of rows are a = A f + b with A symmetric and positive semidefinite, and each force obeys
 
-    a_i = 0 with lo_i <= f_i <= hi_i,    a_i > 0 with f_i = lo_i,    a_i < 0 with f_i = hi_i.
+    a_i = 0 with low_i <= f_i <= high_i,    a_i > 0 with f_i = low_i,    a_i < 0 with f_i = high_i.
 
-A contact has lo = 0, hi = inf; Coulomb friction at zero slip has lo = -mu N, hi = mu N (Pfeiffer and Glocker 1996).
-The principal pivoting of Dantzig and of Baraff (1994) brings in one row after the other and never loses a condition.
+A contact has low = 0, high = inf; Coulomb friction at zero slip has low = -mu N, high = mu N (Pfeiffer and Glocker,
+1996). The principal pivoting of Dantzig and of Baraff (1994) brings in one row after the other and never loses a
+condition. Rows may depend on each other (a body that a wall and the floor's friction both hold): then accelerations
+are unique, and one of the possible sets of forces is found.
 """
 
 from __future__ import annotations
@@ -20,181 +22,160 @@ _DEPENDENCE = 1e-9
 
 
 @kernel
-def solve_box(a_matrix, b, lo, hi, forced, f, a, state):
-    """Solve in place: forces f and accelerations a (both shape (k,)), state FREE, AT_LOW, AT_HIGH or DEPENDENT.
+def solve_box(problem, k):
+    """Solve the first k rows in place: forces, accelerations, and states FREE, AT_LOW, AT_HIGH or DEPENDENT.
 
-    forced: 0, or AT_LOW / AT_HIGH for a row whose force has just reached that bound on its way out: it stays there.
-    DEPENDENT rows are at rest because FREE rows hold them; their force keeps its value within the bounds.
-    Returns False if the budget of pivots is spent (never seen for positive semidefinite A; a guard).
+    problem.forced: 0, or AT_LOW / AT_HIGH for a row whose force has just reached that bound on its way out: it stays.
+    DEPENDENT rows are at rest because FREE rows hold them; their force keeps a value within its bounds.
+    Returns False if the budget of pivots is spent (a guard: positive semidefinite problems end).
     """
-    k = len(b)
+    f, a, state, forced = problem.force, problem.acceleration, problem.state, problem.forced
     for i in range(k):
-        f[i] = 0.0
-        state[i] = OUT
-    for i in range(k):
+        f[i], state[i] = 0.0, OUT
         if forced[i] == AT_LOW:
-            f[i], state[i] = lo[i], AT_LOW
+            f[i], state[i] = problem.low[i], AT_LOW
         elif forced[i] == AT_HIGH:
-            f[i], state[i] = hi[i], AT_HIGH
+            f[i], state[i] = problem.high[i], AT_HIGH
     scale = 0.0
     for i in range(k):
-        a[i] = b[i]
+        a[i] = problem.b[i]
         for j in range(k):
-            a[i] += a_matrix[i, j] * f[j]
-        scale = max(scale, abs(a[i]), abs(b[i]))
-    done = True
-    for i in range(k):
-        if state[i] == OUT:
-            done = _drive(a_matrix, lo, hi, forced, f, a, state, i, _ROUND_OFF * scale) and done
+            a[i] += problem.matrix[i, j] * f[j]
+        scale = max(scale, abs(a[i]), abs(problem.b[i]))
     tolerance = _ROUND_OFF * scale
     for i in range(k):
-        if state[i] != FREE and abs(a[i]) <= tolerance and _dependent(a_matrix, state, i):
+        if state[i] == OUT and not _drive(problem, k, i, tolerance):
+            return False
+    for i in range(k):
+        if state[i] != FREE and abs(a[i]) <= tolerance and _dependent(problem, k, i):
             state[i] = DEPENDENT
-    return done
+    return True
 
 
 @kernel
-def _drive(a_matrix, lo, hi, forced, f, a, state, i, tolerance):
+def _drive(problem, k, i, tolerance):
     """Move f_i until row i obeys its condition, keeping the conditions of all rows that are in."""
-    k = len(f)
-    df, da = np.zeros(k), np.zeros(k)
+    f, a, state = problem.force, problem.acceleration, problem.state
+    df, da = problem.d_force, problem.d_acceleration
     for _ in range(50 + 20 * k):
         if abs(a[i]) <= tolerance:
-            if _dependent(a_matrix, state, i):
-                state[i] = DEPENDENT
-            else:
-                state[i] = FREE
+            state[i] = DEPENDENT if _dependent(problem, k, i) else FREE
             a[i] = 0.0
             return True
         way = 1.0 if a[i] < 0.0 else -1.0
-        bound = hi[i] if way > 0.0 else lo[i]
+        bound = problem.high[i] if way > 0.0 else problem.low[i]
         if f[i] == bound:
             state[i] = AT_HIGH if way > 0.0 else AT_LOW
             return True
-        _response(a_matrix, state, i, way, df, da)
-        step, who = (bound - f[i]) * way, i
-        at_bound = True
+        _respond(problem, k, i, way)
+        step, who, at_bound = (bound - f[i]) * way, i, True
         if da[i] * way > 0.0 and -a[i] / da[i] <= step:
             step, at_bound = -a[i] / da[i], False
         for j in range(k):
             if j == i or state[j] == OUT:
                 continue
-            if state[j] == FREE and df[j] != 0.0:
-                room = ((hi[j] if df[j] > 0.0 else lo[j]) - f[j]) / df[j]
-                if room < step:
-                    step, who, at_bound = max(room, 0.0), j, True
+            if state[j] == FREE:
+                if df[j] != 0.0:
+                    room = ((problem.high[j] if df[j] > 0.0 else problem.low[j]) - f[j]) / df[j]
+                    if room < step:
+                        step, who, at_bound = max(room, 0.0), j, True
             elif state[j] == DEPENDENT:
                 # a row that FREE rows held takes over at once when they no longer do
-                if abs(da[j]) > _DEPENDENCE * np.sqrt(a_matrix[i, i] * a_matrix[j, j]):
+                if abs(da[j]) > _DEPENDENCE * np.sqrt(problem.matrix[i, i] * problem.matrix[j, j]):
                     step, who, at_bound = 0.0, j, False
-            elif forced[j] == 0 and ((state[j] == AT_LOW and da[j] < 0.0) or (state[j] == AT_HIGH and da[j] > 0.0)):
+            elif problem.forced[j] == 0 and (
+                (state[j] == AT_LOW and da[j] < 0.0) or (state[j] == AT_HIGH and da[j] > 0.0)
+            ):
                 room = max(-a[j] / da[j], 0.0)
-                if room < step and not _dependent_with(a_matrix, state, j, i):
+                if room < step and not _dependent_beside(problem, k, j, i):
                     step, who, at_bound = room, j, False
         if step == np.inf:
             return False
         for j in range(k):
             f[j] += step * df[j]
             a[j] += step * da[j]
-        if who != i and at_bound:
-            state[who] = AT_HIGH if df[who] > 0.0 else AT_LOW
-            f[who] = hi[who] if df[who] > 0.0 else lo[who]
-        elif who != i:
-            state[who] = FREE
-            a[who] = 0.0
-        elif at_bound:
-            f[i] = bound
-            state[i] = AT_HIGH if way > 0.0 else AT_LOW
-            return True
+        if not at_bound:
+            state[who], a[who] = FREE, 0.0
         else:
-            a[i] = 0.0
-            state[i] = FREE
+            high = df[who] > 0.0
+            state[who] = AT_HIGH if high else AT_LOW
+            f[who] = problem.high[who] if high else problem.low[who]
+        if who == i:
             return True
     return False
 
 
 @kernel
-def _response(a_matrix, state, i, way, df, da):
+def _respond(problem, k, i, way):
     """Change of all forces and accelerations as f_i moves by `way` and the FREE rows keep their acceleration."""
-    k = len(df)
-    df[:] = 0.0
+    df, da = problem.d_force, problem.d_acceleration
+    for j in range(k):
+        df[j] = 0.0
     df[i] = way
-    free = _free(state, i)
-    if len(free):
-        solution = _solve(a_matrix, free, a_matrix[:, i] * -way)
-        for p in range(len(free)):
-            df[free[p]] = solution[p]
+    count = _free_rows(problem, k, i, -1)
+    _solve(problem, count, i)
+    for p in range(count):
+        df[problem.free[p]] = -way * problem.solution[p]
     for j in range(k):
         da[j] = 0.0
         for l in range(k):
-            da[j] += a_matrix[j, l] * df[l]
-    for p in range(len(free)):
-        da[free[p]] = 0.0
-    if da[i] * way <= _DEPENDENCE * a_matrix[i, i]:
+            da[j] += problem.matrix[j, l] * df[l]
+    for p in range(count):
+        da[problem.free[p]] = 0.0
+    if da[i] * way <= _DEPENDENCE * problem.matrix[i, i]:
         da[i] = 0.0
 
 
 @kernel
-def _free(state, but):
+def _free_rows(problem, k, but, also):
+    """List the FREE rows except `but`, and the row `also` (-1: none). Returns how many."""
     count = 0
-    for j in range(len(state)):
-        if state[j] == FREE and j != but:
+    for j in range(k):
+        if j != but and (problem.state[j] == FREE or j == also):
+            problem.free[count] = j
             count += 1
-    free = np.empty(count, np.int64)
-    count = 0
-    for j in range(len(state)):
-        if state[j] == FREE and j != but:
-            free[count] = j
-            count += 1
-    return free
+    return count
 
 
 @kernel
-def _dependent(a_matrix, state, i):
-    return _schur(a_matrix, _free(state, i), i) <= _DEPENDENCE * a_matrix[i, i]
+def _dependent(problem, k, i):
+    """Whether the FREE rows determine the acceleration of row i."""
+    return _rest(problem, _free_rows(problem, k, i, -1), i) <= _DEPENDENCE * problem.matrix[i, i]
 
 
 @kernel
-def _dependent_with(a_matrix, state, j, i):
-    """Whether row j would depend on the FREE rows together with row i."""
-    free = _free(state, j)
-    both = np.empty(len(free) + 1, np.int64)
-    both[: len(free)] = free
-    both[-1] = i
-    if _schur(a_matrix, free, i) <= _DEPENDENCE * a_matrix[i, i]:
-        return _schur(a_matrix, free, j) <= _DEPENDENCE * a_matrix[j, j]
-    return _schur(a_matrix, both, j) <= _DEPENDENCE * a_matrix[j, j]
+def _dependent_beside(problem, k, j, i):
+    """Whether the FREE rows together with row i determine the acceleration of row j."""
+    also = -1 if _dependent(problem, k, i) else i
+    return _rest(problem, _free_rows(problem, k, j, also), j) <= _DEPENDENCE * problem.matrix[j, j]
 
 
 @kernel
-def _schur(a_matrix, free, i):
-    rest = a_matrix[i, i]
-    if len(free):
-        solution = _solve(a_matrix, free, a_matrix[:, i])
-        for p in range(len(free)):
-            rest -= a_matrix[i, free[p]] * solution[p]
+def _rest(problem, count, i):
+    """Schur complement of row i after the `count` listed free rows."""
+    _solve(problem, count, i)
+    rest = problem.matrix[i, i]
+    for p in range(count):
+        rest -= problem.matrix[i, problem.free[p]] * problem.solution[p]
     return rest
 
 
 @kernel
-def _solve(a_matrix, free, right):
-    """A_ff x = right_f by Cholesky; the free rows are independent by construction."""
-    m = len(free)
-    factor = np.empty((m, m))
-    x = np.empty(m)
-    for p in range(m):
+def _solve(problem, count, i):
+    """Solve A_ff x = A_fi for the listed free rows by Cholesky; they are independent by construction."""
+    a_matrix, free, factor, x = problem.matrix, problem.free, problem.factor, problem.solution
+    for p in range(count):
         for q in range(p + 1):
             total = a_matrix[free[p], free[q]]
             for l in range(q):
                 total -= factor[p, l] * factor[q, l]
             factor[p, q] = np.sqrt(max(total, 1e-300)) if p == q else total / factor[q, q]
-        total = right[free[p]]
+        total = a_matrix[free[p], i]
         for l in range(p):
             total -= factor[p, l] * x[l]
         x[p] = total / factor[p, p]
-    for p in range(m - 1, -1, -1):
+    for p in range(count - 1, -1, -1):
         total = x[p]
-        for l in range(p + 1, m):
+        for l in range(p + 1, count):
             total -= factor[l, p] * x[l]
         x[p] = total / factor[p, p]
-    return x

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupling import automaton as auto
-from coupling.flow import Flows, Rows, add_flow, empty_flows, rows_of
-from coupling.response import ENERGIES, Event, Response, Status, classify
+from coupling import state as st
+from coupling.flow import Rows, add_flow, empty_flows, rows_of
+from coupling.response import Event, Response, Status, classify
 from coupling.scene import Scene
 from coupling.structure import linear_structure
 
@@ -19,7 +20,6 @@ _STATUS = {
     auto.ACCURACY_LOST: Status.ACCURACY_LOST,
     auto.UNDECIDED: Status.UNDECIDED,
 }
-_KINDS = ("impact", "stick", "slip", "detach", "rest")
 
 
 def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) -> Response:
@@ -54,70 +54,39 @@ class _Run:
         self.rows, displacement, velocity = rows_of(scene, structure)
         self.flows = empty_flows(self.rows)
         self.log = _Log(events, [])
-        self.state = _initial_state(self.rows, self.flows, displacement, velocity)
+        modes = self.flows.eigenvalue.shape[1]
+        self.state = st.new_state(self.rows, modes, displacement, velocity)
         self.state.coordinates[:] = np.r_[structure.displacement, structure.velocity]
-        self.channels = _channels(self.rows, self.flows)
-        self.records = _records(self.rows, scene.time.periods, samples_per_period)
+        self.channels = st.new_channels(self.rows, modes)
+        self.records = st.new_records(self.rows, scene.time.periods, samples_per_period)
+        self.scratch = st.new_scratch(self.rows, modes)
 
     def go(self, periods: int, max_events: int) -> int:
         """Advance to the end of `periods`. Returns the automaton's code."""
-        if not auto.begin(self.rows, self.flows, self.state, self.records):
+        if not auto.begin(self.rows, self.state, self.records, self.scratch):
             return auto.UNDECIDED
         self._advance(0, max_events)
-        auto.record_section(self.rows, self.flows, self.state, self.records)
+        auto.record_section(self.rows, self.flows, self.state, self.records, self.scratch)
         return self._advance(periods, max_events)
 
     def _advance(self, periods: int, max_events: int) -> int:
         while True:
-            code = int(
-                auto.advance(self.rows, self.flows, self.state, self.channels, self.records, periods, max_events)
+            code = auto.advance(
+                self.rows, self.flows, self.state, self.channels, self.records, self.scratch, periods, max_events
             )
             if code == auto.NEEDS_FLOW:
                 key = (int(self.state.key[0]), int(self.state.key[1]))
                 self.flows = add_flow(self.flows, self.rows, key)
                 continue
-            self.log.take(self.records.log, int(self.state.counters[auto.LOGGED]))
-            self.state.counters[auto.LOGGED] = 0
+            self.log.take(self.records.log, int(self.state.counters[st.LOGGED]))
+            self.state.counters[st.LOGGED] = 0
             if code != auto.LOG_FULL:
-                return code
-
-
-def _initial_state(rows: Rows, flows: Flows, displacement: np.ndarray, velocity: np.ndarray) -> auto.State:
-    r, m, n, b = len(rows.delassus), flows.eigenvalue.shape[1], len(rows.stiffness), len(rows.mass)
-    state = auto.State(
-        counters=np.zeros(9, np.int64), time=np.zeros(1), key=np.zeros(2, np.int64),
-        amplitude=np.zeros(m, complex), awake=np.zeros(m, np.int64), coordinates=np.zeros(2 * n),
-        constant=np.zeros(n), displacement=displacement.copy(), velocity=velocity.copy(), drift=np.zeros(r),
-        body_drift=np.zeros(b), held=np.zeros(r), level=np.zeros(r), state=np.zeros(r, np.int64),
-        released=np.zeros(r, np.bool_), ledger=np.zeros(len(ENERGIES)), settling=np.zeros(r),
-    )  # fmt: skip
-    state.amplitude[0] = 1.0
-    return state
-
-
-def _channels(rows: Rows, flows: Flows) -> auto.Channels:
-    k = len(rows.delassus) + rows.friction_rows
-    whole = lambda: np.zeros(k, np.int64)  # noqa: E731
-    real = lambda: np.zeros(k)  # noqa: E731
-    return auto.Channels(
-        whole(), whole(), whole(), real(), real(), real(), real(), real(), real(),
-        np.zeros((k, flows.eigenvalue.shape[1]), complex),
-    )  # fmt: skip
-
-
-def _records(rows: Rows, periods: int, samples: int) -> auto.Records:
-    b = len(rows.mass)
-    return auto.Records(
-        peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
-        momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),
-        section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
-        samples=np.zeros((periods * samples, 1 + b)), log=np.zeros((4096 + 4 * len(rows.delassus), 7)),
-    )  # fmt: skip
+                return int(code)
 
 
 def _response(scene: Scene, run: _Run, status: Status, wall_time: float) -> Response:
     rows, records, counters = run.rows, run.records, run.state.counters
-    done = int(counters[auto.PERIOD])
+    done = int(counters[st.PERIOD])
     first = min(scene.time.transient, max(done - 1, 0))
     window = slice(first, done)
     span = max(done - first, 1) * rows.period
@@ -125,7 +94,7 @@ def _response(scene: Scene, run: _Run, status: Status, wall_time: float) -> Resp
     b = len(rows.mass)
     section = records.section[: done + 1]
     harmonic = 2 / span * records.harmonic[window].sum()
-    evaluated = {name: float(value) for name, value in zip(ENERGIES, ledger[-1], strict=True)}
+    evaluated = {name: float(value) for name, value in zip(st.ENERGIES, ledger[-1], strict=True)}
     peaks = records.peak[window]
     samples = len(records.samples) // scene.time.periods
     return Response(
@@ -137,7 +106,7 @@ def _response(scene: Scene, run: _Run, status: Status, wall_time: float) -> Resp
         amplitude_harmonic=float(abs(harmonic)),
         phase=float(np.angle(1j * harmonic)),
         impacts_per_period=float(records.impacts[window].sum() / max(done - first, 1)),
-        events=int(counters[auto.EVENTS]),
+        events=int(counters[st.EVENTS]),
         classification=classify(section[first:], records.impacts[window], evaluated["friction"]),
         energy=evaluated,
         energy_residual=_residual(records.ledger[: done + 1]),
@@ -146,9 +115,9 @@ def _response(scene: Scene, run: _Run, status: Status, wall_time: float) -> Resp
         periods=done,
         transient=first,
         counters={
-            "impacts": int(counters[auto.IMPACTS]),
-            "segments": int(counters[auto.SEGMENTS]),
-            "evaluations": int(counters[auto.EVALUATIONS]),
+            "impacts": int(counters[st.IMPACTS]),
+            "segments": int(counters[st.SEGMENTS]),
+            "evaluations": int(counters[st.EVALUATIONS]),
             "subsystems": int(np.count_nonzero(run.flows.modes)),
         },
         peak=records.peak[:done].copy(),
@@ -165,8 +134,8 @@ def _response(scene: Scene, run: _Run, status: Status, wall_time: float) -> Resp
 def _residual(ledger: np.ndarray) -> float:
     """Imbalance of the energy ledger (periods + 1, 6), relative to its largest term."""
     change = ledger[-1] - ledger[0]
-    imbalance = change[auto.EXCITATION] - change[auto.VISCOUS : auto.STORED].sum() - change[auto.STORED]
-    largest = max(np.abs(change).max(), np.abs(ledger[:, auto.STORED]).max())
+    imbalance = change[st.EXCITATION] - change[st.VISCOUS : st.STORED].sum() - change[st.STORED]
+    largest = max(np.abs(change).max(), np.abs(ledger[:, st.STORED]).max())
     return float(abs(imbalance) / largest) if largest > 0 else 0.0
 
 
@@ -191,6 +160,6 @@ def _events(rows: Rows, chunks: list[np.ndarray]) -> list[Event]:
             side = "body" if len(bodies) == 2 else "left" if rows.bodies[row, bodies[0]] > 0 else "right"
         # speeds of the gap, turned into speeds of the body relative to what it meets
         sign = 1.0 if side in ("left", "floor") else -1.0
-        before, after, impulse = sign * float(entry[4]) + 0.0, sign * float(entry[5]) + 0.0, float(entry[6])
-        events.append(Event(float(entry[0]), _KINDS[int(entry[1])], int(bodies[0]), side, before, after, impulse))
+        before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
+        events.append(Event(float(entry[0]), st.KINDS[int(entry[1])], int(bodies[0]), side, before, after, impulse))
     return events

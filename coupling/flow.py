@@ -37,6 +37,7 @@ class Rows(NamedTuple):
     limit: np.ndarray  # (friction rows,) friction force at slip, N
     restitution: np.ndarray  # (contacts,)
     gap: np.ndarray  # (contacts,) free travel of the contact's cavity, m: the scale of its gap
+    wall_body: np.ndarray  # (r,) the body of a contact with a wall that rides on the body's floor, otherwise -1
     floor: np.ndarray  # (b, n) floor functional under each body
     mass: np.ndarray  # (b,) kg
     weight: np.ndarray  # (b,) gravity force along the cavity, N
@@ -103,6 +104,7 @@ def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray,
         limit=np.array([_friction_force(scene, i) for i in range(bodies)]),
         restitution=np.array(restitution),
         gap=np.array(gaps),
+        wall_body=np.array([_wall_body(j_structure, j_bodies, r) for r in range(len(j_bodies))]),
         floor=floor,
         mass=mass,
         weight=mass * scene.gravity.tangential,
@@ -132,6 +134,15 @@ def _initial_rows(scene: Scene, structure: LinearStructure, rows: Rows) -> tuple
     speed[: rows.friction_rows] = velocity  # exact, so that a body at relative rest is known to be so
     moved[: rows.friction_rows] = 0.0
     return displacement + moved, speed
+
+
+def _wall_body(structure: np.ndarray, bodies: np.ndarray, r: int) -> int:
+    touched = np.flatnonzero(bodies[r])
+    if r < len(bodies[r]) or len(touched) != 1:
+        return -1
+    body = int(touched[0])
+    rides = np.array_equal(structure[r], bodies[r, body] * structure[body])
+    return body if rides else -1
 
 
 def _friction_force(scene: Scene, index: int) -> float:

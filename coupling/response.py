@@ -22,10 +22,6 @@ class Status(StrEnum):
     UNDECIDED = "undecided_contact"
 
 
-#: entries of the energy ledger, J
-ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
-
-
 @dataclass(frozen=True)
 class Event:
     """One event: time (s), kind, body, side ("left", "right", "body" or "floor"), speeds (m/s), impulse (N s)."""

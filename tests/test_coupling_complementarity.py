@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from coupling.complementarity import AT_HIGH, AT_LOW, DEPENDENT, FREE, solve_box
+from coupling.state import new_problem
 
 
 def solve(a_matrix, b, lo, hi, forced=None):
     k = len(b)
-    f, a, state = np.zeros(k), np.zeros(k), np.zeros(k, np.int64)
-    forced = np.zeros(k, np.int64) if forced is None else np.asarray(forced)
-    assert solve_box(np.asarray(a_matrix, float), np.asarray(b, float), np.asarray(lo, float), np.asarray(hi, float),
-                     forced, f, a, state)  # fmt: skip
-    return f, a, state
+    problem = new_problem(k + 1)  # room to spare: only the first k rows count
+    problem.matrix[:k, :k], problem.b[:k], problem.low[:k], problem.high[:k] = a_matrix, b, lo, hi
+    problem.forced[:k] = 0 if forced is None else forced
+    assert solve_box(problem, k)
+    return problem.force[:k], problem.acceleration[:k], problem.state[:k]
 
 
 def by_enumeration(a_matrix, b, lo, hi):

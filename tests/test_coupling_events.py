@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from coupling.automaton import _step
 from coupling.events import FORCE, POSITION, VELOCITY, bounds, evaluate, exp_minus_line, exp_minus_one
+from coupling.watch import advance_or_stop
 
 
 @njit
@@ -16,7 +16,7 @@ def search(order, k0, k1, k2, g, eigenvalue, end):
     t, steps = 0.0, 0
     while t < end:
         f, slope, curvature, noise = evaluate(order, k0, k1, k2, g, eigenvalue, awake, t)
-        step = _step(f, slope, curvature, noise, second, third, end, 1e-15 * end)
+        step = advance_or_stop(f, slope, curvature, noise, second, third, end, 1e-15 * end)
         if step <= 0.0:
             return t, steps
         t += step

@@ -1,0 +1,168 @@
+"""What changes during a run: the automaton's state, its event functions, its records and its scratch space.
+
+Sizes: r rows (friction rows first, then contacts), m complex modes, n modes of the structure, b bodies, k channels.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from coupling.flow import Rows
+
+# state of a friction row; a row that slips is known by its direction, one without friction coasts
+SLIP_LEFT, COAST, SLIP_RIGHT, STICK, HELD = -1, 0, 1, 2, 3
+# state of a contact row; TOUCHING: closed, but another row carries its force
+OPEN, CLOSED, TOUCHING = 0, 1, 2
+
+COUNTERS = ("period", "flow", "searching", "logged", "events", "impacts", "evaluations", "segments", "awake")
+PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE = range(len(COUNTERS))
+
+KINDS = ("impact", "stick", "slip", "detach", "rest")
+IMPACT, STICKS, SLIPS, DETACHES, RESTS = range(len(KINDS))
+
+#: entries of the energy ledger, J
+ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
+EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES))
+
+
+class State(NamedTuple):
+    """The state at the start of a segment."""
+
+    counters: np.ndarray  # int, by the names above
+    time: np.ndarray  # (1,) within the period, s
+    key: np.ndarray  # (2,) closed friction rows and contacts, bit masks
+    amplitude: np.ndarray  # (m,) complex modal amplitudes; the first is the excitation's phase
+    awake: np.ndarray  # (m,) the modes that are awake are the first counters[AWAKE] of these
+    coordinates: np.ndarray  # (2n,) p and p' of the structure where a new subsystem begins
+    constant: np.ndarray  # (n,) constant part of p
+    displacement: np.ndarray  # (r,) of each row, m
+    velocity: np.ndarray  # (r,)
+    drift: np.ndarray  # (r,) constant acceleration of each row's free bodies
+    body_drift: np.ndarray  # (b,)
+    held: np.ndarray  # (r,) constant force of rows that are not closed, N
+    level: np.ndarray  # (r,) constant part of a closed row's force, N
+    state: np.ndarray  # (r,) int
+    released: np.ndarray  # (r,) whether the row has just let go, its force at a bound
+    settling: np.ndarray  # (r,) rebound speed below which an impact ends a chatter, m/s
+    ledger: np.ndarray  # (6,) J
+
+
+class Channels(NamedTuple):
+    """The event functions watched in a segment."""
+
+    row: np.ndarray
+    order: np.ndarray
+    side: np.ndarray
+    k0: np.ndarray
+    k1: np.ndarray
+    k2: np.ndarray
+    second: np.ndarray
+    third: np.ndarray
+    safe: np.ndarray  # time before which no root can lie
+    g: np.ndarray  # (k, m)
+
+
+class Records(NamedTuple):
+    """What a run leaves behind. One entry a period unless said otherwise."""
+
+    peak: np.ndarray  # largest |x|, m
+    harmonic: np.ndarray  # complex integral of x exp(-i omega t), m s
+    square: np.ndarray  # integral of x^2, m^2 s
+    momentum: np.ndarray  # complex integral of the bodies' momentum times exp(-i omega t), N s^2
+    impacts: np.ndarray
+    section: np.ndarray  # (periods + 1, 3 + 2b): x, x', bodies' momentum, slips, slip velocities at the period's start
+    ledger: np.ndarray  # (periods + 1, 6) cumulative, J
+    samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples a period
+    log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
+
+
+class Scratch(NamedTuple):
+    """Space for intermediate results."""
+
+    first: np.ndarray  # (m,) exp(lambda tau) - 1 of the awake modes
+    line: np.ndarray  # (m,) exp(lambda tau) - 1 - lambda tau
+    speed: np.ndarray  # (m,)
+    coordinates: np.ndarray  # (2n,)
+    on_structure: np.ndarray  # (n,)
+    on_bodies: np.ndarray  # (b,)
+    acceleration: np.ndarray  # (r,)
+    jump: np.ndarray  # (n,)
+    impulse: np.ndarray  # (r,)
+    before: np.ndarray  # (r,) int, row states
+    forced: np.ndarray  # (r,) int
+    rows: np.ndarray  # (r,) int
+    problem: Problem
+
+
+class Problem(NamedTuple):
+    """A complementarity problem of up to r rows with the space to solve it (coupling.complementarity)."""
+
+    matrix: np.ndarray  # (r, r)
+    b: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    forced: np.ndarray
+    force: np.ndarray
+    acceleration: np.ndarray
+    state: np.ndarray
+    restitution: np.ndarray
+    d_force: np.ndarray
+    d_acceleration: np.ndarray
+    free: np.ndarray
+    factor: np.ndarray  # (r, r)
+    solution: np.ndarray
+
+
+def new_state(rows: Rows, modes: int, displacement: np.ndarray, velocity: np.ndarray) -> State:
+    """The state at time zero with the rows as given; `modes` is the room for complex modes."""
+    r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
+    state = State(
+        counters=np.zeros(len(COUNTERS), np.int64), time=np.zeros(1), key=np.zeros(2, np.int64),
+        amplitude=np.zeros(modes, complex), awake=np.zeros(modes, np.int64), coordinates=np.zeros(2 * n),
+        constant=np.zeros(n), displacement=np.array(displacement), velocity=np.array(velocity), drift=np.zeros(r),
+        body_drift=np.zeros(b), held=np.zeros(r), level=np.zeros(r), state=np.zeros(r, np.int64),
+        released=np.zeros(r, np.bool_), settling=np.zeros(r), ledger=np.zeros(len(ENERGIES)),
+    )  # fmt: skip
+    state.amplitude[0] = 1.0
+    return state
+
+
+def new_channels(rows: Rows, modes: int) -> Channels:
+    """Room for two event functions a friction row and one a contact."""
+    k = len(rows.delassus) + rows.friction_rows
+    integers, reals = np.zeros((3, k), np.int64), np.zeros((6, k))
+    return Channels(*integers, *reals, np.zeros((k, modes), complex))
+
+
+def new_records(rows: Rows, periods: int, samples: int) -> Records:
+    """Room for `periods` periods with `samples` samples each."""
+    b = len(rows.mass)
+    return Records(
+        peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
+        momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),
+        section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
+        samples=np.zeros((periods * samples, 1 + b)), log=np.zeros((4096 + 4 * len(rows.delassus), 6)),
+    )  # fmt: skip
+
+
+def new_problem(r: int) -> Problem:
+    """Room for a complementarity problem of r rows."""
+    reals, integers = iter(np.zeros((9, r))), iter(np.zeros((3, r), np.int64))
+    return Problem(
+        matrix=np.zeros((r, r)), b=next(reals), low=next(reals), high=next(reals), forced=next(integers),
+        force=next(reals), acceleration=next(reals), state=next(integers), restitution=next(reals),
+        d_force=next(reals), d_acceleration=next(reals), free=next(integers), factor=np.zeros((r, r)),
+        solution=next(reals),
+    )  # fmt: skip
+
+
+def new_scratch(rows: Rows, modes: int) -> Scratch:
+    """Scratch space for a scene."""
+    r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
+    complexes, integers = np.zeros((3, modes), complex), np.zeros((3, r), np.int64)
+    return Scratch(
+        *complexes, np.zeros(2 * n), np.zeros(n), np.zeros(b), np.zeros(r), np.zeros(n), np.zeros(r), *integers,
+        new_problem(r),
+    )  # fmt: skip

@@ -1,0 +1,144 @@
+"""Which event functions a state calls for, and the first of their roots."""
+
+from __future__ import annotations
+
+import math
+
+from coupling.compiled import kernel
+from coupling.complementarity import AT_HIGH, AT_LOW
+from coupling.events import FORCE, POSITION, VELOCITY, bounds, evaluate, safe_step
+from coupling.state import AWAKE, CLOSED, EVALUATIONS, FLOW, OPEN, SEGMENTS, SLIP_LEFT, SLIP_RIGHT, STICK
+
+#: shortest step in periods: what a double can resolve within a period
+RESOLUTION = 1e-15
+#: rebounds shorter than this, in periods, end a chatter
+CHATTER = 3e-10
+
+
+@kernel
+def next_event(rows, flows, st, ch):
+    """Time to the next event and its channel, or to the period's end and -1."""
+    s = st.counters[FLOW]
+    left = max(rows.period - st.time[0], 0.0)
+    shortest = RESOLUTION * rows.period
+    eigenvalue, awake = flows.eigenvalue[s], st.awake[: st.counters[AWAKE]]
+    count = _watch(rows, flows, st, ch, s, left)
+    st.counters[SEGMENTS] += 1
+    while True:
+        k, tau = -1, left
+        for i in range(count):
+            if ch.safe[i] < tau:
+                k, tau = i, ch.safe[i]
+        if k < 0:
+            return left, -1
+        st.counters[EVALUATIONS] += 1
+        f, slope, curvature, noise = evaluate(
+            ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau
+        )
+        step = advance_or_stop(f, slope, curvature, noise, ch.second[k], ch.third[k], left, shortest)
+        if step <= 0.0:
+            return tau, k
+        ch.safe[k] = tau + step
+
+
+@kernel
+def advance_or_stop(f, slope, curvature, noise, second, third, longest, shortest):
+    """Safe step from a point of an event function; 0 where the function is at its root and falls."""
+    if f <= noise:
+        if slope < 0.0 or (slope <= second * shortest and curvature < 0.0):
+            return 0.0
+        f = 0.0
+    step = safe_step(f, slope, curvature, second, third, longest)
+    if step < shortest:
+        return 0.0 if slope < 0.0 else shortest
+    return step
+
+
+@kernel
+def _watch(rows, flows, st, ch, s, left):
+    """Set up the event functions of the segment with their first safe steps. Returns how many."""
+    count = 0
+    for r in range(rows.friction_rows):
+        state = st.state[r]
+        if state == STICK:
+            for side in (AT_LOW, AT_HIGH):
+                count = _watch_force(rows, flows, st, ch, s, r, side, rows.limit[r], count, left)
+        elif state == SLIP_LEFT or state == SLIP_RIGHT:  # noqa: SIM109 (faster compiled)
+            count = _watch_motion(rows, flows, st, ch, s, r, VELOCITY, float(state), count, left)
+    for r in range(rows.friction_rows, len(st.state)):
+        if st.state[r] == CLOSED:
+            count = _watch_force(rows, flows, st, ch, s, r, AT_LOW, 0.0, count, left)
+        elif st.state[r] == OPEN and not _surely_opens(rows, st, r):
+            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, 1.0, count, left)
+    return count
+
+
+@kernel
+def _surely_opens(rows, st, r):
+    """Whether a gap can only widen in this segment: the body slides away from a wall that rides on its floor."""
+    body = rows.wall_body[r]
+    if body < 0 or (st.state[body] != SLIP_LEFT and st.state[body] != SLIP_RIGHT):
+        return False
+    return st.state[body] * rows.bodies[r, body] > 0.0
+
+
+@kernel
+def _watch_motion(rows, flows, st, ch, s, r, order, sign, k, left):
+    """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r for its first root."""
+    ch.row[k], ch.order[k], ch.side[k] = r, order, 0
+    curvature, jerk, snap = sign * st.drift[r], 0.0, 0.0
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        rate = flows.eigenvalue[s, j]
+        g = sign * flows.motion[s, r, j] * st.amplitude[j]
+        second = g * rate * rate
+        curvature += second.real
+        jerk += (second * rate).real
+        ch.g[k, j] = g if order == POSITION else g * rate
+        snap += (abs(second.real) + abs(second.imag)) * (rate.real * rate.real + rate.imag * rate.imag)
+    if order == POSITION:
+        f, slope, fall = st.displacement[r], st.velocity[r], curvature
+        ch.k1[k], ch.k2[k] = slope, st.drift[r]
+        st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
+    else:
+        f, slope, fall = sign * st.velocity[r], curvature, jerk
+        ch.k1[k], ch.k2[k] = sign * st.drift[r], 0.0
+    ch.k0[k] = f
+    awake = st.awake[: st.counters[AWAKE]]
+    ch.second[k], ch.third[k] = bounds(order, ch.k2[k], ch.g[k], flows.eigenvalue[s], awake)
+    shortest = RESOLUTION * rows.period
+    if st.released[r]:
+        # the force was at its bound: the row starts from rest with vanishing acceleration, and its jerk decides
+        quick = 2.0 * jerk / snap if order == POSITION else 1.5 * fall / ch.third[k]
+        ch.safe[k] = max(quick if quick == quick else left, 1e3 * shortest)
+    else:
+        noise = 4e-16 * abs(f)
+        ch.safe[k] = advance_or_stop(f, slope, fall, noise, ch.second[k], ch.third[k], left, shortest)
+    return k + 1
+
+
+@kernel
+def _watch_force(rows, flows, st, ch, s, r, side, limit, k, left):
+    """Watch the force of a closed row for reaching its low (AT_LOW) or high (AT_HIGH) bound."""
+    sign = 1.0 if side == AT_LOW else -1.0
+    constant = sign * st.level[r] + limit
+    f, slope, curvature, swing = constant, 0.0, 0.0, 0.0
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        rate = flows.eigenvalue[s, j]
+        g = sign * flows.force[s, r, j] * st.amplitude[j]
+        ch.g[k, j] = g
+        f += g.real
+        slope += (g * rate).real
+        curvature += (g * rate * rate).real
+        swing += math.hypot(g.real, g.imag)
+    if constant > swing:
+        return k  # the force never comes near its bound: nothing to watch
+    ch.row[k], ch.order[k], ch.side[k] = r, FORCE, side
+    ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
+    awake = st.awake[: st.counters[AWAKE]]
+    ch.second[k], ch.third[k] = bounds(FORCE, 0.0, ch.g[k], flows.eigenvalue[s], awake)
+    noise = 1e-15 * (abs(constant) + swing)
+    shortest = RESOLUTION * rows.period
+    ch.safe[k] = advance_or_stop(f, slope, curvature, noise, ch.second[k], ch.third[k], left, shortest)
+    return k + 1
