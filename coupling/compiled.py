@@ -6,4 +6,4 @@ the arithmetic: a compiled function allocates nothing and works in the arrays th
 
 from numba import njit
 
-kernel = njit(cache=True, error_model="numpy", _nrt=False)
+kernel = njit(cache=True, error_model="numpy", _nrt=False)  # type: ignore[call-overload]  # _nrt is not in its stubs

@@ -39,7 +39,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
     """`data` as a `record`, or an InputError naming the source, the key and the remedy."""
-    adapter = _adapter(record)
+    adapter: TypeAdapter[T] = _adapter(record)
     try:
         return adapter.validate_python(dict(data))
     except ValidationError as error:
@@ -48,7 +48,7 @@ def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
 
 
 @lru_cache(maxsize=32)
-def _adapter(record: type[T]) -> TypeAdapter[T]:
+def _adapter(record: Any) -> TypeAdapter[Any]:
     return TypeAdapter(record)
 
 

@@ -133,7 +133,7 @@ def new_channels(rows: Rows, modes: int) -> Channels:
     """Room for two event functions a friction row and one a contact."""
     k = len(rows.delassus) + rows.friction_rows
     integers, reals = np.zeros((3, k), np.int64), np.zeros((6, k))
-    return Channels(*integers, *reals, np.zeros((k, modes), complex))
+    return Channels._make([*integers, *reals, np.zeros((k, modes), complex)])
 
 
 def new_records(rows: Rows, periods: int, samples: int) -> Records:
@@ -162,7 +162,7 @@ def new_scratch(rows: Rows, modes: int) -> Scratch:
     """Scratch space for a scene."""
     r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
     complexes, integers = np.zeros((3, modes), complex), np.zeros((3, r), np.int64)
-    return Scratch(
-        *complexes, np.zeros(2 * n), np.zeros(n), np.zeros(b), np.zeros(r), np.zeros(n), np.zeros(r), *integers,
-        new_problem(r),
+    return Scratch._make(
+        [*complexes, np.zeros(2 * n), np.zeros(n), np.zeros(b), np.zeros(r), np.zeros(n), np.zeros(r), *integers,
+         new_problem(r)]
     )  # fmt: skip
