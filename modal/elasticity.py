@@ -106,6 +106,12 @@ class Solid:
         """Cells, VTK cell types and points, the points in the order of the nodes; for pyvista.UnstructuredGrid."""
         return fenicsx.vtk_mesh(self.space)
 
+    def write(self, fields: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> None:
+        """Write named displacement fields (N,) for ParaView, as XDMF at the nodes of the mesh."""
+        if os.path.splitext(path)[1] != ".xdmf":
+            raise ElasticityError(f"path: expected a file name ending in .xdmf, not {path}")
+        fenicsx.write_fields(self.space, fields, path)
+
     def _patch(self, facets: np.ndarray) -> Patch:
         nodes = fenicsx.group_nodes(self.space, facets)
         return Patch(nodes, fenicsx.facet_weights(self.domain, self.space, facets)[nodes])

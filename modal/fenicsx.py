@@ -18,6 +18,9 @@ from typing import Any
 
 import dolfinx
 import dolfinx.fem.petsc
+import dolfinx.io
+import dolfinx.mesh
+import dolfinx.plot
 import gmsh
 import numpy as np
 import petsc4py
@@ -93,10 +96,7 @@ def read(path: str | os.PathLike[str]) -> Domain:
 
 def vector_space(domain: Domain, degree: int) -> Any:
     """Continuous Lagrange displacements of a degree, three components a node."""
-    with _quiet():
-        if hasattr(fem, "functionspace"):
-            return fem.functionspace(domain.mesh, ("Lagrange", degree, (3,)))
-        return fem.VectorFunctionSpace(domain.mesh, ("Lagrange", degree))
+    return _vectors(domain.mesh, degree)
 
 
 def discontinuous_space(domain: Domain, degree: int) -> Any:
@@ -168,10 +168,21 @@ def evaluate(expression: Any, space: Any) -> Any:
     return function
 
 
+def write_fields(space: Any, fields: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> None:
+    """Write named displacement fields at the nodes of the mesh, as XDMF."""
+    # XDMF carries one set of nodes
+    at_nodes = _vectors(space.mesh, space.mesh.geometry.cmap.degree)
+    with dolfinx.io.XDMFFile(MPI.COMM_SELF, os.fspath(path), "w") as file:
+        file.write_mesh(space.mesh)
+        for name, values in fields.items():
+            function = fem.Function(at_nodes)
+            function.interpolate(field(space, values))
+            function.name = name
+            file.write_function(function)
+
+
 def vtk_mesh(space: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cells, VTK cell types and points of the nodes of a space, as pyvista.UnstructuredGrid takes them."""
-    import dolfinx.plot
-
     create = getattr(dolfinx.plot, "vtk_mesh", None) or dolfinx.plot.create_vtk_mesh
     cells, types, points = create(space)
     return np.asarray(cells), np.asarray(types), np.asarray(points)
@@ -206,6 +217,13 @@ def _check_kinds() -> None:
     for kind in gmsh.model.mesh.getElementTypes(2):
         if gmsh.model.mesh.getElementProperties(kind)[2] != order:
             raise MeshError(f"facets are not of the volume elements' order {order}; set the order of the whole mesh")
+
+
+def _vectors(mesh: Any, degree: int) -> Any:
+    with _quiet():
+        if hasattr(fem, "functionspace"):
+            return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
+        return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
 def _members(tags: Any, names: Mapping[str, int]) -> dict[str, np.ndarray]:

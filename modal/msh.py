@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,7 +26,8 @@ def session(name: str) -> Iterator[None]:
         current = gmsh.model.getCurrent()
     else:
         # reading config files and catching signals are a program's business, not a library's
-        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        with _native_stderr_muted():
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
     terminal = gmsh.option.getNumber("General.Terminal")
     gmsh.option.setNumber("General.Terminal", 0)
     try:
@@ -79,6 +81,24 @@ def check_disjoint(dimension: int, kind: str) -> None:
                     f"{kind} groups {names[first]!r} and {name!r} share {shared} elements; "
                     f"make the groups disjoint, an element can carry one label only"
                 )
+
+
+@contextlib.contextmanager
+def _native_stderr_muted() -> Iterator[None]:
+    """Send what C code writes to standard error to nowhere.
+
+    gmsh's wheels carry a PETSc of their own, which mistakes Open MPI 5 for two MPI libraries at once and says so, past
+    gmsh's own settings. Meshing does not use it.
+    """
+    stderr = os.dup(2)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(nowhere)
 
 
 def _elements(dimension: int, tag: int) -> set[tuple[int, ...]]:

@@ -1,5 +1,6 @@
 """Stiffness, mass, patches and stresses against what elasticity gives in closed form."""
 
+import h5py
 import numpy as np
 import pytest
 
@@ -101,3 +102,27 @@ def test_refuses_a_group_without_material(tmp_path):
     path = build(BLOCK, tmp_path / "block.msh")
     with pytest.raises(ElasticityError, match="volume group 'block' has none"):
         assemble(path, {}, {})
+
+
+def test_fields_for_paraview(solid, block, tmp_path):
+    """The stretch of the block comes back at the nodes of the mesh."""
+    fields = {"stretch": displacement(block, np.diag([1.0, 2.0, 3.0])), "zero": np.zeros(block.size)}
+    solid.write(fields, tmp_path / "u.xdmf")
+    with h5py.File(tmp_path / "u.h5") as file:
+        points = file["Mesh/mesh/geometry"][()]
+        assert np.ptp(points, axis=0) == pytest.approx([0.3, 0.2, 0.1])
+        assert file["Function/stretch/0"][()] == pytest.approx(points * [1.0, 2.0, 3.0], abs=1e-12)
+        assert np.all(file["Function/zero/0"][()] == 0.0)
+
+
+def test_cells_for_pyvista(solid, block):
+    """The cells that drawing takes fill the volume, on the points of the matrices."""
+    pyvista = pytest.importorskip("pyvista")
+    cells, types, points = solid.vtk_mesh()
+    assert np.array_equal(points, block.coordinates)
+    assert pyvista.UnstructuredGrid(cells, types, points).volume == pytest.approx(0.3 * 0.15 * 0.1, rel=1e-6)
+
+
+def test_refuses_other_formats(solid, tmp_path):
+    with pytest.raises(ElasticityError, match=r"\.xdmf"):
+        solid.write({}, tmp_path / "u.vtk")
