@@ -1,0 +1,33 @@
+# `make` alone lists what there is. Every target sets up what it needs; in an environment of your own (conda), name its
+# interpreter instead: make test PYTHON=python
+
+PYTHON = .venv/bin/python
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-all check bench
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup: ## install what is missing: system packages (apt, with sudo when not root) and .venv
+ifeq ($(origin PYTHON), file)
+	@scripts/setup.sh
+endif
+
+demo: setup ## the whole pipeline on the shipped mesh; the report is out/report.html
+	$(PYTHON) -m studies demo -o out
+
+test: setup ## the tests, fast tier
+	$(PYTHON) -m pytest -q
+
+test-all: setup ## the tests with the slow verification tier
+	$(PYTHON) -m pytest -q -m "slow or not slow"
+
+check: setup ## ruff, mypy, import contracts
+	$(PYTHON) -m ruff check
+	$(PYTHON) -m ruff format --check
+	$(PYTHON) -m mypy
+	$(PYTHON) -c "from importlinter.cli import lint_imports_command as lint; lint()"
+
+bench: setup ## error against cost, and where methods fail; charts in out/bench
+	$(PYTHON) -m studies bench engine -o out/bench

@@ -1,0 +1,116 @@
+#!/usr/bin/env bash
+# Everything vanedamp needs, on Debian or Ubuntu: system packages (dolfinx has no wheel), a virtual environment on the
+# system's interpreter, which apt's dolfinx belongs to, the pinned packages of requirements.txt and the project itself.
+# It installs what is missing and nothing else, so it may run before every command.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+python=/usr/bin/python3
+venv=.venv
+stamp=$venv/setup-stamp # names what .venv was made from; written last, so that a killed set-up starts over
+
+system_packages=(
+    # h5py stays apt's: PyPI's carries a second HDF5 library, which breaks Debian 12's dolfinx
+    python3-dolfinx python3-slepc4py python3-scipy python3-h5py
+    python3-venv python3-setuptools python3-wheel
+    # without OpenBLAS a factorisation is six times slower
+    libopenblas0-pthread
+    # dolfinx compiles forms when they are first used
+    gcc libc6-dev
+    # gmsh and pyvista, which render without a display but not without these
+    libglu1-mesa libgl1 libegl1 libxcursor1 libxft2 libxinerama1 libxfixes3 libxrender1 libfontconfig1
+)
+
+say() { echo "setup: $*" >&2; }
+
+refuse() {
+    say "$*"
+    cat >&2 <<'END'
+Where the system has no suitable dolfinx, take conda's (conda-forge, Linux and macOS):
+    conda env create -f environment.yml
+    conda activate vanedamp
+    pip install --no-deps -e .
+    make test PYTHON=python
+END
+    exit 1
+}
+
+as_root() {
+    if [ "$(id -u)" = 0 ]; then
+        "$@"
+    elif command -v sudo >/dev/null; then
+        sudo "$@"
+    else
+        say "this needs root, and there is no sudo. As root: apt-get install --no-install-recommends ${missing[*]}"
+        exit 1
+    fi
+}
+
+quietly() { as_root env DEBIAN_FRONTEND=noninteractive "$@" >/dev/null; }
+
+apt_get() { quietly apt-get -qq -o DPkg::Lock::Timeout=600 "$@"; }
+
+installed() { [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null)" = installed ]; }
+
+require_python() {
+    $python -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
+        refuse "$python is $($python -V), and 3.11 or newer is needed."
+}
+
+install_system_packages() {
+    local package
+    missing=()
+    for package in "${system_packages[@]}"; do
+        installed "$package" || missing+=("$package")
+    done
+    if [ ${#missing[@]} = 0 ]; then
+        require_python
+        return
+    fi
+    say "installing system packages: ${missing[*]}"
+    quietly dpkg --configure -a || true # finishes what an earlier installation left half done
+    apt_get update || say "apt-get update failed; going on with the package lists that are there"
+    [ -x $python ] || apt_get install -y --no-install-recommends python3
+    require_python
+    apt-get --simulate install python3-dolfinx >/dev/null 2>&1 || refuse "apt has no python3-dolfinx to install here."
+    apt_get install -y --no-install-recommends "${missing[@]}"
+}
+
+# A finished set-up whose interpreter still finds the packages, also after an upgrade of the system's Python.
+finished() {
+    [ -f $stamp ] && $venv/bin/python -P - <<'END'
+import sys
+from importlib.util import find_spec
+
+sys.exit(not all(map(find_spec, ["dolfinx", "slepc4py", "scipy", "h5py", "numba", "gmsh", "pyvista", "pytest", "modal"])))
+END
+}
+
+up_to_date() { finished && [ "$(cat $stamp)" = "$wanted" ]; }
+
+wanted=$({ pwd && cat scripts/setup.sh requirements.txt pyproject.toml; } | cksum)
+up_to_date && exit 0
+
+command -v apt-get >/dev/null || refuse "there is no apt-get here."
+exec 9<scripts/setup.sh
+flock --nonblock 9 || { say "waiting for another set-up to end" && flock 9; }
+up_to_date && exit 0
+
+install_system_packages
+finished || $python -m venv --clear --system-site-packages $venv
+rm -f $stamp
+say "installing Python packages into $venv"
+# --no-deps: requirements.txt is complete, and dependencies that apt provides under other names stay apt's
+$venv/bin/pip install --quiet --disable-pip-version-check --no-deps -r requirements.txt
+$venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+echo "$wanted" >$stamp
+$venv/bin/python - >&2 <<'END'
+import platform
+
+import dolfinx
+import numpy
+from petsc4py import PETSc
+
+petsc = ".".join(map(str, PETSc.Sys.getVersion()))
+print(f"setup: ready: Python {platform.python_version()}, dolfinx {dolfinx.__version__}, PETSc {petsc}, numpy {numpy.__version__}")
+END
