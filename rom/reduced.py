@@ -151,11 +151,7 @@ class ReducedModel:
 
     def row(self, label: str) -> np.ndarray:
         """(n,) functional of an interface coordinate. Raises ReducedModelError with the labels that exist."""
-        if label not in self.interface:
-            raise ReducedModelError(
-                f"no interface coordinate {label!r}; there are: {', '.join(self.interface) or 'none'}"
-            )
-        return self.selection[self.interface.index(label)]
+        return self.selection[self._index(label)]
 
     def contact_mass(self, label: str) -> float:
         """1 / (w^T M^-1 w), kg: what an impact on that interface coordinate has to move at once.
@@ -165,11 +161,16 @@ class ReducedModel:
         row = self.row(label)
         return float(1.0 / (row @ linalg.solve(self.mass, row, assume_a="pos")))
 
+    def receptance(self, frequencies_hz: Sequence[float] | np.ndarray) -> np.ndarray:
+        """(f, k, k) complex receptance, m/N, from forces at all interface coordinates to displacements at all."""
+        omegas = 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies_hz, dtype=float))
+        dynamic = (self.stiffness + 1j * omega * self.damping - omega**2 * self.mass for omega in omegas)
+        return np.array([self.selection @ np.linalg.solve(matrix, self.selection.T) for matrix in dynamic])
+
     def frf(self, frequencies_hz: Sequence[float] | np.ndarray, response_label: str, force_label: str) -> np.ndarray:
         """(f,) complex receptance, m/N: displacement at one interface coordinate for a unit force at another."""
-        response, force = self.row(response_label), self.row(force_label)
-        omegas = 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies_hz, dtype=float))
-        return np.array([response @ np.linalg.solve(self._dynamic_stiffness(omega), force) for omega in omegas])
+        response, force = self._index(response_label), self._index(force_label)
+        return self.receptance(frequencies_hz)[:, response, force]
 
     def truncated(self, modes: int) -> ReducedModel:
         """The model with its first `modes` fixed-interface modes alone; the static interface stays exact.
@@ -247,8 +248,10 @@ class ReducedModel:
     def _eigenvalues(self) -> np.ndarray:
         return _spectrum(self.mass, self.stiffness)[0]
 
-    def _dynamic_stiffness(self, omega: float) -> np.ndarray:
-        return self.stiffness + 1j * omega * self.damping - omega**2 * self.mass
+    def _index(self, label: str) -> int:
+        if label not in self.interface:
+            raise ReducedModelError(f"no interface coordinate {label!r}; there are: {', '.join(self.interface)}")
+        return self.interface.index(label)
 
     def _check_interface(self) -> None:
         twice = sorted({label for label in self.interface if self.interface.count(label) > 1})

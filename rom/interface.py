@@ -1,0 +1,162 @@
+"""Interface coordinates: the displacements that loads and contacts act on, as functionals of a structure's DOFs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from modal import store
+from modal.matrices import Patch, SystemMatrices, patch_average, unit_direction
+
+KINDS = ("average", "rigid", "node")
+# of the largest singular value: below it a functional, or a rigid motion of a patch, is a combination of the others
+_DEPENDENT = 1e-10
+
+
+class InterfaceError(ValueError):
+    """Interface coordinates that the structure does not have, or that depend on each other; the message names them."""
+
+
+@dataclass(frozen=True)
+class InterfaceCoordinate:
+    """One displacement of a structure.
+
+    label      its name in the reduced model
+    facets     the patch of the system matrices
+    direction  three numbers, scaled to length one
+    kind       "average": mean displacement over the area; the patch deforms freely, a load on it is a constant
+               traction. "rigid": the patch moves as a rigid body, which stiffens the structure, and this is the
+               translation of its centroid. "node": the node nearest to the centroid.
+
+    The least-squares rigid motion of a patch that deforms needs no kind of its own: fitted over the area about the
+    centroid, its translation is the mean displacement. Raises InterfaceError or modal.matrices.MatricesError.
+    """
+
+    label: str
+    facets: str
+    direction: tuple[float, float, float]
+    kind: str = "average"
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InterfaceError(f"{self.label}: kind must be one of {', '.join(KINDS)}, not {self.kind!r}")
+        object.__setattr__(self, "direction", tuple(unit_direction(self.direction).tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """k interface coordinates on a structure with N DOFs.
+
+    coordinates  their definitions, in order
+    vectors      (N, k) functionals: the displacements are vectors^T q
+    motions      (N, n) sparse, the motions q = motions @ y that supports and rigid patches leave to the structure
+    """
+
+    coordinates: tuple[InterfaceCoordinate, ...]
+    vectors: np.ndarray
+    motions: sparse.csr_array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coordinates", tuple(self.coordinates))
+        object.__setattr__(self, "vectors", store.frozen(self.vectors))
+
+    @classmethod
+    def on_patches(cls, matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> Interface:
+        """The interface of these coordinates.
+
+        Raises InterfaceError for labels that occur twice, rigid patches that touch the supports or each other, and
+        coordinates that cannot move or depend on others; modal.matrices.MatricesError for an unknown patch.
+        """
+        labels = [coordinate.label for coordinate in coordinates]
+        if not labels:
+            raise InterfaceError("interface: no coordinates; name at least one facet group and direction")
+        twice = sorted({label for label in labels if labels.count(label) > 1})
+        if twice:
+            raise InterfaceError(f"{twice[0]}: this label occurs twice; interface labels must be unique")
+        vectors = np.column_stack([_functional(matrices, coordinate) for coordinate in coordinates])
+        motions = _motions(matrices, {item.facets: item.label for item in coordinates if item.kind == "rigid"})
+        _check_independent(labels, motions.T @ vectors)
+        return cls(tuple(coordinates), vectors, motions)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The k labels."""
+        return tuple(coordinate.label for coordinate in self.coordinates)
+
+    @property
+    def directions(self) -> np.ndarray:
+        """(k, 3) unit directions."""
+        return np.array([coordinate.direction for coordinate in self.coordinates])
+
+    def restrict(self, matrices: SystemMatrices) -> tuple[sparse.csr_array, sparse.csr_array, np.ndarray]:
+        """Stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure."""
+        stiffness, mass = (
+            sparse.csr_array(self.motions.T @ matrix @ self.motions) for matrix in (matrices.stiffness, matrices.mass)
+        )
+        return stiffness, mass, self.motions.T @ self.vectors
+
+
+def _functional(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.ndarray:
+    if coordinate.kind != "node":
+        return patch_average(matrices, coordinate.facets, coordinate.direction)
+    patch = matrices.patch(coordinate.facets)
+    positions = matrices.coordinates[patch.nodes]
+    nearest = patch.nodes[np.argmin(np.linalg.norm(positions - _centroid(matrices, patch), axis=1))]
+    functional = np.zeros(matrices.size)
+    functional[3 * nearest : 3 * nearest + 3] = coordinate.direction
+    return functional
+
+
+def _motions(matrices: SystemMatrices, rigid: dict[str, str]) -> sparse.csr_array:
+    """Columns for the free DOFs outside rigid patches, then up to six for every rigid patch."""
+    free = np.zeros(matrices.size, dtype=bool)
+    free[matrices.free] = True
+    blocks = []
+    for facets, label in rigid.items():
+        patch = matrices.patch(facets)
+        dofs = (3 * patch.nodes[:, None] + np.arange(3)).ravel()
+        if not np.all(free[dofs]):
+            raise InterfaceError(
+                f"{label}: the rigid patch {facets!r} touches the supports or another rigid patch; "
+                'take kind "average", or rigid patches without common nodes'
+            )
+        free[dofs] = False
+        basis = rigid_basis(matrices.coordinates[patch.nodes] - _centroid(matrices, patch))
+        columns = np.tile(np.arange(basis.shape[1]), len(dofs))
+        shape = (matrices.size, basis.shape[1])
+        blocks.append(sparse.csr_array((basis.ravel(), (np.repeat(dofs, basis.shape[1]), columns)), shape=shape))
+    rest = np.flatnonzero(free)
+    identity = sparse.csr_array((np.ones(rest.size), (rest, np.arange(rest.size))), shape=(matrices.size, rest.size))
+    return sparse.csr_array(sparse.hstack([identity, *blocks]))
+
+
+def rigid_motions(offsets: np.ndarray) -> np.ndarray:
+    """(3 n, 6) unit translations along and rotations (1 rad, small) about x, y, z of points at (n, 3) offsets."""
+    rotations = np.cross(np.eye(3), offsets[:, None, :])
+    translations = np.broadcast_to(np.eye(3), rotations.shape)
+    return np.concatenate([translations, rotations], axis=1).swapaxes(1, 2).reshape(-1, 6)
+
+
+def rigid_basis(offsets: np.ndarray) -> np.ndarray:
+    """(3 n, 6) orthonormal rigid motions of points; fewer columns for points on one line or a single one."""
+    length = np.abs(offsets).max() or 1.0
+    left, singular, _ = np.linalg.svd(rigid_motions(offsets / length), full_matrices=False)
+    return left[:, singular > _DEPENDENT * singular[0]]
+
+
+def _centroid(matrices: SystemMatrices, patch: Patch) -> np.ndarray:
+    return patch.weights @ matrices.coordinates[patch.nodes] / patch.area
+
+
+def _check_independent(labels: list[str], vectors: np.ndarray) -> None:
+    lengths = np.linalg.norm(vectors, axis=0)
+    for label, length in zip(labels, lengths, strict=True):
+        if length == 0.0:
+            raise InterfaceError(f"{label}: cannot move, it lies on the supports")
+    _, singular, right = np.linalg.svd(vectors / lengths, full_matrices=False)
+    if singular[-1] < _DEPENDENT * singular[0]:
+        involved = [label for label, share in zip(labels, right[-1], strict=True) if abs(share) > 1e-6]
+        raise InterfaceError(f"{', '.join(involved)}: linearly dependent displacements; drop one of them")
