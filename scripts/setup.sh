@@ -82,7 +82,8 @@ finished() {
 import sys
 from importlib.util import find_spec
 
-sys.exit(not all(map(find_spec, ["dolfinx", "slepc4py", "scipy", "h5py", "numba", "gmsh", "pyvista", "pytest", "modal"])))
+packages = "dolfinx slepc4py scipy h5py numba gmsh pyvista pytest modal".split()
+sys.exit(not all(map(find_spec, packages)))
 END
 }
 
@@ -112,5 +113,6 @@ import numpy
 from petsc4py import PETSc
 
 petsc = ".".join(map(str, PETSc.Sys.getVersion()))
-print(f"setup: ready: Python {platform.python_version()}, dolfinx {dolfinx.__version__}, PETSc {petsc}, numpy {numpy.__version__}")
+versions = f"dolfinx {dolfinx.__version__}, PETSc {petsc}, numpy {numpy.__version__}"
+print(f"setup: ready: Python {platform.python_version()}, {versions}")
 END
