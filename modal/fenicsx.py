@@ -80,9 +80,8 @@ def read(path: str | os.PathLike[str]) -> Domain:
             raise MeshError(f"{file}: {error}") from error
         names = {dimension: msh.groups(dimension) for dimension in (2, 3)}
         with _quiet():
-            result = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=3)
-    # 0.5 to 0.9 give a tuple, later versions a record
-    mesh, cells, facets = (getattr(result, "mesh", None) or result[0]), result[1], result[2]
+            # three fields up to 0.9, more after them since
+            mesh, cells, facets = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=3)[:3]
     domain = Domain(
         mesh=mesh,
         volumes=_members(cells, names[3]),
