@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass, fields
+from numbers import Integral, Real
 from pathlib import Path
 
 import gmsh
@@ -59,12 +60,12 @@ class VaneCluster:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            value = getattr(self, item.name)
-            if item.name in ("airfoils", "cavities", "order"):
-                if value != int(value) or value < (0 if item.name == "cavities" else 1):
-                    raise ParameterError(f"{item.name}: expected a count, not {value}")
-            elif not math.isfinite(value):
-                raise ParameterError(f"{item.name}: expected a finite number, not {value}")
+            value, least = getattr(self, item.name), 0 if item.name == "cavities" else 1
+            if isinstance(item.default, int):
+                if not isinstance(value, Integral) or value < least:
+                    raise ParameterError(f"{item.name}: expected a whole number of at least {least}, not {value!r}")
+            elif not isinstance(value, Real) or not math.isfinite(value):
+                raise ParameterError(f"{item.name}: expected a finite number, not {value!r}")
             elif item.name not in ("camber_deg", "stagger_deg") and value <= 0.0:
                 raise ParameterError(f"{item.name}: expected a positive number, not {value}")
         self._check_angles()

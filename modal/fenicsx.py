@@ -170,7 +170,9 @@ def evaluate(expression: Any, space: Any) -> Any:
 def write_fields(space: Any, fields: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> None:
     """Write named displacement fields at the nodes of the mesh, as XDMF."""
     # XDMF carries one set of nodes
-    at_nodes = _vectors(space.mesh, space.mesh.geometry.cmap.degree)
+    geometry = space.mesh.geometry
+    coordinate_map = geometry.cmaps[0] if hasattr(geometry, "cmaps") else geometry.cmap
+    at_nodes = _vectors(space.mesh, coordinate_map.degree)
     with dolfinx.io.XDMFFile(MPI.COMM_SELF, os.fspath(path), "w") as file:
         file.write_mesh(space.mesh)
         for name, values in fields.items():

@@ -51,7 +51,7 @@ def first_bending(
     if not largest >= least_share:
         listed = ", ".join(f"{f:.5g} Hz: {share:.2g}" for f, share in zip(modes.frequencies_hz, shares, strict=True))
         raise ParticipationError(
-            f"direction {list(direction)}: no mode carries {least_share:.0%} of the movable mass along it ({listed}); "
+            f"direction {np.asarray(direction).tolist()}: no mode carries {least_share:.0%} of the movable mass along it ({listed}); "
             "compute more modes or check the direction"
         )
     # symmetric structures have pairs whose shares differ by round-off alone

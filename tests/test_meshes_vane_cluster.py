@@ -98,6 +98,8 @@ def test_same_parameters_same_file(tmp_path):
         ({"chord": float("nan")}, "chord"),
         ({"airfoils": 0}, "airfoils"),
         ({"cavities": 1.5}, "cavities"),
+        ({"cavities": -1}, "cavities"),
+        ({"pitch_deg": "4"}, "pitch_deg"),
         ({"order": 3}, "order"),
         ({"airfoils": 60}, "pitch_deg"),
         ({"pitch_deg": 1.0}, "pitch_deg"),
