@@ -51,8 +51,8 @@ def first_bending(
     if not largest >= least_share:
         listed = ", ".join(f"{f:.5g} Hz: {share:.2g}" for f, share in zip(modes.frequencies_hz, shares, strict=True))
         raise ParticipationError(
-            f"direction {np.asarray(direction).tolist()}: no mode carries {least_share:.0%} of the movable mass along it ({listed}); "
-            "compute more modes or check the direction"
+            f"direction {np.asarray(direction).tolist()}: no mode carries {least_share:.0%} of the movable mass "
+            f"along it ({listed}); compute more modes or check the direction"
         )
     # symmetric structures have pairs whose shares differ by round-off alone
     return int(np.flatnonzero(shares > (1.0 - 1e-6) * largest)[0])
