@@ -51,7 +51,7 @@ Factorize = Callable[[sparse.csr_array], Solver]
 
 
 def superlu(matrix: sparse.csr_array) -> Solver:
-    """SciPy's sparse LU: at hand everywhere, and fine up to some 30 000 DOFs; MUMPS is ten times faster above."""
+    """SciPy's sparse LU, at hand everywhere; from some 30 000 DOFs on MUMPS factorises several times faster."""
     options = {"SymmetricMode": True}
     try:
         return splu(sparse.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options=options)
