@@ -1,0 +1,266 @@
+"""Sweeps: every point is the run it stands for, whoever runs it and however often the sweep was interrupted."""
+
+import json
+import math
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from coupling import sweep as module
+from coupling.engine import simulate
+from coupling.inputs import InputError, validate
+from coupling.scene import Scene
+from coupling.structure import excitation_force, receptance
+from coupling.sweep import MEASURES, Sweep, sweep, warm_up
+
+STIFFNESS, MASS, RATIO, BODY = 1.0e4, 1.0, 0.01, 0.05
+RESONANCE = math.sqrt(STIFFNESS / MASS) / (2 * math.pi)
+DATA = {
+    "structure": {"model": "rigid", "mass": MASS, "stiffness": STIFFNESS, "damping_ratio": RATIO},
+    "excitation": {"frequency": RESONANCE, "resonance_amplitude": 1e-3},
+    "cavity": [{"name": "c1", "gap": 5e-4}],
+    "damper": [{"cavity": "c1", "mass": BODY, "friction": 0.3, "restitution": 0.6}],
+    "time": {"periods": 30, "transient": 10},
+    "sweep": {
+        "cavity.c1.gap": [5e-4, 2e-4],
+        "excitation.frequency": {"start": 0.97 * RESONANCE, "stop": 1.02 * RESONANCE, "num": 6},
+    },
+}
+
+
+def scene(**changes):
+    return validate(Scene, DATA | changes, "scene.toml")
+
+
+@pytest.fixture(scope="module")
+def result():
+    return sweep(scene())
+
+
+def same(first, second):
+    """Equal in everything but the clock."""
+    for name in [*MEASURES, "energy_share", "status", "classification"]:
+        if name != "wall_time_s":
+            np.testing.assert_array_equal(getattr(first, name), getattr(second, name), err_msg=name)
+
+
+def test_points_are_single_runs(result):
+    assert list(result.axes) == ["cavity.c1.gap", "excitation.frequency"]
+    assert result.shape == (2, 6)
+    for i, gap in enumerate(result.axes["cavity.c1.gap"]):
+        for j, frequency in enumerate(result.axes["excitation.frequency"]):
+            single = simulate(scene().replace({"cavity.c1.gap": gap, "excitation.frequency": frequency}))
+            expected = single.to_json()
+            for name in ("amplitude_max", "amplitude_mean", "amplitude_rms", "impacts_per_period", "energy_residual"):
+                assert getattr(result, name)[i, j] == expected[name]
+            assert result.status[i, j] == expected["status"]
+            assert result.classification[i, j] == expected["classification"]
+            losses = np.array([single.energy[name] for name in module.LOSSES])
+            np.testing.assert_allclose(result.energy_share[i, j], losses / losses.sum(), rtol=1e-12)
+
+
+def test_linear_curves_of_one_mode(result):
+    omega = 2 * np.pi * result.axes["excitation.frequency"]
+    damping = 2 * RATIO * math.sqrt(STIFFNESS * MASS)
+    # the resonance of displacement lies beside the natural frequency: r^2 = 1 - 2 zeta^2
+    force = 1e-3 * STIFFNESS * 2 * RATIO * math.sqrt(1 - RATIO**2)
+    for name, mass in (("undamped", MASS), ("fixed", MASS + BODY)):
+        expected = force / np.abs(STIFFNESS - mass * omega**2 + 1j * omega * damping)
+        for row in getattr(result, f"amplitude_{name}"):
+            np.testing.assert_allclose(row, expected, rtol=1e-9)
+
+
+def test_linear_curves_are_the_receptance(result):
+    frequencies = result.axes["excitation.frequency"]
+    force = excitation_force(scene())
+    np.testing.assert_allclose(
+        result.amplitude_undamped[0], force * np.abs(receptance(scene(), frequencies)), rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        result.amplitude_fixed[0], force * np.abs(receptance(scene(), frequencies, True)), rtol=1e-12
+    )
+
+
+def test_bodies_in_a_closed_gap_are_fixed():
+    frequencies = {"start": 0.9 * RESONANCE, "stop": RESONANCE, "num": 3}
+    tight = scene(
+        cavity=[{"name": "c1", "gap": 1e-9}],
+        time={"periods": 600, "transient": 500},
+        sweep={"excitation.frequency": frequencies},
+    )
+    found = sweep(tight)
+    np.testing.assert_allclose(found.amplitude_mean, found.amplitude_fixed, rtol=2e-3)
+
+
+def test_linear_curves_under_base_excitation():
+    shaken = scene(
+        excitation={"frequency": 10.0, "base_acceleration": 2.0}, sweep={"excitation.frequency": [8.0, 15.0, 20.0]}
+    )
+    found = sweep(shaken)
+    omega = 2 * np.pi * found.axes["excitation.frequency"]
+    damping = 2 * RATIO * math.sqrt(STIFFNESS * MASS)
+    for name, mass in (("undamped", MASS), ("fixed", MASS + BODY)):
+        expected = 2.0 * mass / np.abs(STIFFNESS - mass * omega**2 + 1j * omega * damping)
+        np.testing.assert_allclose(getattr(found, f"amplitude_{name}"), expected, rtol=1e-9)
+
+
+def test_prescribed_motion_keeps_its_amplitude():
+    table = scene(
+        structure={"model": "prescribed", "displacement_amplitude": 1e-3},
+        excitation={"frequency": 10.0},
+        sweep={"excitation.frequency": [8.0, 12.0]},
+    )
+    found = sweep(table)
+    for name in ("amplitude_undamped", "amplitude_fixed", "amplitude_max"):
+        np.testing.assert_allclose(getattr(found, name), 1e-3, rtol=1e-9)
+
+
+def test_attached_mass_fraction_without_bodies_is_nan():
+    bare = scene(cavity=[], damper=[], sweep={"excitation.frequency": [RESONANCE]})
+    assert np.isnan(sweep(bare).attached_mass_fraction).all()
+
+
+def test_workers_change_nothing(result):
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        pool.submit(warm_up).result()
+        same(sweep(scene(), pool), result)
+
+
+def test_progress_counts_to_the_end():
+    calls = []
+    sweep(scene(), progress=lambda done, total: calls.append((done, total)))
+    assert calls[-1] == (12, 12)
+    assert [done for done, _ in calls] == sorted(done for done, _ in calls)
+
+
+def test_file_round_trip(result, tmp_path):
+    result.save(tmp_path / "sweep.h5")
+    loaded = Sweep.load(tmp_path / "sweep.h5")
+    same(loaded, result)
+    assert loaded.scene == result.scene
+    assert list(loaded.axes) == list(result.axes)
+    assert not loaded.amplitude_max.flags.writeable
+
+
+def test_single_axis_round_trip(tmp_path):
+    one = sweep(scene(sweep={"excitation.frequency": [RESONANCE]}))
+    one.save(tmp_path / "sweep.h5")
+    same(Sweep.load(tmp_path / "sweep.h5"), one)
+
+
+def test_xarray_opens_the_file(result, tmp_path):
+    result.save(tmp_path / "sweep.h5")
+    with xarray.open_dataset(tmp_path / "sweep.h5", engine="h5netcdf") as data:
+        assert data.amplitude_max.dims == ("cavity_c1_gap", "excitation_frequency")
+        assert data.energy_share.dims == ("cavity_c1_gap", "excitation_frequency", "loss")
+        assert data.amplitude_max.attrs["units"] == "m"
+        assert data.excitation_frequency.attrs["units"] == "Hz"
+        row = data.amplitude_mean.sel(cavity_c1_gap=2e-4)
+        np.testing.assert_array_equal(row, result.amplitude_mean[1])
+        assert list(data.loss.values) == ["viscous", "friction", "impact", "contact"]
+
+
+def test_to_json_is_plain(result):
+    data = json.loads(json.dumps(result.to_json()))
+    assert data["axes"]["cavity.c1.gap"] == [5e-4, 2e-4]
+    assert data["units"]["excitation.frequency"] == "Hz"
+    assert np.shape(data["amplitude_max"]) == (2, 6)
+
+
+@pytest.mark.parametrize(
+    ("grid", "message"),
+    [
+        ({}, r"^sweep: missing; name a grid"),
+        ({"cavity.c1.gap": [1e-4, -1e-4]}, r"^sweep: at cavity.c1.gap = -0.0001: cavity\[0\].gap: .*greater than 0"),
+        ({"cavity.c2.gap": [1e-4]}, r"no entry 'c2'; known: c1"),
+        ({"excitation.frequncy": [1.0]}, r"unknown key; did you mean 'frequency'"),
+        ({"damper.restitution": [0.5, 1.5]}, r"damper\[0\].restitution: .*less than or equal to 1"),
+    ],
+)
+def test_bad_grids_are_refused_before_the_first_run(grid, message, monkeypatch):
+    monkeypatch.setattr(module, "simulate", lambda _: pytest.fail("a run was started"))
+    with pytest.raises(InputError, match=message):
+        sweep(scene(sweep=grid))
+
+
+def test_a_broken_run_is_one_point(monkeypatch, result):
+    last = result.axes["excitation.frequency"][-1]
+
+    def brittle(point):
+        if point.excitation.frequency == last and point.cavity[0].gap == 2e-4:
+            raise ZeroDivisionError("no such luck")
+        return simulate(point)
+
+    monkeypatch.setattr(module, "simulate", brittle)
+    found = sweep(scene())
+    assert found.status[1, -1] == "error: ZeroDivisionError: no such luck"
+    assert np.isnan(found.amplitude_max[1, -1])
+    assert found.amplitude_undamped[1, -1] == result.amplitude_undamped[1, -1]
+    assert (found.status.ravel()[:-1] == "ok").all()
+
+
+def test_numerical_trouble_is_a_status():
+    found = sweep(scene(solver={"max_events": 5}))
+    assert set(found.status.ravel()) == {"event_budget"}
+
+
+class Killed(Exception):
+    pass
+
+
+def killed_after(count):
+    def progress(done, total):
+        if done >= count:
+            raise Killed
+
+    return progress
+
+
+def test_resumes_where_it_was_interrupted(result, tmp_path, monkeypatch):
+    partial = tmp_path / "sweep.partial"
+    with pytest.raises(Killed):
+        sweep(scene(), progress=killed_after(5), checkpoint=partial)
+    with partial.open("a") as file:
+        file.write('[7, {"amplitude_max": 0.1')  # the line at which it was killed
+    runs = []
+    monkeypatch.setattr(module, "simulate", lambda point: runs.append(point) or simulate(point))
+    same(sweep(scene(), checkpoint=partial), result)
+    assert len(runs) == 12 - 5
+
+
+def test_points_of_another_scene_are_not_taken_over(tmp_path, monkeypatch):
+    partial = tmp_path / "sweep.partial"
+    sweep(scene(), checkpoint=partial)
+    runs = []
+    monkeypatch.setattr(module, "simulate", lambda point: runs.append(point) or simulate(point))
+    sweep(scene(gravity={"acceleration": 1.0}), checkpoint=partial)
+    assert len(runs) == 12
+
+
+def test_survives_a_kill(result, tmp_path):
+    program = f"""
+import os, signal
+from coupling.inputs import validate
+from coupling.scene import Scene
+from coupling.sweep import sweep
+
+def progress(done, total):
+    if done >= 7:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+sweep(validate(Scene, {DATA!r}, "scene.toml"), progress=progress, checkpoint="sweep.partial")
+"""
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parent.parent)}
+    finished = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, env=environment, check=False)
+    assert finished.returncode == -signal.SIGKILL
+    calls = []
+    same(sweep(scene(), progress=lambda done, _: calls.append(done), checkpoint=tmp_path / "sweep.partial"), result)
+    assert calls[0] == 8
