@@ -1,0 +1,127 @@
+"""The command `vanedamp`: mesh, modal, reduce, run, sweep, report, demo."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+_PACKAGES = ("modal", "rom", "coupling", "meshes", "studies")
+_ROOT = Path(__file__).resolve().parent.parent
+BAD_INPUT = 2
+_INTERRUPTED = 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """One line for a wrong command line, too."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line. Returns the exit status: 0, or 2 for bad input, told in one line on standard error."""
+    arguments = _parser().parse_args(argv)
+    stranger = _stranger()
+    if stranger is not None:
+        return _refuse(
+            f"the package `modal` at {stranger} is not the one of vanedamp (PyPI has another of that name); "
+            "uninstall it with `pip uninstall modal`, then install vanedamp again"
+        )
+    from studies import commands  # what each command needs is loaded when it is wanted
+
+    try:
+        getattr(commands, arguments.command)(arguments)
+    except ValueError as error:
+        # bad input has error classes of our own; any other ValueError is a fault of the program
+        if type(error).__module__.split(".")[0] not in _PACKAGES:
+            raise
+        return _refuse(_located(str(error), getattr(arguments, "input", None)))
+    except KeyboardInterrupt:
+        print("vanedamp: interrupted", file=sys.stderr)
+        return _INTERRUPTED
+    return 0
+
+
+def _refuse(message: str) -> int:
+    print("vanedamp: " + " ".join(message.split()), file=sys.stderr)
+    return BAD_INPUT
+
+
+def _located(message: str, file: str | None) -> str:
+    """The message with the input file in front, unless it says so itself."""
+    return message if file is None or message.startswith(f"{file}:") else f"{file}: {message}"
+
+
+def _stranger() -> str | None:
+    """Where a package `modal` that is not ours comes from."""
+    found = importlib.util.find_spec("modal")
+    origin = None if found is None or found.origin is None else Path(found.origin).resolve()
+    if origin is not None and origin.parent == _ROOT / "modal" and (origin.parent / "store.py").is_file():
+        return None
+    return str(origin and origin.parent)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="vanedamp", description="Vibration damping of vane clusters by loose bodies in cavities: from a mesh to "
+        "forced responses with impacts."
+    )  # fmt: skip
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def command(name: str, summary: str, source: str | None, output: str, required: bool = False) -> _Parser:
+        made: _Parser = commands.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".")
+        if source is not None:
+            made.add_argument("input", metavar=source, help="input file, SI units")
+        made.add_argument("-o", "--output", metavar=output, required=required, help="result file")
+        return made
+
+    def with_json(made: _Parser) -> _Parser:
+        made.add_argument(
+            "--json", metavar="FILE", help="the result for machines; - writes it to standard output and nothing else"
+        )
+        return made
+
+    command("mesh", "write the mesh of a case that names a generator", "CASE.toml", "MESH.msh", required=True)
+
+    modal = with_json(
+        command(
+            "modal", "natural frequencies, effective masses, rigid model of the first bending", "CASE.toml", "MODES.h5"
+        )
+    )
+    modal.add_argument("--vtk", metavar="FILE.vtu", help="the mode shapes for ParaView (.vtu or .vtk)")
+
+    reduce = with_json(command("reduce", "Craig-Bampton reduction onto the case's interface", "CASE.toml", "ROM.h5"))
+    reduce.add_argument(
+        "--modes", type=_count, default=12, metavar="N", help="fixed-interface modes to keep (default: %(default)s)"
+    )
+
+    run = with_json(command("run", "one scene at one excitation frequency", "SCENE.toml", "RESPONSE.h5"))
+    run.add_argument("--events", action="store_true", help="keep the list of events")
+    run.add_argument("--samples", type=_count, default=0, metavar="N", help="keep N samples of every period")
+
+    sweep = with_json(command("sweep", "a run at every point of the scene's [sweep] grid", "SCENE.toml", "SWEEP.h5"))
+    sweep.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
+
+    report = command("report", "one HTML page of results", None, "REPORT.html", required=True)
+    report.add_argument("inputs", nargs="+", metavar="DIR|FILE", help="results of modal, reduce and sweep (.h5)")
+
+    demo = command("demo", "the whole pipeline on the shipped mesh", None, "DIR")
+    demo.set_defaults(output="out")
+    demo.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
+    return parser
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"expected a count, not {text!r}")
+    return int(text)
+
+
+def _some(text: str) -> int:
+    if _count(text) == 0:
+        raise argparse.ArgumentTypeError("expected at least 1")
+    return int(text)

@@ -1,0 +1,253 @@
+"""The case file: mesh, materials, supports, modes and interface of a structure (SI units), as frozen records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic.dataclasses import dataclass
+
+from coupling.inputs import STRICT, InputError, Real, Whole, nearest, read_toml, validate
+from meshes import benchmarks, vane_cluster
+from meshes.benchmarks import Block
+from meshes.vane_cluster import VaneCluster
+
+if TYPE_CHECKING:
+    from modal.elasticity import Material
+
+Positive = Annotated[Real, Field(gt=0)]
+Ratio = Annotated[Real, Field(ge=0, lt=1)]
+Degree = Annotated[Whole, Field(ge=1, le=3)]
+Direction = tuple[Real, Real, Real]
+
+
+@dataclass(frozen=True, config=STRICT)
+class MeshFile:
+    """A gmsh mesh, and the polynomial degree of the displacements on it."""
+
+    file: str
+    degree: Degree = 2
+
+
+@dataclass(frozen=True, config=STRICT)
+class VaneClusterMesh:
+    """The parametric vane cluster; in the file its parameters are keys of [mesh]."""
+
+    generator: Literal["vane_cluster"]
+    parameters: VaneCluster
+    degree: Degree = 2
+
+    def build(self, path: str | Path) -> Path:
+        """Write the mesh. Raises what meshes.vane_cluster.build raises."""
+        return vane_cluster.build(self.parameters, path)
+
+
+@dataclass(frozen=True, config=STRICT)
+class BlockMesh:
+    """A block for verification; in the file its parameters are keys of [mesh]."""
+
+    generator: Literal["block"]
+    parameters: Block
+    degree: Degree = 2
+
+    def build(self, path: str | Path) -> Path:
+        """Write the mesh. Raises what meshes.benchmarks.build raises."""
+        return benchmarks.build(self.parameters, path)
+
+
+#: the records of the generators' parameters
+GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
+
+
+def _kind(table: Any) -> str:
+    return str(table.get("generator", "existing")) if isinstance(table, Mapping) else "existing"
+
+
+def _gather(table: Any) -> Any:
+    """The table with a generator's parameters in a table of their own."""
+    if not isinstance(table, Mapping) or "generator" not in table:
+        return table
+    own = {key: table[key] for key in ("generator", "degree") if key in table}
+    parameters = {key: value for key, value in table.items() if key not in own}
+    for key, value in parameters.items():
+        if isinstance(value, str):  # the generators' records would take "3" for 3
+            raise ValueError(f"{key}: expected a number, not {value!r}")
+    return own | {"parameters": parameters}
+
+
+Mesh = Annotated[
+    Annotated[MeshFile, Tag("existing")]
+    | Annotated[VaneClusterMesh, Tag("vane_cluster")]
+    | Annotated[BlockMesh, Tag("block")],
+    Discriminator(_kind),
+    BeforeValidator(_gather),
+]
+
+
+@dataclass(frozen=True, config=STRICT)
+class MaterialTable:
+    """Isotropic material of a volume group: young (Pa), poisson, density (kg/m^3), damping_ratio of every mode,
+    fatigue_strength (Pa)."""
+
+    young: Positive
+    poisson: Annotated[Real, Field(gt=-1, lt=0.5)]
+    density: Positive
+    damping_ratio: Ratio | None = None
+    fatigue_strength: Positive | None = None
+
+    @property
+    def elastic(self) -> Material:
+        """What the finite elements need of it."""
+        from modal.elasticity import Material  # dolfinx is slow to load, and a bad file wants a quick answer
+
+        return Material(self.young, self.poisson, self.density)
+
+
+def _components(clamped: Any) -> Any:
+    """{facet group: components} from a list of groups and of such tables."""
+    merged: dict[Any, Any] = {}
+    for entry in [clamped] if isinstance(clamped, Mapping) else clamped if isinstance(clamped, list) else [None]:
+        if not isinstance(entry, str | Mapping):
+            raise ValueError("expected a list of facet groups, such as ['clamp'] or [{ clamp = 'y' }]")
+        merged |= {entry: "xyz"} if isinstance(entry, str) else entry
+    for group, components in merged.items():
+        if not components or not isinstance(components, str) or set(components) - set("xyz"):
+            raise ValueError(f"{group}: expected components out of 'xyz', not {components!r}")
+    return merged
+
+
+@dataclass(frozen=True, config=STRICT)
+class Support:
+    """Facet groups that are held: all components, or those named, as in {group = "y"}."""
+
+    clamped: Annotated[dict[str, str], BeforeValidator(_components)] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, config=STRICT)
+class ModesTable:
+    """Which modes are computed (the first `count`, or all up to `max_frequency` Hz) and which is the first bending:
+    the one with most effective mass along `direction`. `at` names the interface coordinate of the rigid model."""
+
+    count: Annotated[Whole, Field(ge=1)] | None = None
+    max_frequency: Positive | None = None
+    direction: Direction = (0.0, 1.0, 0.0)
+    damping_ratio: Ratio | None = None
+    at: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.count is not None and self.max_frequency is not None:
+            raise ValueError("give one of count and max_frequency")
+        if not any(self.direction):
+            raise ValueError("direction: expected three numbers, not all zero, such as [0, 1, 0]")
+
+
+@dataclass(frozen=True, config=STRICT)
+class InterfaceTable:
+    """One interface coordinate: the displacement of a facet group along a direction."""
+
+    facets: str
+    direction: Direction
+    kind: Literal["average", "rigid", "node"] = "average"
+
+    def __post_init__(self) -> None:
+        if not any(self.direction):
+            raise ValueError("direction: expected three numbers, not all zero, such as [0, 1, 0]")
+
+
+@dataclass(frozen=True, config=STRICT)
+class Case:
+    """Everything that modes and reduction of a structure need."""
+
+    mesh: Mesh
+    material: Annotated[dict[str, MaterialTable], Field(min_length=1)]
+    support: Support = field(default_factory=Support)
+    modes: ModesTable = field(default_factory=ModesTable)
+    interface: dict[str, InterfaceTable] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        given = {table.damping_ratio for table in self.material.values()} - {None}
+        if self.modes.damping_ratio is None and len(given) > 1:
+            raise ValueError("material: the damping ratios differ; set the one of the modes in [modes] damping_ratio")
+        if self.modes.at is not None and self.modes.at not in self.interface:
+            raise ValueError(f"modes.at: no interface '{self.modes.at}'; {_known(self.modes.at, self.interface)}")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Case:
+        """The case in a TOML file; a mesh file is taken relative to it. Raises InputError."""
+        data = read_toml(path)
+        mesh = data.get("mesh")
+        if isinstance(mesh, dict):
+            _check_mesh(mesh, path)
+        return validate(cls, data, str(path))
+
+    @property
+    def damping_ratio(self) -> float:
+        """Modal damping ratio of every mode; zero when the file names none."""
+        if self.modes.damping_ratio is not None:
+            return self.modes.damping_ratio
+        return next((t.damping_ratio for t in self.material.values() if t.damping_ratio is not None), 0.0)
+
+    @property
+    def fatigue_strength(self) -> float | None:
+        """The least of the materials' fatigue strengths, Pa."""
+        return min((t.fatigue_strength for t in self.material.values() if t.fatigue_strength is not None), default=None)
+
+    @property
+    def materials(self) -> dict[str, Material]:
+        """Elastic materials by volume group."""
+        return {name: table.elastic for name, table in self.material.items()}
+
+    @property
+    def response_label(self) -> str | None:
+        """The interface coordinate of the rigid model: the one named, the only one, or `shroud`.
+
+        None without any interface. Raises InputError when the choice is open.
+        """
+        if self.modes.at is not None or not self.interface:
+            return self.modes.at
+        if len(self.interface) == 1 or "shroud" in self.interface:
+            return "shroud" if "shroud" in self.interface else next(iter(self.interface))
+        raise InputError(f"modes.at: name the interface of the rigid model, one of {', '.join(self.interface)}")
+
+    def check_groups(self, facets: Iterable[str], volumes: Iterable[str]) -> None:
+        """Raise InputError for a facet or volume group that the mesh does not have."""
+        facets, volumes = list(facets), list(volumes)
+        for group in self.support.clamped:
+            _check_group("support.clamped", "facet group", group, facets)
+        for label, table in self.interface.items():
+            _check_group(f"interface.{label}.facets", "facet group", table.facets, facets)
+        for group in self.material:
+            _check_group(f"material.{group}", "volume group", group, [*volumes, "default"])
+
+
+def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
+    """Settle what the union of mesh tables cannot say in one line, and find the file."""
+    generator, file = mesh.get("generator"), mesh.get("file")
+    if (generator is None) == (file is None):
+        raise InputError(f"{path}: mesh: give one of file and generator")
+    known = ["file", "degree"]
+    if generator is not None:
+        if str(generator) not in GENERATORS:
+            raise InputError(
+                f"{path}: mesh.generator: no generator {generator!r}; {_known(str(generator), GENERATORS)}"
+            )
+        known = ["generator", "degree", *(item.name for item in fields(GENERATORS[str(generator)]))]
+    for key in mesh:
+        if key not in known:
+            raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, known)}")
+    if isinstance(file, str):
+        mesh["file"] = str(Path(path).parent / file)
+        if not Path(mesh["file"]).is_file():
+            raise InputError(f"{path}: mesh.file: no such file {mesh['file']}; `vanedamp mesh` writes one")
+
+
+def _check_group(key: str, kind: str, group: str, known: list[str]) -> None:
+    if group not in known:
+        raise InputError(f"{key}: no {kind} '{group}' in the mesh; it has {', '.join(sorted(known)) or 'none'}")
+
+
+def _known(word: str, known: Iterable[str]) -> str:
+    return nearest(word, list(known))

@@ -1,0 +1,104 @@
+"""Interactive charts of forced responses (plotly), for pages that carry plotly themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from coupling.sweep import LOSSES
+from studies.forced_response import FREQUENCY, ForcedResponse
+
+_COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#7e22ce", "#0e7490", "#a16207", "#be185d", "#475569")
+_LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626", "contact": "#2563eb"}
+_FONT = "system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif"
+_AXIS: dict[str, Any] = {"showline": True, "linecolor": "#334155", "ticks": "outside", "gridcolor": "#e2e8f0"}
+
+
+def responses_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
+    """Undamped, fixed and damped (maximum and mean) amplitudes over each other, relative to the undamped maximum."""
+    figure = go.Figure()
+    for response, colour in zip(responses, _cycle(responses), strict=True):
+        styles: list[tuple[str, str, dict[str, Any], str]] = [
+            ("undamped", "undamped", {"dash": "dot", "width": 1.6}, "lines"),
+            ("fixed", "bodies fixed", {"dash": "dash", "width": 1.6}, "lines"),
+            ("damped_max", "damped, maximum", {"width": 0.8}, "lines+markers"),
+            ("damped_mean", "damped, mean of peaks", {"width": 2.8}, "lines"),
+        ]
+        for curve, title, line, mode in styles:
+            values = getattr(response, curve)
+            figure.add_scatter(
+                x=response.x, y=values / response.reference, name=title, mode=mode, line=line | {"color": colour},
+                marker={"size": 4}, legendgroup=response.name, legendgrouptitle_text=response.name,
+                customdata=values * 1e6, hovertemplate="%{y:.3f} (%{customdata:.3g} µm)",
+            )  # fmt: skip
+    figure.update_yaxes(title_text="amplitude / undamped maximum", rangemode="tozero")
+    return _finish(figure, responses, height=560)
+
+
+def mistuning_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
+    """Attached mass fraction and impacts per period."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
+    for response, colour in zip(responses, _cycle(responses), strict=True):
+        curves = (response.attached_mass_fraction, response.impacts_per_period)
+        for row, values in enumerate(curves, start=1):
+            figure.add_scatter(
+                x=response.x, y=values, name=response.name, mode="lines+markers", marker={"size": 4},
+                line={"color": colour, "width": 1.6}, legendgroup=response.name, showlegend=row == 1, row=row, col=1,
+            )  # fmt: skip
+    figure.add_hline(y=1, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
+    figure.update_yaxes(title_text="attached mass fraction", row=1, col=1)
+    figure.update_yaxes(title_text="impacts per period", rangemode="tozero", row=2, col=1)
+    return _finish(figure, responses, height=560)
+
+
+def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
+    """Where the energy goes: stacked shares of the losses, one panel a response."""
+    figure = make_subplots(
+        rows=1, cols=len(responses), shared_yaxes=True, subplot_titles=[response.name for response in responses],
+        horizontal_spacing=0.04,
+    )  # fmt: skip
+    for column, response in enumerate(responses, start=1):
+        for index, loss in enumerate(LOSSES):
+            if not any((other.energy_share[:, index] > 0).any() for other in responses):
+                continue
+            figure.add_scatter(
+                x=response.x, y=100 * response.energy_share[:, index], name=loss, stackgroup=str(column), mode="lines",
+                line={"width": 0.5, "color": _LOSS_COLOURS[loss]}, legendgroup=loss, showlegend=column == 1,
+                hovertemplate="%{y:.1f} %", row=1, col=column,
+            )  # fmt: skip
+    figure.update_yaxes(range=[0, 100])
+    figure.update_yaxes(title_text="share of the energy lost, %", row=1, col=1)
+    return _finish(figure, responses, height=420)
+
+
+def to_html(figure: go.Figure, identifier: str) -> str:
+    """The chart as a piece of HTML for a page that already holds plotly's script."""
+    buttons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]]  # no button that would send data anywhere
+    configuration = {"displaylogo": False, "responsive": True, "modeBarButtons": buttons}
+    html: str = figure.to_html(full_html=False, include_plotlyjs=False, div_id=identifier, config=configuration)
+    return html
+
+
+def _cycle(responses: Sequence[ForcedResponse]) -> list[str]:
+    return [_COLOURS[index % len(_COLOURS)] for index in range(len(responses))]
+
+
+def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int) -> go.Figure:
+    first = responses[0]
+    title = (
+        "excitation frequency, Hz" if first.axis == FREQUENCY else f"{first.axis}, {first.units}".removesuffix(", 1")
+    )
+    figure.update_xaxes(hoverformat=".6g", **_AXIS)
+    figure.update_yaxes(**_AXIS)
+    for axis in figure.select_xaxes():
+        if axis.showticklabels is not False:  # of panels above each other, the lowest carries the title
+            axis.update(title_text=title)
+    figure.update_layout(
+        height=height, autosize=True, template="plotly_white", hovermode="x unified",
+        font={"family": _FONT, "size": 14}, margin={"l": 70, "r": 20, "t": 40, "b": 60},
+        legend={"groupclick": "toggleitem"},
+    )  # fmt: skip
+    return figure

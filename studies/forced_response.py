@@ -1,0 +1,117 @@
+"""Forced responses: what a sweep says along one axis, beside the linear curves of the structure."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from coupling.scene import Prescribed, Rigid, Rom, Scene
+from coupling.sweep import Sweep
+from modal.store import frozen
+
+FREQUENCY = "excitation.frequency"
+#: a damped response within this share of the undamped one has not been touched by the bodies
+_UNTOUCHED = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class ForcedResponse:
+    """Curves along an axis of a sweep, each of shape (n,); displacements in m.
+
+    reference          the largest undamped amplitude: what amplitudes are divided by in charts
+    damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks
+    energy_share       (n, 4) of viscous, friction, impact and contact loss
+    trouble            number of points whose status is not ok
+    """
+
+    name: str
+    axis: str
+    units: str
+    x: np.ndarray
+    reference: float
+    undamped: np.ndarray
+    fixed: np.ndarray
+    damped_max: np.ndarray
+    damped_mean: np.ndarray
+    attached_mass_fraction: np.ndarray
+    impacts_per_period: np.ndarray
+    energy_share: np.ndarray
+    trouble: int
+
+    def peak(self, curve: str) -> tuple[float, float]:
+        """Position on the axis and height, relative to the reference, of the top of a curve."""
+        values = getattr(self, curve)
+        top = int(np.nanargmax(values))
+        return float(self.x[top]), float(values[top] / self.reference)
+
+    @property
+    def onset(self) -> float | None:
+        """The first point at which the bodies change the mean response by more than 1 %; None if they never do."""
+        touched = np.flatnonzero(np.abs(self.damped_mean / self.undamped - 1) > _UNTOUCHED)
+        return float(self.x[touched[0]]) if touched.size else None
+
+
+def model_name(scene: Scene) -> str:
+    """The rung of the model ladder, in words."""
+    structure = scene.structure
+    if isinstance(structure, Rom):
+        return "reduced model" if structure.modes is None else f"reduced model, {structure.modes} modes"
+    return {Rigid: "rigid model", Prescribed: "prescribed motion"}[type(structure)]
+
+
+def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedResponse]:
+    """One forced response for every combination of the other axes.
+
+    They run along the excitation frequency if the sweep has it, or else along its longest axis.
+    """
+    paths = list(sweep.axes)
+    along = paths.index(FREQUENCY) if FREQUENCY in paths else int(np.argmax(sweep.shape))
+    order = np.argsort(sweep.axes[paths[along]], kind="stable")
+    others = [sweep.axes[path] for index, path in enumerate(paths) if index != along]
+    labels = [path for index, path in enumerate(paths) if index != along]
+    responses = []
+    for combination in itertools.product(*(range(len(values)) for values in others)):
+        point: tuple[Any, ...] = (*combination[:along], order, *combination[along:])
+        units = sweep.units()
+        values = [
+            f"{path.split('.', 1)[-1]} = {axis[index]} {units[path]}".removesuffix(" 1")
+            for path, axis, index in zip(labels, others, combination, strict=True)
+        ]
+        responses.append(_response(sweep, point, paths[along], ", ".join([name or model_name(sweep.scene), *values])))
+    return responses
+
+
+def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> ForcedResponse:
+    curves = {
+        "undamped": sweep.amplitude_undamped, "fixed": sweep.amplitude_fixed, "damped_max": sweep.amplitude_max,
+        "damped_mean": sweep.amplitude_mean, "attached_mass_fraction": sweep.attached_mass_fraction,
+        "impacts_per_period": sweep.impacts_per_period, "energy_share": sweep.energy_share,
+    }  # fmt: skip
+    cut = {key: frozen(values[point]) for key, values in curves.items()}
+    resonance = sweep.scene.excitation.resonance_amplitude
+    return ForcedResponse(
+        name=name,
+        axis=axis,
+        units=sweep.units()[axis],
+        x=frozen(sweep.axes[axis][point[list(sweep.axes).index(axis)]]),
+        reference=resonance or float(cut["undamped"].max()),
+        trouble=int(np.count_nonzero(sweep.status[point] != "ok")),
+        **cut,
+    )
+
+
+def resonance_grid(start: float, stop: float, peaks: list[float], width: float, num: int) -> np.ndarray:
+    """(num,) ascending frequencies from start to stop, half of them evenly and half around the peaks.
+
+    peaks: frequencies, each of which is a point of the grid; width: of a peak, as a share of its frequency.
+    """
+    fine = np.linspace(start, stop, 4001)
+    bells = sum(1 / (1 + ((fine - peak) / (width * peak)) ** 2) for peak in peaks)
+    share = np.cumsum(1 / len(fine) + bells / np.sum(bells))
+    grid = np.interp(np.linspace(share[0], share[-1], num), share, fine)
+    for peak in peaks:
+        grid[np.argmin(np.abs(grid - peak))] = peak
+    return grid

@@ -1,0 +1,151 @@
+"""The stages from a case file to modes, rigid model and reduced model."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modal.calibrate import FATIGUE_SHARE, RigidModel, fatigue_amplitude, rigid_model
+from modal.eigen import Modes, factorize, solve_modes
+from modal.elasticity import Solid
+from modal.matrices import SystemMatrices
+from modal.participation import effective_masses, first_bending
+from modal.store import Variable
+from rom.craig_bampton import reduce
+from rom.interface import Interface, InterfaceCoordinate
+from rom.reduced import ReducedModel
+from studies.config import Case, MeshFile
+from studies.provenance import versions
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """A case with its finite elements: the solid on its mesh, and the matrices."""
+
+    case: Case
+    solid: Solid
+    matrices: SystemMatrices
+
+
+def assemble(case: Case) -> Structure:
+    """Mesh, groups, matrices. Raises the errors of the modal package, and InputError for unknown groups."""
+    label = case.response_label  # an open choice is refused before the work
+    with _mesh(case) as path:
+        solid = Solid(path, case.materials, case.mesh.degree)
+        case.check_groups(solid.domain.facets, solid.domain.volumes)
+        matrices = solid.assemble(case.support.clamped, case.damping_ratio)
+    if label is not None:
+        _functional(case, matrices, label)
+    return Structure(case, solid, matrices)
+
+
+@contextlib.contextmanager
+def _mesh(case: Case) -> Iterator[Path]:
+    """The mesh file, or one that the generator writes for the moment."""
+    if isinstance(case.mesh, MeshFile):
+        yield Path(case.mesh.file)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        yield case.mesh.build(Path(folder) / f"{case.mesh.generator}.msh")
+
+
+def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
+    return interface(case, matrices, [label]).vectors[:, 0]
+
+
+def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
+    """The case's interface coordinates on its matrices, all of them or those named."""
+    tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
+    coordinates = [InterfaceCoordinate(label, t.facets, t.direction, t.kind) for label, t in tables.items()]
+    return Interface.on_patches(matrices, coordinates)
+
+
+@dataclass(frozen=True, eq=False)
+class ModalAnalysis:
+    """Modes and what they mean.
+
+    effective_mass  (m, 3) kg along x, y, z; movable_mass (3,) kg is what they would sum to over all modes
+    first_bending   index of the mode that carries most mass along `direction`
+    rigid           that mode as one mass on a spring, at its interface coordinate; None without an interface
+    amplitude       m, displacement there at which the mode's stress reaches 70 % of the fatigue strength; None without
+    """
+
+    structure: Structure
+    modes: Modes
+    effective_mass: np.ndarray
+    first_bending: int
+    rigid: RigidModel | None
+    amplitude: float | None
+    wall_time_s: float
+
+    def to_json(self) -> dict[str, Any]:
+        """The result as plain data."""
+        data: dict[str, Any] = {
+            "frequency_hz": self.modes.frequencies_hz.tolist(),
+            "effective_mass": self.effective_mass.tolist(),
+            "movable_mass": self.structure.matrices.movable_mass.tolist(),
+            "residual": self.modes.residuals.tolist(),
+            "first_bending": self.first_bending,
+            "rigid": None if self.rigid is None else asdict(self.rigid),
+            "wall_time_s": self.wall_time_s,
+        }
+        if self.amplitude is not None:
+            strength = self.structure.case.fatigue_strength
+            data["fatigue"] = {"strength": strength, "share": FATIGUE_SHARE, "amplitude": self.amplitude}
+        return data
+
+    def mesh(self) -> tuple[dict[str, Variable], int]:
+        """The nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
+        cells, types, points = self.structure.solid.vtk_mesh()
+        corners = cells.reshape(len(types), -1)[:, 1:]
+        variables = {
+            "coordinates": Variable(points, ("node", "axis"), "m"),
+            "cell": Variable(corners, ("cells", "corner")),
+        }
+        return variables, int(types[0])
+
+    def save(self, path: str | Path) -> None:
+        """Write the modes with their masses, the mesh (for pictures) and the rigid model."""
+        mesh, cell_type = self.mesh()
+        variables = {
+            "axis": Variable(np.array(["x", "y", "z"], dtype=object), ("axis",)),
+            "effective_mass": Variable(self.effective_mass, ("mode", "axis"), "kg"),
+            "movable_mass": Variable(self.structure.matrices.movable_mass, ("axis",), "kg"),
+            **mesh,
+        }
+        result = self.to_json()
+        attributes = {
+            name: result[name] for name in ("first_bending", "rigid", "fatigue") if result.get(name) is not None
+        }
+        attributes |= {"vtk_cell_type": cell_type, "versions": versions()}
+        self.modes.save(path, variables, attributes)
+
+
+def modal_analysis(structure: Structure) -> ModalAnalysis:
+    """Modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
+    started = time.perf_counter()
+    case, matrices = structure.case, structure.matrices
+    modes = solve_modes(matrices, case.modes.count or 10, case.modes.max_frequency)
+    bending = first_bending(modes, matrices, case.modes.direction)
+    label, rigid, amplitude = case.response_label, None, None
+    if label is not None:
+        functional = _functional(case, matrices, label)
+        rigid = rigid_model(modes, bending, functional, label, case.damping_ratio)
+        if case.fatigue_strength is not None:
+            peak = float(structure.solid.von_mises(modes.shapes[bending]).max())
+            amplitude = fatigue_amplitude(modes, bending, functional, peak, case.fatigue_strength)
+    masses = effective_masses(modes, matrices)
+    return ModalAnalysis(structure, modes, masses, bending, rigid, amplitude, time.perf_counter() - started)
+
+
+def reduction(structure: Structure, modes: int) -> ReducedModel:
+    """Craig-Bampton model on the case's interface with that many fixed-interface modes."""
+    coordinates = interface(structure.case, structure.matrices)
+    return reduce(structure.matrices, coordinates, modes, factorize=factorize)
