@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from coupling.compiled import kernel
-from coupling.contact import SIMULTANEOUS, all_move, collide, constant_loads, settle
+from coupling.contact import SIMULTANEOUS, all_move, collide, constant_loads, settle, stop_riders
 from coupling.events import POSITION, VELOCITY, exp_minus_line, exp_minus_one
 from coupling.ledger import account
 from coupling.state import (
@@ -44,6 +44,11 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
             if s < 0:
                 return NEEDS_FLOW
             _enter(rows, flows, st, work, s)
+            if stop_riders(rows, flows, st):
+                _keep_released(st, work)
+                if not settle(rows, st, rec, work):
+                    return UNDECIDED
+                continue
         if st.counters[PERIOD] >= periods:
             return DONE
         if st.counters[EVENTS] >= max_events:
@@ -57,6 +62,8 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
         if who < 0:
             st.counters[PERIOD] += 1
             st.time[0] = 0.0
+            for r in range(len(st.last_impact)):
+                st.last_impact[r] -= rows.period
             _phase(rows, st)
             _wake(flows, st)
             record_section(rows, flows, st, rec, work)
@@ -242,8 +249,9 @@ def _move(rows, flows, st, work, tau):
         st.velocity[r] += speed
     for a in range(count):
         st.amplitude[st.awake[a]] *= 1.0 + work.first[a]
-    for r in range(len(st.released)):
-        st.released[r] = False
+    if tau > 0.0:
+        for r in range(len(st.released)):
+            st.released[r] = 0
 
 
 @kernel
@@ -260,8 +268,7 @@ def _within_walls(rows, st):
 def _happen(rows, flows, st, rec, work, r, order, side):
     """The event of row r: jump of velocities, new states. Returns False if it cannot be decided."""
     n = len(st.constant)
-    for i in range(len(st.state)):
-        work.forced[i] = 0
+    _keep_released(st, work)
     if order == POSITION:
         st.displacement[r] = 0.0
         if not collide(rows, st, rec, work):
@@ -280,6 +287,13 @@ def _happen(rows, flows, st, rec, work, r, order, side):
         work.forced[r] = side
     _coordinates(flows, st, st.coordinates)
     return settle(rows, st, rec, work)
+
+
+@kernel
+def _keep_released(st, work):
+    """Rows that let go at this instant are not caught again by what else happens in it."""
+    for r in range(len(st.state)):
+        work.forced[r] = st.released[r]
 
 
 @kernel

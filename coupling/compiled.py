@@ -4,6 +4,31 @@ Cached on disk between processes; divisions by zero give inf as in C; no referen
 the arithmetic: a compiled function allocates nothing and works in the arrays that it is given (coupling.state.Scratch).
 """
 
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
 from numba import njit
 
-kernel = njit(cache=True, error_model="numpy", _nrt=False)  # type: ignore[call-overload]  # _nrt is not in its stubs
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function of the engine."""
+    compiled = njit(cache=True, error_model="numpy", _nrt=False)(function)  # type: ignore[call-overload]
+    # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls
+    compiled._cache._cache_file._source_stamp = _sources()
+    return compiled
+
+
+@cache
+def _sources() -> str:
+    """Digest of the files that hold compiled functions or the constants in them."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        text = file.read_bytes()
+        if b"@kernel" in text or file.name in ("compiled.py", "state.py"):
+            digest.update(text)
+    return digest.hexdigest()

@@ -17,15 +17,18 @@ import numpy as np
 from coupling.compiled import kernel
 
 OUT, FREE, AT_LOW, AT_HIGH, DEPENDENT = 0, 1, 2, 3, 4
-_ROUND_OFF = 1e-11
+_ROUND_OFF = 1e-12
 _DEPENDENCE = 1e-9
 
 
 @kernel
-def solve_box(problem, k):
+def solve_box(problem, k, scale):
     """Solve the first k rows in place: forces, accelerations, and states FREE, AT_LOW, AT_HIGH or DEPENDENT.
 
-    problem.forced: 0, or AT_LOW / AT_HIGH for a row whose force has just reached that bound on its way out: it stays.
+    scale: size of the terms that b is the sum of, which sets what counts as round-off.
+    problem.forced: 0, or AT_LOW / AT_HIGH for a row whose force has just reached that bound on its way out: it stays
+    there unless its acceleration then contradicts (forced becomes 0). Rows found at a bound without acceleration are
+    marked in the same way.
     DEPENDENT rows are at rest because FREE rows hold them; their force keeps a value within its bounds.
     Returns False if the budget of pivots is spent (a guard: positive semidefinite problems end).
     """
@@ -36,7 +39,6 @@ def solve_box(problem, k):
             f[i], state[i] = problem.low[i], AT_LOW
         elif forced[i] == AT_HIGH:
             f[i], state[i] = problem.high[i], AT_HIGH
-    scale = 0.0
     for i in range(k):
         a[i] = problem.b[i]
         for j in range(k):
@@ -47,8 +49,19 @@ def solve_box(problem, k):
         if state[i] == OUT and not _drive(problem, k, i, tolerance):
             return False
     for i in range(k):
-        if state[i] != FREE and abs(a[i]) <= tolerance and _dependent(problem, k, i):
-            state[i] = DEPENDENT
+        # a row forced to its bound stays there only as long as its acceleration agrees
+        if forced[i] != 0 and (
+            (state[i] == AT_LOW and a[i] < -tolerance) or (state[i] == AT_HIGH and a[i] > tolerance)
+        ):
+            forced[i], state[i] = 0, OUT
+            if not _drive(problem, k, i, tolerance):
+                return False
+    for i in range(k):
+        if state[i] != FREE and abs(a[i]) <= tolerance:
+            if _dependent(problem, k, i):
+                state[i] = DEPENDENT
+            elif state[i] != DEPENDENT:
+                forced[i] = state[i]
     return True
 
 

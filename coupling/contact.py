@@ -14,6 +14,7 @@ from coupling.state import (
     CLOSED,
     COAST,
     DETACHES,
+    FLOW,
     HELD,
     IMPACT,
     IMPACT_LOSS,
@@ -33,14 +34,17 @@ from coupling.state import (
 
 #: gaps closed to this share of the free travel are closed at the same instant
 SIMULTANEOUS = 1e-12
+#: impacts of one contact that follow each other within this share of a period are the end of an inelastic collapse:
+#: bodies in a row can meet infinitely often in finite time (McNamara and Young 1992)
+COLLAPSE = 1e-13
 
 
 @kernel
 def collide(rows, st, rec, work):
     """Newton's law at all touching contacts at once: v+ + k v- >= 0 and P >= 0 complement each other.
 
-    Velocities of rows jump; the impulses are left in work.impulse (r,). An impact whose rebound would end a chatter is
-    plastic. Returns False if the problem cannot be solved.
+    Velocities of rows jump; the impulses are left in work.impulse (r,). An impact at the end of a chatter or of an
+    inelastic collapse is plastic. Returns False if the problem cannot be solved.
     """
     friction, problem, r_count = rows.friction_rows, work.problem, len(st.state)
     k = _touching(rows, st, work)
@@ -48,7 +52,8 @@ def collide(rows, st, rec, work):
         r = work.rows[p]
         before = min(st.velocity[r], 0.0)
         restitution = rows.restitution[r - friction]
-        if -before * restitution < st.settling[r]:
+        collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * rows.period
+        if collapsed or -before * restitution < st.settling[r]:
             restitution = 0.0
         problem.restitution[p] = restitution
         # a contact that separates already may not be driven together: its law starts from zero
@@ -56,7 +61,7 @@ def collide(rows, st, rec, work):
         problem.low[p], problem.high[p], problem.forced[p] = 0.0, np.inf, 0
         for q in range(k):
             problem.matrix[p, q] = rows.delassus[r, work.rows[q]]
-    if not solve_box(problem, k):
+    if not solve_box(problem, k, 0.0):
         return False
     for p in range(k):
         # kept before the jump, for the ledger and the log
@@ -78,6 +83,7 @@ def collide(rows, st, rec, work):
             st.velocity[r] = -problem.restitution[p] * min(before, 0.0)
         st.ledger[IMPACT_LOSS] -= 0.5 * impulse * (before + st.velocity[r])
         if before < 0.0:
+            st.last_impact[r] = st.time[0]
             st.counters[IMPACTS] += 1
             rec.impacts[st.counters[PERIOD]] += 1
             _log(rows, st, rec, IMPACT, r, before, st.velocity[r], impulse)
@@ -117,6 +123,8 @@ def settle(rows, st, rec, work):
     """
     friction, k = rows.friction_rows, 0
     for r in range(friction, len(st.state)):
+        if rows.rides[r] and _bodies_rest(rows, st, r):
+            st.velocity[r] = 0.0
         k = _stand_by(st, work, r, OPEN, st.displacement[r] == 0.0 and st.velocity[r] == 0.0, k)
     for r in range(friction):
         k = _stand_by(st, work, r, COAST, rows.limit[r] > 0.0 and st.velocity[r] == 0.0, k)
@@ -137,10 +145,37 @@ def settle(rows, st, rec, work):
 
 
 @kernel
+def _bodies_rest(rows, st, r):
+    """Whether the bodies of a contact rest on their floor: friction rows of bodies have the bodies' numbers."""
+    for b in range(len(rows.mass)):  # noqa: SIM110 (numba compiles no generator)
+        if rows.bodies[r, b] != 0.0 and st.velocity[b] != 0.0:
+            return False
+    return True
+
+
+@kernel
+def stop_riders(rows, flows, st):
+    """Bodies that ride on the structure do not slip: true to round-off after an impact, made exact here.
+
+    Returns whether a slip was stopped: its friction is then open again.
+    """
+    s, stopped = st.counters[FLOW], False
+    for r in range(rows.friction_rows):
+        if (st.state[r] == SLIP_LEFT or st.state[r] == SLIP_RIGHT) and st.drift[r] == 0.0:
+            still = True
+            for j in range(flows.modes[s]):
+                still = still and flows.motion[s, r, j] == 0.0
+            if still:
+                st.velocity[r] = 0.0
+                stopped = True
+    return stopped
+
+
+@kernel
 def _stand_by(st, work, r, moving, rests, k):
     """Note the old state of row r, take it for moving, and list it if it may be at rest."""
     work.before[r] = st.state[r]
-    st.released[r], st.held[r], st.state[r] = False, 0.0, moving
+    st.released[r], st.held[r], st.state[r] = 0, 0.0, moving
     if rests:
         work.rows[k] = r
         k += 1
@@ -151,7 +186,7 @@ def _stand_by(st, work, r, moving, rests, k):
 def _decide(rows, st, work, k):
     """Solve for the k listed rows at rest: which are closed, stick, slip or open."""
     friction, problem = rows.friction_rows, work.problem
-    _free_acceleration(rows, st, work)
+    scale = _free_acceleration(rows, st, work)
     for p in range(k):
         r = work.rows[p]
         problem.b[p] = work.acceleration[r]
@@ -159,11 +194,11 @@ def _decide(rows, st, work, k):
         problem.forced[p] = work.forced[r]
         for q in range(k):
             problem.matrix[p, q] = rows.delassus[r, work.rows[q]]
-    if not solve_box(problem, k):
+    if not solve_box(problem, k, scale):
         return False
     for p in range(k):
         r, state = work.rows[p], problem.state[p]
-        st.released[r] = problem.forced[p] != 0 and state != DEPENDENT
+        st.released[r] = problem.forced[p]
         if state == FREE:
             st.state[r] = STICK if r < friction else CLOSED
             continue
@@ -193,25 +228,34 @@ def constant_loads(rows, st, work):
 
 @kernel
 def _free_acceleration(rows, st, work):
-    """Acceleration of each row under the known forces, with no row closed, at st.coordinates."""
-    n, b = len(st.constant), len(rows.mass)
+    """Acceleration of each row under the known forces, with no row closed, at st.coordinates.
+
+    Returns the size of the terms that the accelerations are sums of.
+    """
+    n, b, largest = len(st.constant), len(rows.mass), 0.0
     constant_loads(rows, st, work)
     phase = st.amplitude[0]
     for i in range(n):
-        total = (rows.force[i] * phase).real - rows.stiffness[i] * st.coordinates[i]
+        force, spring, damper = (rows.force[i] * phase).real, rows.stiffness[i] * st.coordinates[i], 0.0
         if rows.proportional:
-            total -= rows.damping[i, i] * st.coordinates[n + i]
+            damper = rows.damping[i, i] * st.coordinates[n + i]
         else:
             for k in range(n):
-                total -= rows.damping[i, k] * st.coordinates[n + k]
-        work.on_structure[i] += total
+                damper += rows.damping[i, k] * st.coordinates[n + k]
+        work.on_structure[i] += force - spring - damper
+        work.jump[i] = abs(force) + abs(spring) + abs(damper)
     for r in range(len(st.state)):
-        total = 0.0
+        total, size = 0.0, 0.0
         for i in range(n):
             total += rows.structure[r, i] * work.on_structure[i]
+            size += abs(rows.structure[r, i]) * work.jump[i]
         for i in range(b):
-            total += rows.bodies[r, i] * (work.on_bodies[i] + (rows.inertia[i] * phase).real) / rows.mass[i]
+            part = rows.bodies[r, i] * (work.on_bodies[i] + (rows.inertia[i] * phase).real) / rows.mass[i]
+            total += part
+            size += abs(part)
         work.acceleration[r] = total
+        largest = max(largest, size)
+    return largest
 
 
 @kernel

@@ -38,6 +38,7 @@ class Rows(NamedTuple):
     restitution: np.ndarray  # (contacts,)
     gap: np.ndarray  # (contacts,) free travel of the contact's cavity, m: the scale of its gap
     wall_body: np.ndarray  # (r,) the body of a contact with a wall that rides on the body's floor, otherwise -1
+    rides: np.ndarray  # (r,) whether a contact opens only by slip of its bodies: walls and floor move as one
     floor: np.ndarray  # (b, n) floor functional under each body
     mass: np.ndarray  # (b,) kg
     weight: np.ndarray  # (b,) gravity force along the cavity, N
@@ -105,6 +106,7 @@ def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray,
         restitution=np.array(restitution),
         gap=np.array(gaps),
         wall_body=np.array([_wall_body(j_structure, j_bodies, r) for r in range(len(j_bodies))], np.int64),
+        rides=np.array([_rides(j_structure, j_bodies, r) for r in range(len(j_bodies))], np.bool_),
         floor=floor,
         mass=mass,
         weight=mass * scene.gravity.tangential,
@@ -138,11 +140,12 @@ def _initial_rows(scene: Scene, structure: LinearStructure, rows: Rows) -> tuple
 
 def _wall_body(structure: np.ndarray, bodies: np.ndarray, r: int) -> int:
     touched = np.flatnonzero(bodies[r])
-    if r < len(bodies[r]) or len(touched) != 1:
-        return -1
-    body = int(touched[0])
-    rides = np.array_equal(structure[r], bodies[r, body] * structure[body])
-    return body if rides else -1
+    return int(touched[0]) if len(touched) == 1 and _rides(structure, bodies, r) else -1
+
+
+def _rides(structure: np.ndarray, bodies: np.ndarray, r: int) -> bool:
+    count = bodies.shape[1]
+    return r >= count and np.allclose(structure[r], bodies[r] @ structure[:count], rtol=1e-14, atol=0)
 
 
 def _friction_force(scene: Scene, index: int) -> float:

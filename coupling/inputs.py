@@ -39,7 +39,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
     """`data` as a `record`, or an InputError naming the source, the key and the remedy."""
-    adapter: TypeAdapter[T] = _adapter(record)
+    adapter: TypeAdapter[T] = _adapter(record)  # type: ignore[arg-type]
     try:
         return adapter.validate_python(dict(data))
     except ValidationError as error:

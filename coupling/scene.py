@@ -100,7 +100,8 @@ class Gravity:
     @property
     def normal(self) -> float:
         """Acceleration across the cavity, pressing on its floor (m/s^2)."""
-        return self.acceleration * math.cos(math.radians(self.orientation_deg))
+        cosine = math.cos(math.radians(self.orientation_deg))
+        return self.acceleration * cosine if abs(cosine) > 1e-15 else 0.0  # upright is upright
 
     @property
     def tangential(self) -> float:

@@ -44,8 +44,9 @@ class State(NamedTuple):
     held: np.ndarray  # (r,) constant force of rows that are not closed, N
     level: np.ndarray  # (r,) constant part of a closed row's force, N
     state: np.ndarray  # (r,) int
-    released: np.ndarray  # (r,) whether the row has just let go, its force at a bound
+    released: np.ndarray  # (r,) the bound at which a row's force was when it let go at this very instant, otherwise 0
     settling: np.ndarray  # (r,) rebound speed below which an impact ends a chatter, m/s
+    last_impact: np.ndarray  # (r,) time of the last impact, counted from the period's start, s
     ledger: np.ndarray  # (6,) J
 
 
@@ -123,7 +124,8 @@ def new_state(rows: Rows, modes: int, displacement: np.ndarray, velocity: np.nda
         amplitude=np.zeros(modes, complex), awake=np.zeros(modes, np.int64), coordinates=np.zeros(2 * n),
         constant=np.zeros(n), displacement=np.array(displacement), velocity=np.array(velocity), drift=np.zeros(r),
         body_drift=np.zeros(b), held=np.zeros(r), level=np.zeros(r), state=np.zeros(r, np.int64),
-        released=np.zeros(r, np.bool_), settling=np.zeros(r), ledger=np.zeros(len(ENERGIES)),
+        released=np.zeros(r, np.int64), settling=np.zeros(r), last_impact=np.full(r, -np.inf),
+        ledger=np.zeros(len(ENERGIES)),
     )  # fmt: skip
     state.amplitude[0] = 1.0
     return state

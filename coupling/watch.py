@@ -37,7 +37,8 @@ def next_event(rows, flows, st, ch):
         )
         step = advance_or_stop(f, slope, curvature, noise, ch.second[k], ch.third[k], left, shortest)
         if step <= 0.0:
-            return tau, k
+            # what a double cannot tell from the segment's start happens at its start
+            return (tau if tau > shortest else 0.0), k
         ch.safe[k] = tau + step
 
 
@@ -107,7 +108,7 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, k, left):
     awake = st.awake[: st.counters[AWAKE]]
     ch.second[k], ch.third[k] = bounds(order, ch.k2[k], ch.g[k], flows.eigenvalue[s], awake)
     shortest = RESOLUTION * rows.period
-    if st.released[r]:
+    if st.released[r] != 0:
         # the force was at its bound: the row starts from rest with vanishing acceleration, and its jerk decides
         quick = 2.0 * jerk / snap if order == POSITION else 1.5 * fall / ch.third[k]
         ch.safe[k] = max(quick if quick == quick else left, 1e3 * shortest)

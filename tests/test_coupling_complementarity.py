@@ -14,7 +14,7 @@ def solve(a_matrix, b, lo, hi, forced=None):
     problem = new_problem(k + 1)  # room to spare: only the first k rows count
     problem.matrix[:k, :k], problem.b[:k], problem.low[:k], problem.high[:k] = a_matrix, b, lo, hi
     problem.forced[:k] = 0 if forced is None else forced
-    assert solve_box(problem, k)
+    assert solve_box(problem, k, 0.0)
     return problem.force[:k], problem.acceleration[:k], problem.state[:k]
 
 
