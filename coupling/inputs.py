@@ -16,6 +16,8 @@ T = TypeVar("T")
 #: Every record read from a file knows all its keys and holds finite numbers.
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
+_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+
 # numbers are numbers: no text, no booleans
 Real = Annotated[float, Strict()]
 Whole = Annotated[int, Strict()]
@@ -43,8 +45,9 @@ def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
     try:
         return adapter.validate_python(dict(data))
     except ValidationError as error:
-        first = error.errors()[0]
-        raise InputError(f"{source}: {_explain(adapter, first, data)}") from None
+        # a misspelt key is missing, too: its own complaint is the one that helps
+        found = sorted(error.errors(), key=lambda entry: entry["type"] not in _UNKNOWN)
+        raise InputError(f"{source}: {_explain(adapter, found[0], data)}") from None
 
 
 @lru_cache(maxsize=32)
@@ -62,7 +65,7 @@ def _explain(adapter: TypeAdapter[Any], error: Any, data: Any) -> str:
     kind = error["type"]
     path = _path_in_data(error["loc"], data, names_absent_key="argument" in kind or "missing" in kind)
     key = _dotted(path)
-    if kind in ("unexpected_keyword_argument", "extra_forbidden"):
+    if kind in _UNKNOWN:
         known = _known_keys(adapter.json_schema(), error["loc"][:-1])
         return f"{key}: unknown key; {nearest(str(path[-1]), known)}"
     if kind in ("missing", "missing_argument"):

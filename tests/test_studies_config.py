@@ -1,0 +1,198 @@
+"""Case files: what they mean, and the one line that says what is wrong with them."""
+
+import pytest
+
+from coupling.inputs import InputError
+from meshes.vane_cluster import SHIPPED
+from studies.config import Case
+
+CASE = f"""
+[mesh]
+file = "{SHIPPED}"
+degree = 2
+[material.default]
+young = 2e11
+poisson = 0.3
+density = 8190.0
+damping_ratio = 0.002
+[support]
+clamped = ["clamp"]
+[modes]
+count = 10
+direction = [0, 1, 0]
+[interface.c1]
+facets = "c1_floor"
+direction = [0, 1, 0]
+"""
+BLOCK = """
+[mesh]
+generator = "block"
+length = 0.1
+width = 0.02
+thickness = 0.01
+divisions = [4, 1, 1]
+[material.default]
+young = 2e11
+poisson = 0.3
+density = 8000
+"""
+
+
+def load(text, tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(text)
+    return Case.load(path)
+
+
+def changed(old, new, text=CASE):
+    assert text.count(old) == 1
+    return text.replace(old, new)
+
+
+def test_reads_a_case(tmp_path):
+    case = load(CASE, tmp_path)
+    assert case.mesh.file == str(SHIPPED)
+    assert case.damping_ratio == 0.002
+    assert case.fatigue_strength is None
+    assert case.support.clamped == {"clamp": "xyz"}
+    assert case.response_label == "c1"
+    assert case.materials["default"].density == 8190.0
+
+
+def test_mesh_is_found_beside_the_case(tmp_path):
+    (tmp_path / "part.msh").write_text("")
+    case = load(changed(str(SHIPPED), "part.msh"), tmp_path)
+    assert case.mesh.file == str(tmp_path / "part.msh")
+
+
+def test_generators_take_their_parameters(tmp_path):
+    case = load(BLOCK, tmp_path)
+    assert case.mesh.parameters.divisions == (4, 1, 1)
+    assert case.mesh.degree == 2
+    cluster = load(changed(f'file = "{SHIPPED}"', 'generator = "vane_cluster"\nairfoils = 3'), tmp_path)
+    assert cluster.mesh.parameters.airfoils == 3
+
+
+@pytest.mark.parametrize(
+    ("clamped", "expected"),
+    [
+        ('["a", "b"]', {"a": "xyz", "b": "xyz"}),
+        ('{a = "y"}', {"a": "y"}),
+        ('["a", {b = "xz"}]', {"a": "xyz", "b": "xz"}),
+        ("[]", {}),
+    ],
+)
+def test_supports(clamped, expected, tmp_path):
+    case = load(changed('["clamp"]', clamped), tmp_path)
+    assert case.support.clamped == expected
+
+
+def test_damping_of_the_modes_overrides_the_material(tmp_path):
+    assert load(changed("count = 10", "damping_ratio = 0.01"), tmp_path).damping_ratio == 0.01
+    assert load(changed("damping_ratio = 0.002\n", ""), tmp_path).damping_ratio == 0.0
+
+
+def test_least_fatigue_strength_counts(tmp_path):
+    second = "[material.airfoils]\nyoung = 1e11\npoisson = 0.3\ndensity = 1\nfatigue_strength = 3e8\n[support]"
+    text = changed("[support]", second, changed("density = 8190.0", "density = 8190.0\nfatigue_strength = 4e8"))
+    assert load(text, tmp_path).fatigue_strength == 3e8
+
+
+@pytest.mark.parametrize(
+    ("interfaces", "at", "expected"),
+    [
+        (["c1"], None, "c1"),
+        (["c1", "shroud"], None, "shroud"),
+        (["c1", "shroud"], "c1", "c1"),
+        ([], None, None),
+    ],
+)
+def test_response_of_the_rigid_model(interfaces, at, expected, tmp_path):
+    head = CASE.split("[interface")[0]
+    tables = "".join(f'[interface.{name}]\nfacets = "f"\ndirection = [0, 1, 0]\n' for name in interfaces)
+    text = head.replace("count = 10", f'at = "{at}"' if at else "") + tables
+    assert load(text, tmp_path).response_label == expected
+
+
+def test_open_choice_of_the_response_is_refused(tmp_path):
+    case = load(CASE + '[interface.c2]\nfacets = "f"\ndirection = [0, 1, 0]\n', tmp_path)
+    with pytest.raises(InputError, match=r"^modes.at: name the interface of the rigid model, one of c1, c2"):
+        _ = case.response_label
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("density = 8190.0", "density = -1.0", "material.default.density: should be greater than 0"),
+        ("poisson = 0.3", "poisson = 0.5", "material.default.poisson: should be less than 0.5"),
+        ("poisson = 0.3", "poisson = -1.0", "material.default.poisson: should be greater than -1"),
+        ("young = 2e11", 'young = "stiff"', "material.default.young: should be a valid number"),
+        ("young = 2e11", "young = inf", "material.default.young: should be a finite number"),
+        ("young = 2e11", "yuong = 2e11", "material.default.yuong: unknown key; did you mean 'young'?"),
+        ("young = 2e11\n", "", "material.default.young: missing; it is required here"),
+        ("damping_ratio = 0.002", "damping_ratio = 1.0", "material.default.damping_ratio: should be less than 1"),
+        ("[modes]", "[mode]", "mode: unknown key; did you mean 'modes'?"),
+        ("count = 10", "count = 0", "modes.count: should be greater than or equal to 1"),
+        ("count = 10", "count = 10.5", "modes.count: should be a valid integer"),
+        ("count = 10", "count = 1\nmax_frequency = 1.0", "modes: give one of count and max_frequency"),
+        ("count = 10", 'at = "shroud"', "modes.at: no interface 'shroud'; known: c1"),
+        ('"c1_floor"', '"c1_floor"\nkind = "mean"', "interface.c1.kind: should be 'average', 'rigid' or 'node'"),
+        ('facets = "c1_floor"\n', "", "interface.c1.facets: missing"),
+        ('["clamp"]', '"clamp"', "support.clamped: expected a list of facet groups"),
+        ('["clamp"]', '{clamp = "w"}', "support.clamped: clamp: expected components out of 'xyz', not 'w'"),
+        ("degree = 2", "degree = 4", "mesh.degree: should be less than or equal to 3"),
+        ("degree = 2", "span = 2", "mesh.span: unknown key; known: degree, file"),
+        (f'file = "{SHIPPED}"\n', "", "mesh: give one of file and generator"),
+        (str(SHIPPED), "nowhere.msh", "mesh.file: no such file"),
+        ("degree = 2", "degree = ", "not valid TOML"),
+    ],
+)
+def test_bad_input_is_one_line_with_the_key(old, new, message, tmp_path):
+    with pytest.raises(InputError) as refused:
+        load(changed(old, new), tmp_path)
+    text = str(refused.value)
+    assert text.startswith(f"{tmp_path / 'case.toml'}: {message}")
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"block"', '"blok"', "mesh.generator: no generator 'blok'; did you mean 'block'?"),
+        ('"block"', "[1]", "mesh.generator: no generator [1]; known: block, vane_cluster"),
+        ("thickness = 0.01", "thikness = 0.01", "mesh.thikness: unknown key; did you mean 'thickness'?"),
+        ("thickness = 0.01", "thickness = -0.01", "mesh: thickness: expected a positive number of metres"),
+        ("thickness = 0.01", 'thickness = "3"', "mesh: thickness: expected a number, not '3'"),
+        ("thickness = 0.01\n", "", "mesh.thickness: missing"),
+        ("[4, 1, 1]", "[4, 1, 1.5]", "mesh.divisions[2]: should be a valid integer"),
+    ],
+)
+def test_bad_generator_parameters(old, new, message, tmp_path):
+    with pytest.raises(InputError) as refused:
+        load(changed(old, new, BLOCK), tmp_path)
+    assert str(refused.value).startswith(f"{tmp_path / 'case.toml'}: {message}")
+
+
+def test_differing_damping_ratios_need_a_decision(tmp_path):
+    second = "[material.airfoils]\nyoung = 1e11\npoisson = 0.3\ndensity = 1\ndamping_ratio = 0.1\n[support]"
+    with pytest.raises(InputError, match=r"material: the damping ratios differ; .*\[modes\] damping_ratio"):
+        load(changed("[support]", second), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('["clamp"]', '["clmp"]', "support.clamped: no facet group 'clmp' in the mesh; it has c1_floor, clamp"),
+        ('"c1_floor"', '"c9"', "interface.c1.facets: no facet group 'c9' in the mesh; it has c1_floor, clamp"),
+        (
+            "[material.default]",
+            "[material.disk]",
+            "material.disk: no volume group 'disk' in the mesh; it has airfoils,",
+        ),
+    ],
+)
+def test_unknown_groups_list_those_that_exist(old, new, message, tmp_path):
+    case = load(changed(old, new), tmp_path)
+    with pytest.raises(InputError) as refused:
+        case.check_groups(["clamp", "c1_floor"], ["airfoils"])
+    assert str(refused.value).startswith(message)
