@@ -130,14 +130,7 @@ def sweep(
     Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks
     is a point with the status "error: ...".
     """
-    axes, combinations = scene.sweep_points()
-    if not axes:
-        raise InputError(
-            'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
-        )
-    base = dataclasses.replace(scene, sweep={})
-    scenes = [_at(base, values) for values in combinations]
-    linear_structure(scenes[0])
+    axes, scenes = grid(scene)
     shape = tuple(len(values) for values in axes.values())
     with _Checkpoint(checkpoint, scene) as done:
         missing = [index for index in range(len(scenes)) if index not in done.records]
@@ -158,6 +151,19 @@ def sweep(
         **{name: frozen(values, object).reshape(shape) for name, values in texts.items()},
         provenance=dict(provenance or {}),
     )
+
+
+def grid(scene: Scene) -> tuple[dict[str, np.ndarray], list[Scene]]:
+    """Axes by path and the scenes of all points, the last axis fastest. Raises InputError for a point that is none."""
+    axes, combinations = scene.sweep_points()
+    if not axes:
+        raise InputError(
+            'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
+        )
+    base = dataclasses.replace(scene, sweep={})
+    scenes = [_at(base, values) for values in combinations]
+    linear_structure(scenes[0])
+    return axes, scenes
 
 
 def warm_up() -> None:

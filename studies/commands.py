@@ -103,8 +103,11 @@ def sweep(arguments: Namespace) -> None:
     """A grid of runs; finished points are kept beside the result and taken up again after a kill."""
     _check_outputs(arguments)
     scene = _load_scene(arguments.input)
+    from coupling.sweep import grid
     from coupling.sweep import sweep as run_sweep
     from studies.provenance import versions
+
+    grid(scene)  # processes are slow to start: a bad grid is told before
 
     checkpoint = None if arguments.output is None else Path(f"{arguments.output}.partial")
     with workers(arguments.workers) as pool, progress("sweep") as report:
