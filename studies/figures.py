@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
@@ -13,6 +14,7 @@ from studies.forced_response import FREQUENCY, ForcedResponse
 
 _COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#7e22ce", "#0e7490", "#a16207", "#be185d", "#475569")
 _LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626", "contact": "#2563eb"}
+_PANELS = 3  # energy panels side by side
 _FONT = "system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif"
 _AXIS: dict[str, Any] = {"showline": True, "linecolor": "#334155", "ticks": "outside", "gridcolor": "#e2e8f0"}
 
@@ -20,6 +22,7 @@ _AXIS: dict[str, Any] = {"showline": True, "linecolor": "#334155", "ticks": "out
 def responses_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
     """Undamped, fixed and damped (maximum and mean) amplitudes over each other, relative to the undamped maximum."""
     figure = go.Figure()
+    linear: list[np.ndarray] = []
     for response, colour in zip(responses, _cycle(responses), strict=True):
         styles: list[tuple[str, str, dict[str, Any], str]] = [
             ("undamped", "undamped", {"dash": "dot", "width": 1.6}, "lines"),
@@ -29,10 +32,15 @@ def responses_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
         ]
         for curve, title, line, mode in styles:
             values = getattr(response, curve)
+            if curve in ("undamped", "fixed"):
+                if any(np.array_equal(values, other) for other in linear):
+                    continue  # sweeps of gaps, friction ... share their linear curves
+                linear.append(values)
             figure.add_scatter(
                 x=response.x, y=values / response.reference, name=title, mode=mode, line=line | {"color": colour},
                 marker={"size": 4}, legendgroup=response.name, legendgrouptitle_text=response.name,
-                customdata=values * 1e6, hovertemplate="%{y:.3f} (%{customdata:.3g} µm)",
+                customdata=values * 1e6,
+                hovertemplate=f"{response.name}, {title}: %{{y:.3f}} (%{{customdata:.3g}} µm)<extra></extra>",
             )  # fmt: skip
     figure.update_yaxes(title_text="amplitude / undamped maximum", rangemode="tozero")
     return _finish(figure, responses, height=560)
@@ -56,22 +64,25 @@ def mistuning_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
 
 def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
     """Where the energy goes: stacked shares of the losses, one panel a response."""
+    columns = min(len(responses), _PANELS)
+    rows = -(-len(responses) // columns)
     figure = make_subplots(
-        rows=1, cols=len(responses), shared_yaxes=True, subplot_titles=[response.name for response in responses],
-        horizontal_spacing=0.04,
+        rows=rows, cols=columns, shared_yaxes=True, subplot_titles=[response.name for response in responses],
+        horizontal_spacing=0.04, vertical_spacing=0.25 / rows,
     )  # fmt: skip
-    for column, response in enumerate(responses, start=1):
+    for number, response in enumerate(responses):
         for index, loss in enumerate(LOSSES):
             if not any((other.energy_share[:, index] > 0).any() for other in responses):
                 continue
             figure.add_scatter(
-                x=response.x, y=100 * response.energy_share[:, index], name=loss, stackgroup=str(column), mode="lines",
-                line={"width": 0.5, "color": _LOSS_COLOURS[loss]}, legendgroup=loss, showlegend=column == 1,
-                hovertemplate="%{y:.1f} %", row=1, col=column,
+                x=response.x, y=100 * response.energy_share[:, index], name=loss, stackgroup=str(number), mode="lines",
+                line={"width": 0.5, "color": _LOSS_COLOURS[loss]}, legendgroup=loss, showlegend=number == 0,
+                hovertemplate=f"{loss}: %{{y:.1f}} %<extra></extra>",
+                row=number // columns + 1, col=number % columns + 1,
             )  # fmt: skip
     figure.update_yaxes(range=[0, 100])
-    figure.update_yaxes(title_text="share of the energy lost, %", row=1, col=1)
-    return _finish(figure, responses, height=420)
+    figure.update_yaxes(title_text="share of the energy lost, %", col=1)
+    return _finish(figure, responses, height=400 * rows)
 
 
 def to_html(figure: go.Figure, identifier: str) -> str:

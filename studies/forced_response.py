@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,17 +42,17 @@ class ForcedResponse:
     energy_share: np.ndarray
     trouble: int
 
-    def peak(self, curve: str) -> tuple[float, float]:
-        """Position on the axis and height, relative to the reference, of the top of a curve."""
+    def peak(self, curve: str) -> tuple[Any, float]:
+        """Position on the axis and height, relative to the reference, of the top of a curve; nan if all failed."""
         values = getattr(self, curve)
-        top = int(np.nanargmax(values))
-        return float(self.x[top]), float(values[top] / self.reference)
+        top = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
+        return self.x[top], float(values[top] / self.reference)
 
     @property
-    def onset(self) -> float | None:
+    def onset(self) -> Any:
         """The first point at which the bodies change the mean response by more than 1 %; None if they never do."""
-        touched = np.flatnonzero(np.abs(self.damped_mean / self.undamped - 1) > _UNTOUCHED)
-        return float(self.x[touched[0]]) if touched.size else None
+        touched = np.flatnonzero(np.abs(self.damped_mean - self.undamped) > _UNTOUCHED * self.undamped)
+        return self.x[touched[0]] if touched.size else None
 
 
 def model_name(scene: Scene) -> str:
@@ -65,10 +66,11 @@ def model_name(scene: Scene) -> str:
 def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedResponse]:
     """One forced response for every combination of the other axes.
 
-    They run along the excitation frequency if the sweep has it, or else along its longest axis.
+    They run along the excitation frequency if the sweep has it, or else along its longest axis of numbers.
     """
     paths = list(sweep.axes)
-    along = paths.index(FREQUENCY) if FREQUENCY in paths else int(np.argmax(sweep.shape))
+    lengths = [len(values) * (values.dtype.kind in "if") for values in sweep.axes.values()]
+    along = paths.index(FREQUENCY) if FREQUENCY in paths else int(np.argmax(lengths))
     order = np.argsort(sweep.axes[paths[along]], kind="stable")
     others = [sweep.axes[path] for index, path in enumerate(paths) if index != along]
     labels = [path for index, path in enumerate(paths) if index != along]
@@ -77,7 +79,7 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
         point: tuple[Any, ...] = (*combination[:along], order, *combination[along:])
         units = sweep.units()
         values = [
-            f"{path.split('.', 1)[-1]} = {axis[index]} {units[path]}".removesuffix(" 1")
+            f"{path.split('.', 1)[-1]} = {shown(axis[index])} {units[path]}".removesuffix(" 1")
             for path, axis, index in zip(labels, others, combination, strict=True)
         ]
         responses.append(_response(sweep, point, paths[along], ", ".join([name or model_name(sweep.scene), *values])))
@@ -96,11 +98,16 @@ def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> For
         name=name,
         axis=axis,
         units=sweep.units()[axis],
-        x=frozen(sweep.axes[axis][point[list(sweep.axes).index(axis)]]),
-        reference=resonance or float(cut["undamped"].max()),
+        x=sweep.axes[axis][point[list(sweep.axes).index(axis)]],
+        reference=resonance or float(cut["undamped"].max()) or math.nan,  # without excitation nothing to relate to
         trouble=int(np.count_nonzero(sweep.status[point] != "ok")),
         **cut,
     )
+
+
+def shown(value: Any) -> str:
+    """A value of an axis in a few digits; text as it is."""
+    return str(value) if isinstance(value, str) else f"{value:.6g}"
 
 
 def resonance_grid(start: float, stop: float, peaks: list[float], width: float, num: int) -> np.ndarray:

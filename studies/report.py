@@ -19,7 +19,7 @@ from coupling.sweep import Sweep
 from modal.store import StoreError, load, replacing
 from rom.reduced import ReducedModel
 from studies import figures
-from studies.forced_response import ForcedResponse, forced_responses, model_name
+from studies.forced_response import ForcedResponse, forced_responses, model_name, shown
 from studies.pictures import mode_picture
 from studies.provenance import versions
 
@@ -67,6 +67,7 @@ def write_report(results: Results, path: str | Path) -> None:
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
+    environment.filters["shown"] = shown
     template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
     responses = _responses(results.sweeps)
     scenes = {Path(name).name: _flat(_without_sweep(sweep)) for name, sweep in results.sweeps.items()}
@@ -126,7 +127,7 @@ def _key_figures(response: ForcedResponse) -> dict[str, Any]:
         "name": response.name,
         "reference": response.reference,
         "onset": response.onset,
-        "impacts": float(np.nanmax(response.impacts_per_period)),
+        "impacts": float(np.nan_to_num(response.impacts_per_period).max()),
         "points": len(response.x),
         "trouble": response.trouble,
     }
@@ -177,7 +178,7 @@ def _provenance(results: Results) -> dict[str, dict[str, str]]:
 def _without_sweep(sweep: Sweep) -> dict[str, Any]:
     """The scene as data, with the sweep's axes in short."""
     axes = {
-        path: f"{len(values)} values, {_shown(values[0])} to {_shown(values[-1])}"
+        path: f"{len(values)} values, {_digits(values[0])} to {_digits(values[-1])}"
         for path, values in sweep.axes.items()
     }
     return sweep.scene.to_dict() | {"sweep": axes}
@@ -192,9 +193,9 @@ def _flat(data: Any, path: str = "") -> dict[str, str]:
     elif isinstance(data, list | tuple):
         return {path: ", ".join(map(str, data))}
     else:
-        return {path: _shown(data)}
+        return {path: _digits(data)}
     return {key: text for name, value in items for key, text in _flat(value, name).items()}
 
 
-def _shown(value: Any) -> str:
+def _digits(value: Any) -> str:
     return f"{value:.8g}" if isinstance(value, float) else str(value)
