@@ -17,7 +17,7 @@ from coupling.sweep import Sweep
 from modal.eigen import Modes
 from rom.reduced import ReducedModel
 from studies import commands
-from studies.cli import BAD_INPUT, main
+from studies.cli import BAD_INPUT, _parser, main
 
 ROOT = Path(__file__).resolve().parent.parent
 CASE = """
@@ -430,6 +430,22 @@ def test_killed_sweep_keeps_the_old_file_and_goes_on(folder):
     assert main(arguments) == 0
     assert Sweep.load("sweep.h5").shape == (4,)
     assert not (folder / "sweep.h5.partial").exists()
+
+
+# words
+
+
+def test_commands_of_the_readme_are_understood(capsys):
+    text = (ROOT / "README.md").read_text()
+    lines = [line.split("#")[0].split() for line in text.splitlines() if line.startswith("    vanedamp ")]
+    assert len(lines) >= 5
+    for _, *arguments in lines:
+        assert _parser().parse_args(arguments).command == arguments[0]
+    described = {line.split("`")[1].split()[1] for line in text.splitlines() if line.startswith("| `vanedamp ")}
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    usage = capsys.readouterr().out
+    assert described == {line.split()[0] for line in usage.splitlines() if line.startswith("    ") and line[4] != " "}
 
 
 # processes
