@@ -68,6 +68,7 @@ install_system_packages() {
         return
     fi
     say "installing system packages: ${missing[*]}"
+    as_root true # ends here when sudo is refused
     quietly dpkg --configure -a || true # finishes what an earlier installation left half done
     apt_get update || say "apt-get update failed; going on with the package lists that are there"
     [ -x $python ] || apt_get install -y --no-install-recommends python3
