@@ -122,9 +122,8 @@ def settle(rows, st, rec, work):
     bound and leaves it. Returns False if the problem cannot be solved.
     """
     friction, k = rows.friction_rows, 0
+    _align(rows, st)
     for r in range(friction, len(st.state)):
-        if rows.rides[r] and _bodies_rest(rows, st, r):
-            st.velocity[r] = 0.0
         k = _stand_by(st, work, r, OPEN, st.displacement[r] == 0.0 and st.velocity[r] == 0.0, k)
     for r in range(friction):
         k = _stand_by(st, work, r, COAST, rows.limit[r] > 0.0 and st.velocity[r] == 0.0, k)
@@ -142,6 +141,17 @@ def settle(rows, st, rec, work):
     _log_changes(rows, st, rec, work)
     st.counters[SEARCHING] = 1
     return True
+
+
+@kernel
+def _align(rows, st):
+    """Slips and gaps that are one motion, on walls and floors that move as one, are at rest together, exactly."""
+    for r in range(rows.friction_rows, len(st.state)):
+        if rows.wall_body[r] >= 0 and st.displacement[r] == 0.0 and st.velocity[r] == 0.0:
+            st.velocity[rows.wall_body[r]] = 0.0
+    for r in range(rows.friction_rows, len(st.state)):
+        if rows.rides[r] and _bodies_rest(rows, st, r):
+            st.velocity[r] = 0.0
 
 
 @kernel
@@ -250,9 +260,9 @@ def _free_acceleration(rows, st, work):
             total += rows.structure[r, i] * work.on_structure[i]
             size += abs(rows.structure[r, i]) * work.jump[i]
         for i in range(b):
-            part = rows.bodies[r, i] * (work.on_bodies[i] + (rows.inertia[i] * phase).real) / rows.mass[i]
-            total += part
-            size += abs(part)
+            inertia = (rows.inertia[i] * phase).real
+            total += rows.bodies[r, i] * (work.on_bodies[i] + inertia) / rows.mass[i]
+            size += abs(rows.bodies[r, i]) * (abs(work.on_bodies[i]) + abs(inertia)) / rows.mass[i]
         work.acceleration[r] = total
         largest = max(largest, size)
     return largest
@@ -268,14 +278,23 @@ def _log(rows, st, rec, kind, r, before, after, impulse):
 
 @kernel
 def _log_changes(rows, st, rec, work):
+    """Log what changed. A body that rests at a wall is at rest on the floor too, and only the wall is named."""
     for r in range(len(st.state)):
         was, now = work.before[r], st.state[r]
         if r < rows.friction_rows:
-            if now >= STICK > was:
+            if now >= STICK > was and not _at_wall(rows, st.state, r):
                 _log(rows, st, rec, STICKS, r, 0.0, 0.0, 0.0)
-            elif was >= STICK > now:
+            elif was >= STICK > now and not _at_wall(rows, work.before, r):
                 _log(rows, st, rec, SLIPS, r, 0.0, st.velocity[r], 0.0)
         elif now != OPEN and was == OPEN:
             _log(rows, st, rec, RESTS, r, 0.0, 0.0, 0.0)
         elif now == OPEN and was != OPEN:
             _log(rows, st, rec, DETACHES, r, 0.0, st.velocity[r], 0.0)
+
+
+@kernel
+def _at_wall(rows, state, body):
+    for r in range(rows.friction_rows, len(state)):  # noqa: SIM110 (numba compiles no generator)
+        if rows.wall_body[r] == body and state[r] != OPEN:
+            return True
+    return False
