@@ -1,0 +1,261 @@
+"""A second way to the same motion: DOP853 with event location, the independent check of the exact engine.
+
+Everything here is chosen for plainness: small dense matrices, contact states by trying all combinations, and steps so
+short that samples bound what an event function can do between them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from reference_impacts import accumulates, collide, snap
+from reference_modes import STUCK, VANISHES, Flow, Mode, Modes
+from reference_system import System
+from scipy.integrate import DOP853, DenseOutput, OdeSolution
+from scipy.optimize import brentq
+
+from coupling.scene import Scene
+from rom.reduced import ReducedModel
+
+
+class Event(NamedTuple):
+    """time (s); kind "impact", "stick", "slip", "detach" or "rest"; side "left", "right", "neighbour" or "floor".
+
+    Velocities (m/s) are those of the body relative to the cavity; between neighbours, where damper is the left body
+    of the two, those of the right body relative to the left.
+    """
+
+    time: float
+    kind: str
+    damper: int
+    side: str
+    relative_velocity_before: float
+    relative_velocity_after: float
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Events, final state (SI; structure (n,), bodies (b,) relative to their cavities) and dense response."""
+
+    events: tuple[Event, ...]
+    time: float
+    structure: np.ndarray
+    structure_velocity: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    solution: OdeSolution
+    system: System
+
+    def x(self, time: np.ndarray | float) -> np.ndarray:
+        """Displacement (m) of the structure at excitation.at, or of the table, at times (s) of any shape."""
+        if not len(self.system.M):
+            return self.system.length * self.system.table * np.sin(np.asarray(time) * self.system.omega)
+        return np.tensordot(self.system.output, self.states(time)[0], 1)
+
+    def r(self, damper: int, time: np.ndarray | float) -> np.ndarray:
+        """Position (m) of a body relative to its cavity at times (s) of any shape."""
+        return self.states(time)[1][damper]
+
+    def rd(self, damper: int, time: np.ndarray | float) -> np.ndarray:
+        """Velocity (m/s) of a body relative to its cavity at times (s) of any shape."""
+        return self.states(time)[3][damper]
+
+    def states(self, time: np.ndarray | float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """q, r, q', r' (SI) at times (s) of any shape; the bodies or coordinates come first."""
+        t = np.asarray(time) * self.system.omega
+        y = self.solution(t.ravel()).reshape((-1, *t.shape)) * self.system.length
+        q, r, qd, rd = self.system.split(y)
+        return q, r, qd * self.system.omega, rd * self.system.omega
+
+
+def agreement(one: Reference, other: Reference, tolerance: float) -> float:
+    """Time (s) until which the bodies' positions in two runs of a scene agree, relative to the narrowest half gap.
+
+    Runs that differ in round-off alone tell how long a chaotic motion can be followed.
+    """
+    time = np.union1d(one.solution.ts, other.solution.ts) / one.system.omega
+    apart = np.abs(one.states(time)[1] - other.states(time)[1]).max(axis=0) > tolerance * one.system.length
+    return float(time[apart.argmax()] if apart.any() else time[-1])
+
+
+def integrate(
+    scene: Scene,
+    periods: float,
+    reduced: ReducedModel | None = None,
+    *,
+    rtol: float = 1e-12,
+    step: float = 0.08,
+    pressed: bool = False,
+) -> Reference:
+    """Motion of a scene over a number of excitation periods.
+
+    reduced is the ReducedModel of a scene with model = "rom"; rtol and step (radians of the fastest natural frequency)
+    bound the steps of DOP853; pressed says what an impact elsewhere does to contacts that are at rest, see `collide`.
+    """
+    system = System(scene, reduced)
+    modes = Modes(system)
+    y = np.concatenate([system.q0, system.r0, system.qd0, system.rd0])
+    t, end = 0.0, 2 * np.pi * periods
+    longest = step / system.fastest()
+    events: list[Event] = []
+    times, pieces = [t], []
+    mode = None
+    while True:
+        mode, named = _resume(modes, t, y, mode, pressed)
+        events += named
+        if len(events) > 1000 and events[-1000].time == t / system.omega:
+            raise RuntimeError(f"events without end at t = {t / system.omega:g} s")
+        if t >= end:
+            break
+        for now, state, piece in _march(system, modes.flow(mode), t, y, end, longest, rtol):
+            t, y = now, state
+            if t > times[-1]:
+                times.append(t)
+                pieces.append(piece)
+    q, r, qd, rd = (part * system.length for part in system.split(y))
+    solution = OdeSolution(times, pieces)
+    return Reference(tuple(events), t / system.omega, q, qd * system.omega, r, rd * system.omega, solution, system)
+
+
+def _march(
+    system: System, flow: Flow, start: float, y: np.ndarray, end: float, step: float, rtol: float
+) -> Iterator[tuple[float, np.ndarray, DenseOutput]]:
+    """(time, state, interpolant) after each step, until the first guard turns negative or the end is reached."""
+    z = system.extended(start, y)
+    order, leading, _ = flow.signs(z)
+    # positions count from here, so that a flight that hardly leaves the wall keeps all its digits
+    shift = np.zeros_like(y)
+    system.split(shift)[1][:] = system.split(y)[1]
+    openings = np.where(flow.level == 0, flow.guards @ z, 0.0)
+    matrix, one, sine = np.ascontiguousarray(flow.rate[:-3, :-3]), flow.rate[:-3, -3], flow.rate[:-3, -2]
+    solver = DOP853(
+        lambda t, y: matrix @ y + (one + math.sin(t) * sine),
+        start,
+        y - shift,
+        end,
+        max_step=step,
+        rtol=rtol,
+        atol=1e-3 * rtol,
+        first_step=min(step, end - start),
+    )
+    while solver.status == "running":
+        solver.step()
+        piece = solver.dense_output()
+        search = _Search(system, flow, piece, np.linspace(solver.t_old, solver.t, 5), openings)
+        if solver.t_old == start:
+            search.order, search.leading = order, leading
+        root = search.first(np.flatnonzero(order < VANISHES))
+        if root is not None:
+            yield root, piece(root) + shift, _Shifted(piece, shift)
+            return
+        yield solver.t, solver.y + shift, _Shifted(piece, shift)
+
+
+class _Shifted(DenseOutput):
+    """An interpolant plus a constant."""
+
+    def __init__(self, piece: DenseOutput, shift: np.ndarray) -> None:
+        super().__init__(piece.t_old, piece.t)
+        self.piece, self.shift = piece, shift
+
+    def _call_impl(self, t: np.ndarray) -> np.ndarray:
+        return (self.piece(t).T + self.shift).T
+
+
+class _Search:
+    """The first time in one step at which a guard turns negative.
+
+    Derivatives at the samples, doubled, bound those of the guards in the step: as the step is a small fraction of the
+    fastest period, they cannot grow more. Halving goes on until the bounds say that a piece holds no root, or one.
+    A guard that is zero at an event, where the step starts, has order > 0 and leaves zero with its leading derivative.
+    """
+
+    def __init__(self, system: System, flow: Flow, piece: DenseOutput, times: np.ndarray, openings: np.ndarray) -> None:
+        self.system, self.flow, self.piece, self.times, self.openings = system, flow, piece, times, openings
+        self.samples = flow.relative @ system.extended(times, piece(times))
+        self.samples[0] += openings[:, None]
+        self.bounds = 2 * np.abs(self.samples).max(axis=2)
+        self.order = np.zeros(self.samples.shape[1], int)
+        self.leading = self.samples[0, :, 0]
+
+    def first(self, watched: np.ndarray) -> float | None:
+        """The earliest root of the guards with these indices, None without one."""
+        values, width = self.samples[0], self.times[1] - self.times[0]
+        safe = np.minimum(values[:, :-1], values[:, 1:]) > self.bounds[2, :, None] * width**2 / 8
+        safe[self.order > 0, 0] = False
+        roots = []
+        for index in watched:
+            for sample in np.flatnonzero(~safe[index]):
+                ends = self.samples[:2, index, sample], self.samples[:2, index, sample + 1]
+                root = self._root(index, self.times[sample], self.times[sample + 1], *ends)
+                if root is not None:
+                    roots.append(root)
+                    break
+        return min(roots, default=None)
+
+    def _root(self, index: int, a: float, b: float, at_a: np.ndarray, at_b: np.ndarray) -> float | None:
+        """First root in a <= t <= b, given the guard and its rate at both."""
+        bounds, width = self.bounds[:, index], b - a
+        if a == self.times[0] and self.order[index] > 0:
+            order = self.order[index]
+            if self.leading[index] * (order + 1) > bounds[order + 1] * width:
+                return None
+        elif at_a[0] <= 0:
+            return a
+        elif min(at_a[0], at_b[0]) > bounds[2] * width**2 / 8:
+            return None
+        elif at_b[0] < 0 and max(at_a[1], at_b[1]) + bounds[3] * width**2 / 8 < 0:
+            return brentq(lambda t: self._value(index, t)[0], a, b, xtol=1e-15, rtol=1e-15)
+        if width < 1e-14:
+            return b if at_b[0] < 0 else None
+        middle = (a + b) / 2
+        at_middle = self._value(index, middle)
+        left = self._root(index, a, middle, at_a, at_middle)
+        return self._root(index, middle, b, at_middle, at_b) if left is None else left
+
+    def _value(self, index: int, t: float) -> np.ndarray:
+        value = self.flow.relative[:2, index] @ self.system.extended(t, self.piece(t))
+        value[0] += self.openings[index]
+        return value
+
+
+def _resume(modes: Modes, t: float, y: np.ndarray, old: Mode | None, pressed: bool) -> tuple[Mode, list[Event]]:
+    """Impacts and the next contact state at an event; changes the state y in place."""
+    system = modes.system
+    snap(system, y)
+    before = system.split(y)[3].copy()
+    impacts = collide(system, y, pressed)
+    mode = modes.settle(t, y)
+    for contact, _, _ in impacts:
+        if accumulates(modes, t, y, mode, contact):
+            system.close(y, contact)
+            snap(system, y)
+            collide(system, y, pressed)
+            mode = modes.settle(t, y)
+    unit = system.length * system.omega
+    events = []
+    for contact, arriving, leaving in impacts:
+        damper, side, sign = system.name(contact)
+        events.append(Event(t / system.omega, "impact", damper, side, sign * arriving * unit, sign * leaving * unit))
+    after = system.split(y)[3]
+    for kind, damper, side in _changes(modes, old, mode) if old else []:
+        speeds = float(before[damper]) * unit, float(after[damper]) * unit
+        events.append(Event(t / system.omega, kind, damper, side, *speeds))
+    return mode, events
+
+
+def _changes(modes: Modes, old: Mode, new: Mode) -> list[tuple[str, int, str]]:
+    """(kind, damper, side) of what a change of contact state is called."""
+    changes = []
+    for damper, (was, now) in enumerate(zip(old.floor, new.floor, strict=True)):
+        if was != STUCK and now == STUCK:
+            side = modes.side(damper, new)
+            changes.append(("stick" if side == "floor" else "rest", damper, side))
+        elif was == STUCK and now != STUCK:
+            side = modes.side(damper, old)
+            changes.append(("slip" if side == "floor" else "detach", damper, side))
+    return changes
