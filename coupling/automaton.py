@@ -270,7 +270,8 @@ def _happen(rows, flows, st, rec, work, r, order, side):
     n = len(st.constant)
     _keep_released(st, work)
     if order == POSITION:
-        st.displacement[r] = 0.0
+        # a gap that closes while it still widens, to round-off, is a touch without speed
+        st.displacement[r], st.velocity[r] = 0.0, min(st.velocity[r], 0.0)
         if not collide(rows, st, rec, work):
             return False
         if all_move(rows, st):

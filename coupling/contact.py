@@ -246,23 +246,26 @@ def _free_acceleration(rows, st, work):
     constant_loads(rows, st, work)
     phase = st.amplitude[0]
     for i in range(n):
-        force, spring, damper = (rows.force[i] * phase).real, rows.stiffness[i] * st.coordinates[i], 0.0
+        p, speed, damper = st.coordinates[i], st.coordinates[n + i], 0.0
         if rows.proportional:
-            damper = rows.damping[i, i] * st.coordinates[n + i]
+            damper = rows.damping[i, i] * speed
         else:
             for k in range(n):
                 damper += rows.damping[i, k] * st.coordinates[n + k]
-        work.on_structure[i] += force - spring - damper
-        work.jump[i] = abs(force) + abs(spring) + abs(damper)
+        # sizes by amplitude: what passes through zero has the round-off of its peak
+        work.jump[i] = (
+            abs(work.on_structure[i]) + abs(rows.force[i]) + abs(damper)
+            + rows.stiffness[i] * abs(p) + np.sqrt(rows.stiffness[i]) * abs(speed)
+        )  # fmt: skip
+        work.on_structure[i] += (rows.force[i] * phase).real - rows.stiffness[i] * p - damper
     for r in range(len(st.state)):
         total, size = 0.0, 0.0
         for i in range(n):
             total += rows.structure[r, i] * work.on_structure[i]
             size += abs(rows.structure[r, i]) * work.jump[i]
         for i in range(b):
-            inertia = (rows.inertia[i] * phase).real
-            total += rows.bodies[r, i] * (work.on_bodies[i] + inertia) / rows.mass[i]
-            size += abs(rows.bodies[r, i]) * (abs(work.on_bodies[i]) + abs(inertia)) / rows.mass[i]
+            total += rows.bodies[r, i] * (work.on_bodies[i] + (rows.inertia[i] * phase).real) / rows.mass[i]
+            size += abs(rows.bodies[r, i]) * (abs(work.on_bodies[i]) + abs(rows.inertia[i])) / rows.mass[i]
         work.acceleration[r] = total
         largest = max(largest, size)
     return largest

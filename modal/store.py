@@ -121,7 +121,8 @@ def _dimension_lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
             raise ValueError(f"{name}: {len(variable.dims)} dimensions named for an array of shape {shape}")
         for dimension, length in zip(variable.dims, shape, strict=True):
             if lengths.setdefault(dimension, length) != length:
-                raise ValueError(f"{name}: dimension {dimension} has length {length} here and {lengths[dimension]} elsewhere")
+                other = lengths[dimension]
+                raise ValueError(f"{name}: dimension {dimension} has length {length} here and {other} elsewhere")
     return lengths
 
 
