@@ -10,7 +10,7 @@ from reference_modes import STUCK, ZERO, Mode, Modes
 from reference_system import System
 
 #: A sequence of impacts that would be over within this time (radians of the excitation) is completed at once.
-CHATTER = 1e-8
+CHATTER = 1e-9
 
 
 def collide(system: System, y: np.ndarray, pressed: bool) -> list[tuple[int, float, float]]:

@@ -1,0 +1,65 @@
+"""The engine against an independent way: DOP853 at rtol 1e-12 with event search (tests/reference.py), random scenes.
+
+Impacts come in the same order at times equal to 1e-8 of a period, and the motion between them is the same. Chaos
+multiplies every difference at each impact, so the comparison ends where two runs of the reference itself, at other
+step lengths and tolerances, part. The last impacts of a chatter are left out: each way completes it by its own rule.
+"""
+
+import numpy as np
+import pytest
+from random_scenes import random_reduced, random_scene
+from reference import agreement, integrate
+
+from coupling.engine import simulate
+from coupling.response import Status
+
+PERIODS, SAMPLES = 10, 32
+# impacts slower than this share of the fastest are the end of a chatter
+FADING = 1e-3
+
+
+def impacts(events, end):
+    """(time, body) of the impacts up to `end` that are no end of a chatter."""
+    fastest = max((abs(event.relative_velocity_before) for event in events), default=0.0)
+    return [
+        (event.time, event.damper)
+        for event in events
+        if event.time < end and event.kind == "impact" and abs(event.relative_velocity_before) > FADING * fastest
+    ]
+
+
+@pytest.mark.parametrize(
+    ("structure", "bodies", "seed"),
+    [("rigid", 1, seed) for seed in range(20)]
+    + [("prescribed", 1, seed) for seed in range(10)]
+    + [("rigid", 2, seed) for seed in range(10)]
+    + [("rom", 2, seed) for seed in range(10)],
+)
+def test_motion_equals_dop853(structure, bodies, seed, tmp_path):
+    scene = random_scene(seed, structure, bodies).replace({"time.periods": PERIODS, "time.transient": 0})
+    reduced = None
+    if structure == "rom":
+        reduced = random_reduced(seed)
+        reduced.save(tmp_path / "rom.h5")
+        scene = scene.replace({"structure.file": str(tmp_path / "rom.h5")})
+    period = 1 / scene.excitation.frequency
+    reference = integrate(scene, PERIODS, reduced, pressed=True)
+    end = agreement(reference, integrate(scene, PERIODS, reduced, pressed=True, rtol=1e-13, step=0.05), 1e-9)
+    response = simulate(scene, events=True, samples_per_period=SAMPLES)
+    assert response.status == Status.OK
+    assert response.energy_residual < 1e-10
+
+    expected, found = impacts(reference.events, end), impacts(response.event_list, end)
+    assert abs(len(expected) - len(found)) <= 1  # one may lie just beyond the end
+    for (time, body), (other, other_body) in zip(expected, found, strict=False):
+        assert body == other_body
+        assert abs(time - other) < 1e-8 * period
+
+    time = response.time[response.time < end]
+    assert len(time) > 2 * SAMPLES
+    followed = response.displacement[: len(time)] - reference.x(time)
+    assert np.abs(followed).max() <= 2e-8 * np.abs(response.displacement).max()
+    for body, damper in enumerate(scene.damper):
+        gap = next(cavity.gap for cavity in scene.cavity if cavity.name == damper.cavity)
+        followed = response.body_displacement[: len(time), body] - reference.r(body, time)
+        assert np.abs(followed).max() <= 2e-7 * gap
