@@ -13,15 +13,16 @@ import numpy as np
 from scipy.linalg import eigh
 
 from coupling.scene import Scene
-from coupling.sweep import sweep, warm_up
+from coupling.sweep import Sweep, sweep, warm_up
 from meshes.vane_cluster import SHIPPED
 from modal.calibrate import RigidModel
-from modal.store import replacing
+from modal.store import load, replacing
 from studies.commands import available_cores, new_pool, progress, tell_sweep
-from studies.forced_response import resonance_grid
+from studies.forced_response import forced_responses, resonance_grid
+from studies.pictures import mode_picture, summary_picture
 from studies.provenance import versions
 
-_MODES = 6
+_MODES = 3
 _BODY = 0.02  # of the mass of the rigid model
 _GAP = 0.5  # of the undamped amplitude
 _RANGE = (0.95, 1.03)  # of the first bending frequency
@@ -59,9 +60,18 @@ def run_demo(folder: Path, workers: int | None = None) -> Path:
 
     with _stage("report"):
         write_report(collect(results), folder / "report.html")
+        _summary(folder)
     print(_COMMANDS.format(folder=folder, modes=_MODES))
     print(f"{folder / 'report.html'}: done in {time.perf_counter() - started:.0f} s")
     return folder / "report.html"
+
+
+def _summary(folder: Path) -> None:
+    """The mode and the rigid model's forced response in one picture, summary.png."""
+    _, attributes = load(folder / "modes.h5", "modes")
+    picture = mode_picture(folder / "modes.h5", int(attributes["first_bending"]))
+    (response,) = forced_responses(Sweep.load(folder / "sweep_rigid.h5"))
+    summary_picture(picture, response, folder / "summary.png")
 
 
 def _structure(folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from modal.store import load, replacing
 
 if TYPE_CHECKING:
     from modal.eigen import Modes
+    from studies.forced_response import ForcedResponse
 
 #: largest displacement in a picture, as a share of the structure's size
 _EXAGGERATION = 0.06
@@ -33,6 +35,37 @@ def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
         environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(_ROOT), os.environ.get("PYTHONPATH", "")])}
         finished = subprocess.run(command, env=environment, capture_output=True, check=False)
         return picture.read_bytes() if finished.returncode == 0 else None
+
+
+def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: str | Path) -> None:
+    """PNG of the mode beside the forced response: undamped, with bodies, with the bodies fixed."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.6), width_ratios=[1, 1.25], layout="constrained")
+    left.axis("off")
+    if mode_png is not None:
+        left.imshow(plt.imread(io.BytesIO(mode_png)))
+        left.set_title("first bending mode of the cluster", fontsize=11)
+    curves: list[tuple[np.ndarray, str, dict[str, Any]]] = [
+        (response.undamped, "undamped", {"color": "#7a7f87", "linestyle": ":"}),
+        (response.fixed, "bodies fixed", {"color": "#7a7f87", "linestyle": "--"}),
+        (response.damped_max, "loose bodies, maximum", {"color": "#9fc1ea", "marker": ".", "linewidth": 0.8}),
+        (response.damped_mean, "loose bodies, mean of peaks", {"color": "#1f5fa8", "linewidth": 2.0}),
+    ]
+    for amplitude, label, look in curves:
+        right.plot(response.x, amplitude / response.reference, label=label, **look)
+    right.set_xlabel("excitation frequency, Hz")
+    right.set_ylabel("amplitude / undamped maximum")
+    right.set_title(f"forced response, {response.name}", fontsize=11)
+    right.set_ylim(bottom=0.0)
+    right.grid(color="#e6e8eb")
+    right.legend(frameon=False)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=110)
+    plt.close(figure)
 
 
 def save_vtk(modes: Modes, coordinates: np.ndarray, cells: np.ndarray, cell_type: int, path: str | Path) -> None:

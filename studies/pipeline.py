@@ -146,6 +146,6 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
 
 
 def reduction(structure: Structure, modes: int) -> ReducedModel:
-    """Craig-Bampton model on the case's interface with that many fixed-interface modes."""
+    """Craig-Bampton model on the case's interface with that many fixed-interface modes and the quasi-static ones."""
     coordinates = interface(structure.case, structure.matrices)
-    return reduce(structure.matrices, coordinates, modes, factorize=factorize)
+    return reduce(structure.matrices, coordinates, modes, factorize=factorize, quasi_static=True)
