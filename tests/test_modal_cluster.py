@@ -53,15 +53,24 @@ def test_rigid_models_at_shroud_and_cavity_are_alike(cluster, cluster_modes):
     assert min(masses) == pytest.approx(effective_masses(cluster_modes, cluster)[0, 1], rel=0.1)
 
 
-def test_frequencies_and_effective_masses_equal_arpack(coarse):
-    _, matrices = coarse
+def assert_equal_to_arpack(modes, matrices):
+    """Frequencies and effective masses against scipy's shift-invert Lanczos with SuperLU on the same matrices."""
     free = matrices.free
     stiffness, mass = matrices.stiffness[free][:, free], matrices.mass[free][:, free]
-    eigenvalues, vectors = eigsh(stiffness.tocsc(), 10, mass.tocsc(), sigma=0.0)
-    modes = solve_modes(matrices, 10)
+    eigenvalues, vectors = eigsh(stiffness.tocsc(), len(modes), mass.tocsc(), sigma=0.0)
     assert modes.frequencies_hz == pytest.approx(np.sqrt(eigenvalues) / (2 * np.pi), rel=1e-8)
     expected = (vectors.T @ (mass @ matrices.movable_translations()[free])) ** 2
     assert effective_masses(modes, matrices) == pytest.approx(expected, abs=1e-8 * matrices.movable_mass[0])
+
+
+def test_frequencies_and_effective_masses_equal_arpack(coarse):
+    _, matrices = coarse
+    assert_equal_to_arpack(solve_modes(matrices, 10), matrices)
+
+
+@pytest.mark.slow
+def test_shipped_cluster_equals_arpack(cluster, cluster_modes):
+    assert_equal_to_arpack(cluster_modes, cluster)
 
 
 def test_sixty_modes_fill_the_movable_mass_from_below(coarse):
