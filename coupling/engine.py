@@ -154,12 +154,21 @@ def _events(rows: Rows, chunks: list[np.ndarray]) -> list[Event]:
     events = []
     for entry in np.concatenate(chunks) if chunks else ():
         row = int(entry[2])
-        bodies = np.flatnonzero(rows.bodies[row])
-        side = "floor"
-        if row >= rows.friction_rows:
-            side = "body" if len(bodies) == 2 else "left" if rows.bodies[row, bodies[0]] > 0 else "right"
+        body, side = _place(rows, row)
         # speeds of the gap, turned into speeds of the body relative to what it meets
-        sign = 1.0 if side in ("left", "floor") else -1.0
+        sign = -1.0 if side in ("right", "body") else 1.0
         before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
-        events.append(Event(float(entry[0]), st.KINDS[int(entry[1])], int(bodies[0]), side, before, after, impulse))
+        events.append(Event(float(entry[0]), st.KINDS[int(entry[1])], body, side, before, after, impulse))
     return events
+
+
+def _place(rows: Rows, row: int) -> tuple[int, str]:
+    """Number of the body (or of the friction damper, side "casing") and the side on which a row acts."""
+    if len(rows.mass) <= row < rows.friction_rows:
+        return row - len(rows.mass), "casing"
+    bodies = np.flatnonzero(rows.bodies[row])
+    if row < rows.friction_rows:
+        return int(bodies[0]), "floor"
+    if len(bodies) == 2:
+        return int(bodies[0]), "body"
+    return int(bodies[0]), "left" if rows.bodies[row, bodies[0]] > 0 else "right"

@@ -1,8 +1,9 @@
 """Exact flow between two events: the linear subsystems that the sets of closed contacts name.
 
 Rows. Everything unilateral or frictional is a row of one constraint matrix J over the coordinates (p, x): modal
-coordinates of the structure and positions of the bodies. Friction rows come first (one a body: its slip on the floor),
-then contact rows (one a gap: left wall to first body, body to body, last body to right wall).
+coordinates of the structure and positions of the bodies. Friction rows come first (one a body: its slip on the floor;
+one a friction damper: the structure's motion against the casing), then contact rows (one a gap: left wall to first
+body, body to body, last body to right wall).
 
 A subsystem is named by the rows that are held closed. Bodies held to the structure add their mass to it; the others
 move freely. Its state is a vector of complex modal amplitudes c, and with c_0 the excitation (eigenvalue i omega),
@@ -93,20 +94,28 @@ def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray,
             # two bodies of different restitution meet with the geometric mean
             restitution.append(float(np.prod([scene.damper[i].restitution for i in pair]) ** (1 / len(pair))))
             gaps.append(cavity.gap)
-    j_structure = np.vstack([-floor, np.array(on_structure).reshape(len(gaps), n)])
-    j_bodies = np.vstack([unit, np.array(on_bodies).reshape(len(gaps), bodies)])
+    casing = structure.casing
+    j_structure = np.vstack([-floor, casing, np.array(on_structure).reshape(len(gaps), n)])
+    j_bodies = np.vstack([unit, np.zeros((len(casing), bodies)), np.array(on_bodies).reshape(len(gaps), bodies)])
     mass = np.array([damper.mass for damper in scene.damper])
     base = structure.base_acceleration
     rows = Rows(
-        friction_rows=bodies,
+        friction_rows=bodies + len(casing),
         structure=j_structure,
         bodies=j_bodies,
         delassus=j_structure @ j_structure.T + (j_bodies / mass) @ j_bodies.T,
-        limit=np.array([_friction_force(scene, i) for i in range(bodies)]),
+        limit=np.array(
+            [_friction_force(scene, i) for i in range(bodies)]
+            + [damper.friction * damper.normal_force for damper in scene.friction_damper]
+        ),
         restitution=np.array(restitution),
         gap=np.array(gaps),
-        wall_body=np.array([_wall_body(j_structure, j_bodies, r) for r in range(len(j_bodies))], np.int64),
-        rides=np.array([_rides(j_structure, j_bodies, r) for r in range(len(j_bodies))], np.bool_),
+        wall_body=np.array(
+            [_wall_body(j_structure, j_bodies, bodies + len(casing), r) for r in range(len(j_bodies))], np.int64
+        ),
+        rides=np.array(
+            [_rides(j_structure, j_bodies, bodies + len(casing), r) for r in range(len(j_bodies))], np.bool_
+        ),
         floor=floor,
         mass=mass,
         weight=mass * scene.gravity.tangential,
@@ -133,19 +142,19 @@ def _initial_rows(scene: Scene, structure: LinearStructure, rows: Rows) -> tuple
     absolute = velocity + rows.floor @ structure.velocity
     speed = rows.structure @ structure.velocity + rows.bodies @ absolute
     moved = rows.structure @ structure.displacement + rows.bodies @ (rows.floor @ structure.displacement)
-    speed[: rows.friction_rows] = velocity  # exact, so that a body at relative rest is known to be so
-    moved[: rows.friction_rows] = 0.0
+    speed[: len(velocity)] = velocity  # exact, so that a body at relative rest is known to be so
+    moved[: len(velocity)] = 0.0
     return displacement + moved, speed
 
 
-def _wall_body(structure: np.ndarray, bodies: np.ndarray, r: int) -> int:
+def _wall_body(structure: np.ndarray, bodies: np.ndarray, friction_rows: int, r: int) -> int:
     touched = np.flatnonzero(bodies[r])
-    return int(touched[0]) if len(touched) == 1 and _rides(structure, bodies, r) else -1
+    return int(touched[0]) if len(touched) == 1 and _rides(structure, bodies, friction_rows, r) else -1
 
 
-def _rides(structure: np.ndarray, bodies: np.ndarray, r: int) -> bool:
-    count = bodies.shape[1]
-    return r >= count and np.allclose(structure[r], bodies[r] @ structure[:count], rtol=1e-14, atol=0)
+def _rides(structure: np.ndarray, bodies: np.ndarray, friction_rows: int, r: int) -> bool:
+    slips = structure[: bodies.shape[1]]
+    return r >= friction_rows and np.allclose(structure[r], bodies[r] @ slips, rtol=1e-14, atol=0)
 
 
 def _friction_force(scene: Scene, index: int) -> float:
@@ -198,7 +207,7 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     stiffness = np.diag(rows.stiffness)
     load = rows.force + carrier.T @ np.where(attached, rows.inertia, 0)
     dynamic = stiffness + 1j * rows.omega * rows.damping - rows.omega**2 * mass
-    harmonic = basis @ np.linalg.solve(basis.T @ dynamic @ basis, basis.T @ load)
+    harmonic = basis @ _solve_harmonic(basis.T @ dynamic @ basis, basis.T @ load)
     eigenvalue, shape, project = _complex_modes(rows, basis, mass, bool(attached.any()))
     m = len(eigenvalue) + 1
     flows.modes[s] = m
@@ -232,6 +241,18 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
         flows.closed_inverse[s][np.ix_(closed, closed)] = inverse
         flows.force[s][closed, :m] = -inverse @ acceleration[closed]
     _fill_energy(flows, rows, s, full, body)
+
+
+def _solve_harmonic(dynamic: np.ndarray, load: np.ndarray) -> np.ndarray:
+    if not load.any():  # free decay, at any frequency
+        return np.zeros_like(load)
+    try:
+        return np.linalg.solve(dynamic, load)
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "excitation.frequency: the response of an undamped structure at its own frequency grows without bound; "
+            "give it damping or another frequency"
+        ) from None
 
 
 def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.ndarray) -> None:

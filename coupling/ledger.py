@@ -237,7 +237,7 @@ def _sample(rows, flows, st, rec, s, tau, constant):
         t = max(t, 0.0)
         entry = rec.samples[st.counters[PERIOD] * each + i]
         entry[0] = _response_at(flows, st, s, t, constant)[0]
-        for r in range(rows.friction_rows):
+        for r in range(len(rows.mass)):
             shift = t * (st.velocity[r] + 0.5 * st.drift[r] * t)
             for a in range(st.counters[AWAKE]):
                 j = st.awake[a]

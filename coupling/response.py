@@ -24,7 +24,11 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Event:
-    """One event: time (s), kind, body, side ("left", "right", "body" or "floor"), speeds (m/s), impulse (N s)."""
+    """One event: time (s), kind, number of the body, side, speeds (m/s) and impulse (N s).
+
+    side: "left", "right" (walls), "body" (the next body to the right), "floor"; "casing" for a friction damper, whose
+    number is then meant. Speeds are the body's relative to what it meets.
+    """
 
     time: float
     kind: str

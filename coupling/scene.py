@@ -139,6 +139,18 @@ class Damper:
 
 
 @dataclass(frozen=True, config=STRICT)
+class FrictionDamper:
+    """A Coulomb element between the structure and the casing: the spring-loaded damper that is the usual remedy.
+
+    It acts at interface label `at` of a reduced model (default: excitation.at).
+    """
+
+    normal_force: Positive
+    friction: NonNegative
+    at: str | None = None
+
+
+@dataclass(frozen=True, config=STRICT)
 class Contact:
     """The contact law at the walls."""
 
@@ -182,6 +194,7 @@ class Scene:
     excitation: Excitation
     cavity: tuple[Cavity, ...] = ()
     damper: tuple[Damper, ...] = ()
+    friction_damper: tuple[FrictionDamper, ...] = ()
     initial: Initial = field(default_factory=Initial)
     gravity: Gravity = field(default_factory=Gravity)
     contact: Contact = field(default_factory=Contact)
@@ -245,6 +258,8 @@ class Scene:
             excitation = self.excitation
             if excitation.force or excitation.base_acceleration or excitation.resonance_amplitude:
                 raise ValueError("excitation: a prescribed motion takes frequency alone; structure sets the amplitude")
+            if self.friction_damper:
+                raise ValueError("friction_damper: a prescribed motion feels no force; remove it")
             if self.initial != Initial():
                 raise ValueError("initial: a prescribed motion has no initial state; remove the table")
 

@@ -25,9 +25,10 @@ class LinearStructure:
     """A structure with n real modes (n may be 0), excited at angular frequency `omega`.
 
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); response: (n,) functional of the response;
-    floor, left, right: (cavities, n) functionals of the cavities' surfaces; force: (n,) complex modal load and
-    base_acceleration: complex acceleration of the base, both amplitudes of exp(i omega t); displacement and velocity:
-    (n,) initial state; table: complex displacement amplitude of the base that counts as response (prescribed motion).
+    floor, left, right: (cavities, n) functionals of the cavities' surfaces; casing: (friction dampers, n) functionals
+    of what rubs on the casing; force: (n,) complex modal load and base_acceleration: complex acceleration of the base,
+    both amplitudes of exp(i omega t); displacement and velocity: (n,) initial state; table: complex displacement
+    amplitude of the base that counts as response (prescribed motion).
     """
 
     omega: float
@@ -37,6 +38,7 @@ class LinearStructure:
     floor: np.ndarray
     left: np.ndarray
     right: np.ndarray
+    casing: np.ndarray
     force: np.ndarray
     base_acceleration: complex
     displacement: np.ndarray
@@ -68,7 +70,7 @@ def linear_structure(scene: Scene) -> LinearStructure:
         none = np.zeros((cavities, 0))
         flat = np.zeros(0)
         return LinearStructure(
-            omega, flat, np.zeros((0, 0)), flat, none, none, none, flat.astype(complex),
+            omega, flat, np.zeros((0, 0)), flat, none, none, none, np.zeros((0, 0)), flat.astype(complex),
             -(omega**2) * amplitude, flat, flat, table=amplitude,
         )  # fmt: skip
     basis = _basis(scene)
@@ -76,6 +78,10 @@ def linear_structure(scene: Scene) -> LinearStructure:
     response = _row(basis, at, "excitation.at")
     surfaces = np.array([_surfaces(basis, scene, index) for index in range(cavities)])
     left, right, floor = surfaces.reshape(cavities, 3, len(response)).swapaxes(0, 1)
+    casing = [
+        _row(basis, damper.at or at, f"friction_damper[{i}].at") if isinstance(scene.structure, Rom) else response
+        for i, damper in enumerate(scene.friction_damper)
+    ]
     base = -1j * (scene.excitation.base_acceleration or 0.0)
     force = -1j * response * _force_amplitude(scene, basis, response) - basis.base[str(at)] * base
     # the initial state belongs to the rigid model, whose single mode has the functional `response`
@@ -83,8 +89,9 @@ def linear_structure(scene: Scene) -> LinearStructure:
     displacement = np.full(len(response), scene.initial.displacement * scale)
     velocity = np.full(len(response), scene.initial.velocity * scale)
     return LinearStructure(
-        omega, basis.stiffness, basis.damping, response, floor, left, right, force, base, displacement, velocity
-    )
+        omega, basis.stiffness, basis.damping, response, floor, left, right,
+        np.reshape(casing, (len(casing), len(response))), force, base, displacement, velocity,
+    )  # fmt: skip
 
 
 def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np.ndarray:

@@ -208,6 +208,47 @@ def test_free_decay_is_closed_form():
     assert response.energy["viscous"] == pytest.approx(-response.energy["stored"], rel=1e-12)
 
 
+def rubbing(frequency, force=0.0, friction=0.1, **tables):
+    """Unit mass on a spring of 1e4 N/m that rubs on the casing with friction * 10 N."""
+    return scene(
+        structure={"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.0},
+        excitation={"frequency": frequency, "force": force},
+        friction_damper=[{"normal_force": 10.0, "friction": friction}],
+        **tables,
+    )
+
+
+def test_free_decay_with_coulomb_friction():
+    """Code_Aster SDND100: turning points (-1)^n (U0 - 2 n mu m g / c), then the mass sticks at the fourth."""
+    start = {"initial": {"displacement": 0.85e-3}, "time": {"periods": 4, "transient": 0}}
+    response = simulate(rubbing(100 / (2 * np.pi), **start), events=True, samples_per_period=2)
+    turning = [(-1) ** n * (0.85e-3 - 2e-4 * n) for n in range(5)]
+    assert response.displacement[:5] == pytest.approx(turning, rel=1e-12)
+    assert response.displacement[5:] == pytest.approx([0.05e-3] * 3, rel=1e-12)
+    assert [(event.kind, event.side) for event in response.event_list] == [("stick", "casing")]
+    assert response.event_list[0].time == pytest.approx(4 * np.pi / 100, rel=1e-12)
+    assert response.energy["friction"] == pytest.approx(0.5e4 * (0.85e-3**2 - 0.05e-3**2), rel=1e-12)
+    assert response.energy_residual < 1e-12
+
+
+def test_den_hartog():
+    """Den Hartog (1931): forced vibration with Coulomb friction to ground, motion without stops."""
+    r, ratio = 0.6, 0.2
+    v, u = 1 / (1 - r**2), np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
+    steady = {"time": {"periods": 3000, "transient": 2900}}
+    response = simulate(rubbing(r * 100 / (2 * np.pi), force=1.0, friction=0.1 * ratio, **steady))
+    assert np.sqrt(v**2 - (ratio * u) ** 2) == pytest.approx(1.55060285, rel=1e-8)
+    assert response.amplitude_max * 1e4 == pytest.approx(np.sqrt(v**2 - (ratio * u) ** 2), rel=1e-6)
+    assert response.classification == "no-contact"
+    assert response.energy_residual < 1e-10
+
+
+def test_friction_damper_that_never_slips_locks_the_structure():
+    response = simulate(rubbing(10.0, force=1.0, friction=1.0, time={"periods": 5, "transient": 0}))
+    assert response.classification == "stuck"
+    assert response.amplitude_max == 0.0
+
+
 def test_base_acceleration_equals_an_inertial_force():
     """A base that shakes a structure without bodies is the force -m a on it; a body feels the base as well."""
     shaken = cluster(excitation={"frequency": 2414.0 * 0.99, "base_acceleration": 3.0})
@@ -278,6 +319,16 @@ def test_mistakes_of_the_model_are_named():
         simulate(cluster(structure={"model": "rigid", "mass": 1.0, "stiffness": 1e8, "damping_ratio": 0.0}))
     with pytest.raises(InputError, match="critically damped"):
         simulate(cluster(structure={"model": "rigid", "mass": 1.0, "stiffness": 1e8, "damping_ratio": 1.0}))
+
+
+def test_undamped_structure_at_its_own_frequency_is_refused():
+    with pytest.raises(InputError, match="grows without bound"):
+        simulate(
+            scene(
+                structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.0},
+                excitation={"frequency": 1 / (2 * np.pi), "force": 1.0},
+            )
+        )
 
 
 def test_overdamped_structure_decays_without_oscillation():
