@@ -12,6 +12,7 @@ from coupling import state as st
 from coupling.flow import Rows, add_flow, empty_flows, rows_of
 from coupling.response import Event, Response, Status, classify
 from coupling.scene import Scene
+from coupling.statistics import mean_confidence, transient_length
 from coupling.structure import linear_structure
 
 _STATUS = {
@@ -20,6 +21,9 @@ _STATUS = {
     auto.ACCURACY_LOST: Status.ACCURACY_LOST,
     auto.UNDECIDED: Status.UNDECIDED,
 }
+
+#: periods between two looks at whether the response is steady
+_CHUNK = 100
 
 
 def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) -> Response:
@@ -30,8 +34,32 @@ def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) ->
     """
     started = time.perf_counter()
     run = _Run(scene, events, samples_per_period)
-    code = run.go(scene.time.periods, scene.solver.max_events)
-    return _response(scene, run, _STATUS[code], time.perf_counter() - started)
+    code = run.begin(scene.solver.max_events)
+    transient, status = scene.time.dropped, _STATUS[code]
+    if status is Status.OK and scene.time.steady == "auto":
+        status, transient = _until_steady(run, scene)
+    elif status is Status.OK:
+        status = _STATUS[run.advance(scene.time.periods, scene.solver.max_events)]
+    return _response(scene, run, status, transient, started)
+
+
+def _until_steady(run: _Run, scene: Scene) -> tuple[Status, int]:
+    """Advance until the mean amplitude is known well enough. Returns the status and the length of the transient."""
+    status, dropped = Status.NOT_STEADY, scene.time.dropped
+    for periods in range(_CHUNK, scene.time.periods + _CHUNK, _CHUNK):
+        code = run.advance(min(periods, scene.time.periods), scene.solver.max_events)
+        if code != auto.DONE:
+            return _STATUS[code], dropped
+        peaks = run.records.peak[: run.state.counters[st.PERIOD]]
+        transient = transient_length(peaks)
+        if transient is None:
+            status, dropped = Status.NOT_STEADY, scene.time.dropped
+            continue
+        confidence = mean_confidence(peaks[transient:])
+        if confidence is not None and confidence <= scene.time.tolerance * peaks[transient:].mean():
+            return Status.OK, transient
+        status, dropped = Status.UNCERTAIN, transient
+    return status, dropped
 
 
 @dataclass
@@ -61,15 +89,17 @@ class _Run:
         self.records = st.new_records(self.rows, scene.time.periods, samples_per_period)
         self.scratch = st.new_scratch(self.rows, modes)
 
-    def go(self, periods: int, max_events: int) -> int:
-        """Advance to the end of `periods`. Returns the automaton's code."""
+    def begin(self, max_events: int) -> int:
+        """Decide the initial state and record it. Returns the automaton's code."""
         if not auto.begin(self.rows, self.state, self.records, self.scratch):
             return auto.UNDECIDED
-        self._advance(0, max_events)
-        auto.record_section(self.rows, self.flows, self.state, self.records, self.scratch)
-        return self._advance(periods, max_events)
+        code = self.advance(0, max_events)
+        if code == auto.DONE:
+            auto.record_section(self.rows, self.flows, self.state, self.records, self.scratch)
+        return code
 
-    def _advance(self, periods: int, max_events: int) -> int:
+    def advance(self, periods: int, max_events: int) -> int:
+        """Advance to the end of `periods`. Returns the automaton's code."""
         while True:
             code = auto.advance(
                 self.rows, self.flows, self.state, self.channels, self.records, self.scratch, periods, max_events
@@ -84,10 +114,10 @@ class _Run:
                 return int(code)
 
 
-def _response(scene: Scene, run: _Run, status: Status, wall_time: float) -> Response:
+def _response(scene: Scene, run: _Run, status: Status, transient: int, started: float) -> Response:
     rows, records, counters = run.rows, run.records, run.state.counters
     done = int(counters[st.PERIOD])
-    first = min(scene.time.transient, max(done - 1, 0))
+    first = min(transient, max(done - 1, 0))
     window = slice(first, done)
     span = max(done - first, 1) * rows.period
     ledger = records.ledger[: done + 1] - records.ledger[first]
@@ -102,6 +132,7 @@ def _response(scene: Scene, run: _Run, status: Status, wall_time: float) -> Resp
         frequency=scene.excitation.frequency,
         amplitude_max=float(peaks.max(initial=0.0)),
         amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
+        amplitude_mean_confidence=mean_confidence(peaks),
         amplitude_rms=float(np.sqrt(max(records.square[window].sum() / span, 0.0))),
         amplitude_harmonic=float(abs(harmonic)),
         phase=float(np.angle(1j * harmonic)),
@@ -111,7 +142,7 @@ def _response(scene: Scene, run: _Run, status: Status, wall_time: float) -> Resp
         energy=evaluated,
         energy_residual=_residual(records.ledger[: done + 1]),
         attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
-        wall_time_s=wall_time,
+        wall_time_s=time.perf_counter() - started,
         periods=done,
         transient=first,
         counters={

@@ -14,12 +14,18 @@ from modal.store import Variable, save
 
 
 class Status(StrEnum):
-    """How a run ended. Everything but OK means that the figures cover only the periods that were completed."""
+    """How a run ended.
+
+    NOT_STEADY: no end of the transient in sight; UNCERTAIN: the mean's confidence interval is still too wide. The other
+    troubles mean that the figures cover only the periods that were completed.
+    """
 
     OK = "ok"
     EVENT_BUDGET = "event_budget"
     ACCURACY_LOST = "accuracy_lost"
     UNDECIDED = "undecided_contact"
+    NOT_STEADY = "not_steady"
+    UNCERTAIN = "confidence_not_reached"
 
 
 @dataclass(frozen=True)
@@ -43,7 +49,8 @@ class Event:
 class Response:
     """What a structure with loose bodies did. Amplitudes and energies are those of the evaluated periods.
 
-    amplitude_*: of the displacement at excitation.at (m); energy: J over the evaluated time, `stored` its change;
+    amplitude_*: of the displacement at excitation.at (m), with the half width of the mean's 95 % confidence interval
+    (None if there are too few periods); energy: J over the evaluated time, `stored` its change;
     energy_residual: imbalance of the whole run's ledger relative to its largest term; attached_mass_fraction: share
     of the bodies' mass that the structure feels (None without bodies or motion); peak: (periods,) largest |x| of each
     period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
@@ -54,6 +61,7 @@ class Response:
     frequency: float
     amplitude_max: float
     amplitude_mean: float
+    amplitude_mean_confidence: float | None
     amplitude_rms: float
     amplitude_harmonic: float
     phase: float
@@ -79,7 +87,8 @@ class Response:
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """The result as plain data, with the list of events if wanted."""
         names = (
-            "frequency", "amplitude_max", "amplitude_mean", "amplitude_rms", "amplitude_harmonic", "phase",
+            "frequency", "amplitude_max", "amplitude_mean", "amplitude_mean_confidence", "amplitude_rms",
+            "amplitude_harmonic", "phase",
             "impacts_per_period", "events", "classification", "energy", "energy_residual", "attached_mass_fraction",
             "wall_time_s", "periods", "transient", "counters",
         )  # fmt: skip

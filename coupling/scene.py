@@ -159,14 +159,27 @@ class Contact:
 
 @dataclass(frozen=True, config=STRICT)
 class Time:
-    """Excitation periods simulated, and how many of the first are left out of the evaluation."""
+    """Excitation periods simulated, and how many of the first are left out of the evaluation.
+
+    steady = "auto" instead drops the transient by a statistical rule and ends the run, within `periods`, once the 95 %
+    confidence interval of the mean amplitude is narrower than `tolerance` of it on either side.
+    """
 
     periods: Annotated[Whole, Field(gt=0)] = 1500
-    transient: Annotated[Whole, Field(ge=0)] = 1000
+    transient: Annotated[Whole, Field(ge=0)] | None = None
+    steady: Literal["auto"] | None = None
+    tolerance: Annotated[Real, Field(gt=0, lt=1)] = 0.01
 
     def __post_init__(self) -> None:
-        if self.transient >= self.periods:
+        if self.steady is not None and self.transient is not None:
+            raise ValueError("give one of transient and steady")
+        if self.transient is not None and self.transient >= self.periods:
             raise ValueError(f"transient ({self.transient}) must be less than periods ({self.periods})")
+
+    @property
+    def dropped(self) -> int:
+        """Periods left out of the evaluation unless the state tells: two thirds if nothing was said."""
+        return self.periods * 2 // 3 if self.transient is None else self.transient
 
 
 @dataclass(frozen=True, config=STRICT)
