@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import multiprocessing
 import os
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coupling.inputs import InputError
 from modal.store import replacing
+from studies.terminal import progress, tell_modes, tell_sweep
+from studies.workers import workers
 
 if TYPE_CHECKING:
     from coupling.scene import Scene
@@ -52,7 +51,7 @@ def modal(arguments: Namespace) -> None:
     result = analysis.to_json()
     _write_json(arguments.json, result)
     if arguments.json != "-":
-        _tell_modes(result)
+        tell_modes(result)
 
 
 def reduce(arguments: Namespace) -> None:
@@ -135,82 +134,6 @@ def demo(arguments: Namespace) -> None:
     from studies.demo import run_demo
 
     run_demo(Path(arguments.output), arguments.workers)
-
-
-@contextmanager
-def workers(count: int | None) -> Iterator[ProcessPoolExecutor | None]:
-    """Worker processes with the engine compiled, one for every core unless told; None for a single one."""
-    count = count or available_cores()
-    if count == 1:
-        yield None
-        return
-    with new_pool(count) as pool:
-        from coupling.sweep import warm_up
-
-        pool.submit(warm_up).result()
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def new_pool(count: int) -> ProcessPoolExecutor:
-    """Fresh processes: a fork of one that holds MPI or threads is not safe."""
-    return ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
-
-
-@contextmanager
-def progress(title: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on standard error, on a terminal only."""
-    from tqdm import tqdm
-
-    with tqdm(desc=title, disable=None, leave=False) as bar:
-
-        def show(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done - bar.n)
-
-        yield show
-
-
-def tell_sweep(result: Any) -> None:
-    """Print what a sweep found."""
-    from studies.forced_response import forced_responses, shown
-
-    for response in forced_responses(result):
-        place, height = response.peak("damped_mean")
-        print(
-            f"{response.name}: damped peak (mean) {height:.3f} of the undamped maximum {response.reference:.4g} m, "
-            f"at {response.axis} = {shown(place)} {response.units}".removesuffix(" 1")
-        )
-    bad = [status for status in result.status.ravel() if status != "ok"]
-    if bad:
-        print(f"{len(bad)} of {result.status.size} points are not ok, such as: {bad[0]}")
-
-
-def _tell_modes(result: Mapping[str, Any]) -> None:
-    print("mode  frequency/Hz   effective mass x, y, z / kg        residual")
-    rows = zip(result["frequency_hz"], result["effective_mass"], result["residual"], strict=True)
-    for index, (frequency, masses, residual) in enumerate(rows):
-        mark = "  first bending" if index == result["first_bending"] else ""
-        print(
-            f"{index + 1:4}  {frequency:12.2f}   " + "  ".join(f"{m:9.5f}" for m in masses) + f"   {residual:.1e}{mark}"
-        )
-    rigid = result["rigid"]
-    if rigid:
-        print(
-            f"rigid model at {rigid['at']}: mass {rigid['mass']:.5g} kg, stiffness {rigid['stiffness']:.5g} N/m, "
-            f"damping {rigid['damping']:.4g} N s/m"
-        )
-    if "fatigue" in result:
-        fatigue = result["fatigue"]
-        print(f"amplitude at {fatigue['share']:.0%} of the fatigue strength: {fatigue['amplitude']:.4g} m")
 
 
 def _load_scene(path: str) -> Scene:

@@ -17,10 +17,11 @@ from coupling.sweep import Sweep, sweep, warm_up
 from meshes.vane_cluster import SHIPPED
 from modal.calibrate import RigidModel
 from modal.store import load, replacing
-from studies.commands import available_cores, new_pool, progress, tell_sweep
 from studies.forced_response import forced_responses, resonance_grid
 from studies.pictures import mode_picture, summary_picture
 from studies.provenance import versions
+from studies.terminal import progress, tell_sweep
+from studies.workers import available_cores, new_pool
 
 _MODES = 3
 _BODY = 0.02  # of the mass of the rigid model
