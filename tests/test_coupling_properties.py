@@ -46,7 +46,12 @@ def models(tmp_path_factory):
         if modes == 1:
             rows = dict.fromkeys(LABELS, shared)
         model = ReducedModel.from_matrices(
-            mass=np.eye(modes), stiffness=np.diag(omegas**2), interface=rows, damping_ratio=0.01
+            mass=np.eye(modes),
+            stiffness=np.diag(omegas**2),
+            interface=rows,
+            damping_ratio=0.01,
+            directions=dict.fromkeys(LABELS, (0.0, 1.0, 0.0)),
+            base_load=np.outer(shared / (shared @ shared), (0.0, 1.0, 0.0)),
         )
         files[modes] = str(folder / f"{modes}.h5")
         model.save(files[modes])
@@ -173,6 +178,7 @@ def test_laws_with_own_cavities(data, models):
     check_laws(data, models)
 
 
+@pytest.mark.slow  # what round-off decides may differ from machine to machine
 @pytest.mark.xfail(strict=True, reason=FALLS)
 @TRAPPED
 @given(data=worlds())

@@ -278,6 +278,7 @@ def test_free_bodies_in_a_box(restitution):
 SHARED = [(8, 0.97, 60), (8, 1.0, 120)]
 
 
+@pytest.mark.slow  # what round-off decides may differ from machine to machine
 @pytest.mark.xfail(strict=True, reason="approach by round-off beside a fast separation is taken for rest and hit again")
 @pytest.mark.parametrize(("bodies", "ratio", "periods"), SHARED)
 def test_row_of_bodies_never_stalls(bodies, ratio, periods):
@@ -300,6 +301,7 @@ def test_row_of_bodies_never_stalls(bodies, ratio, periods):
     assert response.energy_residual < 1e-10
 
 
+@pytest.mark.slow  # what round-off decides may differ from machine to machine
 @pytest.mark.xfail(strict=True, reason="round-off in equal accelerations of free bodies makes them meet and part")
 def test_frictionless_neighbours_fall_together():
     """Bodies without friction that lie against each other under gravity along the cavity have no force between them.
@@ -342,10 +344,13 @@ def test_undamped_resonance_is_refused():
         "one body",
         pytest.param(
             "row",
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason="gaps and slips of a row of bodies drift apart: their velocities disagree by round-off",
-            ),
+            marks=[
+                pytest.mark.slow,
+                pytest.mark.xfail(
+                    strict=True,
+                    reason="gaps and slips of a row of bodies drift apart: their velocities disagree by round-off",
+                ),
+            ],
         ),
     ],
 )
@@ -374,6 +379,7 @@ def test_bodies_stay_apart_in_a_long_run(shape):
     assert openings.min() >= -1e-12 * gap
 
 
+@pytest.mark.slow  # what round-off decides may differ from machine to machine
 @pytest.mark.xfail(strict=True, reason="a row let go at this instant is kept open though later rows push it shut")
 def test_bodies_let_go_and_pushed_at_one_instant():
     """At the end of two coupled chatters rows let go one after the other: none may be walked through."""
@@ -418,6 +424,19 @@ def test_a_million_elastic_impacts():
     response = simulate(data)
     assert response.counters["impacts"] >= 1_000_000
     assert abs(response.slip_velocity[-1][0]) == pytest.approx(1.0, rel=1e-9)
+    assert response.energy_residual < 1e-10
+
+
+@pytest.mark.slow  # what round-off decides may differ from machine to machine
+@pytest.mark.xfail(strict=True, reason="the residual is relative to net energies, which are all round-off here")
+def test_ledger_of_a_motion_that_comes_to_nothing():
+    """A free body seen from a shaken table gains and loses the same energy in every period: a ledger of zeros."""
+    data = scene(
+        structure={"model": "prescribed", "displacement_amplitude": 0.1},
+        **row(10.0, {"position": 0.0}),
+    )
+    response = simulate(data)
+    assert response.counters["impacts"] == 0
     assert response.energy_residual < 1e-10
 
 
