@@ -269,7 +269,7 @@ def test_order_of_cavities_does_not_matter(data, models, seed):
 
 
 @FAST
-@given(data=worlds(structures=("rigid",)))
+@given(data=worlds(structures=("rigid",), cavities="own"))
 def test_mirror_image(data, models):
     """Left and right exchanged, without excitation, which has a phase: everything changes its sign."""
     data = data | {"excitation": {"frequency": data["excitation"]["frequency"]}}
