@@ -40,10 +40,11 @@ def random_scene(seed: int, structure: str = "rigid", bodies: int = 1, *, shared
     return validate(Scene, data, f"random scene {seed}")
 
 
-def random_reduced(seed: int) -> ReducedModel:
+def random_reduced(seed: int, modes: int | None = None) -> ReducedModel:
     """Two to six modes up to five times the first, interface labels "a" and "b", coupled coordinates."""
     rng = np.random.default_rng([seed, 6])
-    modes = int(rng.integers(2, 7))
+    drawn = int(rng.integers(2, 7))
+    modes = modes or drawn
     first = _between(rng, 20.0, 3000.0)
     omegas = 2 * math.pi * first * np.concatenate([[1.0], np.sort(rng.uniform(1.3, 5.0, modes - 1))])
     # modal coordinates = basis @ q
@@ -120,3 +121,71 @@ def _bodies(
             damper["normal_load"] = body * amplitude * (2 * math.pi * frequency) ** 2 * _between(rng, 0.01, 2.0)
         dampers.append(damper)
     return {"cavity": cavities, "damper": dampers}
+
+
+def random_compliant(
+    seed: int, structure: str = "rigid", bodies: int = 1, where: str = ""
+) -> tuple[Scene, ReducedModel | None]:
+    """A random scene with compliant contacts, and its reduced model (five modes).
+
+    where: words; "shared" for one cavity, "separate" for walls and floor on different functionals.
+    The stiffness gives the lightest body 3 to 100 times the frequency of the excitation; one body in five has a
+    restitution below exp(-2), where the contact is overdamped, and one in ten is elastic.
+    """
+    shared, separate = "shared" in where, "separate" in where
+    rng = np.random.default_rng([seed, len(structure), bodies, shared, separate])
+    scene, reduced = random_scene(seed, structure, bodies, shared=shared), None
+    lightest = min(damper.mass for damper in scene.damper)
+    stiffness = lightest * (2 * math.pi * scene.excitation.frequency * _between(rng, 3.0, 100.0)) ** 2
+    values: dict = {"contact": {"law": "compliant", "stiffness": stiffness}}
+    for index in range(bodies):
+        chance = rng.random()
+        if chance < 0.3:
+            values[f"damper.{index}.restitution"] = 1.0 if chance < 0.1 else _between(rng, 0.02, 0.13)
+    if structure == "rom":
+        reduced = _with_surfaces(random_reduced(seed, modes=5), rng)
+        if separate:
+            values |= {"cavity.left": "left", "cavity.right": "right", "cavity.floor": "floor"}
+    return scene.replace(values), reduced
+
+
+def random_jenkins(
+    seed: int, structure: str = "rigid", bodies: int = 0, law: str = "newton", elements: int = 1
+) -> tuple[Scene, ReducedModel | None]:
+    """A random scene with Jenkins elements as stiff as a part of the structure, and its reduced model."""
+    rng = np.random.default_rng([seed, len(structure), bodies, elements, 7])
+    make = random_compliant if law == "compliant" else random_scene
+    scene = make(seed, structure, max(bodies, 1))
+    scene, reduced = scene if law == "compliant" else (scene, random_reduced(seed) if structure == "rom" else None)
+    data = scene.to_dict()
+    if not bodies:
+        data |= {"cavity": [], "damper": []}
+    omega = 2 * math.pi * scene.excitation.frequency
+    mass = 0.3 if structure == "rom" else scene.structure.mass
+    load = (scene.excitation.force or 0.0) + mass * (scene.excitation.base_acceleration or 0.0)
+    data["friction_damper"] = []
+    for index in range(elements):
+        element = {
+            "normal_force": load * _between(rng, 0.3, 10.0),
+            "friction": rng.uniform(0.1, 1.0),
+            "stiffness": mass * omega**2 * _between(rng, 0.1, 30.0),
+        }
+        if structure == "rom":
+            element["at"] = LABELS[(index + 1) % 2]
+        data["friction_damper"].append(element)
+    return validate(Scene, data, f"random Jenkins scene {seed}"), reduced
+
+
+def _with_surfaces(model: ReducedModel, rng: np.random.Generator) -> ReducedModel:
+    """The model with labels "left", "right" and "floor" that move a little differently from label "a"."""
+    row = model.row("a")
+    rows = {label: model.row(label) for label in LABELS}
+    rows |= {label: row * (1 + 0.1 * rng.uniform(-1.0, 1.0, len(row))) for label in ("left", "right", "floor")}
+    return ReducedModel.from_matrices(
+        mass=model.mass,
+        stiffness=model.stiffness,
+        damping_ratio=model.damping_ratio,
+        interface=rows,
+        directions=dict.fromkeys(rows, (0.0, 1.0, 0.0)),
+        base_load=model.base_load,
+    )

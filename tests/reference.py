@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from reference_impacts import accumulates, collide, snap
-from reference_modes import STUCK, VANISHES, Flow, Mode, Modes
+from reference_modes import OPEN, PRESSING, STUCK, VANISHES, ZERO, Flow, Mode, Modes
 from reference_system import System
 from scipy.integrate import DOP853, DenseOutput, OdeSolution
 from scipy.optimize import brentq
@@ -26,7 +26,8 @@ class Event(NamedTuple):
     """time (s); kind "impact", "stick", "slip", "detach" or "rest"; side "left", "right", "neighbour" or "floor".
 
     Velocities (m/s) are those of the body relative to the cavity; between neighbours, where damper is the left body
-    of the two, those of the right body relative to the left.
+    of the two, those of the right body relative to the left. Jenkins elements have side "casing" and their own number.
+    An impact on a compliant wall lasts until its "detach": what it leaves with is then known, and the impulse (N s).
     """
 
     time: float
@@ -35,6 +36,7 @@ class Event(NamedTuple):
     side: str
     relative_velocity_before: float
     relative_velocity_after: float
+    impulse: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -98,9 +100,8 @@ def integrate(
     """
     system = System(scene, reduced)
     modes = Modes(system)
-    y = np.concatenate([system.q0, system.r0, system.qd0, system.rd0])
+    y = np.concatenate([system.q0, system.r0, system.qd0, system.rd0, np.zeros(len(system.spring))])
     t, end = 0.0, 2 * np.pi * periods
-    longest = step / system.fastest()
     events: list[Event] = []
     times, pieces = [t], []
     mode = None
@@ -111,13 +112,15 @@ def integrate(
             raise RuntimeError(f"events without end at t = {t / system.omega:g} s")
         if t >= end:
             break
-        for now, state, piece in _march(system, modes.flow(mode), t, y, end, longest, rtol):
+        for now, state, piece in _march(system, modes.flow(mode), t, y, end, step, rtol):
             t, y = now, state
             if t > times[-1]:
                 times.append(t)
                 pieces.append(piece)
     q, r, qd, rd = (part * system.length for part in system.split(y))
     solution = OdeSolution(times, pieces)
+    if system.compliant:
+        events = _completed(events, system, solution)
     return Reference(tuple(events), t / system.omega, q, qd * system.omega, r, rd * system.omega, solution, system)
 
 
@@ -129,7 +132,9 @@ def _march(
     order, leading, _ = flow.signs(z)
     # positions count from here, so that a flight that hardly leaves the wall keeps all its digits
     shift = np.zeros_like(y)
-    system.split(shift)[1][:] = system.split(y)[1]
+    if not system.compliant:
+        system.split(shift)[1][:] = system.split(y)[1]
+    step /= flow.fastest
     openings = np.where(flow.level == 0, flow.guards @ z, 0.0)
     matrix, one, sine = np.ascontiguousarray(flow.rate[:-3, :-3]), flow.rate[:-3, -3], flow.rate[:-3, -2]
     solver = DOP853(
@@ -228,7 +233,8 @@ def _resume(modes: Modes, t: float, y: np.ndarray, old: Mode | None, pressed: bo
     system = modes.system
     snap(system, y)
     before = system.split(y)[3].copy()
-    impacts = collide(system, y, pressed)
+    impacts = [] if system.compliant else collide(system, y, pressed)
+    _pin(system, y)
     mode = modes.settle(t, y)
     for contact, _, _ in impacts:
         if accumulates(modes, t, y, mode, contact):
@@ -245,7 +251,53 @@ def _resume(modes: Modes, t: float, y: np.ndarray, old: Mode | None, pressed: bo
     for kind, damper, side in _changes(modes, old, mode) if old else []:
         speeds = float(before[damper]) * unit, float(after[damper]) * unit
         events.append(Event(t / system.omega, kind, damper, side, *speeds))
+    for contact, state in enumerate(mode.soft):
+        was = old.soft[contact] if old else OPEN
+        if (was == PRESSING) != (state == PRESSING):
+            damper, side, sign = system.name(contact)
+            speed = sign * float(system.speed(y)[contact]) * unit
+            kind = "impact" if state == PRESSING else "detach"
+            events.append(Event(t / system.omega, kind, damper, side, speed, 0.0 if kind == "impact" else speed))
+    for element, state in enumerate(mode.casing):
+        if old and (old.casing[element] == STUCK) != (state == STUCK):
+            events.append(Event(t / system.omega, "stick" if state == STUCK else "slip", element, "casing", 0.0, 0.0))
     return mode, events
+
+
+def _pin(system: System, y: np.ndarray) -> None:
+    """Put Jenkins springs that are about to slip exactly at their largest elongation, in place."""
+    elongation = system.elongation(y)
+    slips = np.abs(np.abs(elongation) - system.limit) <= ZERO
+    elongation[slips] = np.copysign(system.limit, elongation)[slips]
+
+
+def _completed(events: list[Event], system: System, solution: OdeSolution) -> list[Event]:
+    """The events with what impacts on compliant walls leave with, and their impulses."""
+    contacts = {system.name(contact)[:2]: contact for contact in range(len(system.pairs))}
+    begun: dict[int, int] = {}
+    events = list(events)
+    for index, event in enumerate(events):
+        if event.kind == "impact":
+            begun[contacts[event.damper, event.side]] = index
+        elif event.kind == "detach":
+            contact = contacts[event.damper, event.side]
+            first = events[begun[contact]]
+            t, weights = quadrature(solution, first.time * system.omega, event.time * system.omega)
+            force = system.press(solution(t))[contact]
+            impulse = float(weights @ force) * system.length * system.omega
+            events[begun[contact]] = first._replace(
+                relative_velocity_after=event.relative_velocity_after, impulse=impulse
+            )
+    return events
+
+
+def quadrature(solution: OdeSolution, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights, in radians, of six Gauss points in each step between two times."""
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    inside = solution.ts[(solution.ts > start) & (solution.ts < end)]
+    times = np.r_[start, inside, end]
+    width = np.diff(times)[:, None] / 2
+    return (times[:-1, None] + width * (nodes + 1)).ravel(), (width * weights).ravel()
 
 
 def _changes(modes: Modes, old: Mode, new: Mode) -> list[tuple[str, int, str]]:

@@ -69,6 +69,9 @@ def accumulates(modes: Modes, t: float, y: np.ndarray, mode: Mode, contact: int)
 def snap(system: System, y: np.ndarray) -> None:
     """Make exactly zero what an event has brought to zero: openings, velocities and their differences."""
     _, r, _, rd = system.split(y)
+    if system.compliant:
+        rd[np.abs(rd) <= ZERO] = 0.0
+        return
     # contacts that are closed, or will be before the clock ticks
     touching = system.opening(y) <= 1e-12 * (np.abs(system.speed(y)) + 1e-3)
     _level(system, r, touching, system.reach)

@@ -11,6 +11,8 @@ import numpy as np
 from reference_system import System
 
 STUCK = 0
+#: States of a compliant contact: apart, pressing, or apart with the wall not yet sprung back.
+OPEN, PRESSING, LOOSE = 0, 1, 2
 #: Relative velocities below this are zero at an event (length and time in the units of the system).
 ZERO = 1e-11
 #: Order of a guard all of whose derivatives vanish.
@@ -21,15 +23,21 @@ LIMITS = np.array([[0, 0, 1, 100, 100], [0, 1, 100, 100, 100], [1, 100, 100, 100
 
 
 class Mode(NamedTuple):
-    """Contact state: per body STUCK or the direction it slides in, and the contacts that press."""
+    """Contact state: per body STUCK or the direction it slides in, and the rigid contacts that press.
+
+    soft: OPEN, PRESSING or LOOSE of every compliant contact; casing: STUCK or the direction in which a Jenkins element
+    slides.
+    """
 
     floor: tuple[int, ...]
     closed: frozenset[int]
+    soft: tuple[int, ...] = ()
+    casing: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class Flow:
-    """The linear motion in one mode, on the extended state (q, r, q', r', 1, sin t, cos t) of size s.
+    """The linear motion in one mode, on the extended state (q, r, q', r', e, 1, sin t, cos t) of size s.
 
     rate (s, s): z' = rate z. guards (g, s): rows that are positive as long as the mode lasts. level (g,): 0 for an
     opening, 1 for a velocity, 2 for a force per mass. press (c, s): the closing acceleration of every contact.
@@ -39,6 +47,11 @@ class Flow:
     guards: np.ndarray
     level: np.ndarray
     press: np.ndarray
+
+    @functools.cached_property
+    def fastest(self) -> float:
+        """The largest natural frequency or rate of decay, or the excitation's frequency (which is 1)."""
+        return float(np.abs(np.linalg.eigvals(self.rate)).max())
 
     @functools.cached_property
     def derivatives(self) -> np.ndarray:
@@ -80,7 +93,8 @@ class Modes:
         system = self.system
         z = system.extended(t, y)
         rd = system.split(y)[3]
-        touching = np.flatnonzero((system.opening(y) == 0) & (system.speed(y) == 0)).tolist()
+        at_rest = (system.opening(y) == 0) & (system.speed(y) == 0) & (not system.compliant)
+        touching = np.flatnonzero(at_rest).tolist()
         near = {body for contact in touching for body in system.pairs[contact]}
         options: list[tuple[int, ...]] = []
         for body, velocity in enumerate(rd):
@@ -90,9 +104,11 @@ class Modes:
                 options.append((STUCK, 1, -1))
             else:
                 options.append((1,) if velocity > 0 else (-1,))
+        softs = list(itertools.product(*self._soft_options(y)))
+        casings = list(itertools.product(*self._casing_options(y)))
         for floor in itertools.product(*options):
-            for closed in self._closures(floor, touching):
-                mode = Mode(floor, closed)
+            for chosen in itertools.product(self._closures(floor, touching), softs, casings):
+                mode = Mode(floor, *chosen)
                 if np.all(self.flow(mode).signs(z)[2] >= 0):
                     return mode
         raise RuntimeError(f"no consistent contact state at r = {system.split(y)[1]}, r' = {rd}")
@@ -108,6 +124,28 @@ class Modes:
                 free.append(contact)
         subsets = itertools.chain.from_iterable(itertools.combinations(free, k) for k in range(len(free) + 1))
         return [frozenset(fixed.union(subset)) for subset in subsets]
+
+    def _soft_options(self, y: np.ndarray) -> list[tuple[int, ...]]:
+        """States that opening and speed allow every compliant contact."""
+        system = self.system
+        return (
+            [_soft_states(*contact) for contact in zip(system.opening(y), system.speed(y), system.delay, strict=True)]
+            if system.compliant
+            else []
+        )
+
+    def _casing_options(self, y: np.ndarray) -> list[tuple[int, ...]]:
+        """States that elongation and velocity allow every Jenkins element."""
+        system = self.system
+        options: list[tuple[int, ...]] = []
+        velocity = system.V @ system.split(y)[2]
+        for elongation, limit, speed in zip(system.elongation(y), system.limit, velocity, strict=True):
+            direction = int(np.sign(elongation))
+            if abs(elongation) < limit - ZERO or direction * speed < -ZERO:
+                options.append((STUCK,))
+            else:
+                options.append((direction,) if direction * speed > ZERO else (STUCK, direction))
+        return options
 
     def side(self, body: int, mode: Mode) -> str:
         """What a stuck body rests against: a wall ("left", "right"), a "neighbour" or just the "floor"."""
@@ -129,12 +167,17 @@ class Modes:
         structure[:, n + b : 2 * n + b] = -system.inverse @ system.C
         structure[:, one] = -system.inverse @ system.W @ slide
         structure[:, sine] = system.inverse @ system.force
+        springs = slice(2 * (n + b), one)
+        structure[:, springs] = -system.inverse @ system.V.T @ np.diag(system.spring)
+        push = self._push(mode)
+        structure += system.inverse @ system.walls.T @ push
         bodies = -system.W.T @ structure
+        bodies += np.diag(1 / system.m) @ system.G.T @ push
         bodies[:, one] += slide / system.m + system.weight
         bodies[:, sine] -= system.base
         stuck = [index for index, state in enumerate(mode.floor) if state == STUCK]
         moving = [c for c in sorted(mode.closed) if not self._holds(c, mode)]
-        held = np.vstack([np.eye(b)[stuck].reshape(-1, b), system.G[moving].reshape(-1, b)])
+        held = np.vstack([np.eye(b)[stuck].reshape(len(stuck), b), system.G[moving].reshape(len(moving), b)])
         forces = -np.linalg.solve(held @ system.D @ held.T, held @ bodies)
         structure -= system.inverse @ system.W @ held.T @ forces
         bodies += system.D @ held.T @ forces
@@ -146,9 +189,34 @@ class Modes:
         rate[: n + b, n + b : 2 * (n + b)] = np.eye(n + b)
         rate[n + b : 2 * n + b] = structure
         rate[2 * n + b : 2 * (n + b)] = bodies
+        for element, state in enumerate(mode.casing):
+            if state == STUCK:
+                rate[2 * (n + b) + element, n + b : 2 * n + b] = system.V[element]
         rate[sine, sine + 1], rate[sine + 1, sine] = 1.0, -1.0
         guards = self._guards(mode, dict(zip(stuck, forces, strict=False)), forces[len(stuck) :])
         return Flow(rate, *guards, -system.G @ bodies)
+
+    def _push(self, mode: Mode) -> np.ndarray:
+        """(c, s) forces of the compliant contacts on the extended state."""
+        push = np.zeros((len(self.system.pairs), self.system.size))
+        for contact, state in enumerate(mode.soft):
+            if state == PRESSING:
+                push[contact] = self.system.stiffness[contact] * self._pressing(contact)
+        return push
+
+    def _opening(self, contact: int) -> np.ndarray:
+        """(s,) opening of a contact on the extended state."""
+        system, row = self.system, np.zeros(self.system.size)
+        q, r, _, _ = system.split(row)
+        q[:], r[:], row[-3] = system.H[contact], system.G[contact], system.reach[contact]
+        return row
+
+    def _pressing(self, contact: int) -> np.ndarray:
+        """(s,) force of a compliant contact per stiffness, -(opening + delay * speed)."""
+        system, row = self.system, np.zeros(self.system.size)
+        _, _, qd, rd = system.split(row)
+        qd[:], rd[:] = system.H[contact], system.G[contact]
+        return -self._opening(contact) - system.delay[contact] * row
 
     def _holds(self, contact: int, mode: Mode) -> bool:
         """Whether a wall or a stuck body takes part in the contact."""
@@ -157,21 +225,31 @@ class Modes:
     def _guards(self, mode: Mode, hold: dict[int, np.ndarray], press: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         system = self.system
         n, b = len(system.M), len(system.m)
-        rows, levels = [], []
+        rows, levels, eye = [], [], np.eye(system.size)
         for contact in range(len(system.pairs)):
-            if contact not in mode.closed:
-                row = np.zeros(system.size)
-                row[n : n + b] = system.G[contact]
-                row[system.size - 3] = system.reach[contact]
-                rows.append(row)
+            if contact not in mode.closed and not system.compliant:
+                rows.append(self._opening(contact))
                 levels.append(0)
         for body, direction in enumerate(mode.floor):
             if direction != STUCK and system.friction[body] > 0:
-                rows.append(direction * np.eye(system.size)[2 * n + b + body])
+                rows.append(direction * eye[2 * n + b + body])
                 levels.append(1)
         rows += [force / system.m.mean() for force in press]
         for chain, left_open, right_open in self._chains(mode):
             rows += self._margins(chain, left_open, right_open, hold)
+        for contact, state in enumerate(mode.soft):
+            if state == PRESSING:
+                rows.append(self._pressing(contact))
+            else:
+                rows.append(self._opening(contact) * (1.0 if state == OPEN else -1.0))
+            if state == LOOSE:
+                rows.append(-self._pressing(contact))
+        for element, state in enumerate(mode.casing):
+            at = 2 * (n + b) + element
+            if state == STUCK:
+                rows += [system.limit[element] * eye[-3] + sign * eye[at] for sign in (1.0, -1.0)]
+            else:
+                rows.append(state * np.r_[np.zeros(n + b), system.V[element], np.zeros(system.size - 2 * n - b)])
         levels += [2] * (len(rows) - len(levels))
         return np.array(rows).reshape(len(rows), system.size), np.array(levels, dtype=int)
 
@@ -207,3 +285,15 @@ class Modes:
                     row[system.size - 3] += system.friction[bodies].sum()
                     rows.append(row / system.m[bodies].sum())
         return rows
+
+
+def _soft_states(opening: float, speed: float, delay: float) -> tuple[int, ...]:
+    """What a compliant contact can be; at a bound the accelerations decide."""
+    force = -(opening + delay * speed)
+    if opening > ZERO:
+        return (OPEN,)
+    if opening < -ZERO:
+        return (PRESSING,) if force > ZERO else (LOOSE,) if force < -ZERO else (PRESSING, LOOSE)
+    if abs(speed) <= ZERO:
+        return (OPEN, PRESSING)
+    return (PRESSING,) if speed < 0 else (OPEN,)

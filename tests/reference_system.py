@@ -1,21 +1,28 @@
 """A scene as small dense matrices, for the reference integrator.
 
-Coordinates: q of the structure, r of the bodies relative to their cavities. Every contact and friction force is
-internal to r, so that with h the forces that the cavities exert on the bodies
+Coordinates: q of the structure, r of the bodies relative to their cavities, e of elongations of Jenkins springs. Every
+contact and friction force is internal to r, so that with h the forces that the cavities exert on the bodies
 
-    M q'' = f sin t - C q' - K q - W h,        r'' = h / m + g - a sin t - W^T q''
+    M q'' = f sin t - C q' - K q - W h - V^T k e,        r'' = h / m + g - a sin t - W^T q''
 
-Time is measured in radians of the excitation, length in half of the narrowest gap, mass in kg.
+Compliant walls may push on functionals of their own: M q'' has then (H - G W^T)^T lambda, and h has G^T lambda without
+reaction on W, where lambda = -stiffness (opening + delay * speed).
+
+Time is measured in radians of the excitation, length in half of the narrowest gap (or in the elongation at which the
+first Jenkins element slips, if that is less), mass in kg.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
+from reference_laws import damping_ratio
+from scipy.linalg import eigh
 
-from coupling.scene import Prescribed, Rigid, Scene
+from coupling.scene import FrictionDamper, Prescribed, Rigid, Scene
 from rom.reduced import ReducedModel
 
 
@@ -24,22 +31,39 @@ def neighbour_restitution(left: float, right: float) -> float:
     return math.sqrt(left * right)
 
 
+def largest_elongation(element: FrictionDamper) -> float:
+    """Elongation (m) at which a Jenkins element slips."""
+    if element.stiffness is None:
+        raise NotImplementedError("friction_damper: a rigid Coulomb element; give its stiffness")
+    return element.friction * element.normal_force / element.stiffness
+
+
 class System:
     """A scene in matrices.
 
-    W (n, b) interface rows, m (b,) masses, friction (b,) largest friction forces, G (c, b) and reach (c,): the opening
-    G r + reach of every contact, pairs (c, 2): the bodies to its left and right, -1 for a wall.
+    W (n, b) interface rows, m (b,) masses, friction (b,) largest friction forces, G (c, b), H (c, n) and reach (c,):
+    the opening G r + H q + reach of every contact, pairs (c, 2): the bodies to its left and right, -1 for a wall.
+    compliant: whether contacts are; stiffness (c,) and delay (c,) = damping / stiffness of those.
+    V (j, n), spring (j,), limit (j,): functional, stiffness and largest elongation of the Jenkins elements.
     """
 
     def __init__(self, scene: Scene, reduced: ReducedModel | None = None) -> None:
-        if scene.contact.law != "newton":
-            raise NotImplementedError(f"contact law {scene.contact.law}")
+        self.compliant = scene.contact.law == "compliant"
         self.omega = 2 * math.pi * scene.excitation.frequency
-        self.length = min((cavity.gap for cavity in scene.cavity), default=2.0) / 2
+        gaps = [cavity.gap / 2 for cavity in scene.cavity]
+        self.length = min(gaps + [largest_elongation(element) for element in scene.friction_damper], default=1.0)
         self._bodies(scene)
         self._contacts(scene)
         self._structure(scene, reduced)
-        self.size = 2 * (len(self.M) + len(self.m)) + 3
+        self.spring = np.array([element.stiffness for element in scene.friction_damper]) / self.omega**2
+        self.limit = np.array([largest_elongation(element) for element in scene.friction_damper]) / self.length
+        if self.compliant:
+            self._compliance(scene)
+        elif np.any(np.abs(self.H) > 1e-14):
+            raise NotImplementedError("Newton's law with walls and floor on different interface labels")
+        else:
+            self.H[:] = 0.0  # a touch is a touch to the last bit
+        self.size = 2 * (len(self.M) + len(self.m)) + len(self.spring) + 3
 
     def _bodies(self, scene: Scene) -> None:
         unit = self.length * self.omega**2
@@ -57,7 +81,7 @@ class System:
         self.rd0 = np.array([damper.velocity for damper in scene.damper]) / (self.length * self.omega)
 
     def _contacts(self, scene: Scene) -> None:
-        rows, reach, restitution, pairs = [], [], [], []
+        rows, reach, restitution, pairs, cavities = [], [], [], [], []
         for cavity in scene.cavity:
             row = [index for index, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
             for left, right in itertools.pairwise([-1, *row, -1] if row else []):
@@ -71,40 +95,46 @@ class System:
                 reach.append(0.0 if len(k) == 2 else cavity.gap / 2 / self.length)
                 restitution.append(neighbour_restitution(*k) if len(k) == 2 else k[0])
                 pairs.append((left, right))
+                cavities.append(cavity)
         self.G = np.array(rows).reshape(len(rows), len(self.m))
         self.reach = np.array(reach)
         self.restitution = np.array(restitution)
         self.pairs = pairs
+        self._cavities = cavities
 
     def _structure(self, scene: Scene, reduced: ReducedModel | None) -> None:
-        """M, C, K, force, W, base acceleration and initial state; a prescribed motion has no coordinates at all."""
+        """M, C, K, force, W, H, V, base acceleration and initial state; a prescribed motion has no coordinates."""
         excitation, bodies = scene.excitation, len(self.m)
         unit = self.length * self.omega**2
         base = (excitation.base_acceleration or 0.0) / unit
         if excitation.resonance_amplitude is not None:
             raise NotImplementedError("resonance_amplitude: give the force")
         self.table = 0.0
+        row: Callable[[str | None], np.ndarray]
         if isinstance(scene.structure, Prescribed):
             self.table = scene.structure.displacement_amplitude / self.length
             M, C, K = np.zeros((3, 0, 0))
-            self.output, self.W, load = np.zeros(0), np.zeros((0, bodies)), np.zeros(0)
+            self.output, load = np.zeros(0), np.zeros(0)
             self.base = np.full(bodies, -self.table)
+            row = lambda label: np.zeros(0)  # noqa: E731
         elif isinstance(scene.structure, Rigid):
             structure = scene.structure
             M, C, K = np.array([structure.mass, structure.viscous, structure.stiffness]).reshape(3, 1, 1)
-            self.output, self.W, load = np.ones(1), np.ones((1, bodies)), M[0]
+            self.output, load = np.ones(1), M[0]
             self.base = np.full(bodies, base)
+            row = lambda label: np.ones(1)  # noqa: E731
         else:
             model = reduced if scene.structure.modes is None else reduced.truncated(scene.structure.modes)
             M, C, K = model.mass, model.damping, model.stiffness
-            labels = [self._label(scene, damper.cavity) for damper in scene.damper]
             self.output = model.row(excitation.at)
-            self.W = np.array([model.row(label) for label in labels]).reshape(bodies, model.size).T
             # the base moves in the direction of the response
             direction = model.directions[model.interface.index(excitation.at)]
             load = model.base_load @ direction
+            labels = [self._cavity(scene, damper.cavity).labels()[2] for damper in scene.damper]
             along = [model.directions[model.interface.index(label)] @ direction for label in labels]
             self.base = base * np.array(along)
+            row = model.row
+        self._functionals(scene, row, len(M))
         self.M, self.C, self.K = M, C / self.omega, K / self.omega**2
         self.force = self.output * (excitation.force or 0.0) / unit - load * base
         self.q0 = np.full(len(M), scene.initial.displacement / self.length)
@@ -113,20 +143,47 @@ class System:
         #: Acceleration of r per contact force: the inverse of the contact mass on its diagonal.
         self.D = np.diag(1 / self.m) + self.W.T @ self.inverse @ self.W
 
+    def _functionals(self, scene: Scene, row: Callable[[str | None], np.ndarray], size: int) -> None:
+        """W, V and H, which is the floor's share in an opening and, against it, that of the wall."""
+        floors = [row(self._cavity(scene, damper.cavity).labels()[2]) for damper in scene.damper]
+        self.W = np.array(floors).reshape(len(floors), size).T
+        casing = [row(element.at or scene.excitation.at) for element in scene.friction_damper]
+        self.V = np.array(casing).reshape(len(casing), size)
+        self.walls = np.zeros((len(self.pairs), size))
+        for contact, ((left, right), cavity) in enumerate(zip(self.pairs, self._cavities, strict=True)):
+            if left < 0:
+                self.walls[contact] = -row(cavity.labels()[0])
+            elif right < 0:
+                self.walls[contact] = row(cavity.labels()[1])
+        self.H = self.walls + self.G @ self.W.T
+
+    def _compliance(self, scene: Scene) -> None:
+        """Stiffness and delay of the contacts; the damping takes the mass of the structure's first mode at the wall."""
+        self.stiffness = np.full(len(self.pairs), scene.contact.stiffness / self.omega**2)
+        first = eigh(self.K, self.M)[1][:, 0] if len(self.M) else np.zeros(0)
+        inverse_mass = self.G**2 @ (1 / self.m) + (self.walls @ first) ** 2
+        zeta = np.array([damping_ratio(k) for k in self.restitution])
+        self.delay = 2 * zeta / np.sqrt(self.stiffness * inverse_mass)
+
     @staticmethod
-    def _label(scene: Scene, name: str) -> str:
-        labels = {label for cavity in scene.cavity if cavity.name == name for label in cavity.labels() if label}
-        if len(labels) != 1:
-            raise NotImplementedError(f"cavity '{name}': walls and floor on different interface labels")
-        return labels.pop()
+    def _cavity(scene: Scene, name: str):
+        return next(cavity for cavity in scene.cavity if cavity.name == name)
 
     def opening(self, y: np.ndarray) -> np.ndarray:
         """(c,) how far every contact is open."""
-        return self.G @ self.split(y)[1] + self.reach
+        q, r, _, _ = self.split(y)
+        return self.G @ r + self.H @ q + self.reach
 
     def speed(self, y: np.ndarray) -> np.ndarray:
         """(c,) how fast every contact opens."""
-        return self.G @ self.split(y)[3]
+        _, _, qd, rd = self.split(y)
+        return self.G @ rd + self.H @ qd
+
+    def press(self, y: np.ndarray) -> np.ndarray:
+        """(c, ...) what compliant contacts would push with, if they were closed, in states (s, ...)."""
+        q, r, qd, rd = self.split(y)
+        opening = (self.G @ r + self.H @ q).T + self.reach
+        return (-self.stiffness * (opening + self.delay * (self.G @ rd + self.H @ qd).T)).T
 
     def extended(self, t: np.ndarray | float, y: np.ndarray) -> np.ndarray:
         """The state of shape (..., ) with 1, sin t and cos t below it."""
@@ -137,6 +194,11 @@ class System:
         """Views of q, r, q', r' in a state."""
         n, b = len(self.M), len(self.m)
         return y[:n], y[n : n + b], y[n + b : 2 * n + b], y[2 * n + b : 2 * (n + b)]
+
+    def elongation(self, y: np.ndarray) -> np.ndarray:
+        """View of the elongations of the Jenkins springs in a state."""
+        first = 2 * (len(self.M) + len(self.m))
+        return y[first : first + len(self.spring)]
 
     def kick(self, y: np.ndarray, impulses: np.ndarray) -> None:
         """Apply the impulses (b,) of the cavities on the bodies to the velocities of a state, in place."""
@@ -155,8 +217,3 @@ class System:
         if left < 0:
             return right, "left", 1.0
         return left, "right" if right < 0 else "neighbour", 1.0 if right >= 0 else -1.0
-
-    def fastest(self) -> float:
-        """The highest undamped frequency of the structure, or the excitation's (which is 1) if that is higher."""
-        squares = np.linalg.eigvals(self.inverse @ self.K).real if len(self.M) else np.zeros(0)
-        return math.sqrt(max([1.0, *squares]))
