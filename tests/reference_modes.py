@@ -18,8 +18,8 @@ ZERO = 1e-11
 #: Order of a guard all of whose derivatives vanish.
 VANISHES = 5
 #: What counts as zero for the derivatives (columns) of an opening, of a velocity and of a force per mass (rows).
-#: Openings and velocities are made exactly zero at events, all else carries round-off.
-LIMITS = np.array([[0, 0, 1, 100, 100], [0, 1, 100, 100, 100], [1, 100, 100, 100, 100]]) * ZERO
+#: Openings and velocities are made exactly zero at events, all else carries round-off; stiff contacts bring more of it.
+LIMITS = np.array([[0, 0, 1, 100, 100], [0, 1, 100, 100, 100], [1, 100, 100, 100, 100], [0, 100, 100, 100, 100]]) * ZERO
 
 
 class Mode(NamedTuple):
@@ -40,7 +40,8 @@ class Flow:
     """The linear motion in one mode, on the extended state (q, r, q', r', e, 1, sin t, cos t) of size s.
 
     rate (s, s): z' = rate z. guards (g, s): rows that are positive as long as the mode lasts. level (g,): 0 for an
-    opening, 1 for a velocity, 2 for a force per mass. press (c, s): the closing acceleration of every contact.
+    opening, 1 for a velocity, 2 for a force per mass, 3 for a velocity beside stiff contacts. press (c, s): the closing
+    acceleration of every contact.
     """
 
     rate: np.ndarray
@@ -233,7 +234,7 @@ class Modes:
         for body, direction in enumerate(mode.floor):
             if direction != STUCK and system.friction[body] > 0:
                 rows.append(direction * eye[2 * n + b + body])
-                levels.append(1)
+                levels.append(3 if system.compliant else 1)
         rows += [force / system.m.mean() for force in press]
         for chain, left_open, right_open in self._chains(mode):
             rows += self._margins(chain, left_open, right_open, hold)
