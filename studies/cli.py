@@ -1,4 +1,4 @@
-"""The command `vanedamp`: mesh, modal, reduce, run, sweep, report, demo."""
+"""The command `vanedamp`: mesh, modal, reduce, run, sweep, report, demo, bench."""
 
 from __future__ import annotations
 
@@ -112,6 +112,12 @@ def _parser() -> argparse.ArgumentParser:
     demo = command("demo", "the whole pipeline on the shipped mesh", None, "DIR")
     demo.set_defaults(output="out")
     demo.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
+
+    bench = command("bench", "how fast and how exact the methods are, measured here", None, "DIR", required=True)
+    bench.add_argument(
+        "study", choices=("engine",), help="engine: the exact engine against a hand-written loop and solve_ivp"
+    )
+    bench.add_argument("--quick", action="store_true", help="seconds instead of minutes, and rougher figures")
     return parser
 
 

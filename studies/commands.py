@@ -136,6 +136,17 @@ def demo(arguments: Namespace) -> None:
     run_demo(Path(arguments.output), arguments.workers)
 
 
+def bench(arguments: Namespace) -> None:
+    """Speed and accuracy, measured on this machine."""
+    folder = Path(arguments.output)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--output {folder}: expected a folder, not a file")
+    from studies.bench_engine import FULL, QUICK, run_bench, tell
+
+    tell(run_bench(folder, QUICK if arguments.quick else FULL))
+    print(f"{folder}: bench_engine.json, bench_engine.csv and figures")
+
+
 def _load_scene(path: str) -> Scene:
     from coupling.scene import Rom, Scene
 
