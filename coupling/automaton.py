@@ -11,26 +11,38 @@ from __future__ import annotations
 import math
 
 from coupling.compiled import kernel
-from coupling.contact import SIMULTANEOUS, all_move, collide, constant_loads, settle, stop_riders
+from coupling.contact import add_force, constant_loads, keep_released, settle, stop_riders
 from coupling.events import POSITION, VELOCITY, exp_minus_line, exp_minus_one
+from coupling.gaps import SIMULTANEOUS, close, join, join_speeds, measure_gaps, only, rigid, shift_slip
+from coupling.impacts import all_move, collide
 from coupling.ledger import account
+from coupling.springs import begin_push, change_push, spring_energy, spring_force
 from coupling.state import (
     AWAKE,
+    CLOSED,
+    CLOSES,
     EVENTS,
     FLOW,
     FRICTION,
+    HELD,
+    LEAVING,
     LOGGED,
     OPEN,
     PERIOD,
+    RECLOSES,
     SEARCHING,
+    SPRUNG,
     STICK,
     STORED,
+    TOUCHING,
 )
-from coupling.watch import next_event
+from coupling.watch import longest_hop, next_event
 
 # what advance() returns
 DONE, NEEDS_FLOW, LOG_FULL, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED = range(6)
 
+#: differences below this share of their terms are round-off
+_EQUAL = 1e-14
 #: modes whose acceleration is below this share of the largest sleep until the next impact
 _ASLEEP = 1e-14
 
@@ -45,7 +57,7 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
                 return NEEDS_FLOW
             _enter(rows, flows, st, work, s)
             if stop_riders(rows, flows, st):
-                _keep_released(st, work)
+                keep_released(st, work)
                 if not settle(rows, st, rec, work):
                     return UNDECIDED
                 continue
@@ -81,11 +93,17 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
 def begin(rows, st, rec, work):
     """Decide the contact states of the initial state. Returns False if that fails."""
     n, hit = len(st.constant), False
+    for r in range(rows.friction_rows):
+        if not rigid(rows, r) and rows.limit[r] > 0.0:
+            st.state[r] = SPRUNG
     for r in range(len(st.state)):
         work.forced[r] = 0
         if r >= rows.friction_rows and st.displacement[r] <= SIMULTANEOUS * rows.gap[r - rows.friction_rows]:
-            st.displacement[r] = 0.0
-            hit = hit or st.velocity[r] < 0.0
+            _touch(rows, st, work, r)
+            if st.velocity[r] < 0.0 and rigid(rows, r):
+                hit = True
+            elif st.velocity[r] < 0.0:
+                begin_push(rows, st, rec, r)
     if hit:
         if not collide(rows, st, rec, work):
             return False
@@ -93,6 +111,17 @@ def begin(rows, st, rec, work):
         for i in range(n):
             st.coordinates[n + i] += work.jump[i]
     return settle(rows, st, rec, work)
+
+
+@kernel
+def _touch(rows, st, work, r):
+    """The gap of row r is zero, exactly, and so are those that close with it."""
+    only(work, r)
+    join(rows, st, work)
+    st.displacement[r] = 0.0
+    measure_gaps(rows, st)
+    if rigid(rows, r):
+        close(rows, st, work)
 
 
 @kernel
@@ -118,6 +147,10 @@ def record_section(rows, flows, st, rec, work):
         energy += 0.5 * rows.mass[k] * velocity * velocity - rows.weight[k] * height
         entry[3 + k], entry[3 + b + k] = st.displacement[k], st.velocity[k]
     entry[2] = momentum
+    for r in range(len(st.state)):
+        # a Jenkins element keeps its spring's energy while it slides
+        if st.state[r] == SPRUNG or (r < rows.friction_rows and not rigid(rows, r) and rows.limit[r] > 0.0):
+            energy += spring_energy(rows, st, r)
     st.ledger[STORED] = energy
     for i in range(len(st.ledger)):
         rec.ledger[st.counters[PERIOD], i] = st.ledger[i]
@@ -153,55 +186,114 @@ def _enter(rows, flows, st, work, s):
     """Begin subsystem s with the structure at st.coordinates and the row states as they are."""
     n, b, y = len(st.constant), len(rows.mass), st.coordinates
     st.counters[FLOW], st.counters[SEARCHING] = s, 0
+    sprung = flows.sprung[s]
     constant_loads(rows, st, work)
-    for i in range(n):
+    if sprung:
+        _preload(rows, st, work, y)
+    for i in range(n + b if sprung else n):
         total = 0.0
         for k in range(n):
             total += flows.static[s, i, k] * work.on_structure[k] + flows.held[s, i, k] * y[k]
         for k in range(b):
             total += flows.static[s, i, n + k] * work.on_bodies[k]
-        st.constant[i] = total
+        if i < n:
+            st.constant[i] = total
+        else:
+            st.slip_constant[i - n] = total
     for i in range(b):
         st.body_drift[i] = 0.0
         for k in range(b):
             st.body_drift[i] += flows.body_acceleration[s, i, k] * work.on_bodies[k]
-    _constant_forces(rows, flows, st, work, s)
     _phase(rows, st)
     for i in range(2 * n):
         work.coordinates[i] = y[i] - (flows.shape[s, i, 0] * st.amplitude[0]).real
         if i < n:
             work.coordinates[i] -= st.constant[i]
+    if sprung:
+        for i in range(b):
+            turn = st.amplitude[0]
+            work.slips[i] = st.displacement[i] - (flows.excited[s, i] * turn).real - st.slip_constant[i]
+            work.slips[b + i] = st.velocity[i] - (flows.excited[s, b + i] * turn).real
     for j in range(1, flows.modes[s]):
         total = 0.0j
         for i in range(2 * n):
             total += flows.project[s, j, i] * work.coordinates[i]
+        if sprung:
+            for i in range(2 * b):
+                total += flows.project_slip[s, j, i] * work.slips[i]
         st.amplitude[j] = total
+    _constant_forces(rows, flows, st, work, s)
     _wake(flows, st)
+
+
+@kernel
+def _preload(rows, st, work, y):
+    """Add the forces that closed springs have at p = 0 and bodies in mid-travel: of a wall's gap, of an anchor."""
+    for r in range(len(st.state)):
+        if st.state[r] == SPRUNG:
+            offset = 0.0
+            if r < rows.friction_rows:
+                offset = st.displacement[r]
+                for i in range(len(st.constant)):
+                    offset -= rows.structure[r, i] * y[i]
+            elif rows.before[r] < 0 or rows.after[r] < 0:
+                offset = 0.5 * rows.gap[r - rows.friction_rows]
+            add_force(rows, work, r, -rows.spring[r] * offset)
 
 
 @kernel
 def _constant_forces(rows, flows, st, work, s):
     """Constant parts of the rows' accelerations and of the closed rows' forces."""
     n, b, r_count = len(st.constant), len(rows.mass), len(st.state)
+    sprung = flows.sprung[s]
+    if sprung:
+        constant_loads(rows, st, work)  # without the preload: springs are in the levels
     for r in range(r_count):
-        st.drift[r], work.acceleration[r] = 0.0, 0.0
+        st.drift[r], st.level[r] = 0.0, 0.0
+        if sprung and st.state[r] == SPRUNG:
+            st.level[r] = spring_force(rows, st, r)
+            for j in range(flows.modes[s]):
+                st.level[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
+        size = 0.0
         for k in range(b):
-            st.drift[r] += rows.bodies[r, k] * st.body_drift[k]
-            work.acceleration[r] += rows.bodies[r, k] * work.on_bodies[k] / rows.mass[k]
-        for k in range(n):
-            work.acceleration[r] += rows.structure[r, k] * (work.on_structure[k] - rows.stiffness[k] * st.constant[k])
+            part = rows.bodies[r, k] * st.body_drift[k]
+            st.drift[r] += part
+            size += abs(part)
+        if abs(st.drift[r]) <= _EQUAL * size:
+            st.drift[r] = 0.0  # bodies that fall together
     for r in range(r_count):
-        st.level[r] = 0.0
+        work.acceleration[r], work.jerk[r] = 0.0, 0.0
+        for k in range(b):
+            part = rows.bodies[r, k] * work.on_bodies[k] / rows.mass[k]
+            work.acceleration[r] += part
+            work.jerk[r] += abs(part)
+        for k in range(n):
+            part = rows.structure[r, k] * (work.on_structure[k] - rows.stiffness[k] * st.constant[k])
+            work.acceleration[r] += part
+            work.jerk[r] += abs(part)
+        if sprung:
+            for k in range(r_count):
+                work.acceleration[r] += rows.delassus[r, k] * st.level[k]
+                work.jerk[r] += abs(rows.delassus[r, k] * st.level[k])
+    for r in range(r_count):
+        if flows.closed_inverse[s, r, r] == 0.0:
+            continue
+        level, size = 0.0, 0.0
         for k in range(r_count):
-            st.level[r] -= flows.closed_inverse[s, r, k] * work.acceleration[k]
+            level -= flows.closed_inverse[s, r, k] * work.acceleration[k]
+            size += abs(flows.closed_inverse[s, r, k]) * work.jerk[k]
+        st.level[r] = level if abs(level) > _EQUAL * size else 0.0
 
 
 @kernel
 def _wake(flows, st):
     """Put modes to sleep whose acceleration is negligible beside the largest."""
-    s, largest = st.counters[FLOW], 0.0
+    s, largest, fastest = st.counters[FLOW], 0.0, 0.0
     for j in range(flows.modes[s]):
-        largest = max(largest, _acceleration(flows, st, s, j))
+        size = _acceleration(flows, st, s, j)
+        largest = max(largest, size)
+        fastest = max(fastest, size / abs(flows.eigenvalue[s, j]))
+    st.fastest[0] = fastest
     st.awake[0] = 0
     count = 1
     for j in range(1, flows.modes[s]):
@@ -232,10 +324,12 @@ def _exponentials(flows, st, work, tau):
 @kernel
 def _move(rows, flows, st, work, tau):
     """Carry rows and amplitudes over tau."""
-    s, count = st.counters[FLOW], st.counters[AWAKE]
+    s, count, friction = st.counters[FLOW], st.counters[AWAKE], rows.friction_rows
     for r in range(len(st.state)):
-        friction = r < rows.friction_rows
-        if st.state[r] >= STICK if friction else st.state[r] != OPEN:
+        state = st.state[r]
+        if (r >= friction and (rows.rides[r] or state == CLOSED or state == TOUCHING)) or (
+            r < friction and (state == STICK or state == HELD)
+        ):
             continue
         shift, speed = tau * (st.velocity[r] + 0.5 * st.drift[r] * tau), st.drift[r] * tau
         for a in range(count):
@@ -243,10 +337,15 @@ def _move(rows, flows, st, work, tau):
             g = flows.motion[s, r, j] * st.amplitude[j]
             shift += (g * work.line[a]).real
             speed += (g * flows.eigenvalue[s, j] * work.first[a]).real
-        if friction:
-            st.ledger[FRICTION] -= st.held[r] * shift
-        st.displacement[r] += shift
         st.velocity[r] += speed
+        if r < friction:
+            st.ledger[FRICTION] -= st.held[r] * shift
+        if r >= friction or rigid(rows, r) or state == SPRUNG:  # a Jenkins element slides with its spring as it is
+            shift_slip(st, r, shift)
+    if flows.sprung[s]:
+        _push(rows, flows, st, work, tau)
+    _stay_together(rows, st, work)
+    measure_gaps(rows, st)
     for a in range(count):
         st.amplitude[st.awake[a]] *= 1.0 + work.first[a]
     if tau > 0.0:
@@ -255,11 +354,37 @@ def _move(rows, flows, st, work, tau):
 
 
 @kernel
+def _stay_together(rows, st, work):
+    """Bodies that move as one keep to each other exactly."""
+    closed = False
+    for r in range(rows.friction_rows, len(st.state)):
+        work.shut[r] = rigid(rows, r) and st.state[r] != OPEN
+        closed = closed or work.shut[r]
+    if closed:
+        join(rows, st, work)
+        join_speeds(rows, st, work)
+
+
+@kernel
+def _push(rows, flows, st, work, tau):
+    """Add up the impulses of compliant contacts."""
+    s = st.counters[FLOW]
+    for r in range(rows.friction_rows, len(st.state)):
+        if st.state[r] == SPRUNG:
+            st.push[r] += st.level[r] * tau
+            for a in range(st.counters[AWAKE]):
+                j = st.awake[a]
+                part = flows.force[s, r, j] * st.amplitude[j] / flows.eigenvalue[s, j]
+                st.push[r] += (part * work.first[a]).real
+
+
+@kernel
 def _within_walls(rows, st):
     """Whether round-off has kept every body inside its cavity."""
     friction = rows.friction_rows
-    for r in range(friction, len(st.state)):  # noqa: SIM110 (numba compiles no generator)
-        if not st.displacement[r] >= -1e-9 * rows.gap[r - friction]:
+    for r in range(friction, len(st.state)):
+        pressed = st.state[r] == SPRUNG or st.state[r] == LEAVING
+        if not pressed and not st.displacement[r] >= -1e-9 * rows.gap[r - friction]:
             return False
     return True
 
@@ -268,10 +393,20 @@ def _within_walls(rows, st):
 def _happen(rows, flows, st, rec, work, r, order, side):
     """The event of row r: jump of velocities, new states. Returns False if it cannot be decided."""
     n = len(st.constant)
-    _keep_released(st, work)
-    if order == POSITION:
+    keep_released(st, work)
+    if order == POSITION and side != RECLOSES:
         # a gap that closes while it still widens, to round-off, is a touch without speed
-        st.displacement[r], st.velocity[r] = 0.0, min(st.velocity[r], 0.0)
+        if side == CLOSES and st.velocity[r] > 0.0:
+            st.velocity[r] = 0.0
+            only(work, r)
+            join_speeds(rows, st, work)
+        _touch(rows, st, work, r)
+    if order == POSITION and side == CLOSES and rigid(rows, r):
+        for i in range(rows.friction_rows, len(st.state)):
+            if st.state[i] == CLOSED:
+                st.settling[i] = longest_hop(rows, flows, st, i)
+            elif st.state[i] == TOUCHING:
+                st.settling[i] = 0.0
         if not collide(rows, st, rec, work):
             return False
         if all_move(rows, st):
@@ -284,17 +419,14 @@ def _happen(rows, flows, st, rec, work, r, order, side):
         return settle(rows, st, rec, work)
     if order == VELOCITY:
         st.velocity[r] = 0.0
-    else:
+    elif r < rows.friction_rows or rigid(rows, r):
         work.forced[r] = side
+    elif side != CLOSES:
+        change_push(rows, st, rec, work, r, side)
+    elif st.velocity[r] < 0.0:
+        begin_push(rows, st, rec, r)
     _coordinates(flows, st, st.coordinates)
     return settle(rows, st, rec, work)
-
-
-@kernel
-def _keep_released(st, work):
-    """Rows that let go at this instant are not caught again by what else happens in it."""
-    for r in range(len(st.state)):
-        work.forced[r] = st.released[r]
 
 
 @kernel
@@ -302,7 +434,7 @@ def _kick(flows, st, work):
     """Impulses on the rows, within the same subsystem."""
     s = st.counters[FLOW]
     for r in range(len(st.state)):
-        if work.impulse[r] > 0.0:
+        if work.impulse[r] != 0.0:
             for j in range(1, flows.modes[s]):
                 st.amplitude[j] += flows.kick[s, r, j] * work.impulse[r]
     _wake(flows, st)

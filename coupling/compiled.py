@@ -12,12 +12,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function of the engine."""
     compiled = njit(cache=True, error_model="numpy", _nrt=False)(function)  # type: ignore[call-overload]
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
+        return compiled
     # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls
     compiled._cache._cache_file._source_stamp = _sources()
     return compiled

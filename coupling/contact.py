@@ -1,7 +1,7 @@
-"""What happens at an event: impacts by Newton's law, and which rows then rest, stick, slip or open.
+"""Which rows rest, stick, slip or open after an event: complementarity of forces and accelerations.
 
-Impacts of several contacts at once are one complementarity problem on velocities, the states after every event one on
-accelerations (Pfeiffer and Glocker 1996, chapters 5 and 8); friction is free of impulses.
+Pfeiffer and Glocker (1996), chapter 5. Where a force and its acceleration vanish together, as at the instant at which a
+contact lets go, their rates decide in the same way.
 """
 
 from __future__ import annotations
@@ -9,157 +9,61 @@ from __future__ import annotations
 import numpy as np
 
 from coupling.compiled import kernel
-from coupling.complementarity import AT_LOW, DEPENDENT, FREE, solve_box
+from coupling.complementarity import AT_HIGH, AT_LOW, DEPENDENT, FREE, solve_box
+from coupling.gaps import join_speeds, measure_gaps, rigid, slowest
+from coupling.log import log_changes
+from coupling.springs import press, slide_or_hold, spring_force
 from coupling.state import (
     CLOSED,
     COAST,
-    DETACHES,
     FLOW,
     HELD,
-    IMPACT,
-    IMPACT_LOSS,
-    IMPACTS,
-    LOGGED,
     OPEN,
-    PERIOD,
-    RESTS,
     SEARCHING,
     SLIP_LEFT,
     SLIP_RIGHT,
-    SLIPS,
+    SPRUNG,
     STICK,
-    STICKS,
     TOUCHING,
 )
 
-#: gaps closed to this share of the free travel are closed at the same instant
-SIMULTANEOUS = 1e-12
-#: impacts of one contact that follow each other within this share of a period are the end of an inelastic collapse:
-#: bodies in a row can meet infinitely often in finite time (McNamara and Young 1992)
-COLLAPSE = 1e-13
-
-
-@kernel
-def collide(rows, st, rec, work):
-    """Newton's law at all touching contacts at once: v+ + k v- >= 0 and P >= 0 complement each other.
-
-    Velocities of rows jump; the impulses are left in work.impulse (r,). An impact at the end of a chatter or of an
-    inelastic collapse is plastic. Returns False if the problem cannot be solved.
-    """
-    friction, problem, r_count = rows.friction_rows, work.problem, len(st.state)
-    k = _touching(rows, st, work)
-    for p in range(k):
-        r = work.rows[p]
-        before = min(st.velocity[r], 0.0)
-        restitution = rows.restitution[r - friction]
-        collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * rows.period
-        if collapsed or -before * restitution < st.settling[r]:
-            restitution = 0.0
-        problem.restitution[p] = restitution
-        # a contact that separates already may not be driven together: its law starts from zero
-        problem.b[p] = st.velocity[r] + restitution * before
-        problem.low[p], problem.high[p], problem.forced[p] = 0.0, np.inf, 0
-        for q in range(k):
-            problem.matrix[p, q] = rows.delassus[r, work.rows[q]]
-    if not solve_box(problem, k, 0.0):
-        return False
-    for p in range(k):
-        # kept before the jump, for the ledger and the log
-        work.acceleration[p] = st.velocity[work.rows[p]]
-    for r in range(r_count):
-        work.impulse[r] = 0.0
-        change, size = 0.0, 0.0
-        for p in range(k):
-            part = rows.delassus[r, work.rows[p]] * problem.force[p]
-            change += part
-            size += abs(part)
-        if abs(change) > 1e-13 * size:
-            st.velocity[r] += change
-    for p in range(k):
-        r, before, impulse = work.rows[p], work.acceleration[p], problem.force[p]
-        work.impulse[r] = impulse
-        st.displacement[r] = 0.0
-        if impulse > 0.0 or problem.state[p] == DEPENDENT:
-            st.velocity[r] = -problem.restitution[p] * min(before, 0.0)
-        st.ledger[IMPACT_LOSS] -= 0.5 * impulse * (before + st.velocity[r])
-        if before < 0.0:
-            st.last_impact[r] = st.time[0]
-            st.counters[IMPACTS] += 1
-            rec.impacts[st.counters[PERIOD]] += 1
-            _log(rows, st, rec, IMPACT, r, before, st.velocity[r], impulse)
-    return True
-
-
-@kernel
-def _touching(rows, st, work):
-    friction, count = rows.friction_rows, 0
-    for r in range(friction, len(st.state)):
-        near = st.displacement[r] <= SIMULTANEOUS * rows.gap[r - friction]
-        if st.displacement[r] == 0.0 or (near and st.velocity[r] < 0.0):
-            work.rows[count] = r
-            count += 1
-    return count
-
-
-@kernel
-def all_move(rows, st):
-    """Whether no row is or was at rest and no slip has changed its direction: an impact between free flights."""
-    for r in range(len(st.state)):
-        state = st.state[r]
-        if r >= rows.friction_rows:
-            if state != OPEN or (st.displacement[r] == 0.0 and st.velocity[r] == 0.0):
-                return False
-        elif state != COAST and (state >= STICK or state * st.velocity[r] <= 0.0):
-            return False
-    return True
+#: forces and accelerations below this share of the terms that they are sums of are round-off
+ROUND_OFF = 1e-12
 
 
 @kernel
 def settle(rows, st, rec, work):
-    """States of all rows from velocities and, where these vanish, from the complementarity problem on accelerations.
+    """Decide the state of every row from displacements, velocities and st.coordinates; name the subsystem.
 
-    st.coordinates holds the structure; work.forced: AT_LOW or AT_HIGH for a row whose force has just reached that
-    bound and leaves it. Returns False if the problem cannot be solved.
+    work.forced marks rows whose force has just reached a bound. Returns False if the problem cannot be solved.
     """
     friction, k = rows.friction_rows, 0
-    _align(rows, st)
+    _halt(rows, st, work)
     for r in range(friction, len(st.state)):
-        k = _stand_by(st, work, r, OPEN, st.displacement[r] == 0.0 and st.velocity[r] == 0.0, k)
+        if rigid(rows, r):
+            k = _stand_by(st, work, r, OPEN, st.displacement[r] == 0.0 and st.velocity[r] == 0.0, k)
+        else:
+            work.before[r] = SPRUNG
     for r in range(friction):
+        if not rigid(rows, r):
+            work.before[r], st.released[r], st.held[r] = st.state[r], 0, 0.0
+            slide_or_hold(rows, st, work, r)
+            continue
         k = _stand_by(st, work, r, COAST, rows.limit[r] > 0.0 and st.velocity[r] == 0.0, k)
         if rows.limit[r] > 0.0 and st.velocity[r] != 0.0:
             st.state[r] = SLIP_RIGHT if st.velocity[r] > 0.0 else SLIP_LEFT
             st.held[r] = -st.state[r] * rows.limit[r]
-    if k > 0 and not _decide(rows, st, work, k):
+    if not _decide(rows, st, rec, work, k):
         return False
     st.key[0], st.key[1] = 0, 0
     for r in range(len(st.state)):
-        if r < friction and st.state[r] == STICK:
+        state = st.state[r]
+        if r < friction and (state == STICK or state == SPRUNG):
             st.key[0] |= 1 << r
-        elif r >= friction and st.state[r] == CLOSED:
+        elif r >= friction and (state == CLOSED or state == SPRUNG):
             st.key[1] |= 1 << (r - friction)
-    _log_changes(rows, st, rec, work)
+    log_changes(rows, st, rec, work)
     st.counters[SEARCHING] = 1
-    return True
-
-
-@kernel
-def _align(rows, st):
-    """Slips and gaps that are one motion, on walls and floors that move as one, are at rest together, exactly."""
-    for r in range(rows.friction_rows, len(st.state)):
-        if rows.wall_body[r] >= 0 and st.displacement[r] == 0.0 and st.velocity[r] == 0.0:
-            st.velocity[rows.wall_body[r]] = 0.0
-    for r in range(rows.friction_rows, len(st.state)):
-        if rows.rides[r] and _bodies_rest(rows, st, r):
-            st.velocity[r] = 0.0
-
-
-@kernel
-def _bodies_rest(rows, st, r):
-    """Whether the bodies of a contact rest on their floor: friction rows of bodies have the bodies' numbers."""
-    for b in range(len(rows.mass)):  # noqa: SIM110 (numba compiles no generator)
-        if rows.bodies[r, b] != 0.0 and st.velocity[b] != 0.0:
-            return False
     return True
 
 
@@ -171,7 +75,7 @@ def stop_riders(rows, flows, st):
     """
     s, stopped = st.counters[FLOW], False
     for r in range(rows.friction_rows):
-        if (st.state[r] == SLIP_LEFT or st.state[r] == SLIP_RIGHT) and st.drift[r] == 0.0:
+        if (st.state[r] == SLIP_LEFT or st.state[r] == SLIP_RIGHT) and st.drift[r] == 0.0 and rigid(rows, r):
             still = True
             for j in range(flows.modes[s]):
                 still = still and flows.motion[s, r, j] == 0.0
@@ -179,6 +83,25 @@ def stop_riders(rows, flows, st):
                 st.velocity[r] = 0.0
                 stopped = True
     return stopped
+
+
+@kernel
+def keep_released(st, work):
+    """Rows that let go at this instant are not caught again by what else happens in it, unless it pushes them."""
+    for r in range(len(st.state)):
+        work.forced[r] = st.released[r]
+
+
+@kernel
+def _halt(rows, st, work):
+    """Bodies whose contacts touch without speed, to round-off, rest against each other exactly."""
+    tiny = slowest(rows, st)
+    for r in range(rows.friction_rows, len(st.state)):
+        work.shut[r] = rigid(rows, r) and st.displacement[r] == 0.0 and abs(st.velocity[r]) <= tiny
+        if work.shut[r] and not rows.rides[r]:
+            st.velocity[r] = 0.0
+    join_speeds(rows, st, work)
+    measure_gaps(rows, st)
 
 
 @kernel
@@ -193,7 +116,7 @@ def _stand_by(st, work, r, moving, rests, k):
 
 
 @kernel
-def _decide(rows, st, work, k):
+def _decide(rows, st, rec, work, k):
     """Solve for the k listed rows at rest: which are closed, stick, slip or open."""
     friction, problem = rows.friction_rows, work.problem
     scale = _free_acceleration(rows, st, work)
@@ -207,16 +130,75 @@ def _decide(rows, st, work, k):
     if not solve_box(problem, k, scale):
         return False
     for p in range(k):
-        r, state = work.rows[p], problem.state[p]
-        st.released[r] = problem.forced[p]
+        work.verdict[p], work.reaction[p] = problem.state[p], problem.force[p]
+        for r in range(len(st.state)):
+            work.acceleration[r] += rows.delassus[r, work.rows[p]] * problem.force[p]
+    members = _undecided(rows, work, k, ROUND_OFF * scale)
+    if members > 0 and not _decide_by_rates(rows, st, work, k, members):
+        return False
+    for p in range(k):
+        r, state = work.rows[p], work.verdict[p]
         if state == FREE:
             st.state[r] = STICK if r < friction else CLOSED
             continue
-        st.held[r] = problem.force[p]
+        st.held[r] = work.reaction[p]
         if state == DEPENDENT:
             st.state[r] = HELD if r < friction else TOUCHING
         elif r < friction:
             st.state[r] = SLIP_RIGHT if state == AT_LOW else SLIP_LEFT
+    press(rows, st, rec, work, ROUND_OFF * scale)
+    return True
+
+
+@kernel
+def _undecided(rows, work, k, tolerance):
+    """List the rows that rest; returns how many, or 0 if no force is at a bound without acceleration.
+
+    work.side: bound at which a row's force is, 0 if between its bounds.
+    """
+    problem, count, undecided = work.problem, 0, False
+    for p in range(k):
+        work.side[p] = problem.forced[p]
+        rests = problem.state[p] == FREE or problem.state[p] == DEPENDENT
+        if rests:
+            near = tolerance / problem.matrix[p, p]
+            if problem.force[p] - problem.low[p] <= near:
+                work.side[p] = AT_LOW
+            elif problem.high[p] - problem.force[p] <= near:
+                work.side[p] = AT_HIGH
+        if rests or work.side[p] != 0:
+            work.members[count] = p
+            count += 1
+            undecided = undecided or work.side[p] != 0
+    return count if undecided else 0
+
+
+@kernel
+def _decide_by_rates(rows, st, work, k, members):
+    """Complementarity of the rates: a force at its bound may come in, at rest, or stay there and let its row go."""
+    problem = work.problem
+    scale = _free_jerk(rows, st, work, k)
+    for u in range(members):
+        p = work.members[u]
+        r, side = work.rows[p], work.side[p]
+        problem.b[u] = work.jerk[r]
+        problem.low[u] = 0.0 if side == AT_LOW else -np.inf
+        problem.high[u] = 0.0 if side == AT_HIGH else np.inf
+        problem.forced[u] = work.forced[r] if side != 0 else 0
+        for v in range(members):
+            problem.matrix[u, v] = rows.delassus[r, work.rows[work.members[v]]]
+    if not solve_box(problem, members, scale):
+        return False
+    for u in range(members):
+        p = work.members[u]
+        work.verdict[p] = problem.state[u]
+        if problem.state[u] == AT_LOW or problem.state[u] == AT_HIGH:
+            r = work.rows[p]
+            st.released[r] = problem.state[u]
+            if r < rows.friction_rows:
+                work.reaction[p] = -rows.limit[r] if problem.state[u] == AT_LOW else rows.limit[r]
+            else:
+                work.reaction[p] = 0.0
     return True
 
 
@@ -230,41 +212,49 @@ def constant_loads(rows, st, work):
         work.on_bodies[i] = rows.weight[i]
     for r in range(len(st.state)):
         if st.held[r] != 0.0:
-            for i in range(n):
-                work.on_structure[i] += rows.structure[r, i] * st.held[r]
-            for i in range(b):
-                work.on_bodies[i] += rows.bodies[r, i] * st.held[r]
+            add_force(rows, work, r, st.held[r])
+
+
+@kernel
+def add_force(rows, work, r, force):
+    """Add the force of row r (N) to the loads."""
+    for i in range(len(work.on_structure)):
+        work.on_structure[i] += rows.structure[r, i] * force
+    for i in range(len(rows.mass)):
+        work.on_bodies[i] += rows.bodies[r, i] * force
 
 
 @kernel
 def _free_acceleration(rows, st, work):
-    """Acceleration of each row under the known forces, with no row closed, at st.coordinates.
+    """Acceleration of each row under the known forces, with no rigid row closed, at st.coordinates.
 
-    Returns the size of the terms that the accelerations are sums of.
+    Returns the size of the terms that the accelerations are sums of. Leaves the accelerations of the structure's modes
+    in work.on_structure, the forces on the bodies in work.on_bodies.
     """
     n, b, largest = len(st.constant), len(rows.mass), 0.0
     constant_loads(rows, st, work)
+    for r in range(len(st.state)):
+        if st.state[r] == SPRUNG:
+            add_force(rows, work, r, spring_force(rows, st, r))
     phase = st.amplitude[0]
     for i in range(n):
-        p, speed, damper = st.coordinates[i], st.coordinates[n + i], 0.0
-        if rows.proportional:
-            damper = rows.damping[i, i] * speed
-        else:
-            for k in range(n):
-                damper += rows.damping[i, k] * st.coordinates[n + k]
+        p, speed = st.coordinates[i], st.coordinates[n + i]
+        damper = _damping_force(rows, st.coordinates[n:], i)
         # sizes by amplitude: what passes through zero has the round-off of its peak
         work.jump[i] = (
             abs(work.on_structure[i]) + abs(rows.force[i]) + abs(damper)
             + rows.stiffness[i] * abs(p) + np.sqrt(rows.stiffness[i]) * abs(speed)
         )  # fmt: skip
         work.on_structure[i] += (rows.force[i] * phase).real - rows.stiffness[i] * p - damper
+    for i in range(b):
+        work.on_bodies[i] += (rows.inertia[i] * phase).real
     for r in range(len(st.state)):
         total, size = 0.0, 0.0
         for i in range(n):
             total += rows.structure[r, i] * work.on_structure[i]
             size += abs(rows.structure[r, i]) * work.jump[i]
         for i in range(b):
-            total += rows.bodies[r, i] * (work.on_bodies[i] + (rows.inertia[i] * phase).real) / rows.mass[i]
+            total += rows.bodies[r, i] * work.on_bodies[i] / rows.mass[i]
             size += abs(rows.bodies[r, i]) * (abs(work.on_bodies[i]) + abs(rows.inertia[i])) / rows.mass[i]
         work.acceleration[r] = total
         largest = max(largest, size)
@@ -272,32 +262,51 @@ def _free_acceleration(rows, st, work):
 
 
 @kernel
-def _log(rows, st, rec, kind, r, before, after, impulse):
-    entry = rec.log[st.counters[LOGGED]]
-    st.counters[LOGGED] += 1
-    entry[0] = st.counters[PERIOD] * rows.period + st.time[0]
-    entry[1], entry[2], entry[3], entry[4], entry[5] = kind, r, before, after, impulse
+def _damping_force(rows, speed, i):
+    if rows.proportional:
+        return rows.damping[i, i] * speed[i]
+    total = 0.0
+    for k in range(len(rows.stiffness)):
+        total += rows.damping[i, k] * speed[k]
+    return total
 
 
 @kernel
-def _log_changes(rows, st, rec, work):
-    """Log what changed. A body that rests at a wall is at rest on the floor too, and only the wall is named."""
+def _free_jerk(rows, st, work, k):
+    """Rate of each row's acceleration with the forces of the k listed rows held as they are (after _free_acceleration).
+
+    Returns the size of the terms that it is a sum of.
+    """
+    n, b, largest = len(st.constant), len(rows.mass), 0.0
+    for p in range(k):
+        add_force(rows, work, work.rows[p], work.reaction[p])
+    turn = 1j * rows.omega * st.amplitude[0]
+    for i in range(n):
+        speed = st.coordinates[n + i]
+        damper = _damping_force(rows, work.on_structure, i)
+        work.jump[i] = (rows.force[i] * turn).real - rows.stiffness[i] * speed - damper
+        work.sizes[i] = (
+            rows.omega * abs(rows.force[i]) + abs(damper) + rows.stiffness[i] * abs(speed)
+            + rows.stiffness[i] * np.sqrt(rows.stiffness[i]) * abs(st.coordinates[i])
+        )  # fmt: skip
+    for i in range(b):
+        work.slips[i] = (rows.inertia[i] * turn).real
     for r in range(len(st.state)):
-        was, now = work.before[r], st.state[r]
-        if r < rows.friction_rows:
-            if now >= STICK > was and not _at_wall(rows, st.state, r):
-                _log(rows, st, rec, STICKS, r, 0.0, 0.0, 0.0)
-            elif was >= STICK > now and not _at_wall(rows, work.before, r):
-                _log(rows, st, rec, SLIPS, r, 0.0, st.velocity[r], 0.0)
-        elif now != OPEN and was == OPEN:
-            _log(rows, st, rec, RESTS, r, 0.0, 0.0, 0.0)
-        elif now == OPEN and was != OPEN:
-            _log(rows, st, rec, DETACHES, r, 0.0, st.velocity[r], 0.0)
-
-
-@kernel
-def _at_wall(rows, state, body):
-    for r in range(rows.friction_rows, len(state)):  # noqa: SIM110 (numba compiles no generator)
-        if rows.wall_body[r] == body and state[r] != OPEN:
-            return True
-    return False
+        if st.state[r] == SPRUNG:
+            rate = -(rows.spring[r] * st.velocity[r] + rows.dashpot[r] * work.acceleration[r])
+            for i in range(n):
+                work.jump[i] += rows.structure[r, i] * rate
+                work.sizes[i] += abs(rows.structure[r, i] * rate)
+            for i in range(b):
+                work.slips[i] += rows.bodies[r, i] * rate
+    for r in range(len(st.state)):
+        total, size = 0.0, 0.0
+        for i in range(n):
+            total += rows.structure[r, i] * work.jump[i]
+            size += abs(rows.structure[r, i]) * work.sizes[i]
+        for i in range(b):
+            total += rows.bodies[r, i] * work.slips[i] / rows.mass[i]
+            size += abs(rows.bodies[r, i]) * (abs(work.slips[i]) + rows.omega * abs(rows.inertia[i])) / rows.mass[i]
+        work.jerk[r] = total
+        largest = max(largest, size)
+    return largest

@@ -9,8 +9,9 @@ import numpy as np
 
 from coupling import automaton as auto
 from coupling import state as st
-from coupling.flow import Rows, add_flow, empty_flows, rows_of
+from coupling.flow import add_flow, empty_flows
 from coupling.response import Event, Response, Status, classify
+from coupling.rows import Rows, rows_of
 from coupling.scene import Scene
 from coupling.statistics import mean_confidence, transient_length
 from coupling.structure import linear_structure

@@ -1,57 +1,24 @@
-"""Exact flow between two events: the linear subsystems that the sets of closed contacts name.
+"""Exact flow between two events: the linear subsystems that the sets of closed rows (coupling.rows) name.
 
-Rows. Everything unilateral or frictional is a row of one constraint matrix J over the coordinates (p, x): modal
-coordinates of the structure and positions of the bodies. Friction rows come first (one a body: its slip on the floor;
-one a friction damper: the structure's motion against the casing), then contact rows (one a gap: left wall to first
-body, body to body, last body to right wall).
-
-A subsystem is named by the rows that are held closed. Bodies held to the structure add their mass to it; the others
-move freely. Its state is a vector of complex modal amplitudes c, and with c_0 the excitation (eigenvalue i omega),
-every displacement is  constant + polynomial + Re sum_j row_j c_j exp(lambda_j t),  exact for any t (physics: quadratic
-eigenvalue problem of a viscously damped structure, Tisseur and Meerbergen 2001).
+Bodies held to the structure add their mass to it, bodies on closed springs (compliant contacts) their coordinate; the
+others move freely. The state of a subsystem is a vector of complex modal amplitudes c, and with c_0 the excitation
+(eigenvalue i omega), every displacement is  constant + polynomial + Re sum_j row_j c_j exp(lambda_j t),  exact for any
+t (quadratic eigenvalue problem of a viscously damped structure, Tisseur and Meerbergen 2001).
 """
 
 from __future__ import annotations
 
-import itertools
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import null_space
+from scipy.linalg import block_diag, null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from coupling.inputs import InputError
-from coupling.scene import Scene
-from coupling.structure import LinearStructure
+from coupling.rows import Rows
 
 CRITICAL = "structure: a mode is critically damped to round-off; change its damping slightly"
-
-
-class Rows(NamedTuple):
-    """The scene as rows: what the compiled engine needs to know besides the subsystems. n modes, b bodies, r rows."""
-
-    friction_rows: int
-    structure: np.ndarray  # (r, n) J on the modal coordinates
-    bodies: np.ndarray  # (r, b) J on the bodies
-    delassus: np.ndarray  # (r, r) J M^-1 J^T with no constraint closed
-    limit: np.ndarray  # (friction rows,) friction force at slip, N
-    restitution: np.ndarray  # (contacts,)
-    gap: np.ndarray  # (contacts,) free travel of the contact's cavity, m: the scale of its gap
-    wall_body: np.ndarray  # (r,) the body of a contact with a wall that rides on the body's floor, otherwise -1
-    rides: np.ndarray  # (r,) whether a contact opens only by slip of its bodies: walls and floor move as one
-    floor: np.ndarray  # (b, n) floor functional under each body
-    mass: np.ndarray  # (b,) kg
-    weight: np.ndarray  # (b,) gravity force along the cavity, N
-    stiffness: np.ndarray  # (n,)
-    damping: np.ndarray  # (n, n)
-    proportional: bool
-    response: np.ndarray  # (n,)
-    force: np.ndarray  # (n,) complex harmonic load on the modes
-    inertia: np.ndarray  # (b,) complex harmonic load on the bodies: the base's acceleration
-    table: complex
-    omega: float
-    period: float
 
 
 class Flows(NamedTuple):
@@ -61,13 +28,16 @@ class Flows(NamedTuple):
     modes: np.ndarray  # (s,) number of complex modes, the excitation included
     eigenvalue: np.ndarray  # (s, m)
     shape: np.ndarray  # (s, 2n, m): (p, p') = constant + Re(shape c)
-    project: np.ndarray  # (s, m, 2n): c = project ((p, p') - constant - excitation)
+    excited: np.ndarray  # (s, 2b): share of the excitation in the displacements xi of sprung bodies and their rates
+    project: np.ndarray  # (s, m, 2n): c = project ((p, p') - constant - excitation) + ...
+    project_slip: np.ndarray  # (s, m, 2b): ... project_slip ((slips, rates) - constant - excitation)
+    sprung: np.ndarray  # (s,) whether springs are closed
     kick: np.ndarray  # (s, r, m): change of c by a unit impulse on a row
     motion: np.ndarray  # (s, r, m): displacement of each row
-    force: np.ndarray  # (s, r, m): constraint force of each closed row, otherwise the row's free acceleration
-    closed_inverse: np.ndarray  # (s, r, r): inverse Delassus matrix of the closed rows
-    static: np.ndarray  # (s, n, n + b): constant displacement under constant loads
-    held: np.ndarray  # (s, n, n): constant displacement kept by constraints inside the structure
+    force: np.ndarray  # (s, r, m): force of each closed row
+    closed_inverse: np.ndarray  # (s, r, r): inverse Delassus matrix of the rigid closed rows
+    static: np.ndarray  # (s, n + b, n + b): constant (p, xi) under constant loads on (p, x)
+    held: np.ndarray  # (s, n + b, n): constant (p, xi) kept by constraints inside the structure
     body_acceleration: np.ndarray  # (s, b, b): of free bodies under constant loads
     body: np.ndarray  # (s, b, m): displacement of each body
     response: np.ndarray  # (s, m)
@@ -78,100 +48,16 @@ class Flows(NamedTuple):
     size: np.ndarray  # (s, m): largest displacement of a mode over all rows and the response
 
 
-def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray, np.ndarray]:
-    """Rows of a scene, with the initial displacement and velocity of each row, shapes (r,)."""
-    bodies, n = len(scene.damper), structure.modes
-    unit, floor = np.eye(bodies), np.zeros((bodies, n))
-    on_structure, on_bodies = [], []
-    restitution, gaps = [], []
-    for index, cavity in enumerate(scene.cavity):
-        row = [i for i, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
-        floor[row] = structure.floor[index]
-        for before, after in itertools.pairwise([None, *row, None]) if row else ():
-            pair = [i for i in (before, after) if i is not None]
-            on_structure.append((after is None) * structure.right[index] - (before is None) * structure.left[index])
-            on_bodies.append(sum(unit[i] if i == after else -unit[i] for i in pair))
-            # two bodies of different restitution meet with the geometric mean
-            restitution.append(float(np.prod([scene.damper[i].restitution for i in pair]) ** (1 / len(pair))))
-            gaps.append(cavity.gap)
-    casing = structure.casing
-    j_structure = np.vstack([-floor, casing, np.array(on_structure).reshape(len(gaps), n)])
-    j_bodies = np.vstack([unit, np.zeros((len(casing), bodies)), np.array(on_bodies).reshape(len(gaps), bodies)])
-    mass = np.array([damper.mass for damper in scene.damper])
-    base = structure.base_acceleration
-    rows = Rows(
-        friction_rows=bodies + len(casing),
-        structure=j_structure,
-        bodies=j_bodies,
-        delassus=j_structure @ j_structure.T + (j_bodies / mass) @ j_bodies.T,
-        limit=np.array(
-            [_friction_force(scene, i) for i in range(bodies)]
-            + [damper.friction * damper.normal_force for damper in scene.friction_damper]
-        ),
-        restitution=np.array(restitution),
-        gap=np.array(gaps),
-        wall_body=np.array(
-            [_wall_body(j_structure, j_bodies, bodies + len(casing), r) for r in range(len(j_bodies))], np.int64
-        ),
-        rides=np.array(
-            [_rides(j_structure, j_bodies, bodies + len(casing), r) for r in range(len(j_bodies))], np.bool_
-        ),
-        floor=floor,
-        mass=mass,
-        weight=mass * scene.gravity.tangential,
-        stiffness=np.array(structure.stiffness),
-        damping=np.array(structure.damping),
-        proportional=bool(np.count_nonzero(structure.damping - np.diag(np.diag(structure.damping))) == 0),
-        response=np.array(structure.response),
-        force=np.array(structure.force, complex),
-        inertia=-mass * base + 0j,
-        table=complex(structure.table),
-        omega=structure.omega,
-        period=2 * np.pi / structure.omega,
-    )
-    return rows, *_initial_rows(scene, structure, rows)
-
-
-def _initial_rows(scene: Scene, structure: LinearStructure, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
-    position = np.array([damper.position for damper in scene.damper])
-    velocity = np.array([damper.velocity for damper in scene.damper])
-    # positions are relative to the floor; walls on other functionals start at their rest distance
-    displacement = rows.bodies @ position
-    ends = np.count_nonzero(rows.bodies[rows.friction_rows :], axis=1) == 1
-    displacement[rows.friction_rows :][ends] += rows.gap[ends] / 2
-    absolute = velocity + rows.floor @ structure.velocity
-    speed = rows.structure @ structure.velocity + rows.bodies @ absolute
-    moved = rows.structure @ structure.displacement + rows.bodies @ (rows.floor @ structure.displacement)
-    speed[: len(velocity)] = velocity  # exact, so that a body at relative rest is known to be so
-    moved[: len(velocity)] = 0.0
-    return displacement + moved, speed
-
-
-def _wall_body(structure: np.ndarray, bodies: np.ndarray, friction_rows: int, r: int) -> int:
-    touched = np.flatnonzero(bodies[r])
-    return int(touched[0]) if len(touched) == 1 and _rides(structure, bodies, friction_rows, r) else -1
-
-
-def _rides(structure: np.ndarray, bodies: np.ndarray, friction_rows: int, r: int) -> bool:
-    slips = structure[: bodies.shape[1]]
-    return r >= friction_rows and np.allclose(structure[r], bodies[r] @ slips, rtol=1e-14, atol=0)
-
-
-def _friction_force(scene: Scene, index: int) -> float:
-    damper = scene.damper[index]
-    normal = damper.mass * scene.gravity.normal if damper.normal_load is None else damper.normal_load
-    return damper.friction * max(normal, 0.0)
-
-
 def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
     """Room for `capacity` subsystems, none of them filled (key -1)."""
     n, b, r = len(rows.stiffness), len(rows.mass), len(rows.delassus)
-    m = 2 * n + 1
+    m = 2 * n + 1 + 2 * b * bool(np.isfinite(rows.spring[rows.friction_rows :]).any())
     z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
     return Flows(
-        np.full((capacity, 2), -1, np.int64), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(m, 2 * n),
-        z(r, m), z(r, m), z(r, m), f(r, r), f(n, n + b), f(n, n), f(b, b), z(b, m), z(m),
+        np.full((capacity, 2), -1, np.int64), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
+        z(m, 2 * b), np.zeros(capacity, np.bool_), z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
+        f(b, b), z(b, m), z(m),
         z(m), z(m, m), z(m, m), np.zeros(capacity, np.bool_), f(m),
     )  # fmt: skip
 
@@ -197,50 +83,77 @@ def _closed_rows(rows: Rows, key: tuple[int, int]) -> np.ndarray:
 
 
 def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
-    n = len(rows.stiffness)
-    carrier, cluster, inner = _attachment(rows, closed)
-    attached = cluster < 0
-    carrier_mass = np.where(attached, rows.mass, 0.0)
-    mass = np.eye(n) + (carrier.T * carrier_mass) @ carrier
-    # coordinates eta of the structure: p = (kept) + basis eta, where closed rows tie two of its functionals together
+    n, b = len(rows.stiffness), len(rows.mass)
+    rigid, sprung = closed[np.isinf(rows.spring[closed])], closed[np.isfinite(rows.spring[closed])]
+    carrier, cluster, inner = _attachment(rows, rigid)
+    springs = _sprung_bodies(rows, cluster, sprung)
+    carrier[springs.anchored] = rows.floor[springs.anchored]
+    free = (cluster >= 0) & ~springs.anchored
+    # coordinates z = (p, xi): bodies are at x = carrier p + xi, besides the parabolas of free ones; z = lift eta
     basis = null_space(inner) if len(inner) else np.eye(n)
-    stiffness = np.diag(rows.stiffness)
-    load = rows.force + carrier.T @ np.where(attached, rows.inertia, 0)
-    dynamic = stiffness + 1j * rows.omega * rows.damping - rows.omega**2 * mass
-    harmonic = basis @ _solve_harmonic(basis.T @ dynamic @ basis, basis.T @ load)
-    eigenvalue, shape, project = _complex_modes(rows, basis, mass, bool(attached.any()))
+    lift, drop = block_diag(basis, springs.lift), block_diag(basis.T, springs.drop)
+    spread = np.vstack([np.hstack([np.eye(n), carrier.T]), np.hstack([np.zeros((b, n)), np.eye(b)])])
+    loads = lift.T @ spread  # loads on (p, x) become loads on eta
+    functional = _functional(rows, carrier)
+    law = np.hstack([functional[sprung], rows.bodies[sprung]])
+    mass = loads @ np.diag(np.r_[np.ones(n), rows.mass]) @ loads.T
+    z_damping = block_diag(rows.damping, np.zeros((b, b))) + law.T * rows.dashpot[sprung] @ law
+    z_stiffness = block_diag(np.diag(rows.stiffness), np.zeros((b, b))) + law.T * rows.spring[sprung] @ law
+    damping, stiffness = lift.T @ z_damping @ lift, lift.T @ z_stiffness @ lift
+    harmonic = lift @ _solve_harmonic(
+        stiffness + 1j * rows.omega * damping - rows.omega**2 * mass, loads @ np.r_[rows.force, rows.inertia]
+    )
+    if rows.proportional and lift.shape[1] == n and not len(sprung) and not np.any(cluster < 0):
+        eigenvalue, shape, project = _proportional_modes(rows)
+    else:
+        eigenvalue, shape, project = _complex_modes(mass, damping, stiffness)
+    eigenvalue, shape, project = _one_of_each_pair(eigenvalue, shape, project)
+    shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
     m = len(eigenvalue) + 1
-    flows.modes[s] = m
+    flows.modes[s], flows.sprung[s] = m, len(sprung) > 0
     flows.eigenvalue[s, :m] = np.r_[1j * rows.omega, eigenvalue]
     full = np.hstack([np.r_[harmonic, 1j * rows.omega * harmonic][:, None], shape])
-    flows.shape[s, :, :m] = full
-    flows.project[s, 1:m] = project
-    flows.kick[s, :, 1:m] = rows.structure @ project[:, n:].T
-    body = np.where(attached[:, None], carrier @ full[:n], 0)
-    body_acceleration = np.zeros((len(rows.mass),) * 2)
-    for c in range(cluster.max(initial=-1) + 1):
-        members = cluster == c
-        total = rows.mass[members].sum()
-        body[members, 0] = -rows.inertia[members].sum() / (total * rows.omega**2)
-        body_acceleration[np.ix_(members, members)] = 1 / total
+    structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
+    flows.shape[s, :, :m] = full[structure]
+    flows.excited[s] = full[xi, 0]
+    flows.project[s, 1:m], flows.project_slip[s, 1:m] = project[:, structure], project[:, xi]
+    flows.kick[s, :, 1:m] = rows.structure @ project[:, n + b : 2 * n + b].T
+    own = full[n : n + b].copy()
+    own[free, 0] += rows.base / rows.omega**2
+    body = carrier @ full[:n] + own
+    for c in np.unique(springs.cluster[free]):
+        members = free & (springs.cluster == c)
+        flows.body_acceleration[s][np.ix_(members, members)] = 1 / rows.mass[members].sum()
     flows.body[s, :, :m] = body
-    flows.body_acceleration[s] = body_acceleration
-    flows.motion[s, :, :m] = _row_motion(rows, carrier, attached, body, full[:n])
-    flexible = np.linalg.solve(basis.T @ stiffness @ basis, basis.T)
-    flows.static[s] = basis @ flexible @ np.hstack([np.eye(n), carrier.T * attached])
+    flows.motion[s, :, :m] = functional @ full[:n] + rows.bodies @ own
+    flows.static[s] = lift @ np.linalg.solve(stiffness, loads)
     if len(inner):
-        kept = np.eye(n) - basis @ basis.T
-        flows.held[s] = kept - basis @ flexible @ stiffness @ kept
+        kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
+        flows.held[s] = kept - lift @ np.linalg.solve(stiffness, lift.T @ z_stiffness @ kept)
     flows.response[s, :m] = rows.response @ full[:n]
     flows.response[s, 0] += rows.table
-    acceleration = rows.structure @ np.hstack([-stiffness, -rows.damping]) @ full
-    acceleration[:, 0] += rows.structure @ rows.force + rows.bodies @ (rows.inertia / rows.mass)
-    flows.force[s, :, :m] = acceleration
-    if len(closed):
-        inverse = np.linalg.inv(rows.delassus[np.ix_(closed, closed)])
-        flows.closed_inverse[s][np.ix_(closed, closed)] = inverse
-        flows.force[s][closed, :m] = -inverse @ acceleration[closed]
-    _fill_energy(flows, rows, s, full, body)
+    _fill_forces(flows, rows, s, full[structure], rigid, sprung)
+    _fill_energy(flows, rows, s, full[structure], body)
+
+
+def _fill_forces(flows: Flows, rows: Rows, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
+    m = flows.modes[s]
+    rate = rows.spring[sprung, None] + rows.dashpot[sprung, None] * flows.eigenvalue[s, :m]
+    flows.force[s, sprung, :m] = -rate * flows.motion[s, sprung, :m]
+    if not len(rigid):
+        return
+    pull = rows.structure @ np.hstack([-np.diag(rows.stiffness), -rows.damping])
+    acceleration, size = pull @ full, np.abs(pull) @ np.abs(full)
+    excited = rows.structure @ rows.force + rows.bodies @ (rows.inertia / rows.mass)
+    acceleration[:, 0] += excited
+    size[:, 0] += np.abs(excited)
+    acceleration += rows.delassus[:, sprung] @ flows.force[s, sprung, :m]
+    inverse = np.linalg.inv(rows.delassus[np.ix_(rigid, rigid)])
+    flows.closed_inverse[s][np.ix_(rigid, rigid)] = inverse
+    force = -inverse @ acceleration[rigid]
+    # a contact without force has none, not round-off, or it would open and close at every tick of the clock
+    force[np.abs(force) <= 1e-14 * (np.abs(inverse) @ size[rigid])] = 0.0
+    flows.force[s, rigid, :m] = force
 
 
 def _solve_harmonic(dynamic: np.ndarray, load: np.ndarray) -> np.ndarray:
@@ -260,9 +173,12 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
     velocity = full[n:]
     # all harmonic loads are in phase with the sine: real amplitudes
     flows.work[s, :m] = -rows.force.imag @ velocity - rows.inertia.imag @ (body * flows.eigenvalue[s, :m])
-    flows.loss[s, :m, :m] = velocity.T @ rows.damping @ velocity
-    flows.loss_conjugate[s, :m, :m] = velocity.T @ rows.damping @ velocity.conj()
-    flows.uncoupled[s] = rows.proportional and not flows.closed_inverse[s].any() and m == n + 1
+    rate = flows.motion[s, :, :m] * flows.eigenvalue[s, :m] * flows.force[s, :, :m].any(axis=1)[:, None]
+    flows.loss[s, :m, :m] = velocity.T @ rows.damping @ velocity + (rate.T * rows.dashpot) @ rate
+    flows.loss_conjugate[s, :m, :m] = (
+        velocity.T @ rows.damping @ velocity.conj() + (rate.T * rows.dashpot) @ rate.conj()
+    )
+    flows.uncoupled[s] = rows.proportional and not flows.closed_inverse[s].any() and not flows.sprung[s] and m == n + 1
     flows.size[s, :m] = np.abs(np.vstack([flows.motion[s, :, :m], flows.response[s, :m]])).max(axis=0)
 
 
@@ -302,41 +218,71 @@ def _decided(rows: Rows, r: int, known: np.ndarray) -> bool:
     return free == 0 or (free == 1 and (np.count_nonzero(bodies) == 1 or bool(known[bodies].any())))
 
 
-def _row_motion(
-    rows: Rows, carrier: np.ndarray, attached: np.ndarray, body: np.ndarray, full: np.ndarray
-) -> np.ndarray:
-    """Displacement of each row; exactly zero where the row's two sides ride on one functional."""
-    functional = rows.structure + (rows.bodies * attached) @ carrier
+def _functional(rows: Rows, carrier: np.ndarray) -> np.ndarray:
+    """Functional of p in each row (r, n); exactly zero where the row's two sides ride on one functional."""
+    functional: np.ndarray = rows.structure + rows.bodies @ carrier
     scale = (np.abs(rows.structure) + np.abs(rows.bodies) @ np.abs(carrier)).max(axis=1, initial=0)
     functional[np.abs(functional).max(axis=1, initial=0) <= 1e-12 * scale] = 0
-    motion: np.ndarray = functional @ full + (rows.bodies * ~attached) @ body
-    return motion
+    return functional
+
+
+class _SprungBodies(NamedTuple):
+    """The coordinates of bodies that springs hold: q of b bodies' displacements xi = lift eta, eta = drop xi."""
+
+    lift: np.ndarray  # (b, q)
+    drop: np.ndarray  # (q, b)
+    anchored: np.ndarray  # (b,) whether springs tie a body to the structure
+    cluster: np.ndarray  # (b,) number of the bodies that move freely together
+
+
+def _sprung_bodies(rows: Rows, cluster: np.ndarray, sprung: np.ndarray) -> _SprungBodies:
+    """Bodies that springs tie to the structure move with it; others vibrate about their common centre of mass."""
+    b, groups = len(cluster), cluster.max(initial=-1) + 1
+    member = (cluster == np.arange(groups)[:, None]).astype(float)
+    links = rows.bodies[sprung] @ member.T
+    # the last node is the structure
+    ends = [np.r_[np.flatnonzero(link), groups][:2] for link in links if link.any()]
+    graph = coo_matrix((np.ones(len(ends)), np.array(ends, int).reshape(-1, 2).T), (groups + 1,) * 2)
+    _, part = connected_components(graph, directed=False)
+    columns, rests = [np.zeros((b, 0))], [np.zeros((0, b))]
+    first = np.array([member[g] * (np.arange(b) == np.argmax(member[g])) for g in range(groups)]).reshape(groups, b)
+    for c in np.unique(part[:groups]):
+        inside = np.flatnonzero(part[:groups] == c)
+        if c == part[groups]:
+            columns.append(member[inside].T)
+            rests.append(first[inside])
+        elif len(inside) > 1:
+            mass = member[inside] @ rows.mass
+            relative = null_space(mass[None, :])
+            columns.append(member[inside].T @ relative)
+            rests.append(relative.T @ (np.eye(len(inside)) - mass / mass.sum()) @ first[inside])
+    anchored = (cluster >= 0) & (part[cluster] == part[groups])
+    return _SprungBodies(np.hstack(columns), np.vstack(rests), anchored, np.where(cluster < 0, -1, part[cluster]))
 
 
 def _complex_modes(
-    rows: Rows, basis: np.ndarray, mass: np.ndarray, attached: bool
+    mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Eigenvalues (m,), shapes (2n, m) and projection (m, 2n) of the free motion, one of each conjugate pair."""
-    n, k = basis.shape
+    """Eigenvalues (2k,) of the free motion, vectors of (eta, eta') (2k, 2k) and their inverse."""
+    k = len(mass)
     if k == 0:
-        return np.zeros(0, complex), np.zeros((2 * n, 0), complex), np.zeros((0, 2 * n), complex)
-    if rows.proportional and not attached and n == k:
-        values, vectors, inverse = _proportional_modes(rows)
-    else:
-        reduced = np.linalg.solve(
-            basis.T @ mass @ basis, basis.T @ np.hstack([-np.diag(rows.stiffness) @ basis, -rows.damping @ basis])
-        )
-        # a real matrix: LAPACK returns exact conjugate pairs
-        values, vectors = np.linalg.eig(np.vstack([np.hstack([np.zeros((k, k)), np.eye(k)]), reduced]))
-        values, vectors = values.astype(complex), vectors.astype(complex)
-        scaled = vectors * np.repeat([np.abs(values).max(), 1.0], k)[:, None]
-        if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=0)) > 1e9:
-            raise InputError(CRITICAL)
-        inverse = np.linalg.inv(vectors)
+        return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)
+    reduced = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
+    # a real matrix: LAPACK returns exact conjugate pairs
+    values, vectors = np.linalg.eig(np.vstack([np.hstack([np.zeros((k, k)), np.eye(k)]), reduced]))
+    values, vectors = values.astype(complex), vectors.astype(complex)
+    scaled = vectors * np.repeat([np.abs(values).max(), 1.0], k)[:, None]
+    if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=0)) > 1e9:
+        raise InputError(CRITICAL)
+    return values, vectors, np.linalg.inv(vectors)
+
+
+def _one_of_each_pair(
+    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each conjugate pair the upper one, with twice its vector: displacement = Re(vector c)."""
     keep = values.imag >= 0
-    twice = np.where(values.imag > 0, 2.0, 1.0)[keep]
-    lift = np.kron(np.eye(2), basis)
-    return values[keep], lift @ (vectors[:, keep] * twice), inverse[keep] @ lift.T
+    return values[keep], vectors[:, keep] * np.where(values.imag > 0, 2.0, 1.0)[keep], inverse[keep]
 
 
 def _proportional_modes(rows: Rows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

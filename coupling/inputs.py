@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import ConfigDict, Strict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 T = TypeVar("T")
 
@@ -21,6 +21,9 @@ _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 # numbers are numbers: no text, no booleans
 Real = Annotated[float, Strict()]
 Whole = Annotated[int, Strict()]
+Positive = Annotated[Real, Field(gt=0)]
+NonNegative = Annotated[Real, Field(ge=0)]
+Fraction = Annotated[Real, Field(ge=0, le=1)]
 
 
 class InputError(ValueError):
@@ -66,7 +69,8 @@ def _explain(adapter: TypeAdapter[Any], error: Any, data: Any) -> str:
     path = _path_in_data(error["loc"], data, names_absent_key="argument" in kind or "missing" in kind)
     key = _dotted(path)
     if kind in _UNKNOWN:
-        known = _known_keys(adapter.json_schema(), error["loc"][:-1])
+        # a key of another variant of the table is known, and yet no help
+        known = [name for name in _known_keys(adapter.json_schema(), error["loc"][:-1]) if name != path[-1]]
         return f"{key}: unknown key; {nearest(str(path[-1]), known)}"
     if kind in ("missing", "missing_argument"):
         return f"{key}: missing; it is required here"

@@ -13,11 +13,19 @@ import numpy as np
 from pydantic import Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from coupling.inputs import STRICT, InputError, Real, Whole, nearest, read_toml, validate
-
-Positive = Annotated[Real, Field(gt=0)]
-NonNegative = Annotated[Real, Field(ge=0)]
-Fraction = Annotated[Real, Field(ge=0, le=1)]
+from coupling.inputs import (
+    STRICT,
+    Fraction,
+    InputError,
+    NonNegative,
+    Positive,
+    Real,
+    Whole,
+    nearest,
+    read_toml,
+    validate,
+)
+from coupling.laws import Contact, Newton
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -142,19 +150,14 @@ class Damper:
 class FrictionDamper:
     """A Coulomb element between the structure and the casing: the spring-loaded damper that is the usual remedy.
 
+    With a tangential `stiffness` (N/m) a Jenkins element: spring and slider in series, unloaded at time zero.
     It acts at interface label `at` of a reduced model (default: excitation.at).
     """
 
     normal_force: Positive
     friction: NonNegative
+    stiffness: Positive | None = None
     at: str | None = None
-
-
-@dataclass(frozen=True, config=STRICT)
-class Contact:
-    """The contact law at the walls."""
-
-    law: Literal["newton"] = "newton"
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -210,7 +213,7 @@ class Scene:
     friction_damper: tuple[FrictionDamper, ...] = ()
     initial: Initial = field(default_factory=Initial)
     gravity: Gravity = field(default_factory=Gravity)
-    contact: Contact = field(default_factory=Contact)
+    contact: Contact = field(default_factory=Newton)
     time: Time = field(default_factory=Time)
     solver: Solver = field(default_factory=Solver)
     sweep: dict[str, Range | Annotated[tuple[Real | Whole | str, ...], Field(min_length=1)]] = field(
@@ -228,6 +231,10 @@ class Scene:
                     f"damper[{index}].cavity: no cavity '{damper.cavity}'; {nearest(damper.cavity, names)}"
                 )
             self._check_load(index, damper)
+            try:
+                self.contact.element(damper.restitution, damper.mass)
+            except InputError as error:
+                raise ValueError(f"damper[{index}].{error}") from None
         for cavity in self.cavity:
             self._check_row(cavity)
         self._check_structure()

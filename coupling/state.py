@@ -9,12 +9,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coupling.flow import Rows
+from coupling.rows import Rows
 
-# state of a friction row; a row that slips is known by its direction, one without friction coasts
+# state of a friction row; a row that slips is known by its direction, one without friction coasts; HELD: at rest, but
+# another row carries its force
 SLIP_LEFT, COAST, SLIP_RIGHT, STICK, HELD = -1, 0, 1, 2, 3
-# state of a contact row; TOUCHING: closed, but another row carries its force
-OPEN, CLOSED, TOUCHING = 0, 1, 2
+# state of a contact row; TOUCHING: closed, but another row carries its force; LEAVING: a compliant contact that has
+# ended at zero force, before its gap is open again
+OPEN, CLOSED, TOUCHING, LEAVING = 0, 1, 2, 5
+# state of a row, friction or contact, whose spring is closed
+SPRUNG = 4
+
+# what an event function of a contact stands for, besides the bounds of a force: the gap closes, a gap that was left
+# under compression opens, or closes again because its spring would push
+CLOSES, OPENS, RECLOSES = 10, 11, 12
 
 COUNTERS = ("period", "flow", "searching", "logged", "events", "impacts", "evaluations", "segments", "awake")
 PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE = range(len(COUNTERS))
@@ -37,7 +45,9 @@ class State(NamedTuple):
     awake: np.ndarray  # (m,) the modes that are awake are the first counters[AWAKE] of these
     coordinates: np.ndarray  # (2n,) p and p' of the structure where a new subsystem begins
     constant: np.ndarray  # (n,) constant part of p
-    displacement: np.ndarray  # (r,) of each row, m
+    slip_constant: np.ndarray  # (b,) constant part of the displacements of bodies on springs
+    displacement: np.ndarray  # (r,) of each row, m; of a friction row's spring: its elongation
+    low: np.ndarray  # (r,) of slips: what is beyond the last digit of `displacement`, m
     velocity: np.ndarray  # (r,)
     drift: np.ndarray  # (r,) constant acceleration of each row's free bodies
     body_drift: np.ndarray  # (b,)
@@ -45,8 +55,10 @@ class State(NamedTuple):
     level: np.ndarray  # (r,) constant part of a closed row's force, N
     state: np.ndarray  # (r,) int
     released: np.ndarray  # (r,) the bound at which a row's force was when it let go at this very instant, otherwise 0
-    settling: np.ndarray  # (r,) rebound speed below which an impact ends a chatter, m/s
+    settling: np.ndarray  # (r,) speed of a flight that takes as long as a chatter may be cut short, m/s
     last_impact: np.ndarray  # (r,) time of the last impact, counted from the period's start, s
+    push: np.ndarray  # (r,) impulse of a compliant contact since it began, N s
+    fastest: np.ndarray  # (1,) bound of the speeds in the structure, m/s: round-off of a speed is relative to it
     ledger: np.ndarray  # (6,) J
 
 
@@ -86,14 +98,22 @@ class Scratch(NamedTuple):
     line: np.ndarray  # (m,) exp(lambda tau) - 1 - lambda tau
     speed: np.ndarray  # (m,)
     coordinates: np.ndarray  # (2n,)
+    slips: np.ndarray  # (2b,)
     on_structure: np.ndarray  # (n,)
     on_bodies: np.ndarray  # (b,)
-    acceleration: np.ndarray  # (r,)
     jump: np.ndarray  # (n,)
+    sizes: np.ndarray  # (n,)
+    acceleration: np.ndarray  # (r,)
+    jerk: np.ndarray  # (r,)
     impulse: np.ndarray  # (r,)
+    reaction: np.ndarray  # (r,) of the listed rows
     before: np.ndarray  # (r,) int, row states
-    forced: np.ndarray  # (r,) int
-    rows: np.ndarray  # (r,) int
+    forced: np.ndarray  # (r,) int: the bound that a row's force has just reached
+    shut: np.ndarray  # (r,) int: contacts whose bodies are together
+    rows: np.ndarray  # (r,) int: the listed rows
+    verdict: np.ndarray  # (r,) int, of the listed rows
+    side: np.ndarray  # (r,) int, of the listed rows
+    members: np.ndarray  # (r,) int: places in that list
     problem: Problem
 
 
@@ -122,18 +142,19 @@ def new_state(rows: Rows, modes: int, displacement: np.ndarray, velocity: np.nda
     state = State(
         counters=np.zeros(len(COUNTERS), np.int64), time=np.zeros(1), key=np.zeros(2, np.int64),
         amplitude=np.zeros(modes, complex), awake=np.zeros(modes, np.int64), coordinates=np.zeros(2 * n),
-        constant=np.zeros(n), displacement=np.array(displacement), velocity=np.array(velocity), drift=np.zeros(r),
+        constant=np.zeros(n), slip_constant=np.zeros(b), displacement=np.array(displacement), low=np.zeros(r),
+        velocity=np.array(velocity), drift=np.zeros(r),
         body_drift=np.zeros(b), held=np.zeros(r), level=np.zeros(r), state=np.zeros(r, np.int64),
-        released=np.zeros(r, np.int64), settling=np.zeros(r), last_impact=np.full(r, -np.inf),
-        ledger=np.zeros(len(ENERGIES)),
+        released=np.zeros(r, np.int64), settling=np.zeros(r), last_impact=np.full(r, -np.inf), push=np.zeros(r),
+        fastest=np.zeros(1), ledger=np.zeros(len(ENERGIES)),
     )  # fmt: skip
     state.amplitude[0] = 1.0
     return state
 
 
 def new_channels(rows: Rows, modes: int) -> Channels:
-    """Room for two event functions a friction row and one a contact."""
-    k = len(rows.delassus) + rows.friction_rows
+    """Room for two event functions a row."""
+    k = 2 * len(rows.delassus)
     integers, reals = np.zeros((3, k), np.int64), np.zeros((6, k))
     return Channels._make([*integers, *reals, np.zeros((k, modes), complex)])
 
@@ -163,8 +184,6 @@ def new_problem(r: int) -> Problem:
 def new_scratch(rows: Rows, modes: int) -> Scratch:
     """Scratch space for a scene."""
     r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
-    complexes, integers = np.zeros((3, modes), complex), np.zeros((3, r), np.int64)
-    return Scratch._make(
-        [*complexes, np.zeros(2 * n), np.zeros(n), np.zeros(b), np.zeros(r), np.zeros(n), np.zeros(r), *integers,
-         new_problem(r)]
-    )  # fmt: skip
+    complexes, reals, integers = np.zeros((3, modes), complex), np.zeros((4, r)), np.zeros((7, r), np.int64)
+    sizes = (2 * n, 2 * b, n, b, n, n)
+    return Scratch._make([*complexes, *(np.zeros(size) for size in sizes), *reals, *integers, new_problem(r)])

@@ -7,12 +7,29 @@ import math
 from coupling.compiled import kernel
 from coupling.complementarity import AT_HIGH, AT_LOW
 from coupling.events import FORCE, POSITION, VELOCITY, bounds, evaluate, safe_step
-from coupling.state import AWAKE, CLOSED, EVALUATIONS, FLOW, OPEN, SEGMENTS, SLIP_LEFT, SLIP_RIGHT, STICK
+from coupling.state import (
+    AWAKE,
+    CLOSED,
+    CLOSES,
+    EVALUATIONS,
+    FLOW,
+    LEAVING,
+    OPEN,
+    OPENS,
+    RECLOSES,
+    SEGMENTS,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    SPRUNG,
+    STICK,
+)
 
 #: shortest step in periods: what a double can resolve within a period
 RESOLUTION = 1e-15
-#: rebounds shorter than this, in periods, end a chatter
-CHATTER = 3e-10
+#: what is left of a chatter, in periods, when it is completed by a plastic impact; a body at rest does not leave for
+#: less. Relative displacement and speed are zero at its end either way: the motion of the structure is changed by no
+#: more than the order of (2 pi CHATTER)^3 of it
+CHATTER = 3e-7
 
 
 @kernel
@@ -61,32 +78,37 @@ def _watch(rows, flows, st, ch, s, left):
     count = 0
     for r in range(rows.friction_rows):
         state = st.state[r]
-        if state == STICK:
+        if state == STICK or state == SPRUNG:
             for side in (AT_LOW, AT_HIGH):
                 count = _watch_force(rows, flows, st, ch, s, r, side, rows.limit[r], count, left)
-        elif state == SLIP_LEFT or state == SLIP_RIGHT:  # noqa: SIM109 (faster compiled)
-            count = _watch_motion(rows, flows, st, ch, s, r, VELOCITY, float(state), count, left)
+        elif state == SLIP_LEFT or state == SLIP_RIGHT:
+            count = _watch_motion(rows, flows, st, ch, s, r, VELOCITY, float(state), 0, count, left)
     for r in range(rows.friction_rows, len(st.state)):
-        if st.state[r] == CLOSED:
+        state = st.state[r]
+        if state == CLOSED or state == SPRUNG:
             count = _watch_force(rows, flows, st, ch, s, r, AT_LOW, 0.0, count, left)
-        elif st.state[r] == OPEN and not _surely_opens(rows, st, r):
-            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, 1.0, count, left)
+        elif state == OPEN and not _surely_opens(rows, st, r):
+            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, 1.0, CLOSES, count, left)
+        elif state == LEAVING:
+            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, -1.0, OPENS, count, left)
+            count = _watch_spring(rows, flows, st, ch, s, r, count, left)
     return count
 
 
 @kernel
 def _surely_opens(rows, st, r):
     """Whether a gap can only widen in this segment: the body slides away from a wall that rides on its floor."""
-    body = rows.wall_body[r]
-    if body < 0 or (st.state[body] != SLIP_LEFT and st.state[body] != SLIP_RIGHT):
+    if not rows.rides[r]:
         return False
-    return st.state[body] * rows.bodies[r, body] > 0.0
+    if rows.before[r] < 0:
+        return st.state[rows.after[r]] == SLIP_RIGHT
+    return rows.after[r] < 0 and st.state[rows.before[r]] == SLIP_LEFT
 
 
 @kernel
-def _watch_motion(rows, flows, st, ch, s, r, order, sign, k, left):
-    """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r for its first root."""
-    ch.row[k], ch.order[k], ch.side[k] = r, order, 0
+def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k, left):
+    """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign, for its first root."""
+    ch.row[k], ch.order[k], ch.side[k] = r, order, what
     curvature, jerk, snap = sign * st.drift[r], 0.0, 0.0
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
@@ -98,8 +120,8 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, k, left):
         ch.g[k, j] = g if order == POSITION else g * rate
         snap += (abs(second.real) + abs(second.imag)) * (rate.real * rate.real + rate.imag * rate.imag)
     if order == POSITION:
-        f, slope, fall = st.displacement[r], st.velocity[r], curvature
-        ch.k1[k], ch.k2[k] = slope, st.drift[r]
+        f, slope, fall = sign * st.displacement[r], sign * st.velocity[r], curvature
+        ch.k1[k], ch.k2[k] = slope, sign * st.drift[r]
         st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
     else:
         f, slope, fall = sign * st.velocity[r], curvature, jerk
@@ -115,6 +137,42 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, k, left):
     else:
         noise = 4e-16 * abs(f)
         ch.safe[k] = advance_or_stop(f, slope, fall, noise, ch.second[k], ch.third[k], left, shortest)
+    return k + 1
+
+
+@kernel
+def longest_hop(rows, flows, st, r):
+    """Speed (m/s) with which a contact at rest would leave for a flight of CHATTER, from its force now."""
+    s = st.counters[FLOW]
+    force = st.level[r]
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        force += (flows.force[s, r, j] * st.amplitude[j]).real
+    return max(0.0, force) * rows.delassus[r, r] * 0.5 * CHATTER * rows.period
+
+
+@kernel
+def _watch_spring(rows, flows, st, ch, s, r, k, left):
+    """Watch a compliant contact that has ended for the spring's wish to push again: spring gap + dashpot rate > 0."""
+    spring, dashpot = rows.spring[r], rows.dashpot[r]
+    ch.row[k], ch.order[k], ch.side[k] = r, POSITION, RECLOSES
+    acceleration, curvature = st.drift[r], spring * st.drift[r]
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        rate = flows.eigenvalue[s, j]
+        g = flows.motion[s, r, j] * st.amplitude[j]
+        ch.g[k, j] = (spring + dashpot * rate) * g
+        acceleration += (rate * rate * g).real
+        curvature += (rate * rate * ch.g[k, j]).real
+    ch.k0[k] = spring * st.displacement[r] + dashpot * st.velocity[r]
+    ch.k1[k] = spring * st.velocity[r] + dashpot * acceleration
+    ch.k2[k] = spring * st.drift[r]
+    awake = st.awake[: st.counters[AWAKE]]
+    ch.second[k], ch.third[k] = bounds(POSITION, ch.k2[k], ch.g[k], flows.eigenvalue[s], awake)
+    # the contact ended at zero force
+    noise = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
+    shortest = RESOLUTION * rows.period
+    ch.safe[k] = advance_or_stop(ch.k0[k], ch.k1[k], curvature, noise, ch.second[k], ch.third[k], left, shortest)
     return k + 1
 
 

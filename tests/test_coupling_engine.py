@@ -59,7 +59,7 @@ def test_ball_comes_to_rest(restitution):
         ball(restitution, 1e-20, velocity=1.0, periods=3, time={"periods": 3, "transient": 0}), events=True
     )
     rest = [event for event in response.event_list if event.kind == "rest"]
-    assert [event.time for event in rest] == [pytest.approx(2 / (10 * (1 - restitution)), rel=1e-8)]
+    assert [event.time for event in rest] == [pytest.approx(2 / (10 * (1 - restitution)), rel=1e-6)]
     assert response.energy["impact"] == pytest.approx(0.5, rel=1e-12)
     impacts = [event for event in response.event_list if event.kind == "impact"]
     for n, event in enumerate(impacts[:10]):
@@ -101,7 +101,9 @@ def test_bouncing_ball_period_one(restitution):
     threshold = np.pi * (1 - restitution) / (1 + restitution)
     doubling = np.sqrt(threshold**2 + (2 * (1 + restitution**2) / (1 + restitution) ** 2) ** 2)
     for ratio, kind in ((0.5 * (threshold + doubling), "periodic-1"), (doubling * 1.02, "periodic-2")):
-        response = simulate(period_one_start(restitution, ratio), events=True)
+        start = period_one_start(restitution, ratio)
+        # a little beside the orbit, which an unstable one would leave by round-off only in its own time
+        response = simulate(start.replace({"damper.0.velocity": 0.99 * start.damper[0].velocity}), events=True)
         assert response.classification == kind
         assert response.energy_residual < 1e-10
         if kind == "periodic-1":

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, null_space
 
-from coupling.flow import _closed_rows, add_flow, empty_flows, rows_of
+from coupling.flow import _closed_rows, add_flow, empty_flows
 from coupling.inputs import validate
+from coupling.rows import rows_of
 from coupling.scene import Scene
 from coupling.structure import LinearStructure
 
@@ -93,7 +94,7 @@ def by_flow(rows, closed, flows, loads, q, qd, times):
     """The same from the records of one subsystem, as coupling.flow documents them."""
     n, m = len(rows.stiffness), flows.modes[0]
     p, rate = np.r_[q[:n], qd[:n]], flows.eigenvalue[0, :m]
-    constant = flows.static[0] @ loads + flows.held[0] @ q[:n]
+    constant = (flows.static[0] @ loads + flows.held[0] @ q[:n])[:n]
     shape = flows.shape[0, :, :m]
     amplitude = np.r_[1.0, flows.project[0, 1:m] @ (p - np.r_[constant, np.zeros(n)] - shape[:, 0].real)]
     coordinates, displacement, force = [], [], []

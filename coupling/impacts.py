@@ -1,0 +1,132 @@
+"""Impacts by Newton's law: several contacts at once are one complementarity problem on velocities, solved exactly.
+
+Pfeiffer and Glocker (1996), chapter 8; friction is free of impulses.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coupling.compiled import kernel
+from coupling.complementarity import AT_LOW, DEPENDENT, solve_box
+from coupling.gaps import close, join_speeds, measure_gaps, slowest
+from coupling.log import log_event
+from coupling.state import COAST, IMPACT, IMPACT_LOSS, IMPACTS, OPEN, PERIOD, SPRUNG, STICK
+
+#: impacts of one contact that follow each other within this share of a period are the end of an inelastic collapse:
+#: bodies in a row can meet infinitely often in finite time (McNamara and Young 1992)
+COLLAPSE = 1e-13
+
+
+@kernel
+def collide(rows, st, rec, work):
+    """Newton's law at all touching rigid contacts at once: v+ + k v- >= 0 and P >= 0 complement each other.
+
+    Velocities of rows jump; the impulses are left in work.impulse (r,). An impact at the end of a chatter or of an
+    inelastic collapse is plastic, and what would leave for a flight below the tolerance (st.settling) stays, so that
+    bodies that chatter on one structure do not wake each other for ever. Returns False if the problem cannot be solved.
+    """
+    friction, problem = rows.friction_rows, work.problem
+    k = close(rows, st, work)
+    tiny = slowest(rows, st)
+    for p in range(k):
+        r = work.rows[p]
+        speed = st.velocity[r] if abs(st.velocity[r]) > tiny else 0.0
+        # kept before the jump, for the ledger and the log
+        work.jerk[p], work.acceleration[p] = speed, min(speed, 0.0)
+        restitution = rows.restitution[r - friction]
+        collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * rows.period
+        if collapsed or -speed * restitution < (1.0 - restitution) * st.settling[r]:
+            restitution = 0.0
+        problem.restitution[p] = restitution
+        # a contact that separates already may not be driven together: its law starts from zero
+        problem.b[p] = speed + restitution * min(speed, 0.0)
+        problem.low[p], problem.high[p], problem.forced[p] = 0.0, np.inf, 0
+        for q in range(k):
+            problem.matrix[p, q] = rows.delassus[r, work.rows[q]]
+    solved = solve_box(problem, k, 0.0)
+    while solved and _hold_back(rows, st, work, k):
+        solved = solve_box(problem, k, 0.0)
+    if not solved:
+        return False
+    _jump(rows, st, work, k)
+    for p in range(k):
+        r, before, impulse = work.rows[p], work.acceleration[p], problem.force[p]
+        after = st.velocity[r]
+        if impulse != 0.0 or problem.state[p] == DEPENDENT:
+            after = -problem.restitution[p] * before
+        st.ledger[IMPACT_LOSS] -= 0.5 * impulse * (work.jerk[p] + after)
+        if before < 0.0:
+            st.last_impact[r] = st.time[0]
+            st.counters[IMPACTS] += 1
+            rec.impacts[st.counters[PERIOD]] += 1
+            log_event(rows, st, rec, IMPACT, r, before, after, impulse)
+    return True
+
+
+@kernel
+def _hold_back(rows, st, work, k):
+    """Tie contacts that would separate too slowly. Returns whether there are any."""
+    problem, found = work.problem, False
+    for p in range(k):
+        r = work.rows[p]
+        after = problem.acceleration[p] - problem.restitution[p] * work.acceleration[p]
+        slow = (1.0 - rows.restitution[r - rows.friction_rows]) * st.settling[r]
+        if problem.state[p] == AT_LOW and after < slow:
+            problem.b[p] -= problem.restitution[p] * work.acceleration[p]
+            problem.low[p], problem.restitution[p], found = -np.inf, 0.0, True
+    return found
+
+
+@kernel
+def _jump(rows, st, work, k):
+    """Apply the impulses to the velocities. Contacts obey the law, or are at rest, to the last bit."""
+    friction, problem, speed = rows.friction_rows, work.problem, st.velocity
+    for r in range(len(st.state)):
+        work.impulse[r], work.shut[r] = 0.0, False
+    for p in range(k):
+        work.impulse[work.rows[p]] = problem.force[p]
+    for r in range(len(st.state)):
+        if r >= friction and rows.rides[r]:
+            continue
+        change, size = 0.0, 0.0
+        for p in range(k):
+            part = rows.delassus[r, work.rows[p]] * problem.force[p]
+            change += part
+            size += abs(part)
+        if abs(change) > 1e-13 * size:
+            speed[r] += change
+    measure_gaps(rows, st)
+    tiny = slowest(rows, st)
+    for p in range(k):
+        r = work.rows[p]
+        if problem.force[p] != 0.0 or problem.state[p] == DEPENDENT:
+            after = -problem.restitution[p] * work.acceleration[p]
+            work.shut[r] = after == 0.0
+            if not rows.rides[r]:
+                speed[r] = after
+            elif rows.before[r] < 0:
+                speed[rows.after[r]] = after
+            elif rows.after[r] < 0:
+                speed[rows.before[r]] = -after
+        else:
+            work.shut[r] = abs(speed[r]) <= tiny
+        if work.shut[r] and not rows.rides[r]:
+            speed[r] = 0.0
+    join_speeds(rows, st, work)
+    measure_gaps(rows, st)
+
+
+@kernel
+def all_move(rows, st):
+    """Whether no row is or was at rest and no slip has changed its direction: an impact between free flights."""
+    for r in range(len(st.state)):
+        state = st.state[r]
+        if state == SPRUNG:
+            continue  # a spring's force does not jump
+        if r >= rows.friction_rows:
+            if state != OPEN or (st.displacement[r] == 0.0 and st.velocity[r] == 0.0):
+                return False
+        elif state != COAST and (state >= STICK or state * st.velocity[r] <= 0.0):
+            return False
+    return True
