@@ -95,6 +95,12 @@ class Scratch(NamedTuple):
     forced: np.ndarray  # (r,) int
     rows: np.ndarray  # (r,) int
     problem: Problem
+    order: np.ndarray  # (m,) int: places of the awake modes, those first that the response feels
+    change: np.ndarray  # (m,) of the amplitudes over the segment, in that order
+    total: np.ndarray  # (m,) sum of the amplitudes at its start and end
+    wave: np.ndarray  # (m,) share of the response
+    rate: np.ndarray  # (m,) its eigenvalue
+    turn: np.ndarray  # (m,) exp(rate t) for one step of a grid
 
 
 class Problem(NamedTuple):
@@ -166,5 +172,5 @@ def new_scratch(rows: Rows, modes: int) -> Scratch:
     complexes, integers = np.zeros((3, modes), complex), np.zeros((3, r), np.int64)
     return Scratch._make(
         [*complexes, np.zeros(2 * n), np.zeros(n), np.zeros(b), np.zeros(r), np.zeros(n), np.zeros(r), *integers,
-         new_problem(r)]
+         new_problem(r), np.zeros(modes, np.int64), *np.zeros((5, modes), complex)]
     )  # fmt: skip
