@@ -77,9 +77,9 @@ class Flows(NamedTuple):
     body: np.ndarray  # (s, b, m): displacement of each body
     response: np.ndarray  # (s, m)
     size: np.ndarray  # (s, m): largest displacement of a mode over all rows and the response
-    # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a segment
-    # is the form at its end minus the form at its start. Where the rate by which a product of two modes changes vanishes
-    # beside the frequency the form would cancel: such pairs are left out of the forms, and listed.
+    # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a
+    # segment is the form at its end minus the form at its start. Where the rate by which a product of two modes
+    # changes vanishes beside the frequency the form would cancel: such pairs are left out of the forms, and listed.
     work: np.ndarray  # (s, m) complex: velocity under the harmonic loads
     momentum: np.ndarray  # (s, m) complex: momentum of all bodies
     linear: np.ndarray  # (s, m, 16): maps for work, harmonic and momentum; mean of x; momentum of the free bodies

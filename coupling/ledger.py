@@ -32,7 +32,10 @@ def account(rows, flows, st, rec, work, tau):
 
 @inlined
 def _gather(flows, st, work, s):
-    """Changes and sums of the awake amplitudes, the excitation first, then what the response feels. Returns how many."""
+    """Changes and sums of the awake amplitudes: the excitation, then the modes that the response feels, then the rest.
+
+    Returns how many it feels, the excitation included.
+    """
     count, largest = st.counters[AWAKE], 0.0
     for a in range(count):
         j = st.awake[a]
