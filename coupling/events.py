@@ -69,19 +69,19 @@ def first_root_of_parabola(f, slope, curvature):
 @inlined
 def safe_step(f, slope, curvature, second, third, longest):
     """A step without root: f >= 0, its slope and curvature here, bounds of |f''| and |f'''| from here on."""
+    if third == 0.0:
+        return first_root_of_parabola(f, slope, curvature)
     step = first_root_of_parabola(f, slope, -second)
-    if third == 0.0 or step >= longest:
+    if slope >= 0.0 and curvature > 0.0:
+        # f >= curvature s^2/2 - third s^3/6 > 0 on this side of 3 curvature/third
+        step = max(step, 2.99 * curvature / third)
+    if step >= longest:
         return step
-    # f >= f0 + slope s + curvature s^2/2 - third s^3/6, which on [0, trial] lies above the parabola of curvature
-    # `lowest`; the best trial is the root of the cubic itself, here approached from above and from below in turn
-    trial = first_root_of_parabola(f, slope, curvature)
-    if trial > 4.0 * step:
-        trial = 4.0 * step
-        if slope >= 0.0 and curvature > 0.0:
-            trial = max(trial, 3.0 * curvature / third)
+    trial = 4.0 * step
     for _ in range(3):
         trial = min(trial, longest)
-        lowest = max(curvature - (1 / 3) * third * trial, -second)
+        # the curvature stays above this on [0, trial]
+        lowest = max(curvature - third * trial, -second)
         found = min(first_root_of_parabola(f, slope, lowest), trial)
         if found <= step:
             break
