@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from coupling.compiled import kernel
+from coupling.compiled import inlined, kernel
 from coupling.contact import add_force, constant_loads, keep_released, settle, stop_riders
 from coupling.events import POSITION, VELOCITY, exp_minus_line, exp_minus_one
 from coupling.gaps import SIMULTANEOUS, close, join, join_speeds, measure_gaps, only, rigid, shift_slip
@@ -113,7 +113,7 @@ def begin(rows, st, rec, work):
     return settle(rows, st, rec, work)
 
 
-@kernel
+@inlined
 def _touch(rows, st, work, r):
     """The gap of row r is zero, exactly, and so are those that close with it."""
     only(work, r)
@@ -164,7 +164,7 @@ def _find_flow(flows, key):
     return -1
 
 
-@kernel
+@inlined
 def _phase(rows, st):
     angle = rows.omega * st.time[0]
     st.amplitude[0] = complex(math.cos(angle), math.sin(angle))
@@ -285,7 +285,7 @@ def _constant_forces(rows, flows, st, work, s):
         st.level[r] = level if abs(level) > _EQUAL * size else 0.0
 
 
-@kernel
+@inlined
 def _wake(flows, st):
     """Put modes to sleep whose acceleration is negligible beside the largest."""
     s, largest, fastest = st.counters[FLOW], 0.0, 0.0
@@ -305,13 +305,13 @@ def _wake(flows, st):
     st.counters[AWAKE] = count
 
 
-@kernel
+@inlined
 def _acceleration(flows, st, s, j):
     rate, c = flows.eigenvalue[s, j], st.amplitude[j]
     return (abs(c.real) + abs(c.imag)) * flows.size[s, j] * (rate.real * rate.real + rate.imag * rate.imag)
 
 
-@kernel
+@inlined
 def _exponentials(flows, st, work, tau):
     """The awake modes' exponentials over the segment."""
     s = st.counters[FLOW]
@@ -321,7 +321,7 @@ def _exponentials(flows, st, work, tau):
         work.line[a] = exp_minus_line(z, work.first[a])
 
 
-@kernel
+@inlined
 def _move(rows, flows, st, work, tau):
     """Carry rows and amplitudes over tau."""
     s, count, friction = st.counters[FLOW], st.counters[AWAKE], rows.friction_rows
@@ -353,7 +353,7 @@ def _move(rows, flows, st, work, tau):
             st.released[r] = 0
 
 
-@kernel
+@inlined
 def _stay_together(rows, st, work):
     """Bodies that move as one keep to each other exactly."""
     closed = False
@@ -378,7 +378,7 @@ def _push(rows, flows, st, work, tau):
                 st.push[r] += (part * work.first[a]).real
 
 
-@kernel
+@inlined
 def _within_walls(rows, st):
     """Whether round-off has kept every body inside its cavity."""
     friction = rows.friction_rows
@@ -389,7 +389,7 @@ def _within_walls(rows, st):
     return True
 
 
-@kernel
+@inlined
 def _happen(rows, flows, st, rec, work, r, order, side):
     """The event of row r: jump of velocities, new states. Returns False if it cannot be decided."""
     n = len(st.constant)
@@ -429,7 +429,7 @@ def _happen(rows, flows, st, rec, work, r, order, side):
     return settle(rows, st, rec, work)
 
 
-@kernel
+@inlined
 def _kick(flows, st, work):
     """Impulses on the rows, within the same subsystem."""
     s = st.counters[FLOW]

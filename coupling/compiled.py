@@ -17,7 +17,19 @@ from numba import config, njit
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function of the engine."""
-    compiled = njit(cache=True, error_model="numpy", _nrt=False)(function)  # type: ignore[call-overload]
+    return _compile(function, forceinline=False)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a function of the engine into its callers: for what every segment runs.
+
+    A call hands over every array of its records, some 5 kB: it costs as much as a handful of exponentials.
+    """
+    return _compile(function, forceinline=True)
+
+
+def _compile(function: Callable[..., Any], forceinline: bool) -> Any:
+    compiled = njit(cache=True, error_model="numpy", _nrt=False, forceinline=forceinline)(function)  # type: ignore[call-overload]
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
         return compiled
     # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls
@@ -31,6 +43,6 @@ def _sources() -> str:
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parent.glob("*.py")):
         text = file.read_bytes()
-        if b"@kernel" in text or file.name in ("compiled.py", "state.py"):
+        if b"@kernel" in text or b"@inlined" in text or file.name in ("compiled.py", "flow.py", "state.py"):
             digest.update(text)
     return digest.hexdigest()

@@ -11,36 +11,49 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from coupling.compiled import kernel
+from coupling.compiled import inlined
 
 # how often the exponentials of a function are differentiated: what is left of exp(z) at t = 0
 POSITION, VELOCITY, FORCE = 2, 1, 0
 
 
-@kernel
+# round-off of a sum, relative to the sum of its terms' sizes
+_ROUND_OFF = 4.0 * 2.0**-52
+
+
+@inlined
 def exp_minus_one(z):
     """exp(z) - 1 of a complex number with full relative accuracy, Re z <= 0."""
-    growth = math.expm1(z.real)
     sine, cosine = math.sin(0.5 * z.imag), math.cos(0.5 * z.imag)
     turn = 2.0 * sine * sine
+    if z.real == 0.0:
+        return complex(-turn, 2.0 * sine * cosine)
+    growth = math.expm1(z.real)
     return complex(growth * (1.0 - turn) - turn, (1.0 + growth) * 2.0 * sine * cosine)
 
 
-@kernel
+@inlined
 def exp_minus_line(z, first):
     """exp(z) - 1 - z given first = exp(z) - 1, with full relative accuracy."""
-    if abs(z.real) + abs(z.imag) > 0.25:
+    x, y = z.real, z.imag
+    if abs(x) + abs(y) > 0.25:
         return first - z
-    # Taylor series by Horner, 12 terms: z^13/15! < 1e-20 at |z| = 0.25
-    total = 1.0 + z / 14.0
-    for k in range(13, 2, -1):
-        total = 1.0 + total * z / k
-    return 0.5 * z * z * total
+    # Taylor series of 1 - cos y, sin y - y and e^x - 1 - x; what is left out is below 1e-16 of them
+    u = y * y
+    sine = 1.0 - u * (1 / 72) * (1.0 - u * (1 / 110) * (1.0 - u * (1 / 156)))
+    sine = -(1 / 6) * y * u * (1.0 - u * (1 / 20) * (1.0 - u * (1 / 42) * sine))
+    if x == 0.0:
+        return complex(first.real, sine)
+    versine = 1.0 - u * (1 / 56) * (1.0 - u * (1 / 90) * (1.0 - u * (1 / 132)))
+    versine = 0.5 * u * (1.0 - u * (1 / 12) * (1.0 - u * (1 / 30) * versine))
+    line = 1.0 + x * (1 / 8) * (1.0 + x * (1 / 9) * (1.0 + x * (1 / 10) * (1.0 + x * (1 / 11) * (1.0 + x * (1 / 12)))))
+    line = 1.0 + x * (1 / 4) * (1.0 + x * (1 / 5) * (1.0 + x * (1 / 6) * (1.0 + x * (1 / 7) * line)))
+    line = 0.5 * x * x * (1.0 + x * (1 / 3) * line)
+    growth = x + line
+    return complex(line - (1.0 + growth) * versine, sine + growth * (y + sine))
 
 
-@kernel
+@inlined
 def first_root_of_parabola(f, slope, curvature):
     """Smallest s >= 0 with f + slope s + curvature s^2/2 = 0 for f >= 0; inf if there is none."""
     if f == 0.0 and slope < 0.0:
@@ -53,7 +66,7 @@ def first_root_of_parabola(f, slope, curvature):
     return 2.0 * f / (math.sqrt(square) - slope)
 
 
-@kernel
+@inlined
 def safe_step(f, slope, curvature, second, third, longest):
     """A step without root: f >= 0, its slope and curvature here, bounds of |f''| and |f'''| from here on."""
     if third == 0.0:
@@ -77,7 +90,7 @@ def safe_step(f, slope, curvature, second, third, longest):
     return step
 
 
-@kernel
+@inlined
 def evaluate(order, k0, k1, k2, g, eigenvalue, awake, t):
     """Value, slope, curvature and round-off of an event function at time t.
 
@@ -96,32 +109,33 @@ def evaluate(order, k0, k1, k2, g, eigenvalue, awake, t):
     for a in range(len(awake)):
         j = awake[a]
         rate, amplitude = eigenvalue[j], g[j]
+        speed = rate * amplitude
         z = rate * t
         first = exp_minus_one(z)
-        whole = rate * amplitude * (first + 1.0)
+        change = speed * first
+        whole = speed + change
+        curvature += rate.real * whole.real - rate.imag * whole.imag
         if order == POSITION:
             part = amplitude * exp_minus_line(z, first)
-            value += part.real
-            slope += (rate * amplitude * first).real
-            curvature += (rate * whole).real
+            slope += change.real
         else:
             part = amplitude * (first if order == VELOCITY else first + 1.0)
-            value += part.real
             slope += whole.real
-            curvature += (rate * whole).real
+        value += part.real
         noise += abs(part.real) + abs(part.imag)
-    return value, slope, curvature, 4.0 * np.finfo(np.float64).eps * noise
+    return value, slope, curvature, _ROUND_OFF * noise
 
 
-@kernel
+@inlined
 def bounds(order, k2, g, eigenvalue, awake):
     """Bounds of the second and third derivative of an event function over all later times."""
     second = abs(k2) if order == POSITION else 0.0
     third = 0.0
     for a in range(len(awake)):
         j = awake[a]
-        rate = math.hypot(eigenvalue[j].real, eigenvalue[j].imag)
-        size = math.hypot(g[j].real, g[j].imag) * rate * rate
+        rate, amplitude = eigenvalue[j], g[j]
+        square = rate.real * rate.real + rate.imag * rate.imag
+        size = math.sqrt(amplitude.real * amplitude.real + amplitude.imag * amplitude.imag) * square
         second += size
-        third += size * rate
+        third += size * math.sqrt(square)
     return second, third

@@ -18,6 +18,11 @@ from scipy.sparse.csgraph import connected_components
 from coupling.inputs import InputError
 from coupling.rows import Rows
 
+#: products of modes that change by less than this share over a period have no antiderivative worth having
+SLOW = 1e-2
+#: what vanishes for a slow pair of modes: the sum of their eigenvalues, the same with one conjugate, or one alone
+SUM, DIFFERENCE, ALONE = range(3)
+
 CRITICAL = "structure: a mode is critically damped to round-off; change its damping slightly"
 
 
@@ -41,24 +46,38 @@ class Flows(NamedTuple):
     body_acceleration: np.ndarray  # (s, b, b): of free bodies under constant loads
     body: np.ndarray  # (s, b, m): displacement of each body
     response: np.ndarray  # (s, m)
-    work: np.ndarray  # (s, m): velocity under the harmonic loads
-    loss: np.ndarray  # (s, m, m): viscous power of two modes
-    loss_conjugate: np.ndarray  # (s, m, m): the same of a mode and a conjugate one
-    uncoupled: np.ndarray  # (s,) whether damping couples no two free modes
     size: np.ndarray  # (s, m): largest displacement of a mode over all rows and the response
+    # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a
+    # segment is the form at its end minus the form at its start. Where the rate by which a product of two modes
+    # changes vanishes beside the frequency the form would cancel: such pairs are left out of the forms, and listed.
+    work: np.ndarray  # (s, m) complex: velocity under the harmonic loads
+    momentum: np.ndarray  # (s, m) complex: momentum of all bodies
+    linear: np.ndarray  # (s, m, 16): maps for work, harmonic and momentum; mean of x; momentum of the free bodies
+    loss: np.ndarray  # (s, m, m, 4): viscous loss of two modes, by their real and imaginary parts
+    dashpot: np.ndarray  # (s, m, m, 4): loss in the dashpots of contacts
+    square: np.ndarray  # (s, m, m, 4): squared response of two modes
+    damped: np.ndarray  # (s,) whether contacts with dashpots are closed
+    uncoupled: np.ndarray  # (s,) whether damping couples no two free modes
+    slow: np.ndarray  # (s, p, 3): pairs left out (j, k, kind); kind SUM, DIFFERENCE or ALONE
+    slow_loss: np.ndarray  # (s, p) complex: viscous power of such a pair
+    slow_dashpot: np.ndarray  # (s, p) complex: power in the dashpots
+    slow_square: np.ndarray  # (s, p) complex: its share of the squared response
+    slow_count: np.ndarray  # (s,)
 
 
 def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
     """Room for `capacity` subsystems, none of them filled (key -1)."""
     n, b, r = len(rows.stiffness), len(rows.mass), len(rows.delassus)
     m = 2 * n + 1 + 2 * b * bool(np.isfinite(rows.spring[rows.friction_rows :]).any())
+    pairs = m * (m + 2)
     z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
     return Flows(
         np.full((capacity, 2), -1, np.int64), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
         z(m, 2 * b), np.zeros(capacity, np.bool_), z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
-        f(b, b), z(b, m), z(m),
-        z(m), z(m, m), z(m, m), np.zeros(capacity, np.bool_), f(m),
+        f(b, b), z(b, m), z(m), f(m), z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
+        np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 3), np.int64),
+        z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
     )  # fmt: skip
 
 
@@ -170,16 +189,66 @@ def _solve_harmonic(dynamic: np.ndarray, load: np.ndarray) -> np.ndarray:
 
 def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.ndarray) -> None:
     n, m = len(rows.stiffness), flows.modes[s]
-    velocity = full[n:]
+    velocity, rate = full[n:], flows.eigenvalue[s, :m]
+    response, momentum = flows.response[s, :m], rows.mass @ body * rate
     # all harmonic loads are in phase with the sine: real amplitudes
-    flows.work[s, :m] = -rows.force.imag @ velocity - rows.inertia.imag @ (body * flows.eigenvalue[s, :m])
-    rate = flows.motion[s, :, :m] * flows.eigenvalue[s, :m] * flows.force[s, :, :m].any(axis=1)[:, None]
-    flows.loss[s, :m, :m] = velocity.T @ rows.damping @ velocity + (rate.T * rows.dashpot) @ rate
-    flows.loss_conjugate[s, :m, :m] = (
-        velocity.T @ rows.damping @ velocity.conj() + (rate.T * rows.dashpot) @ rate.conj()
+    work = -rows.force.imag @ velocity - rows.inertia.imag @ (body * rate)
+    free = rows.mass * (np.diagonal(flows.body_acceleration[s]) != 0)
+    along, _ = _reciprocal(rate + rate[0], rows.period)
+    against, _ = _reciprocal(rate - rate[0], rows.period)
+    back, _ = _reciprocal(rate.conj() - rate[0], rows.period)
+    alone, slow_alone = _reciprocal(rate, rows.period)
+    mean = 2 * response * alone
+    free_momentum = free @ flows.motion[s, : len(free), :m] * rate
+    flows.work[s, :m], flows.momentum[s, :m] = work, momentum
+    flows.linear[s, :m] = np.hstack([
+        _real_map(-0.5j * work * (along - against), 0 * work).take([0, 1], axis=-1),
+        _real_map(0.5 * work * (along + against), 0 * work).take([0, 1], axis=-1),
+        _real_map(0.5 * response * against, 0.5 * response.conj() * back),
+        _real_map(0.5 * momentum * against, 0.5 * momentum.conj() * back),
+        np.column_stack([mean.real, -mean.imag, free_momentum.real, -free_momentum.imag]),
+    ])  # fmt: skip
+    sprung = np.isfinite(rows.spring) & flows.force[s].any(axis=1)
+    push, damper = flows.motion[s, sprung, :m] * rate, np.diag(rows.dashpot[sprung])
+    reciprocal, slow = zip(
+        *(_reciprocal(total, rows.period) for total in (rate[:, None] + rate, rate[:, None] + rate.conj())), strict=True
     )
-    flows.uncoupled[s] = rows.proportional and not flows.closed_inverse[s].any() and not flows.sprung[s] and m == n + 1
+    forms = (flows.loss, flows.dashpot, flows.square), (flows.slow_loss, flows.slow_dashpot, flows.slow_square)
+    products = [
+        [left.T @ middle @ right for right in (left, left.conj())]
+        for left, middle in ((velocity, rows.damping), (push, damper), (response[None], np.eye(1)))
+    ]
+    for form, product in zip(forms[0], products, strict=True):
+        form[s, :m, :m] = _real_form(*(part * r for part, r in zip(product, reciprocal, strict=True)))
+    flows.damped[s] = rows.dashpot[sprung].any()
+    flows.uncoupled[s] = rows.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + 1
+    listed = [(j, k, kind) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
+    count = len(listed)
+    for i, (j, k, kind) in enumerate(listed):
+        half = 0.5 if j == k else 1.0
+        for form, product in zip(forms[1], products, strict=True):
+            form[s, i] = half * product[kind][j, k]
+    listed += [(j, 0, ALONE) for j in np.flatnonzero(slow_alone)]
+    flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 3)
+    flows.slow_square[s, count : len(listed)] = 2 * response[slow_alone]
+    flows.slow_count[s] = len(listed)
     flows.size[s, :m] = np.abs(np.vstack([flows.motion[s, :, :m], flows.response[s, :m]])).max(axis=0)
+
+
+def _reciprocal(rate: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """1/rate, 0 where a product with this rate hardly changes over a period, and whether that is so."""
+    slow = np.abs(rate) * period < SLOW
+    return np.where(slow, 0, 1 / np.where(slow, 1, rate)), slow
+
+
+def _real_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Coefficients (..., 4) of the real map a c + b conj(c): real part by Re c and Im c, imaginary part by these."""
+    return np.stack([(a + b).real, (b - a).imag, (a + b).imag, (a - b).real], axis=-1)
+
+
+def _real_form(both: np.ndarray, mixed: np.ndarray) -> np.ndarray:
+    """Coefficients (m, m, 4) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts."""
+    return 0.5 * _real_map(both, mixed) * [1, 1, -1, -1]
 
 
 def _attachment(rows: Rows, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

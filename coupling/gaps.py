@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from coupling.compiled import kernel
+from coupling.compiled import inlined, kernel
 
 #: gaps closed to this share of the free travel are closed at the same instant
 SIMULTANEOUS = 1e-12
@@ -15,7 +15,7 @@ SIMULTANEOUS = 1e-12
 ROUND_OFF = 1e-13
 
 
-@kernel
+@inlined
 def measure_gaps(rows, st):
     """Displacement and velocity of the gaps that ride, from the slips."""
     for r in range(rows.friction_rows, len(st.state)):
@@ -31,7 +31,7 @@ def measure_gaps(rows, st):
             st.displacement[r], st.velocity[r] = (right - left) + (far - near), faster - slower
 
 
-@kernel
+@inlined
 def shift_slip(st, r, shift):
     """Add to the displacement of row r without loss (Knuth's exact sum of two doubles)."""
     old = st.displacement[r]
@@ -42,14 +42,14 @@ def shift_slip(st, r, shift):
     st.low[r] = low - (st.displacement[r] - new)
 
 
-@kernel
+@inlined
 def only(work, r):
     """Mark contact r alone for join and join_speeds."""
     for i in range(len(work.shut)):
         work.shut[i] = i == r
 
 
-@kernel
+@inlined
 def join(rows, st, work):
     """Put bodies that touch (work.shut of their contacts) exactly where they touch, from the walls inwards."""
     slip, low, friction = st.displacement, st.low, rows.friction_rows
@@ -87,7 +87,7 @@ def join_speeds(rows, st, work):
             speed[before] = speed[after]
 
 
-@kernel
+@inlined
 def close(rows, st, work):
     """Put the bodies of all rigid contacts that touch, to round-off, exactly there. Lists them; returns how many."""
     count, tiny, friction = 0, slowest(rows, st), rows.friction_rows
@@ -104,7 +104,7 @@ def close(rows, st, work):
     return count
 
 
-@kernel
+@inlined
 def slowest(rows, st):
     """Speed below which a relative motion is round-off, m/s."""
     fastest = st.fastest[0]
@@ -113,7 +113,7 @@ def slowest(rows, st):
     return ROUND_OFF * fastest
 
 
-@kernel
+@inlined
 def rigid(rows, r):
     """Whether row r is a constraint while it is closed, not a spring."""
     return rows.spring[r] == math.inf

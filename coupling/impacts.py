@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coupling.compiled import kernel
+from coupling.compiled import inlined, kernel
 from coupling.complementarity import AT_LOW, DEPENDENT, solve_box
 from coupling.gaps import close, join_speeds, measure_gaps, slowest
 from coupling.log import log_event
@@ -78,7 +78,7 @@ def _hold_back(rows, st, work, k):
     return found
 
 
-@kernel
+@inlined
 def _jump(rows, st, work, k):
     """Apply the impulses to the velocities. Contacts obey the law, or are at rest, to the last bit."""
     friction, problem, speed = rows.friction_rows, work.problem, st.velocity
@@ -117,7 +117,7 @@ def _jump(rows, st, work, k):
     measure_gaps(rows, st)
 
 
-@kernel
+@inlined
 def all_move(rows, st):
     """Whether no row is or was at rest and no slip has changed its direction: an impact between free flights."""
     for r in range(len(st.state)):

@@ -4,224 +4,304 @@ from __future__ import annotations
 
 import math
 
-from coupling.compiled import kernel
+from coupling.compiled import inlined, kernel
 from coupling.events import exp_minus_line, exp_minus_one
-from coupling.state import AWAKE, EXCITATION, FLOW, PERIOD, VISCOUS
+from coupling.flow import ALONE, DIFFERENCE
+from coupling.state import AWAKE, CONTACT, EXCITATION, FLOW, PERIOD, VISCOUS
+
+#: shares of the response below this part of the largest count for nothing in its square
+_NEGLIGIBLE = 1e-9
 
 
-@kernel
+@inlined
 def account(rows, flows, st, rec, work, tau):
     """Energy, harmonic, mean square, momentum and peak of the segment [0, tau], by closed-form integrals."""
     s, period = st.counters[FLOW], st.counters[PERIOD]
-    first = work.first[: st.counters[AWAKE]]
-    st.ledger[EXCITATION] += _work(rows, flows, st, s, first, tau)
-    st.ledger[VISCOUS] += _viscous(flows, st, s, first, tau)
     constant = 0.0
     for i in range(len(st.constant)):
         constant += rows.response[i] * st.constant[i]
-    rec.harmonic[period] += _harmonic(flows.response[s], flows.eigenvalue[s], st, first, tau, constant, 0.0)
-    rec.square[period] += _square(flows, st, s, first, tau, constant)
-    rec.momentum[period] += _momentum(rows, flows, st, s, first, work.speed, tau)
-    rec.peak[period] = _peak(flows, st, s, tau, constant, rec.peak[period])
+    felt = _gather(flows, st, work, s)
+    _pairs(flows, st, rec, work, s, period, felt)
+    if flows.damped[s]:
+        _dashpots(flows, st, work, s)
+    _with_excitation(rows, flows, st, rec, work, s, period, tau, constant)
+    for i in range(flows.slow_count[s]):
+        _slow_pair(flows, st, rec, s, period, i, tau, constant)
+    rec.peak[period] = _peak(flows, st, work, s, tau, constant, rec.peak[period])
     if rec.samples.shape[0] > 0:
         _sample(rows, flows, st, rec, s, tau, constant)
 
 
-@kernel
-def _integral(rate, last, tau):
-    """Integral of exp(rate t) over [0, tau], given last = exp(rate tau) - 1."""
-    z = rate * tau
-    if abs(z.real) + abs(z.imag) < 1e-5:
-        return tau * (1.0 + z * (0.5 + z / 6.0))
-    return last / rate
+@inlined
+def _gather(flows, st, work, s):
+    """Changes and sums of the awake amplitudes: the excitation, then the modes that the response feels, then the rest.
 
-
-@kernel
-def _product(x, y):
-    """exp(u + v) - 1 from x = exp(u) - 1 and y = exp(v) - 1."""
-    return x * y + x + y
-
-
-@kernel
-def _work(rows, flows, st, s, first, tau):
-    """Work of the harmonic loads, whose amplitude is that of the sine: Im exp(i omega t)."""
-    rate0, phase = flows.eigenvalue[s, 0], st.amplitude[0]
-    total = 0.0
-    for a in range(len(first)):
+    Returns how many it feels, the excitation included.
+    """
+    count, largest = st.counters[AWAKE], 0.0
+    for a in range(count):
         j = st.awake[a]
-        rate = flows.eigenvalue[s, j]
-        c = flows.work[s, j] * st.amplitude[j]
-        forward = phase * c * _integral(rate + rate0, _product(first[a], first[0]), tau)
-        back = phase.conjugate() * c * _integral(rate - rate0, _product(first[a], first[0].conjugate()), tau)
-        total += 0.5 * (forward.imag - back.imag)
-    for b in range(len(rows.mass)):
-        if rows.inertia[b] != 0.0:
-            speed = _free_speed(rows, flows, st, s, b)
-            i0, i1 = _line_integrals(rate0, first[0], tau)
-            total += -rows.inertia[b].imag * (phase * (speed * i0 + st.body_drift[b] * i1)).imag
-    return total
+        wave = flows.response[s, j] * st.amplitude[j]
+        work.wave[a] = wave
+        largest = max(largest, abs(wave.real) + abs(wave.imag))
+    felt, last = 0, count
+    for a in range(count):
+        wave = work.wave[a]
+        if a == 0 or abs(wave.real) + abs(wave.imag) > _NEGLIGIBLE * largest:
+            place = felt
+            felt += 1
+        else:
+            last -= 1
+            place = last
+        j = st.awake[a]
+        change = st.amplitude[j] * work.first[a]
+        work.order[place] = j
+        work.change[place] = change
+        work.total[place] = 2.0 * st.amplitude[j] + change
+    return felt
 
 
-@kernel
-def _free_speed(rows, flows, st, s, b):
-    """Constant part of a free body's velocity at the segment's start; 0 for a body that rides on the structure."""
-    if flows.body_acceleration[s, b, b] == 0.0:
-        return 0.0
-    speed = st.velocity[b]
+@inlined
+def _pairs(flows, st, rec, work, s, period, felt):
+    """Viscous loss and squared response: quadratic forms at the segment's end minus those at its start.
+
+    With c the amplitudes at the start, c + d at the end, the difference is d Q (2 c + d): it does not cancel.
+    """
+    loss, square = 0.0, 0.0
     for a in range(st.counters[AWAKE]):
-        j = st.awake[a]
-        speed -= (flows.motion[s, b, j] * flows.eigenvalue[s, j] * st.amplitude[j]).real
-    return speed
+        j = work.order[a]
+        dr, di, tr, ti = work.change[a].real, work.change[a].imag, work.total[a].real, work.total[a].imag
+        form, other = flows.loss[s, j, j], flows.square[s, j, j]
+        loss += dr * (form[0] * tr + form[1] * ti) + di * (form[2] * tr + form[3] * ti)
+        square += dr * (other[0] * tr + other[1] * ti) + di * (other[2] * tr + other[3] * ti)
+        for b in range(a if a < felt or not flows.uncoupled[s] else 1):
+            k = work.order[b]
+            er, ei, ur, ui = work.change[b].real, work.change[b].imag, work.total[b].real, work.total[b].imag
+            rr, ri, ir, ii = dr * ur + er * tr, dr * ui + ei * tr, di * ur + er * ti, di * ui + ei * ti
+            form, other = flows.loss[s, j, k], flows.square[s, j, k]
+            loss += form[0] * rr + form[1] * ri + (form[2] * ir + form[3] * ii)
+            square += other[0] * rr + other[1] * ri + (other[2] * ir + other[3] * ii)
+    st.ledger[VISCOUS] += loss
+    rec.square[period] += square
 
 
 @kernel
-def _line_integrals(rate, last, tau):
-    """Integrals of exp(rate t) and of t exp(rate t) over [0, tau]."""
-    i0 = _integral(rate, last, tau)
-    z = rate * tau
-    if abs(z.real) + abs(z.imag) < 1e-2:
-        return i0, tau * tau * (0.5 + z / 3.0 + z * z / 8.0 + z * z * z / 30.0 + z * z * z * z / 144.0)
-    return i0, (tau * (last + 1.0) - i0) / rate
+def _dashpots(flows, st, work, s):
+    """Loss in the dashpots of closed contacts, by its form like the viscous loss."""
+    loss = 0.0
+    for a in range(st.counters[AWAKE]):
+        j = work.order[a]
+        dr, di, tr, ti = work.change[a].real, work.change[a].imag, work.total[a].real, work.total[a].imag
+        form = flows.dashpot[s, j, j]
+        loss += dr * (form[0] * tr + form[1] * ti) + di * (form[2] * tr + form[3] * ti)
+        for b in range(a):
+            k = work.order[b]
+            er, ei, ur, ui = work.change[b].real, work.change[b].imag, work.total[b].real, work.total[b].imag
+            rr, ri, ir, ii = dr * ur + er * tr, dr * ui + ei * tr, di * ur + er * ti, di * ui + ei * ti
+            form = flows.dashpot[s, j, k]
+            loss += form[0] * rr + form[1] * ri + (form[2] * ir + form[3] * ii)
+    st.ledger[CONTACT] += loss
 
 
-@kernel
-def _viscous(flows, st, s, first, tau):
-    """Energy lost in the structure's dampers: integral of p' D p'."""
-    total = 0.0
-    for a in range(len(first)):
-        j = st.awake[a]
-        for b in range(a + 1):
-            k = st.awake[b]
-            if flows.uncoupled[s] and k != j and k != 0:
-                continue
-            rate_j, rate_k = flows.eigenvalue[s, j], flows.eigenvalue[s, k]
-            both = st.amplitude[j] * st.amplitude[k] * flows.loss[s, j, k]
-            mixed = st.amplitude[j] * st.amplitude[k].conjugate() * flows.loss_conjugate[s, j, k]
-            conjugate = first[b].conjugate()
-            part = (
-                both * _integral(rate_j + rate_k, _product(first[a], first[b]), tau)
-                + mixed * _integral(rate_j + rate_k.conjugate(), _product(first[a], conjugate), tau)
-            ).real
-            total += 0.5 * part if j == k else part
-    return total
+@inlined
+def _with_excitation(rows, flows, st, rec, work, s, period, tau, constant):
+    """What is linear in the modes: work of the loads, harmonic, momentum and mean, by their linear maps."""
+    work_r, work_i, harm_r, harm_i, mom_r, mom_i, mean, free = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    old_work_r, old_work_i, old_harm_r, old_harm_i, old_mom_r, old_mom_i = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for a in range(st.counters[AWAKE]):
+        j = work.order[a]
+        dr, di, tr, ti = work.change[a].real, work.change[a].imag, work.total[a].real, work.total[a].imag
+        row, c = flows.linear[s, j], st.amplitude[j]
+        work_r += row[0] * dr + row[1] * di
+        work_i += row[2] * dr + row[3] * di
+        harm_r += row[4] * dr + row[5] * di
+        harm_i += row[6] * dr + row[7] * di
+        mom_r += row[8] * dr + row[9] * di
+        mom_i += row[10] * dr + row[11] * di
+        mean += row[12] * dr + row[13] * di
+        free += row[14] * c.real + row[15] * c.imag
+        old_work_r += row[0] * tr + row[1] * ti
+        old_work_i += row[2] * tr + row[3] * ti
+        old_harm_r += row[4] * tr + row[5] * ti
+        old_harm_i += row[6] * tr + row[7] * ti
+        old_mom_r += row[8] * tr + row[9] * ti
+        old_mom_i += row[10] * tr + row[11] * ti
+    # mode 0: phase x + i y, with the sums and changes of both factors as in _pairs
+    change, total = work.change[0], work.total[0]
+    loads = total.real * work_r + total.imag * work_i + change.real * old_work_r + change.imag * old_work_i
+    harmonic = total.conjugate() * complex(harm_r, harm_i) + change.conjugate() * complex(old_harm_r, old_harm_i)
+    momentum = total.conjugate() * complex(mom_r, mom_i) + change.conjugate() * complex(old_mom_r, old_mom_i)
+    # integral of exp(-i omega t)
+    flat = complex(0.0, 1.0 / rows.omega) * change.conjugate()
+    st.ledger[EXCITATION] += 0.5 * loads
+    rec.harmonic[period] += 0.5 * harmonic + constant * flat
+    rec.momentum[period] += 0.5 * momentum
+    rec.square[period] += constant * (mean + constant * tau)
+    if len(rows.mass) > 0:
+        _free_bodies(rows, flows, st, rec, work, s, period, tau, free, flat)
 
 
-@kernel
-def _harmonic(row, eigenvalue, st, first, tau, constant, drift):
-    """Integral over the segment of (constant + drift t + Re sum row_j c_j exp(lambda_j t)) exp(-i omega t)."""
-    back, turn = st.amplitude[0].conjugate(), first[0].conjugate()
-    i0, i1 = _line_integrals(-eigenvalue[0], turn, tau)
-    total = constant * i0 + drift * i1
-    for a in range(len(first)):
-        j = st.awake[a]
-        c = row[j] * st.amplitude[j]
-        if c == 0.0:
-            continue
-        total += 0.5 * c * _integral(eigenvalue[j] - eigenvalue[0], _product(first[a], turn), tau)
-        rate = eigenvalue[j].conjugate()
-        total += 0.5 * c.conjugate() * _integral(rate - eigenvalue[0], _product(first[a].conjugate(), turn), tau)
-    return back * total
-
-
-@kernel
-def _square(flows, st, s, first, tau, constant):
-    """Integral of the squared response; pairs of modes below 1e-9 of the largest are left out."""
-    largest = 0.0
-    for a in range(len(first)):
-        j = st.awake[a]
-        largest = max(largest, abs(flows.response[s, j] * st.amplitude[j]))
-    total = constant * constant * tau
-    for a in range(len(first)):
-        j = st.awake[a]
-        cj, rate_j = flows.response[s, j] * st.amplitude[j], flows.eigenvalue[s, j]
-        if abs(cj) <= 1e-9 * largest:
-            continue
-        total += 2.0 * constant * (cj * _integral(rate_j, first[a], tau)).real
-        for b in range(a + 1):
-            k = st.awake[b]
-            ck, rate_k = flows.response[s, k] * st.amplitude[k], flows.eigenvalue[s, k]
-            if abs(ck) <= 1e-9 * largest:
-                continue
-            part = (
-                cj * ck * _integral(rate_j + rate_k, _product(first[a], first[b]), tau)
-                + cj * ck.conjugate()
-                * _integral(rate_j + rate_k.conjugate(), _product(first[a], first[b].conjugate()), tau)
-            ).real  # fmt: skip
-            total += 0.5 * part if j == k else part
-    return total
-
-
-@kernel
-def _momentum(rows, flows, st, s, first, row, tau):
-    """Integral of the bodies' momentum times exp(-i omega t)."""
-    total = 0.0j
+@inlined
+def _free_bodies(rows, flows, st, rec, work, s, period, tau, waves, flat):
+    """Momentum and work of the polynomial part of the bodies' motion."""
+    speed, drift = -waves, 0.0
     for b in range(len(rows.mass)):
-        for a in range(len(first)):
-            j = st.awake[a]
-            row[j] = flows.body[s, b, j] * flows.eigenvalue[s, j]
-        speed = _free_speed(rows, flows, st, s, b)
-        total += rows.mass[b] * _harmonic(row, flows.eigenvalue[s], st, first, tau, speed, st.body_drift[b])
-    return total
+        drift += rows.mass[b] * st.body_drift[b]
+        if flows.body_acceleration[s, b, b] != 0.0:
+            speed += rows.mass[b] * st.velocity[b]
+    momentum = speed * flat
+    if drift != 0.0:
+        # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
+        first, line = work.first[0].conjugate(), work.line[0].conjugate()
+        slope = (line + complex(0.0, rows.omega * tau) * first) / (rows.omega * rows.omega)
+        momentum += drift * slope * st.amplitude[0].conjugate()
+    rec.momentum[period] += momentum
+    # the base accelerates all bodies alike
+    st.ledger[EXCITATION] += rows.inertia[0].imag / rows.mass[0] * momentum.imag
 
 
-@kernel
-def _response_at(flows, st, s, t, constant):
-    """Response, its slope and curvature at t."""
+@inlined
+def _slow_pair(flows, st, rec, s, period, i, tau, constant):
+    """A pair of modes whose product hardly changes: by series of its integral."""
+    j, k, kind = flows.slow[s, i]
+    c, rate = st.amplitude[j], flows.eigenvalue[s, j]
+    if kind == ALONE:
+        rec.square[period] += constant * (flows.slow_square[s, i] * c * _slow_integral(rate, tau)).real
+        return
+    other, rate_other = st.amplitude[k], flows.eigenvalue[s, k]
+    if kind == DIFFERENCE:
+        other, rate_other = other.conjugate(), rate_other.conjugate()
+    product = c * other * _slow_integral(rate + rate_other, tau)
+    st.ledger[VISCOUS] += (flows.slow_loss[s, i] * product).real
+    st.ledger[CONTACT] += (flows.slow_dashpot[s, i] * product).real
+    rec.square[period] += (flows.slow_square[s, i] * product).real
+    if k == 0 and kind == DIFFERENCE:
+        st.ledger[EXCITATION] -= 0.5 * (flows.work[s, j] * product).imag
+        rec.harmonic[period] += 0.5 * flows.response[s, j] * product
+        rec.momentum[period] += 0.5 * flows.momentum[s, j] * product
+
+
+@inlined
+def _slow_integral(rate, tau):
+    """Integral of exp(rate t) over [0, tau] for |rate tau| < 0.01."""
+    z = rate * tau
+    if z == 0.0:
+        return complex(tau, 0.0)
+    series = 1.0 + z * (1 / 4) * (1.0 + z * (1 / 5) * (1.0 + z * (1 / 6)))
+    return tau * (1.0 + z * (1 / 2) * (1.0 + z * (1 / 3) * series))
+
+
+@inlined
+def _response_at(rates, waves, t, constant):
+    """Response, its slope and curvature at t from its modes' rates and values at zero."""
     x, v, w = constant, 0.0, 0.0
-    for a in range(st.counters[AWAKE]):
-        j = st.awake[a]
-        rate = flows.eigenvalue[s, j]
-        part = flows.response[s, j] * st.amplitude[j] * (exp_minus_one(rate * t) + 1.0)
+    for a in range(len(rates)):
+        rate, wave = rates[a], waves[a]
+        part = wave + wave * exp_minus_one(rate * t)
         x += part.real
         part *= rate
         v += part.real
-        w += (part * rate).real
+        w += rate.real * part.real - rate.imag * part.imag
     return x, v, w
 
 
-@kernel
-def _peak(flows, st, s, tau, constant, peak):
+@inlined
+def _peak(flows, st, work, s, tau, constant, peak):
     """Largest |response| on [0, tau] and before.
 
     Between points of a grid the response differs from its cubic Hermite interpolant by at most (bound of the fourth
     derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is polished by Newton.
+    Where interpolant and bound stay below the peak so far there is nothing to find.
     """
     fourth, size = 0.0, abs(constant)
-    for a in range(st.counters[AWAKE]):
+    x0, v0, x1, v1 = constant, 0.0, constant, 0.0
+    count = st.counters[AWAKE]
+    for a in range(count):
         j = st.awake[a]
-        part = abs(flows.response[s, j] * st.amplitude[j])
         rate = flows.eigenvalue[s, j]
+        wave = flows.response[s, j] * st.amplitude[j]
+        work.wave[a], work.rate[a] = wave, rate
         square = rate.real * rate.real + rate.imag * rate.imag
+        part = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
         fourth += part * square * square
         size += part
+        x0 += wave.real
+        v0 += rate.real * wave.real - rate.imag * wave.imag
+        wave += wave * work.first[a]
+        x1 += wave.real
+        v1 += rate.real * wave.real - rate.imag * wave.imag
     if size <= peak or tau <= 0.0:
         return peak
-    step = tau if fourth == 0.0 else min(tau, (0.384 * size / fourth) ** 0.25)
-    pieces = min(math.ceil(tau / step), 4096)
-    x0, v0, w0 = _response_at(flows, st, s, 0.0, constant)
-    peak = max(peak, abs(x0))
+    peak = max(peak, abs(x0), abs(x1))
+    if not _may_exceed(peak, x0, v0, x1, v1, tau, fourth):
+        return peak
+    pieces = 1
+    if fourth * tau * tau * tau * tau > 0.384 * size:
+        pieces = min(math.ceil(tau * math.sqrt(math.sqrt(fourth / (0.384 * size)))), 4096)
     h = tau / pieces
+    if pieces > 1:
+        for a in range(count):
+            work.turn[a] = exp_minus_one(work.rate[a] * h) + 1.0
+    end, end_slope = x1, v1
     for i in range(pieces):
-        x1, v1, w1 = _response_at(flows, st, s, (i + 1) * h, constant)
-        peak = max(peak, abs(x1))
-        if v0 * v1 < 0.0 and max(abs(x0) + abs(v0) * h, abs(x1) + abs(v1) * h) > peak:
-            lo, hi = i * h, (i + 1) * h
-            t, x, v, w = lo + h * v0 / (v0 - v1), x0, v0, w0
-            for _ in range(8):
-                x, v, w = _response_at(flows, st, s, t, constant)
-                if v * v0 > 0.0:
-                    lo = t
-                else:
-                    hi = t
-                better = t - v / w if w != 0.0 else lo
-                if not lo < better < hi:
-                    better = 0.5 * (lo + hi)
-                if abs(better - t) < 1e-8 * h:
-                    break
-                t = better
-            peak = max(peak, abs(x))
-        x0, v0, w0 = x1, v1, w1
+        x1, v1 = constant, 0.0
+        if i == pieces - 1:
+            x1, v1 = end, end_slope
+        else:
+            for a in range(count):
+                wave, rate = work.wave[a] * work.turn[a], work.rate[a]
+                x1 += wave.real
+                v1 += rate.real * wave.real - rate.imag * wave.imag
+            peak = max(peak, abs(x1))
+        if v0 * v1 < 0.0 and _may_exceed(peak, x0, v0, x1, v1, h, fourth):
+            peak = max(peak, _extremum(work.rate[:count], work.wave[:count], constant, x0, v0, x1, v1, h))
+        x0, v0 = x1, v1
+        if i < pieces - 1:
+            for a in range(count):
+                work.wave[a] *= work.turn[a]
     return peak
+
+
+@inlined
+def _may_exceed(peak, x0, v0, x1, v1, h, fourth):
+    """Whether |x| may exceed peak within [0, h]: cubic interpolant of the ends, and what it may be wrong by."""
+    room = peak - fourth * h * h * h * h / 384.0
+    # the interpolant's basis functions of the slopes stay below 4/27 h
+    rise = max(x0, x1) + (4 / 27) * h * (max(v0, 0.0) + max(-v1, 0.0))
+    fall = min(x0, x1) + (4 / 27) * h * (min(v0, 0.0) + min(-v1, 0.0))
+    return rise > room or -fall > room
+
+
+@kernel
+def _extremum(rates, waves, constant, x0, v0, x1, v1, h):
+    """|x| where its slope vanishes within [0, h], v0 and v1 of opposite sign: Newton from the cubic interpolant."""
+    # slope v0 + b u + c u^2, u = t/h; the root on [0, 1] by the formula that does not cancel
+    b = 6.0 * (x1 - x0) / h - 4.0 * v0 - 2.0 * v1
+    c = 3.0 * (v0 + v1) - 6.0 * (x1 - x0) / h
+    root = math.sqrt(max(b * b - 4.0 * c * v0, 0.0))
+    lo, hi = 0.0, h
+    t = (
+        h * (-2.0 * v0 / (b + math.copysign(root, b)))
+        if b * v0 < 0.0
+        else h * (-b - math.copysign(root, v0)) / (2.0 * c)
+    )
+    if not lo < t < hi:
+        t = h * v0 / (v0 - v1)
+    x = x0
+    for _ in range(8):
+        x, v, w = _response_at(rates, waves, t, constant)
+        if v * v0 > 0.0:
+            lo = t
+        else:
+            hi = t
+        better = t - v / w if w != 0.0 else lo
+        if not lo <= better <= hi:
+            better = 0.5 * (lo + hi)
+        elif abs(better - t) < 1e-5 * h:
+            # x has no slope here: what the last step adds is known to twice its digits
+            return abs(x + 0.5 * v * (better - t))
+        t = better
+    return abs(x)
 
 
 @kernel
@@ -236,11 +316,14 @@ def _sample(rows, flows, st, rec, s, tau, constant):
             break
         t = max(t, 0.0)
         entry = rec.samples[st.counters[PERIOD] * each + i]
-        entry[0] = _response_at(flows, st, s, t, constant)[0]
+        entry[0] = constant
         for r in range(len(rows.mass)):
-            shift = t * (st.velocity[r] + 0.5 * st.drift[r] * t)
-            for a in range(st.counters[AWAKE]):
-                j = st.awake[a]
-                z = flows.eigenvalue[s, j] * t
-                shift += (flows.motion[s, r, j] * st.amplitude[j] * exp_minus_line(z, exp_minus_one(z))).real
-            entry[1 + r] = st.displacement[r] + shift
+            entry[1 + r] = st.displacement[r] + t * (st.velocity[r] + 0.5 * st.drift[r] * t)
+        for a in range(st.counters[AWAKE]):
+            j = st.awake[a]
+            z = flows.eigenvalue[s, j] * t
+            first = exp_minus_one(z)
+            line = exp_minus_line(z, first)
+            entry[0] += (flows.response[s, j] * st.amplitude[j] * (1.0 + first)).real
+            for r in range(len(rows.mass)):
+                entry[1 + r] += (flows.motion[s, r, j] * st.amplitude[j] * line).real

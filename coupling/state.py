@@ -115,6 +115,12 @@ class Scratch(NamedTuple):
     side: np.ndarray  # (r,) int, of the listed rows
     members: np.ndarray  # (r,) int: places in that list
     problem: Problem
+    order: np.ndarray  # (m,) int: places of the awake modes, those first that the response feels
+    change: np.ndarray  # (m,) of the amplitudes over the segment, in that order
+    total: np.ndarray  # (m,) sum of the amplitudes at its start and end
+    wave: np.ndarray  # (m,) share of the response
+    rate: np.ndarray  # (m,) its eigenvalue
+    turn: np.ndarray  # (m,) exp(rate t) for one step of a grid
 
 
 class Problem(NamedTuple):
@@ -184,6 +190,9 @@ def new_problem(r: int) -> Problem:
 def new_scratch(rows: Rows, modes: int) -> Scratch:
     """Scratch space for a scene."""
     r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
-    complexes, reals, integers = np.zeros((3, modes), complex), np.zeros((4, r)), np.zeros((7, r), np.int64)
+    complexes, reals, integers = np.zeros((8, modes), complex), np.zeros((4, r)), np.zeros((7, r), np.int64)
     sizes = (2 * n, 2 * b, n, b, n, n)
-    return Scratch._make([*complexes, *(np.zeros(size) for size in sizes), *reals, *integers, new_problem(r)])
+    return Scratch._make(
+        [*complexes[:3], *(np.zeros(size) for size in sizes), *reals, *integers, new_problem(r),
+         np.zeros(modes, np.int64), *complexes[3:]]
+    )  # fmt: skip

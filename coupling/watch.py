@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from coupling.compiled import kernel
+from coupling.compiled import inlined, kernel
 from coupling.complementarity import AT_HIGH, AT_LOW
 from coupling.events import FORCE, POSITION, VELOCITY, bounds, evaluate, safe_step
 from coupling.state import (
@@ -32,7 +32,7 @@ RESOLUTION = 1e-15
 CHATTER = 3e-7
 
 
-@kernel
+@inlined
 def next_event(rows, flows, st, ch):
     """Time to the next event and its channel, or to the period's end and -1."""
     s = st.counters[FLOW]
@@ -72,7 +72,7 @@ def advance_or_stop(f, slope, curvature, noise, second, third, longest, shortest
     return step
 
 
-@kernel
+@inlined
 def _watch(rows, flows, st, ch, s, left):
     """Set up the event functions of the segment with their first safe steps. Returns how many."""
     count = 0
@@ -95,7 +95,7 @@ def _watch(rows, flows, st, ch, s, left):
     return count
 
 
-@kernel
+@inlined
 def _surely_opens(rows, st, r):
     """Whether a gap can only widen in this segment: the body slides away from a wall that rides on its floor."""
     if not rows.rides[r]:
@@ -105,7 +105,7 @@ def _surely_opens(rows, st, r):
     return rows.after[r] < 0 and st.state[rows.before[r]] == SLIP_LEFT
 
 
-@kernel
+@inlined
 def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k, left):
     """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign, for its first root."""
     ch.row[k], ch.order[k], ch.side[k] = r, order, what
@@ -176,7 +176,7 @@ def _watch_spring(rows, flows, st, ch, s, r, k, left):
     return k + 1
 
 
-@kernel
+@inlined
 def _watch_force(rows, flows, st, ch, s, r, side, limit, k, left):
     """Watch the force of a closed row for reaching its low (AT_LOW) or high (AT_HIGH) bound."""
     sign = 1.0 if side == AT_LOW else -1.0
