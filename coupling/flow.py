@@ -8,6 +8,7 @@ t (quadratic eigenvalue problem of a viscously damped structure, Tisseur and Mee
 
 from __future__ import annotations
 
+import contextlib
 from typing import NamedTuple
 
 import numpy as np
@@ -17,11 +18,10 @@ from scipy.sparse.csgraph import connected_components
 
 from coupling.inputs import InputError
 from coupling.rows import Rows
+from coupling.state import ALONE, DIFFERENCE, SUM
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
-#: what vanishes for a slow pair of modes: the sum of their eigenvalues, the same with one conjugate, or one alone
-SUM, DIFFERENCE, ALONE = range(3)
 
 CRITICAL = "structure: a mode is critically damped to round-off; change its damping slightly"
 
@@ -332,7 +332,11 @@ def _sprung_bodies(rows: Rows, cluster: np.ndarray, sprung: np.ndarray) -> _Spru
 def _complex_modes(
     mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Eigenvalues (2k,) of the free motion, vectors of (eta, eta') (2k, 2k) and their inverse."""
+    """Eigenvalues (2k,) of the free motion, vectors of (eta, eta') (2k, 2k) and their inverse.
+
+    The eigenvalues of the linearised problem are polished on the quadratic one: beside a stiff contact the slow modes
+    have lost the digits that the energies of many impacts need.
+    """
     k = len(mass)
     if k == 0:
         return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)
@@ -343,7 +347,30 @@ def _complex_modes(
     scaled = vectors * np.repeat([np.abs(values).max(), 1.0], k)[:, None]
     if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=0)) > 1e9:
         raise InputError(CRITICAL)
-    return values, vectors, np.linalg.inv(vectors)
+    polished = [
+        _polish(value, shape, mass, damping, stiffness) for value, shape in zip(values, vectors[:k].T, strict=True)
+    ]
+    values, shapes = (np.array(part).T for part in zip(*polished, strict=True))
+    vectors = np.vstack([shapes, shapes * values])
+    # symmetric matrices: shapes are left vectors, too, up to combinations of those with the same eigenvalue
+    left = np.hstack([(values[:, None] * shapes.T) @ mass + shapes.T @ damping, shapes.T @ mass])
+    return values, vectors, np.linalg.solve(left @ vectors, left)
+
+
+def _polish(
+    value: complex, shape: np.ndarray, mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray
+) -> tuple[complex, np.ndarray]:
+    """Two steps of inverse iteration and Rayleigh quotient for (value^2 mass + value damping + stiffness) shape = 0."""
+    for _ in range(2):
+        slope = 2 * value * mass + damping
+        form = shape @ slope @ shape
+        if abs(form) < 1e-3 * (np.abs(shape) @ np.abs(slope) @ np.abs(shape)):
+            return value, shape  # a combination of modes with the same eigenvalue
+        with contextlib.suppress(np.linalg.LinAlgError):  # singular to the last bit: as good as it gets
+            better = np.linalg.solve(value**2 * mass + value * damping + stiffness, slope @ shape)
+            shape = better / np.linalg.norm(better)
+        value -= (shape @ (value**2 * mass + value * damping + stiffness) @ shape) / (shape @ slope @ shape)
+    return value, shape
 
 
 def _one_of_each_pair(

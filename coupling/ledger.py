@@ -6,8 +6,7 @@ import math
 
 from coupling.compiled import inlined, kernel
 from coupling.events import exp_minus_line, exp_minus_one
-from coupling.flow import ALONE, DIFFERENCE
-from coupling.state import AWAKE, CONTACT, EXCITATION, FLOW, PERIOD, VISCOUS
+from coupling.state import ALONE, AWAKE, CONTACT, DIFFERENCE, EXCITATION, FLOW, PERIOD, VISCOUS
 
 #: shares of the response below this part of the largest count for nothing in its square
 _NEGLIGIBLE = 1e-9

@@ -24,6 +24,10 @@ SPRUNG = 4
 # under compression opens, or closes again because its spring would push
 CLOSES, OPENS, RECLOSES = 10, 11, 12
 
+# a pair of modes whose product hardly changes over a period: what vanishes is the sum of their eigenvalues, the same
+# with one conjugate, or one alone
+SUM, DIFFERENCE, ALONE = range(3)
+
 COUNTERS = ("period", "flow", "searching", "logged", "events", "impacts", "evaluations", "segments", "awake")
 PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE = range(len(COUNTERS))
 
