@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from coupling.compiled import kernel
-from coupling.complementarity import AT_LOW
+from coupling.complementarity import AT_HIGH, AT_LOW
 from coupling.gaps import rigid
 from coupling.log import log_event
 from coupling.state import (
@@ -41,7 +41,7 @@ def slide_or_hold(rows, st, work, r):
     state, limit = st.state[r], rows.limit[r]
     if limit == 0.0:
         st.state[r] = COAST
-    elif work.forced[r] != 0:
+    elif work.forced[r] > 0:
         # at its low bound the force opposes motion to the right
         st.state[r] = SLIP_RIGHT if work.forced[r] == AT_LOW else SLIP_LEFT
         st.held[r] = -st.state[r] * limit
@@ -50,6 +50,11 @@ def slide_or_hold(rows, st, work, r):
     elif (state == SLIP_LEFT or state == SLIP_RIGHT) and state * st.velocity[r] > 0.0:
         st.held[r] = -state * limit
     else:
+        if st.velocity[r] == 0.0 and (state == SLIP_LEFT or state == SLIP_RIGHT):
+            # the spring takes over at its bound, to come away from it with the acceleration
+            st.released[r] = -AT_LOW if state == SLIP_RIGHT else -AT_HIGH
+        else:
+            st.released[r] = min(work.forced[r], 0)
         st.state[r], st.held[r] = SPRUNG, 0.0
 
 

@@ -58,7 +58,8 @@ class State(NamedTuple):
     held: np.ndarray  # (r,) constant force of rows that are not closed, N
     level: np.ndarray  # (r,) constant part of a closed row's force, N
     state: np.ndarray  # (r,) int
-    released: np.ndarray  # (r,) the bound at which a row's force was when it let go at this very instant, otherwise 0
+    released: np.ndarray  # (r,) the bound at which a row's force was when it let go at this very instant, otherwise 0;
+    # minus that bound for a spring that takes over from sliding there
     settling: np.ndarray  # (r,) speed of a flight that takes as long as a chatter may be cut short, m/s
     last_impact: np.ndarray  # (r,) time of the last impact, counted from the period's start, s
     push: np.ndarray  # (r,) impulse of a compliant contact since it began, N s

@@ -199,5 +199,8 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k, left):
     ch.second[k], ch.third[k] = bounds(FORCE, 0.0, ch.g[k], flows.eigenvalue[s], awake)
     noise = 1e-15 * (abs(constant) + swing)
     shortest = RESOLUTION * rows.period
-    ch.safe[k] = advance_or_stop(f, slope, curvature, noise, ch.second[k], ch.third[k], left, shortest)
+    if st.released[r] == -side:
+        ch.safe[k] = max(2.9 * curvature / ch.third[k], 1e3 * shortest)
+    else:
+        ch.safe[k] = advance_or_stop(f, slope, curvature, noise, ch.second[k], ch.third[k], left, shortest)
     return k + 1
