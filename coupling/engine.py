@@ -141,7 +141,7 @@ def _response(scene: Scene, run: _Run, status: Status, transient: int, started: 
         events=int(counters[st.EVENTS]),
         classification=classify(section[first:], records.impacts[window], evaluated["friction"]),
         energy=evaluated,
-        energy_residual=_residual(records.ledger[: done + 1]),
+        energy_residual=_residual(records.ledger[: done + 1], rows.mass.sum() * run.state.fastest[0] ** 2 / 2),
         attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
         wall_time_s=time.perf_counter() - started,
         periods=done,
@@ -163,11 +163,14 @@ def _response(scene: Scene, run: _Run, status: Status, transient: int, started: 
     )
 
 
-def _residual(ledger: np.ndarray) -> float:
-    """Imbalance of the energy ledger (periods + 1, 6), relative to its largest term."""
+def _residual(ledger: np.ndarray, bodies: float) -> float:
+    """Imbalance of the energy ledger (periods + 1, 6), relative to its largest term.
+
+    At least to the energy of the bodies at the speed of the structure, J: what comes and goes within a period.
+    """
     change = ledger[-1] - ledger[0]
     imbalance = change[st.EXCITATION] - change[st.VISCOUS : st.STORED].sum() - change[st.STORED]
-    largest = max(np.abs(change).max(), np.abs(ledger[:, st.STORED]).max())
+    largest = max(np.abs(change).max(), np.abs(ledger[:, st.STORED]).max(), bodies)
     return float(abs(imbalance) / largest) if largest > 0 else 0.0
 
 
