@@ -189,7 +189,7 @@ def _enter(rows, flows, st, work, s):
     sprung = flows.sprung[s]
     constant_loads(rows, st, work)
     if sprung:
-        _preload(rows, st, work, y)
+        _preload(rows, flows, st, work, s, y)
     for i in range(n + b if sprung else n):
         total = 0.0
         for k in range(n):
@@ -227,8 +227,8 @@ def _enter(rows, flows, st, work, s):
 
 
 @kernel
-def _preload(rows, st, work, y):
-    """Add the forces that closed springs have at p = 0 and bodies in mid-travel: of a wall's gap, of an anchor."""
+def _preload(rows, flows, st, work, s, y):
+    """Add the forces that closed springs have at p = 0 and xi = 0: of a wall's gap, an anchor, bodies that stick."""
     for r in range(len(st.state)):
         if st.state[r] == SPRUNG:
             offset = 0.0
@@ -236,8 +236,12 @@ def _preload(rows, st, work, y):
                 offset = st.displacement[r]
                 for i in range(len(st.constant)):
                     offset -= rows.structure[r, i] * y[i]
-            elif rows.before[r] < 0 or rows.after[r] < 0:
-                offset = 0.5 * rows.gap[r - rows.friction_rows]
+            else:
+                if rows.before[r] < 0 or rows.after[r] < 0:
+                    offset = 0.5 * rows.gap[r - rows.friction_rows]
+                for b in range(len(rows.mass)):
+                    if flows.attached[s, b]:
+                        offset += rows.bodies[r, b] * st.displacement[b]
             add_force(rows, work, r, -rows.spring[r] * offset)
 
 

@@ -37,6 +37,7 @@ class Flows(NamedTuple):
     project: np.ndarray  # (s, m, 2n): c = project ((p, p') - constant - excitation) + ...
     project_slip: np.ndarray  # (s, m, 2b): ... project_slip ((slips, rates) - constant - excitation)
     sprung: np.ndarray  # (s,) whether springs are closed
+    attached: np.ndarray  # (s, b) whether rigid rows hold a body to the structure
     kick: np.ndarray  # (s, r, m): change of c by a unit impulse on a row
     motion: np.ndarray  # (s, r, m): displacement of each row
     force: np.ndarray  # (s, r, m): force of each closed row
@@ -74,7 +75,7 @@ def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
     return Flows(
         np.full((capacity, 2), -1, np.int64), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
-        z(m, 2 * b), np.zeros(capacity, np.bool_), z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
+        z(m, 2 * b), np.zeros(capacity, np.bool_), np.zeros((capacity, b), np.bool_), z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
         f(b, b), z(b, m), z(m), f(m), z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
         np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 3), np.int64),
         z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
@@ -129,7 +130,7 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     eigenvalue, shape, project = _one_of_each_pair(eigenvalue, shape, project)
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
     m = len(eigenvalue) + 1
-    flows.modes[s], flows.sprung[s] = m, len(sprung) > 0
+    flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, cluster < 0
     flows.eigenvalue[s, :m] = np.r_[1j * rows.omega, eigenvalue]
     full = np.hstack([np.r_[harmonic, 1j * rows.omega * harmonic][:, None], shape])
     structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
