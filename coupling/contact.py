@@ -29,6 +29,8 @@ from coupling.state import (
 
 #: forces and accelerations below this share of the terms that they are sums of are round-off
 ROUND_OFF = 1e-12
+#: a spring's force has the round-off of the travel that its compression is a small difference of: this share of it
+TRAVEL = 1e-2
 
 
 @kernel
@@ -256,6 +258,8 @@ def _free_acceleration(rows, st, work):
         for i in range(b):
             total += rows.bodies[r, i] * work.on_bodies[i] / rows.mass[i]
             size += abs(rows.bodies[r, i]) * (abs(work.on_bodies[i]) + abs(rows.inertia[i])) / rows.mass[i]
+        if r >= rows.friction_rows and st.state[r] == SPRUNG:
+            size += TRAVEL * rows.spring[r] * rows.gap[r - rows.friction_rows] * rows.delassus[r, r]
         work.acceleration[r] = total
         largest = max(largest, size)
     return largest

@@ -69,10 +69,11 @@ def _hold_back(rows, st, work, k):
     """Tie contacts that would separate too slowly. Returns whether there are any."""
     problem, found = work.problem, False
     for p in range(k):
+        problem.forced[p] = 0  # the solver's own mark
         r = work.rows[p]
         after = problem.acceleration[p] - problem.restitution[p] * work.acceleration[p]
         slow = (1.0 - rows.restitution[r - rows.friction_rows]) * st.settling[r]
-        if problem.state[p] == AT_LOW and after < slow:
+        if problem.state[p] == AT_LOW and problem.low[p] == 0.0 and after < slow:
             problem.b[p] -= problem.restitution[p] * work.acceleration[p]
             problem.low[p], problem.restitution[p], found = -np.inf, 0.0, True
     return found
