@@ -187,7 +187,9 @@ def _attached(
 
 def _events(rows: Rows, chunks: list[np.ndarray]) -> list[Event]:
     events = []
-    for entry in np.concatenate(chunks) if chunks else ():
+    entries = np.concatenate(chunks) if chunks else np.zeros((0, 6))
+    _complete(rows, entries)
+    for entry in entries:
         row = int(entry[2])
         body, side = _place(rows, row)
         # speeds of the gap, turned into speeds of the body relative to what it meets
@@ -195,6 +197,19 @@ def _events(rows: Rows, chunks: list[np.ndarray]) -> list[Event]:
         before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
         events.append(Event(float(entry[0]), st.KINDS[int(entry[1])], body, side, before, after, impulse))
     return events
+
+
+def _complete(rows: Rows, entries: np.ndarray) -> None:
+    """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end has brought."""
+    begun: dict[int, np.ndarray] = {}
+    for entry in entries:
+        kind, row = int(entry[1]), int(entry[2])
+        if not np.isfinite(rows.spring[row]):
+            continue
+        if kind == st.IMPACT:
+            begun[row] = entry
+        elif kind == st.DETACHES and row in begun:
+            begun[row][4:6] = entry[4:6]
 
 
 def _place(rows: Rows, row: int) -> tuple[int, str]:
