@@ -200,7 +200,7 @@ def _events(rows: Rows, chunks: list[np.ndarray]) -> list[Event]:
 
 
 def _complete(rows: Rows, entries: np.ndarray) -> None:
-    """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end has brought."""
+    """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end brought."""
     begun: dict[int, np.ndarray] = {}
     for entry in entries:
         kind, row = int(entry[1]), int(entry[2])
