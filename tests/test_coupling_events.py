@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from coupling.events import FORCE, POSITION, VELOCITY, bounds, evaluate, exp_minus_line, exp_minus_one
+from coupling.events import DEGREE, FORCE, POSITION, VELOCITY, exp_minus_line, exp_minus_one, expand
 from coupling.watch import advance_or_stop
 
 
@@ -12,14 +12,13 @@ from coupling.watch import advance_or_stop
 def search(order, k0, k1, k2, g, eigenvalue, end):
     """First root in (0, end), or inf: the engine's loop for one event function."""
     awake = np.arange(len(g))
-    second, third = bounds(order, k2, g, eigenvalue, awake)
-    t, steps = 0.0, 0
+    t, steps, a = 0.0, 0, np.zeros(DEGREE + 1)
     while t < end:
-        f, slope, curvature, noise = evaluate(order, k0, k1, k2, g, eigenvalue, awake, t)
-        step = advance_or_stop(f, slope, curvature, noise, second, third, end, 1e-15 * end)
-        if step <= 0.0:
-            return t, steps
+        noise, second = expand(order, k0, k1, k2, g, eigenvalue, awake, t, a)
+        step, found = advance_or_stop(a, noise, second, end - t, 1e-15 * end)
         t += step
+        if found:
+            return t, steps
         steps += 1
     return np.inf, steps
 
