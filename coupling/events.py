@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from coupling.compiled import inlined
+from coupling.compiled import inlined, kernel
 
 # how often the exponentials of a function are differentiated: what is left of exp(z) at t = 0
 POSITION, VELOCITY, FORCE = 2, 1, 0
@@ -25,6 +25,8 @@ _OVER_FACTORIAL = tuple(1.0 / math.factorial(p) for p in range(DEGREE + 1))
 _ROUND_OFF = 4.0 * 2.0**-52
 # a step that long, in units of (second bound / last bound)^(1 / (DEGREE - 2)), leaves out a few thousandths
 _REACH = 3.0
+# modes faster than this times the first, squared, are fast
+_FAST = 4.0
 # Newton's iteration: a correction below this share leaves an error of its square
 _CONVERGED = 1e-8
 
@@ -75,22 +77,26 @@ def first_root_of_parabola(f, slope, curvature):
 
 
 @inlined
-def expand(order, k0, k1, k2, g, eigenvalue, awake, t, a):
-    """Lower polynomial a (DEGREE + 1,) of an event function from time t on, by powers of the time since.
+def expand(order, k0, k1, k2, g, eigenvalue, awake, t, lower):
+    """Lower polynomials (2, DEGREE + 1) of an event function from time t on, by powers of the time since.
 
-    Returns the round-off of its value and a bound of the second derivative.
+    The first is that of all modes; in the second, those much faster than the first mode count as if they were at their
+    lowest all the time: less sharp close to a root, but good for long steps far from it.
+    Returns the round-off of the value, a bound of the second derivative, and that of the slow modes (-1: all are).
     order POSITION: exponentials as exp(z) - 1 - z, so that k0 and k1 are value and slope at zero exactly; VELOCITY:
     exp(z) - 1 with k0 the value and k1 the constant slope; FORCE: exp(z), k0 alone.
     """
     value, slope, noise = k0, k1, abs(k0)
+    whole, slow = lower[0], lower[1]
     for p in range(2, DEGREE + 1):
-        a[p] = 0.0
-    second, last = 0.0, 0.0
+        whole[p], slow[p] = 0.0, 0.0
+    second, last, fast_value, fast_slope, fast_second, fast_last = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    limit = _FAST * (eigenvalue[0].real * eigenvalue[0].real + eigenvalue[0].imag * eigenvalue[0].imag)
     if order == POSITION:
         value += t * (k1 + 0.5 * k2 * t)
         slope += k2 * t
         noise += abs(k1 * t) + abs(k2 * t * t)
-        a[2], second = k2, abs(k2)
+        slow[2], second = k2, abs(k2)
     elif order == VELOCITY:
         value += k1 * t
         noise += abs(k1 * t)
@@ -122,18 +128,28 @@ def expand(order, k0, k1, k2, g, eigenvalue, awake, t, a):
         before, now = u, x * u - y * v
         if order != POSITION:
             slope += now
-        for p in range(2, DEGREE):
-            before, now = now, twice * now - square * before
-            a[p] += now
         size = (abs(u) + abs(v)) * square
-        second += size
-        square *= square
-        last += size * square * square
-    a[0], a[1] = value, slope
-    for p in range(2, DEGREE):
-        a[p] *= _OVER_FACTORIAL[p]
-    a[DEGREE] = -_OVER_FACTORIAL[DEGREE] * last
-    return _ROUND_OFF * noise, second
+        if square <= limit:
+            for p in range(2, DEGREE):
+                before, now = now, twice * now - square * before
+                slow[p] += now
+            second += size
+            last += size * (square * square) * (square * square)
+        else:
+            fast_value += u + abs(u) + abs(v)
+            fast_slope += now
+            for p in range(2, DEGREE):
+                before, now = now, twice * now - square * before
+                whole[p] += now
+            fast_second += size
+            fast_last += size * (square * square) * (square * square)
+    slow[DEGREE], whole[DEGREE] = -last, -fast_last
+    for p in range(2, DEGREE + 1):
+        slow[p] *= _OVER_FACTORIAL[p]
+        whole[p] = slow[p] + whole[p] * _OVER_FACTORIAL[p]
+    whole[0], whole[1] = value, slope
+    slow[0], slow[1] = value - fast_value, slope - fast_slope
+    return _ROUND_OFF * noise, second + fast_second, second if fast_second > 0.0 else -1.0
 
 
 @inlined
@@ -167,7 +183,7 @@ def _step_by_parabola(a, f, h):
     return min(h, first_root_of_parabola(f, a[1], 2.0 * (a[2] + lowest)))
 
 
-@inlined
+@kernel
 def safe_step(a, f, noise, second, longest):
     """A step without root from where the lower polynomial begins, its value taken as f >= 0, and whether a root follows.
 

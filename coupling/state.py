@@ -81,7 +81,7 @@ class Channels(NamedTuple):
     noise: np.ndarray  # round-off of its value at the start, besides that of k0
     safe: np.ndarray  # time before which no root can lie
     g: np.ndarray  # (k, m)
-    taylor: np.ndarray  # (DEGREE + 1,) scratch space: lower polynomial of one of them (coupling.events)
+    lower: np.ndarray  # (2, DEGREE + 1) scratch space: lower polynomials of one of them (coupling.events)
 
 
 class Records(NamedTuple):
@@ -169,7 +169,7 @@ def new_channels(rows: Rows, modes: int) -> Channels:
     """Room for two event functions a row."""
     k = 2 * len(rows.delassus)
     integers, reals = np.zeros((4, k), np.int64), np.zeros((5, k))
-    return Channels._make([*integers, *reals, np.zeros((k, modes), complex), np.zeros(DEGREE + 1)])
+    return Channels._make([*integers, *reals, np.zeros((k, modes), complex), np.zeros((2, DEGREE + 1))])
 
 
 def new_records(rows: Rows, periods: int, samples: int) -> Records:

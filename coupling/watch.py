@@ -59,23 +59,36 @@ def next_event(rows, flows, st, ch):
                 # what a double cannot tell from the segment's start happens at its start
                 return (tau if tau > shortest else 0.0), k
             st.counters[EVALUATIONS] += 1
-        a = ch.taylor
-        noise, second = expand(ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau, a)
+        noise, second, calm = expand(
+            ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau, ch.lower
+        )
         if tau == 0.0 and (ch.side[k] == CLOSES or ch.side[k] == OPENS):
-            st.settling[ch.row[k]] = max(0.0, -2.0 * a[2]) * 0.5 * CHATTER * rows.period
-        step, ch.found[k] = advance_or_stop(a, max(noise, ch.noise[k]), second, left - tau, shortest)
+            st.settling[ch.row[k]] = max(0.0, -2.0 * ch.lower[0, 2]) * 0.5 * CHATTER * rows.period
+        step, ch.found[k] = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, left - tau, shortest)
         ch.safe[k] = tau + step
 
 
 @inlined
-def advance_or_stop(a, noise, second, longest, shortest):
-    """Safe step from a point of an event function with the lower polynomial a, and whether its root is at the end."""
+def advance_or_stop(lower, noise, second, calm, longest, shortest):
+    """Safe step from a point of an event function, and whether its root is at the end.
+
+    lower, second, calm: lower polynomials and bounds of second derivatives as of coupling.events.expand.
+    """
+    a, slow = lower[0], lower[1]
     f = a[0]
     if f <= noise:
         if a[1] < 0.0 or (a[1] <= second * shortest and a[2] < 0.0):
             return 0.0, True
         f = 0.0
-    step, found = safe_step(a, f, noise, second, max(longest, shortest))
+    longest = max(longest, shortest)
+    far = 0.0
+    if calm >= 0.0 and slow[0] > noise:
+        far, _ = safe_step(slow, slow[0], 0.0, calm, longest)
+        if far >= longest:
+            return far, False
+    step, found = safe_step(a, f, noise, second, longest)
+    if far > step:
+        return far, False
     if step < shortest:
         return (0.0, True) if a[1] < 0.0 else (shortest, False)
     return step, found
