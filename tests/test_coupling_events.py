@@ -54,6 +54,41 @@ def test_first_root_equals_dense_sampling(seed, order):
     assert steps < 400
 
 
+@pytest.mark.parametrize("order", [POSITION, VELOCITY, FORCE])
+@pytest.mark.parametrize("seed", range(10))
+def test_nothing_dips_below_zero_before_the_root(seed, order):
+    """Fifty functions with slow and fast modes each: every local minimum before the root is positive, sought closely.
+
+    A third comes within 1e-3 to 1e-13 of a touch, a third starts at zero, as a gap does after an impact.
+    """
+    rng = np.random.default_rng([seed, 1])
+    for trial in range(50):
+        modes = int(rng.integers(1, 9))
+        rate = np.r_[1.0, np.exp(rng.uniform(np.log(0.3), np.log(60.0), modes - 1))]
+        eigenvalue = -rate * np.exp(rng.uniform(-9, -0.5, modes)) + 1j * rate
+        eigenvalue[0] = 1j
+        g = (rng.normal(size=modes) + 1j * rng.normal(size=modes)) / rate ** rng.uniform(0, 2.5)
+        k1, k2 = (rng.normal(size=2) * 0.3) if order != FORCE else (0.0, 0.0)
+        t = np.linspace(0, 2 * np.pi, 6001)
+        shape = value(order, 0.0, k1, k2, g, eigenvalue, t)
+        k0 = (0.0, -shape[5:].min(), -shape[5:].min() * rng.uniform(0.2, 1.0))[trial % 3]
+        if trial % 3 == 1:
+            k0 += rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-13, -3)
+        shape += k0
+        if shape[0] < 0.0 or shape[1] <= 0.0:
+            continue
+        found, steps = search(order, k0, k1, k2, g, eigenvalue, t[-1])
+        assert steps < 200
+        scale = abs(k0) + abs(k1) + abs(k2) + np.abs(g * (1 + rate)).sum()
+        before = np.flatnonzero((shape[1:-1] <= shape[:-2]) & (shape[1:-1] <= shape[2:]) & (t[1:-1] < found)) + 1
+        for i in before:
+            near = np.linspace(t[i - 1], min(t[i + 1], found), 4001)
+            assert value(order, k0, k1, k2, g, eigenvalue, near).min() > -1e-14 * scale
+        assert shape[t <= found].min() > -1e-14 * scale
+        if found < np.inf:
+            assert abs(value(order, k0, k1, k2, g, eigenvalue, np.array([found]))[0]) < 2e-14 * scale
+
+
 def test_tangential_touch_is_found():
     """1 - cos t touches zero at 2 pi: no sign change. A function lifted by 1e-12 does not touch."""
     g, eigenvalue = np.array([-1.0 + 0j]), np.array([1j])
