@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from coupling.events import DEGREE
 from coupling.rows import Rows
 
 # state of a friction row; a row that slips is known by its direction, one without friction coasts; HELD: at rest, but
@@ -73,13 +74,14 @@ class Channels(NamedTuple):
     row: np.ndarray
     order: np.ndarray
     side: np.ndarray
+    found: np.ndarray  # whether `safe` is its first root
     k0: np.ndarray
     k1: np.ndarray
     k2: np.ndarray
-    second: np.ndarray
-    third: np.ndarray
+    noise: np.ndarray  # round-off of its value at the start, besides that of k0
     safe: np.ndarray  # time before which no root can lie
     g: np.ndarray  # (k, m)
+    lower: np.ndarray  # (2, DEGREE + 1) scratch space: lower polynomials of one of them (coupling.events)
 
 
 class Records(NamedTuple):
@@ -166,8 +168,8 @@ def new_state(rows: Rows, modes: int, displacement: np.ndarray, velocity: np.nda
 def new_channels(rows: Rows, modes: int) -> Channels:
     """Room for two event functions a row."""
     k = 2 * len(rows.delassus)
-    integers, reals = np.zeros((3, k), np.int64), np.zeros((6, k))
-    return Channels._make([*integers, *reals, np.zeros((k, modes), complex)])
+    integers, reals = np.zeros((4, k), np.int64), np.zeros((5, k))
+    return Channels._make([*integers, *reals, np.zeros((k, modes), complex), np.zeros((2, DEGREE + 1))])
 
 
 def new_records(rows: Rows, periods: int, samples: int) -> Records:

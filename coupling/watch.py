@@ -6,7 +6,7 @@ import math
 
 from coupling.compiled import inlined, kernel
 from coupling.complementarity import AT_HIGH, AT_LOW
-from coupling.events import FORCE, POSITION, VELOCITY, bounds, evaluate, safe_step
+from coupling.events import FORCE, POSITION, VELOCITY, expand, safe_step
 from coupling.state import (
     AWAKE,
     CLOSED,
@@ -39,59 +39,81 @@ def next_event(rows, flows, st, ch):
     left = max(rows.period - st.time[0], 0.0)
     shortest = RESOLUTION * rows.period
     eigenvalue, awake = flows.eigenvalue[s], st.awake[: st.counters[AWAKE]]
-    count = _watch(rows, flows, st, ch, s, left)
+    count = _watch(rows, flows, st, ch, s)
     st.counters[SEGMENTS] += 1
+    begun = 0
     while True:
         k, tau = -1, left
-        for i in range(count):
-            if ch.safe[i] < tau:
-                k, tau = i, ch.safe[i]
-        if k < 0:
-            return left, -1
-        st.counters[EVALUATIONS] += 1
-        f, slope, curvature, noise = evaluate(
-            ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau
+        if begun < count:
+            k, tau = begun, 0.0
+            begun += 1
+            if ch.safe[k] > 0.0:
+                continue
+        else:
+            for i in range(count):
+                if ch.safe[i] < tau:
+                    k, tau = i, ch.safe[i]
+            if k < 0:
+                return left, -1
+            if ch.found[k]:
+                # what a double cannot tell from the segment's start happens at its start
+                return (tau if tau > shortest else 0.0), k
+            st.counters[EVALUATIONS] += 1
+        noise, second, calm = expand(
+            ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau, ch.lower
         )
-        step = advance_or_stop(f, slope, curvature, noise, ch.second[k], ch.third[k], left, shortest)
-        if step <= 0.0:
-            # what a double cannot tell from the segment's start happens at its start
-            return (tau if tau > shortest else 0.0), k
+        if tau == 0.0 and (ch.side[k] == CLOSES or ch.side[k] == OPENS):
+            st.settling[ch.row[k]] = max(0.0, -2.0 * ch.lower[0, 2]) * 0.5 * CHATTER * rows.period
+        step, ch.found[k] = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, left - tau, shortest)
         ch.safe[k] = tau + step
 
 
-@kernel
-def advance_or_stop(f, slope, curvature, noise, second, third, longest, shortest):
-    """Safe step from a point of an event function; 0 where the function is at its root and falls."""
+@inlined
+def advance_or_stop(lower, noise, second, calm, longest, shortest):
+    """Safe step from a point of an event function, and whether its root is at the end.
+
+    lower, second, calm: lower polynomials and bounds of second derivatives as of coupling.events.expand.
+    """
+    a, slow = lower[0], lower[1]
+    f = a[0]
     if f <= noise:
-        if slope < 0.0 or (slope <= second * shortest and curvature < 0.0):
-            return 0.0
+        if a[1] < 0.0 or (a[1] <= second * shortest and a[2] < 0.0):
+            return 0.0, True
         f = 0.0
-    step = safe_step(f, slope, curvature, second, third, longest)
+    longest = max(longest, shortest)
+    far = 0.0
+    if calm >= 0.0 and slow[0] > noise:
+        far, _ = safe_step(slow, slow[0], 0.0, calm, longest)
+        if far >= longest:
+            return far, False
+    step, found = safe_step(a, f, noise, second, longest)
+    if far > step:
+        return far, False
     if step < shortest:
-        return 0.0 if slope < 0.0 else shortest
-    return step
+        return (0.0, True) if a[1] < 0.0 else (shortest, False)
+    return step, found
 
 
 @inlined
-def _watch(rows, flows, st, ch, s, left):
-    """Set up the event functions of the segment with their first safe steps. Returns how many."""
+def _watch(rows, flows, st, ch, s):
+    """Set up the event functions of the segment. Returns how many."""
     count = 0
     for r in range(rows.friction_rows):
         state = st.state[r]
         if state == STICK or state == SPRUNG:
             for side in (AT_LOW, AT_HIGH):
-                count = _watch_force(rows, flows, st, ch, s, r, side, rows.limit[r], count, left)
+                count = _watch_force(rows, flows, st, ch, s, r, side, rows.limit[r], count)
         elif state == SLIP_LEFT or state == SLIP_RIGHT:
-            count = _watch_motion(rows, flows, st, ch, s, r, VELOCITY, float(state), 0, count, left)
+            count = _watch_motion(rows, flows, st, ch, s, r, VELOCITY, float(state), 0, count)
     for r in range(rows.friction_rows, len(st.state)):
         state = st.state[r]
         if state == CLOSED or state == SPRUNG:
-            count = _watch_force(rows, flows, st, ch, s, r, AT_LOW, 0.0, count, left)
+            count = _watch_force(rows, flows, st, ch, s, r, AT_LOW, 0.0, count)
         elif state == OPEN and not _surely_opens(rows, st, r):
-            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, 1.0, CLOSES, count, left)
+            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, 1.0, CLOSES, count)
         elif state == LEAVING:
-            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, -1.0, OPENS, count, left)
-            count = _watch_spring(rows, flows, st, ch, s, r, count, left)
+            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, -1.0, OPENS, count)
+            count = _watch_spring(rows, flows, st, ch, s, r, count)
     return count
 
 
@@ -106,38 +128,39 @@ def _surely_opens(rows, st, r):
 
 
 @inlined
-def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k, left):
+def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
     """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign, for its first root."""
-    ch.row[k], ch.order[k], ch.side[k] = r, order, what
+    ch.row[k], ch.order[k], ch.side[k], ch.noise[k], ch.found[k], ch.safe[k] = r, order, what, 0.0, 0, 0.0
+    if order == POSITION:
+        ch.k0[k], ch.k1[k], ch.k2[k] = sign * st.displacement[r], sign * st.velocity[r], sign * st.drift[r]
+    else:
+        ch.k0[k], ch.k1[k], ch.k2[k] = sign * st.velocity[r], sign * st.drift[r], 0.0
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        g = sign * flows.motion[s, r, j] * st.amplitude[j]
+        ch.g[k, j] = g if order == POSITION else g * flows.eigenvalue[s, j]
+    if st.released[r] != 0:
+        _leave(rows, flows, st, ch, s, r, order, sign, k)
+    return k + 1
+
+
+@kernel
+def _leave(rows, flows, st, ch, s, r, order, sign, k):
+    """First safe step of a row whose force was at its bound: from rest, no acceleration, and its jerk decides."""
     curvature, jerk, snap = sign * st.drift[r], 0.0, 0.0
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
-        rate = flows.eigenvalue[s, j]
-        g = sign * flows.motion[s, r, j] * st.amplitude[j]
+        rate, g = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * st.amplitude[j]
+        square = rate.real * rate.real + rate.imag * rate.imag
         second = g * rate * rate
         curvature += second.real
         jerk += (second * rate).real
-        ch.g[k, j] = g if order == POSITION else g * rate
-        snap += (abs(second.real) + abs(second.imag)) * (rate.real * rate.real + rate.imag * rate.imag)
+        snap += (abs(second.real) + abs(second.imag)) * square
+    quick = (2.0 if order == POSITION else 1.5) * jerk / snap
+    shortest = 1e3 * RESOLUTION * rows.period
+    ch.safe[k] = max(quick if quick == quick else rows.period, shortest)
     if order == POSITION:
-        f, slope, fall = sign * st.displacement[r], sign * st.velocity[r], curvature
-        ch.k1[k], ch.k2[k] = slope, sign * st.drift[r]
         st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
-    else:
-        f, slope, fall = sign * st.velocity[r], curvature, jerk
-        ch.k1[k], ch.k2[k] = sign * st.drift[r], 0.0
-    ch.k0[k] = f
-    awake = st.awake[: st.counters[AWAKE]]
-    ch.second[k], ch.third[k] = bounds(order, ch.k2[k], ch.g[k], flows.eigenvalue[s], awake)
-    shortest = RESOLUTION * rows.period
-    if st.released[r] != 0:
-        # the force was at its bound: the row starts from rest with vanishing acceleration, and its jerk decides
-        quick = 2.0 * jerk / snap if order == POSITION else 1.5 * fall / ch.third[k]
-        ch.safe[k] = max(quick if quick == quick else left, 1e3 * shortest)
-    else:
-        noise = 4e-16 * abs(f)
-        ch.safe[k] = advance_or_stop(f, slope, fall, noise, ch.second[k], ch.third[k], left, shortest)
-    return k + 1
 
 
 @kernel
@@ -152,55 +175,46 @@ def longest_hop(rows, flows, st, r):
 
 
 @kernel
-def _watch_spring(rows, flows, st, ch, s, r, k, left):
+def _watch_spring(rows, flows, st, ch, s, r, k):
     """Watch a compliant contact that has ended for the spring's wish to push again: spring gap + dashpot rate > 0."""
     spring, dashpot = rows.spring[r], rows.dashpot[r]
-    ch.row[k], ch.order[k], ch.side[k] = r, POSITION, RECLOSES
-    acceleration, curvature = st.drift[r], spring * st.drift[r]
+    ch.row[k], ch.order[k], ch.side[k], ch.found[k], ch.safe[k] = r, POSITION, RECLOSES, 0, 0.0
+    acceleration = st.drift[r]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
         rate = flows.eigenvalue[s, j]
         g = flows.motion[s, r, j] * st.amplitude[j]
         ch.g[k, j] = (spring + dashpot * rate) * g
         acceleration += (rate * rate * g).real
-        curvature += (rate * rate * ch.g[k, j]).real
     ch.k0[k] = spring * st.displacement[r] + dashpot * st.velocity[r]
     ch.k1[k] = spring * st.velocity[r] + dashpot * acceleration
     ch.k2[k] = spring * st.drift[r]
-    awake = st.awake[: st.counters[AWAKE]]
-    ch.second[k], ch.third[k] = bounds(POSITION, ch.k2[k], ch.g[k], flows.eigenvalue[s], awake)
     # the contact ended at zero force
-    noise = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
-    shortest = RESOLUTION * rows.period
-    ch.safe[k] = advance_or_stop(ch.k0[k], ch.k1[k], curvature, noise, ch.second[k], ch.third[k], left, shortest)
+    ch.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
     return k + 1
 
 
 @inlined
-def _watch_force(rows, flows, st, ch, s, r, side, limit, k, left):
+def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
     """Watch the force of a closed row for reaching its low (AT_LOW) or high (AT_HIGH) bound."""
     sign = 1.0 if side == AT_LOW else -1.0
-    constant = sign * st.level[r] + limit
-    f, slope, curvature, swing = constant, 0.0, 0.0, 0.0
+    constant, swing = sign * st.level[r] + limit, 0.0
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
-        rate = flows.eigenvalue[s, j]
         g = sign * flows.force[s, r, j] * st.amplitude[j]
         ch.g[k, j] = g
-        f += g.real
-        slope += (g * rate).real
-        curvature += (g * rate * rate).real
-        swing += math.hypot(g.real, g.imag)
+        swing += math.sqrt(g.real * g.real + g.imag * g.imag)
     if constant > swing:
         return k  # the force never comes near its bound: nothing to watch
-    ch.row[k], ch.order[k], ch.side[k] = r, FORCE, side
+    ch.row[k], ch.order[k], ch.side[k], ch.noise[k], ch.found[k], ch.safe[k] = r, FORCE, side, 0.0, 0, 0.0
     ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
-    awake = st.awake[: st.counters[AWAKE]]
-    ch.second[k], ch.third[k] = bounds(FORCE, 0.0, ch.g[k], flows.eigenvalue[s], awake)
-    noise = 1e-15 * (abs(constant) + swing)
-    shortest = RESOLUTION * rows.period
     if st.released[r] == -side:
-        ch.safe[k] = max(2.9 * curvature / ch.third[k], 1e3 * shortest)
-    else:
-        ch.safe[k] = advance_or_stop(f, slope, curvature, noise, ch.second[k], ch.third[k], left, shortest)
+        curvature, third = 0.0, 0.0
+        for a in range(st.counters[AWAKE]):
+            j = st.awake[a]
+            rate = flows.eigenvalue[s, j]
+            second = ch.g[k, j] * rate * rate
+            curvature += second.real
+            third += (abs(second.real) + abs(second.imag)) * abs(rate)
+        ch.safe[k] = max(2.9 * curvature / third, 1e3 * RESOLUTION * rows.period)
     return k + 1
