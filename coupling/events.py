@@ -185,7 +185,7 @@ def _step_by_parabola(a, f, h):
 
 @kernel
 def safe_step(a, f, noise, second, longest):
-    """A step without root from where the lower polynomial begins, its value taken as f >= 0, and whether a root follows.
+    """A step without root from where the lower polynomial begins, its value taken as f >= 0; whether a root follows.
 
     A root follows at the end of the step if what the polynomial leaves out there is less than the round-off.
     """
