@@ -27,7 +27,8 @@ class Event(NamedTuple):
 
     Velocities (m/s) are those of the body relative to the cavity; between neighbours, where damper is the left body
     of the two, those of the right body relative to the left. Jenkins elements have side "casing" and their own number.
-    An impact on a compliant wall lasts until its "detach": what it leaves with is then known, and the impulse (N s).
+    An impact on a compliant wall lasts until its "detach": what it leaves with is then known, and the impulse (N s). If
+    the contact is pressed again before the wall has sprung back ("close"), it lasts until the next one.
     """
 
     time: float
@@ -77,10 +78,12 @@ class Reference:
 def agreement(one: Reference, other: Reference, tolerance: float) -> float:
     """Time (s) until which the bodies' positions in two runs of a scene agree, relative to the narrowest half gap.
 
-    Runs that differ in round-off alone tell how long a chaotic motion can be followed.
+    Without bodies, the response. Runs that differ in round-off alone tell how long a chaotic motion can be followed.
     """
     time = np.union1d(one.solution.ts, other.solution.ts) / one.system.omega
-    apart = np.abs(one.states(time)[1] - other.states(time)[1]).max(axis=0) > tolerance * one.system.length
+    bodies = len(one.system.m) > 0
+    first, second = (run.states(time)[1] if bodies else run.x(time)[None] for run in (one, other))
+    apart = np.abs(first - second).max(axis=0) > tolerance * one.system.length
     return float(time[apart.argmax()] if apart.any() else time[-1])
 
 
@@ -256,8 +259,8 @@ def _resume(modes: Modes, t: float, y: np.ndarray, old: Mode | None, pressed: bo
         if (was == PRESSING) != (state == PRESSING):
             damper, side, sign = system.name(contact)
             speed = sign * float(system.speed(y)[contact]) * unit
-            kind = "impact" if state == PRESSING else "detach"
-            events.append(Event(t / system.omega, kind, damper, side, speed, 0.0 if kind == "impact" else speed))
+            kind = "detach" if was == PRESSING else "impact" if was == OPEN else "close"
+            events.append(Event(t / system.omega, kind, damper, side, speed, speed if was == PRESSING else 0.0))
     for element, state in enumerate(mode.casing):
         if old and (old.casing[element] == STUCK) != (state == STUCK):
             events.append(Event(t / system.omega, "stick" if state == STUCK else "slip", element, "casing", 0.0, 0.0))
@@ -283,7 +286,7 @@ def _completed(events: list[Event], system: System, solution: OdeSolution) -> li
             contact = contacts[event.damper, event.side]
             first = events[begun[contact]]
             t, weights = quadrature(solution, first.time * system.omega, event.time * system.omega)
-            force = system.press(solution(t))[contact]
+            force = np.maximum(system.press(solution(t))[contact], 0.0)
             impulse = float(weights @ force) * system.length * system.omega
             events[begun[contact]] = first._replace(
                 relative_velocity_after=event.relative_velocity_after, impulse=impulse
