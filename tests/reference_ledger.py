@@ -10,7 +10,7 @@ from reference_system import System
 def ledger(result: Reference) -> dict[str, float]:
     """Energies in J: excitation, viscous, friction, impact, contact, stored (the change) and the largest stored.
 
-    A compliant contact stores stiffness * opening^2 / 2 as long as it is not open; what then goes on in it is loss.
+    A compliant contact stores stiffness * opening^2 / 2 as long as it pushes; what it holds beyond that is lost.
     """
     system, unit = result.system, result.system.length**2 * result.system.omega**2
     t, weights = quadrature(result.solution, 0.0, result.solution.ts[-1])
@@ -28,7 +28,9 @@ def ledger(result: Reference) -> dict[str, float]:
     energies["impact"] = sum(
         _impact_loss(system, event) for event in result.events if event.kind == "impact" and not system.compliant
     )
-    stored = [_stored(system, result.solution(time)) * unit for time in result.solution.ts[[0, -1]]]
+    ends = result.solution(result.solution.ts[[0, -1]]).T
+    stored = [_stored(system, y) * unit for y in ends]
+    energies["contact"] += (_forsaken(system, ends[1]) - _forsaken(system, ends[0])) * unit
     return energies | {"stored": stored[1] - stored[0], "largest": max(map(abs, stored))}
 
 
@@ -48,7 +50,7 @@ def _slider_loss(result: Reference, y: np.ndarray, qd: np.ndarray) -> np.ndarray
 
 
 def _contact_loss(system: System, y: np.ndarray) -> np.ndarray:
-    """Power lost in the compliant contacts: what goes in and is not stored."""
+    """Power lost in the compliant contacts: what goes in and is not held by a compressed spring, pushing or not."""
     if not system.compliant:
         return np.zeros(y.shape[1])
     opening, speed = _openings(system, y)
@@ -68,8 +70,16 @@ def _stored(system: System, y: np.ndarray) -> float:
     bodies = rd + system.W.T @ qd
     energy = qd @ system.M @ qd + q @ system.K @ q + system.m @ bodies**2 + system.spring @ system.elongation(y) ** 2
     if system.compliant:
-        energy += system.stiffness @ np.minimum(system.opening(y), 0.0) ** 2
+        energy += system.stiffness @ np.minimum(system.opening(y), 0.0) ** 2 - 2 * _forsaken(system, y)
     return float(energy / 2 - system.m @ (system.weight * (r + system.W.T @ q)))
+
+
+def _forsaken(system: System, y: np.ndarray) -> float:
+    """Energy of the walls that spring back without pushing."""
+    if not system.compliant:
+        return 0.0
+    loose = (system.opening(y) < 0) & (system.press(y) < 0)
+    return float(system.stiffness @ (loose * system.opening(y) ** 2)) / 2
 
 
 def _impact_loss(system: System, event: Event) -> float:
