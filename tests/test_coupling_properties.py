@@ -151,7 +151,7 @@ def check_newton(scene, found):
         restitution, mass = restitutions(scene, event)
         assert event.impulse >= 0.0
         assert before * after <= 0.0
-        if abs(before) < 1e-6 * fastest or near:
+        if abs(before) < 1e-4 * fastest or near:
             continue
         assert abs(after) >= restitution * abs(before) * (1 - 1e-12)
         if scene.structure.model == "rigid" and event.side != "body":
