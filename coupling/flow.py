@@ -127,7 +127,7 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     if rows.proportional and lift.shape[1] == n and not len(sprung) and not np.any(cluster < 0):
         eigenvalue, shape, project = _proportional_modes(rows)
     else:
-        eigenvalue, shape, project = _complex_modes(mass, damping, stiffness)
+        eigenvalue, shape, project = _complex_modes(mass, damping, stiffness, polished=len(sprung) > 0)
     eigenvalue, shape, project = _one_of_each_pair(eigenvalue, shape, project)
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
     m = len(eigenvalue) + 1
@@ -332,12 +332,12 @@ def _sprung_bodies(rows: Rows, cluster: np.ndarray, sprung: np.ndarray) -> _Spru
 
 
 def _complex_modes(
-    mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray
+    mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, polished: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Eigenvalues (2k,) of the free motion, vectors of (eta, eta') (2k, 2k) and their inverse.
 
-    The eigenvalues of the linearised problem are polished on the quadratic one: beside a stiff contact the slow modes
-    have lost the digits that the energies of many impacts need.
+    polished: correct the eigenvalues of the linearised problem on the quadratic one. Beside a stiff contact the slow
+    modes have lost the digits that the energies of many impacts need; elsewhere it is not worth its time.
     """
     k = len(mass)
     if k == 0:
@@ -349,10 +349,12 @@ def _complex_modes(
     scaled = vectors * np.repeat([np.abs(values).max(), 1.0], k)[:, None]
     if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=0)) > 1e9:
         raise InputError(CRITICAL)
-    polished = [
+    if not polished:
+        return values, vectors, np.linalg.inv(vectors)
+    pairs = [
         _polish(value, shape, mass, damping, stiffness) for value, shape in zip(values, vectors[:k].T, strict=True)
     ]
-    values, shapes = (np.array(part).T for part in zip(*polished, strict=True))
+    values, shapes = (np.array(part).T for part in zip(*pairs, strict=True))
     vectors = np.vstack([shapes, shapes * values])
     # symmetric matrices: shapes are left vectors, too, up to combinations of those with the same eigenvalue
     left = np.hstack([(values[:, None] * shapes.T) @ mass + shapes.T @ damping, shapes.T @ mass])
