@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 
-from coupling.compiled import inlined, kernel
+from coupling.compiled import entry, inlined, kernel
 from coupling.contact import add_force, constant_loads, keep_released, settle, stop_riders
 from coupling.events import POSITION, VELOCITY, exp_minus_line, exp_minus_one
 from coupling.gaps import SIMULTANEOUS, close, join, join_speeds, measure_gaps, only, rigid, shift_slip
-from coupling.impacts import all_move, collide
+from coupling.impacts import all_move, bounce, collide
 from coupling.ledger import account
 from coupling.springs import begin_push, change_push, spring_energy, spring_force
 from coupling.state import (
@@ -36,7 +36,7 @@ from coupling.state import (
     STORED,
     TOUCHING,
 )
-from coupling.watch import longest_hop, next_event
+from coupling.watch import carry, longest_hop, next_event
 
 # what advance() returns
 DONE, NEEDS_FLOW, LOG_FULL, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED = range(6)
@@ -47,7 +47,7 @@ _EQUAL = 1e-14
 _ASLEEP = 1e-14
 
 
-@kernel
+@entry
 def advance(rows, flows, st, ch, rec, work, periods, max_events):
     """Run until all periods are done or something is needed. Returns one of the codes above."""
     while True:
@@ -61,6 +61,8 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
                 if not settle(rows, st, rec, work):
                     return UNDECIDED
                 continue
+            if st.counters[EVENTS] == 0 and st.counters[PERIOD] == 0:
+                record_section(rows, flows, st, rec, work)
         if st.counters[PERIOD] >= periods:
             return DONE
         if st.counters[EVENTS] >= max_events:
@@ -72,6 +74,7 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
         account(rows, flows, st, rec, work, tau)
         _move(rows, flows, st, work, tau)
         if who < 0:
+            carry(st, ch, tau)
             st.counters[PERIOD] += 1
             st.time[0] = 0.0
             for r in range(len(st.last_impact)):
@@ -89,7 +92,7 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
             return ACCURACY_LOST
 
 
-@kernel
+@entry
 def begin(rows, st, rec, work):
     """Decide the contact states of the initial state. Returns False if that fails."""
     n, hit = len(st.constant), False
@@ -124,7 +127,7 @@ def _touch(rows, st, work, r):
         close(rows, st, work)
 
 
-@kernel
+@inlined
 def record_section(rows, flows, st, rec, work):
     """Section and ledger at the start of a period."""
     n, b = len(st.constant), len(rows.mass)
@@ -170,7 +173,7 @@ def _phase(rows, st):
     st.amplitude[0] = complex(math.cos(angle), math.sin(angle))
 
 
-@kernel
+@inlined
 def _coordinates(flows, st, y):
     """(p, p') at the segment's start."""
     s, n = st.counters[FLOW], len(st.constant)
@@ -294,25 +297,21 @@ def _wake(flows, st):
     """Put modes to sleep whose acceleration is negligible beside the largest."""
     s, largest, fastest = st.counters[FLOW], 0.0, 0.0
     for j in range(flows.modes[s]):
-        size = _acceleration(flows, st, s, j)
-        largest = max(largest, size)
-        fastest = max(fastest, size / abs(flows.eigenvalue[s, j]))
+        c = st.amplitude[j]
+        size = abs(c.real) + abs(c.imag)
+        largest = max(largest, size * flows.acceleration[s, j])
+        fastest = max(fastest, size * flows.speed[s, j])
     st.fastest[0] = fastest
     st.awake[0] = 0
     count = 1
     for j in range(1, flows.modes[s]):
-        if _acceleration(flows, st, s, j) > _ASLEEP * largest:
+        c = st.amplitude[j]
+        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > _ASLEEP * largest:
             st.awake[count] = j
             count += 1
         else:
             st.amplitude[j] = 0.0
     st.counters[AWAKE] = count
-
-
-@inlined
-def _acceleration(flows, st, s, j):
-    rate, c = flows.eigenvalue[s, j], st.amplitude[j]
-    return (abs(c.real) + abs(c.imag)) * flows.size[s, j] * (rate.real * rate.real + rate.imag * rate.imag)
 
 
 @inlined
@@ -397,6 +396,9 @@ def _within_walls(rows, st):
 def _happen(rows, flows, st, rec, work, r, order, side):
     """The event of row r: jump of velocities, new states. Returns False if it cannot be decided."""
     n = len(st.constant)
+    if order == POSITION and side == CLOSES and bounce(rows, st, rec, work, r):
+        _kick(flows, st, work)
+        return True
     keep_released(st, work)
     if order == POSITION and side != RECLOSES:
         # a gap that closes while it still widens, to round-off, is a touch without speed

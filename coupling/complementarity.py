@@ -14,14 +14,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from coupling.compiled import kernel
+from coupling.compiled import entry, kernel
 
-OUT, FREE, AT_LOW, AT_HIGH, DEPENDENT = 0, 1, 2, 3, 4
+OUT, FREE, AT_LOW, AT_HIGH, DEPENDENT = np.arange(5)
+NONE = np.int64(-1)
 _ROUND_OFF = 1e-12
 _DEPENDENCE = 1e-9
 
 
-@kernel
+@entry
 def solve_box(problem, k, scale):
     """Solve the first k rows in place: forces, accelerations, and states FREE, AT_LOW, AT_HIGH or DEPENDENT.
 
@@ -125,7 +126,7 @@ def _respond(problem, k, i, way):
     for j in range(k):
         df[j] = 0.0
     df[i] = way
-    count = _free_rows(problem, k, i, -1)
+    count = _free_rows(problem, k, i, NONE)
     _solve(problem, count, i)
     for p in range(count):
         df[problem.free[p]] = -way * problem.solution[p]
@@ -141,7 +142,7 @@ def _respond(problem, k, i, way):
 
 @kernel
 def _free_rows(problem, k, but, also):
-    """List the FREE rows except `but`, and the row `also` (-1: none). Returns how many."""
+    """List the FREE rows except `but`, and the row `also` (NONE: none). Returns how many."""
     count = 0
     for j in range(k):
         if j != but and (problem.state[j] == FREE or j == also):
@@ -153,13 +154,13 @@ def _free_rows(problem, k, but, also):
 @kernel
 def _dependent(problem, k, i):
     """Whether the FREE rows determine the acceleration of row i."""
-    return _rest(problem, _free_rows(problem, k, i, -1), i) <= _DEPENDENCE * problem.matrix[i, i]
+    return _rest(problem, _free_rows(problem, k, i, NONE), i) <= _DEPENDENCE * problem.matrix[i, i]
 
 
 @kernel
 def _dependent_beside(problem, k, j, i):
     """Whether the FREE rows together with row i determine the acceleration of row j."""
-    also = -1 if _dependent(problem, k, i) else i
+    also = NONE if _dependent(problem, k, i) else i
     return _rest(problem, _free_rows(problem, k, j, also), j) <= _DEPENDENCE * problem.matrix[j, j]
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coupling.compiled import kernel
+from coupling.compiled import ZERO, kernel
 from coupling.complementarity import AT_HIGH, AT_LOW, DEPENDENT, FREE, solve_box
 from coupling.gaps import join_speeds, measure_gaps, rigid, slowest
 from coupling.log import log_changes
@@ -39,7 +39,7 @@ def settle(rows, st, rec, work):
 
     work.forced marks rows whose force has just reached a bound. Returns False if the problem cannot be solved.
     """
-    friction, k = rows.friction_rows, 0
+    friction, k = rows.friction_rows, ZERO
     _halt(rows, st, work)
     for r in range(friction, len(st.state)):
         if rigid(rows, r):
@@ -158,7 +158,7 @@ def _undecided(rows, work, k, tolerance):
 
     work.side: bound at which a row's force is, 0 if between its bounds.
     """
-    problem, count, undecided = work.problem, 0, False
+    problem, count, undecided = work.problem, ZERO, False
     for p in range(k):
         work.side[p] = problem.forced[p]
         rests = problem.state[p] == FREE or problem.state[p] == DEPENDENT

@@ -94,10 +94,7 @@ class _Run:
         """Decide the initial state and record it. Returns the automaton's code."""
         if not auto.begin(self.rows, self.state, self.records, self.scratch):
             return auto.UNDECIDED
-        code = self.advance(0, max_events)
-        if code == auto.DONE:
-            auto.record_section(self.rows, self.flows, self.state, self.records, self.scratch)
-        return code
+        return self.advance(0, max_events)
 
     def advance(self, periods: int, max_events: int) -> int:
         """Advance to the end of `periods`. Returns the automaton's code."""

@@ -12,10 +12,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from coupling.compiled import inlined, kernel
 
 # how often the exponentials of a function are differentiated: what is left of exp(z) at t = 0
-POSITION, VELOCITY, FORCE = 2, 1, 0
+POSITION, VELOCITY, FORCE = np.array([2, 1, 0])
 
 #: degree of the lower polynomial; its last coefficient is that of the bound
 DEGREE = 10

@@ -47,7 +47,9 @@ class Flows(NamedTuple):
     body_acceleration: np.ndarray  # (s, b, b): of free bodies under constant loads
     body: np.ndarray  # (s, b, m): displacement of each body
     response: np.ndarray  # (s, m)
-    size: np.ndarray  # (s, m): largest displacement of a mode over all rows and the response
+    speed: np.ndarray  # (s, m): largest speed of a mode over all rows and the response
+    acceleration: np.ndarray  # (s, m): largest acceleration, likewise
+    turn: np.ndarray  # (s, m): change of its amplitude over an eighth of a period, as a factor
     # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a
     # segment is the form at its end minus the form at its start. Where the rate by which a product of two modes
     # changes vanishes beside the frequency the form would cancel: such pairs are left out of the forms, and listed.
@@ -77,7 +79,7 @@ def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
         np.full((capacity, 2), -1, np.int64), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
         z(m, 2 * b), np.zeros(capacity, np.bool_), np.zeros((capacity, b), np.bool_),
         z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
-        f(b, b), z(b, m), z(m), f(m), z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
+        f(b, b), z(b, m), z(m), f(m), f(m), z(m), z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
         np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 3), np.int64),
         z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
     )  # fmt: skip
@@ -234,7 +236,9 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
     flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 3)
     flows.slow_square[s, count : len(listed)] = 2 * response[slow_alone]
     flows.slow_count[s] = len(listed)
-    flows.size[s, :m] = np.abs(np.vstack([flows.motion[s, :, :m], flows.response[s, :m]])).max(axis=0)
+    size = np.abs(np.vstack([flows.motion[s, :, :m], flows.response[s, :m]])).max(axis=0)
+    flows.speed[s, :m], flows.acceleration[s, :m] = size * np.abs(rate), size * np.abs(rate) ** 2
+    flows.turn[s, :m] = np.exp(rate * rows.period / 8)
 
 
 def _reciprocal(rate: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:

@@ -9,13 +9,63 @@ import numpy as np
 
 from coupling.compiled import inlined, kernel
 from coupling.complementarity import AT_LOW, DEPENDENT, solve_box
-from coupling.gaps import close, join_speeds, measure_gaps, slowest
+from coupling.gaps import SIMULTANEOUS, close, join_speeds, measure_gaps, rigid, slowest
 from coupling.log import log_event
 from coupling.state import COAST, IMPACT, IMPACT_LOSS, IMPACTS, OPEN, PERIOD, SPRUNG, STICK
 
 #: impacts of one contact that follow each other within this share of a period are the end of an inelastic collapse:
 #: bodies in a row can meet infinitely often in finite time (McNamara and Young 1992)
 COLLAPSE = 1e-13
+
+
+@inlined
+def bounce(rows, st, rec, work, r):
+    """The ordinary impact: row r alone, of free flights that go on in their directions, not the last of a chatter.
+
+    Returns False, with nothing changed, if it is not that: then `collide` decides.
+    """
+    friction, speed = rows.friction_rows, st.velocity[r]
+    restitution = rows.restitution[r - friction]
+    last = st.time[0] - st.last_impact[r] < COLLAPSE * rows.period
+    if not rigid(rows, r) or not rows.rides[r] or last or -speed * restitution <= st.settling[r]:
+        return False
+    if -speed <= slowest(rows, st):
+        return False
+    for i in range(friction, len(st.state)):
+        if st.state[i] != OPEN or (i != r and st.displacement[i] <= SIMULTANEOUS * rows.gap[i - friction]):
+            return False
+    impulse = -(1.0 + restitution) * speed / rows.delassus[r, r]
+    for i in range(friction):
+        turns = st.state[i] * (st.velocity[i] + rows.delassus[i, r] * impulse) <= 0.0
+        if st.state[i] >= STICK or (st.state[i] != COAST and turns):
+            return False
+    for i in range(len(st.state)):
+        work.impulse[i] = 0.0
+        if i < friction or not rows.rides[i]:
+            st.velocity[i] += rows.delassus[i, r] * impulse
+    # the contact obeys the law to the last bit
+    before, after, half = rows.before[r], rows.after[r], 0.5 * rows.gap[r - friction]
+    if before < 0:
+        st.displacement[after], st.low[after], st.velocity[after] = -half, 0.0, -restitution * speed
+    elif after < 0:
+        st.displacement[before], st.low[before], st.velocity[before] = half, 0.0, restitution * speed
+    else:
+        st.displacement[after], st.low[after] = st.displacement[before], st.low[before]
+        st.velocity[after] = st.velocity[before] - restitution * speed
+    measure_gaps(rows, st)
+    work.impulse[r] = impulse
+    st.ledger[IMPACT_LOSS] -= 0.5 * (1.0 - restitution) * impulse * speed
+    _count(rows, st, rec, r, speed, -restitution * speed, impulse)
+    return True
+
+
+@inlined
+def _count(rows, st, rec, r, before, after, impulse):
+    """Count and log an impact."""
+    st.last_impact[r] = st.time[0]
+    st.counters[IMPACTS] += 1
+    rec.impacts[st.counters[PERIOD]] += 1
+    log_event(rows.period, st.counters, st.time, rec.log, IMPACT, r, before, after, impulse)
 
 
 @kernel
@@ -57,10 +107,7 @@ def collide(rows, st, rec, work):
             after = -problem.restitution[p] * before
         st.ledger[IMPACT_LOSS] -= 0.5 * impulse * (work.jerk[p] + after)
         if before < 0.0:
-            st.last_impact[r] = st.time[0]
-            st.counters[IMPACTS] += 1
-            rec.impacts[st.counters[PERIOD]] += 1
-            log_event(rows, st, rec, IMPACT, r, before, after, impulse)
+            _count(rows, st, rec, r, before, after, impulse)
     return True
 
 

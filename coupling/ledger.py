@@ -26,7 +26,7 @@ def account(rows, flows, st, rec, work, tau):
     _with_excitation(rows, flows, st, rec, work, s, period, tau, constant)
     for i in range(flows.slow_count[s]):
         _slow_pair(flows, st, rec, s, period, i, tau, constant)
-    rec.peak[period] = _peak(flows, st, work, s, tau, constant, rec.peak[period])
+    rec.peak[period] = _peak(rows, flows, st, work, s, tau, constant, rec.peak[period])
     if rec.samples.shape[0] > 0:
         _sample(rows, flows, st, rec, s, tau, constant)
 
@@ -191,21 +191,7 @@ def _slow_integral(rate, tau):
 
 
 @inlined
-def _response_at(rates, waves, t, constant):
-    """Response, its slope and curvature at t from its modes' rates and values at zero."""
-    x, v, w = constant, 0.0, 0.0
-    for a in range(len(rates)):
-        rate, wave = rates[a], waves[a]
-        part = wave + wave * exp_minus_one(rate * t)
-        x += part.real
-        part *= rate
-        v += part.real
-        w += rate.real * part.real - rate.imag * part.imag
-    return x, v, w
-
-
-@inlined
-def _peak(flows, st, work, s, tau, constant, peak):
+def _peak(rows, flows, st, work, s, tau, constant, peak):
     """Largest |response| on [0, tau] and before.
 
     Between points of a grid the response differs from its cubic Hermite interpolant by at most (bound of the fourth
@@ -234,18 +220,21 @@ def _peak(flows, st, work, s, tau, constant, peak):
     peak = max(peak, abs(x0), abs(x1))
     if not _may_exceed(peak, x0, v0, x1, v1, tau, fourth):
         return peak
-    pieces = 1
-    if fourth * tau * tau * tau * tau > 0.384 * size:
+    h = 0.125 * rows.period
+    if fourth * min(h, tau) ** 4 <= 0.384 * size:
+        pieces = math.ceil(tau / h)
+        for a in range(count):
+            work.turn[a] = flows.turn[s, st.awake[a]]
+    else:
         pieces = min(math.ceil(tau * math.sqrt(math.sqrt(fourth / (0.384 * size)))), 4096)
-    h = tau / pieces
-    if pieces > 1:
+        h = tau / pieces
         for a in range(count):
             work.turn[a] = exp_minus_one(work.rate[a] * h) + 1.0
     end, end_slope = x1, v1
     for i in range(pieces):
         x1, v1 = constant, 0.0
         if i == pieces - 1:
-            x1, v1 = end, end_slope
+            x1, v1, h = end, end_slope, tau - i * h
         else:
             for a in range(count):
                 wave, rate = work.wave[a] * work.turn[a], work.rate[a]
@@ -288,18 +277,36 @@ def _extremum(rates, waves, constant, x0, v0, x1, v1, h):
         t = h * v0 / (v0 - v1)
     x = x0
     for _ in range(8):
-        x, v, w = _response_at(rates, waves, t, constant)
+        # derivatives at t by the recurrence of the modes' characteristic polynomials
+        x, v, w, third, fourth, fifth, sixth = constant, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for a in range(len(rates)):
+            rate, wave = rates[a], waves[a]
+            part = wave + wave * exp_minus_one(rate * t)
+            twice, square = 2.0 * rate.real, rate.real * rate.real + rate.imag * rate.imag
+            d0, d1 = part.real, rate.real * part.real - rate.imag * part.imag
+            d2 = twice * d1 - square * d0
+            d3 = twice * d2 - square * d1
+            d4 = twice * d3 - square * d2
+            x, v, w, third, fourth = x + d0, v + d1, w + d2, third + d3, fourth + d4
+            fifth += twice * d4 - square * d3
+            sixth += (abs(part.real) + abs(part.imag)) * square * square * square
         if v * v0 > 0.0:
             lo = t
         else:
             hi = t
-        better = t - v / w if w != 0.0 else lo
-        if not lo <= better <= hi:
-            better = 0.5 * (lo + hi)
-        elif abs(better - t) < 1e-5 * h:
-            # x has no slope here: what the last step adds is known to twice its digits
-            return abs(x + 0.5 * v * (better - t))
-        t = better
+        step = -v / w if w != 0.0 else math.inf
+        for _ in range(3):
+            slope = v + step * (w + step * (third / 2 + step * (fourth / 6 + step * fifth / 24)))
+            step -= slope / (w + step * (third + step * (fourth / 2 + step * fifth / 6)))
+        if lo <= t + step <= hi:
+            top = x + step * (v + step * (w / 2 + step * (third / 6 + step * (fourth / 24 + step * fifth / 120))))
+            square = step * step
+            # x has no slope there: a step that is wrong by its square root leaves its digits
+            if sixth * square * square * square < 1e-13 * abs(top):
+                return abs(top)
+            t += step
+        else:
+            t = 0.5 * (lo + hi)
     return abs(x)
 
 

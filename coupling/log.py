@@ -7,11 +7,11 @@ from coupling.state import DETACHES, LOGGED, OPEN, PERIOD, RESTS, SLIPS, SPRUNG,
 
 
 @kernel
-def log_event(rows, st, rec, kind, r, before, after, impulse):
+def log_event(period, counters, time, log, kind, r, before, after, impulse):
     """One entry: kind and row, relative velocities (m/s), impulse (N s)."""
-    entry = rec.log[st.counters[LOGGED]]
-    st.counters[LOGGED] += 1
-    entry[0] = st.counters[PERIOD] * rows.period + st.time[0]
+    entry = log[counters[LOGGED]]
+    counters[LOGGED] += 1
+    entry[0] = counters[PERIOD] * period + time[0]
     entry[1], entry[2], entry[3], entry[4], entry[5] = kind, r, before, after, impulse
 
 
@@ -22,15 +22,15 @@ def log_changes(rows, st, rec, work):
         was, now = work.before[r], st.state[r]
         if r < rows.friction_rows:
             if now >= STICK > was and not _at_wall(rows, st.state, r):
-                log_event(rows, st, rec, STICKS, r, 0.0, 0.0, 0.0)
+                log_event(rows.period, st.counters, st.time, rec.log, STICKS, r, 0.0, 0.0, 0.0)
             elif was >= STICK > now and not _at_wall(rows, work.before, r):
-                log_event(rows, st, rec, SLIPS, r, 0.0, st.velocity[r], 0.0)
+                log_event(rows.period, st.counters, st.time, rec.log, SLIPS, r, 0.0, st.velocity[r], 0.0)
         elif now == SPRUNG or was == SPRUNG:
             continue  # logged where a spring begins and ends to push
         elif now != OPEN and was == OPEN:
-            log_event(rows, st, rec, RESTS, r, 0.0, 0.0, 0.0)
+            log_event(rows.period, st.counters, st.time, rec.log, RESTS, r, 0.0, 0.0, 0.0)
         elif now == OPEN and was != OPEN:
-            log_event(rows, st, rec, DETACHES, r, 0.0, st.velocity[r], 0.0)
+            log_event(rows.period, st.counters, st.time, rec.log, DETACHES, r, 0.0, st.velocity[r], 0.0)
 
 
 @kernel

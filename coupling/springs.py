@@ -65,7 +65,7 @@ def begin_push(rows, st, rec, r):
     if st.velocity[r] < 0.0:
         st.counters[IMPACTS] += 1
         rec.impacts[st.counters[PERIOD]] += 1
-        log_event(rows, st, rec, IMPACT, r, st.velocity[r], 0.0, 0.0)
+        log_event(rows.period, st.counters, st.time, rec.log, IMPACT, r, st.velocity[r], 0.0, 0.0)
 
 
 @kernel
@@ -81,7 +81,7 @@ def change_push(rows, st, rec, work, r, what):
         st.ledger[CONTACT] += spring_energy(rows, st, r)
         st.state[r] = LEAVING if st.displacement[r] < 0.0 and st.velocity[r] > 0.0 else OPEN
         work.forced[r] = AT_LOW  # not to be closed again by round-off
-        log_event(rows, st, rec, DETACHES, r, 0.0, st.velocity[r], st.push[r])
+        log_event(rows.period, st.counters, st.time, rec.log, DETACHES, r, 0.0, st.velocity[r], st.push[r])
 
 
 @kernel

@@ -12,28 +12,33 @@ import numpy as np
 from coupling.events import DEGREE
 from coupling.rows import Rows
 
+# Names that functions are called with are numbers of numpy: numba would compile once for every literal (coupling.compiled).
+
 # state of a friction row; a row that slips is known by its direction, one without friction coasts; HELD: at rest, but
 # another row carries its force
-SLIP_LEFT, COAST, SLIP_RIGHT, STICK, HELD = -1, 0, 1, 2, 3
+SLIP_LEFT, COAST, SLIP_RIGHT, STICK, HELD = np.arange(-1, 4)
 # state of a contact row; TOUCHING: closed, but another row carries its force; LEAVING: a compliant contact that has
 # ended at zero force, before its gap is open again
-OPEN, CLOSED, TOUCHING, LEAVING = 0, 1, 2, 5
+OPEN, CLOSED, TOUCHING, LEAVING = np.array([0, 1, 2, 5])
 # state of a row, friction or contact, whose spring is closed
-SPRUNG = 4
+SPRUNG = np.int64(4)
 
 # what an event function of a contact stands for, besides the bounds of a force: the gap closes, a gap that was left
 # under compression opens, or closes again because its spring would push
-CLOSES, OPENS, RECLOSES = 10, 11, 12
+CLOSES, OPENS, RECLOSES = np.arange(10, 13)
 
 # a pair of modes whose product hardly changes over a period: what vanishes is the sum of their eigenvalues, the same
 # with one conjugate, or one alone
 SUM, DIFFERENCE, ALONE = range(3)
 
-COUNTERS = ("period", "flow", "searching", "logged", "events", "impacts", "evaluations", "segments", "awake")
-PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE = range(len(COUNTERS))
+# what is known of an event function: a bound of its second derivative; expansions; `safe` is its first root
+BOUNDED, EXPANDED, ROOT = range(3)
+
+COUNTERS = ("period", "flow", "searching", "logged", "events", "impacts", "evaluations", "segments", "awake", "carried")
+PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE, CARRIED = range(len(COUNTERS))
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")
-IMPACT, STICKS, SLIPS, DETACHES, RESTS = range(len(KINDS))
+IMPACT, STICKS, SLIPS, DETACHES, RESTS = np.arange(len(KINDS))
 
 #: entries of the energy ledger, J
 ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
@@ -74,7 +79,7 @@ class Channels(NamedTuple):
     row: np.ndarray
     order: np.ndarray
     side: np.ndarray
-    found: np.ndarray  # whether `safe` is its first root
+    known: np.ndarray  # how: BOUNDED, EXPANDED or ROOT
     k0: np.ndarray
     k1: np.ndarray
     k2: np.ndarray

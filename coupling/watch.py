@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 
-from coupling.compiled import inlined, kernel
+from coupling.compiled import ZERO, inlined, kernel
 from coupling.complementarity import AT_HIGH, AT_LOW
-from coupling.events import FORCE, POSITION, VELOCITY, expand, safe_step
+from coupling.events import FORCE, POSITION, VELOCITY, expand, first_root_of_parabola, safe_step
 from coupling.state import (
     AWAKE,
+    BOUNDED,
+    CARRIED,
     CLOSED,
     CLOSES,
     EVALUATIONS,
+    EXPANDED,
     FLOW,
     LEAVING,
     OPEN,
     OPENS,
     RECLOSES,
+    ROOT,
     SEGMENTS,
     SLIP_LEFT,
     SLIP_RIGHT,
@@ -34,38 +38,45 @@ CHATTER = 3e-7
 
 @inlined
 def next_event(rows, flows, st, ch):
-    """Time to the next event and its channel, or to the period's end and -1."""
+    """Time to the next event and its channel, or to the period's end and -1.
+
+    What is known beyond the period's end stays known in the next segment (`carry`).
+    """
     s = st.counters[FLOW]
     left = max(rows.period - st.time[0], 0.0)
     shortest = RESOLUTION * rows.period
     eigenvalue, awake = flows.eigenvalue[s], st.awake[: st.counters[AWAKE]]
     count = _watch(rows, flows, st, ch, s)
     st.counters[SEGMENTS] += 1
-    begun = 0
     while True:
         k, tau = -1, left
-        if begun < count:
-            k, tau = begun, 0.0
-            begun += 1
-            if ch.safe[k] > 0.0:
-                continue
+        for i in range(count):
+            if ch.safe[i] < tau:
+                k, tau = i, ch.safe[i]
+        if k < 0:
+            st.counters[CARRIED] = count
+            return left, -1
+        if ch.known[k] == ROOT:
+            st.counters[CARRIED] = 0
+            # what a double cannot tell from the segment's start happens at its start
+            return (tau if tau > shortest else 0.0), k
+        if ch.known[k] == BOUNDED:
+            tau = 0.0  # where exponentials cost nothing
         else:
-            for i in range(count):
-                if ch.safe[i] < tau:
-                    k, tau = i, ch.safe[i]
-            if k < 0:
-                return left, -1
-            if ch.found[k]:
-                # what a double cannot tell from the segment's start happens at its start
-                return (tau if tau > shortest else 0.0), k
             st.counters[EVALUATIONS] += 1
         noise, second, calm = expand(
             ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau, ch.lower
         )
-        if tau == 0.0 and (ch.side[k] == CLOSES or ch.side[k] == OPENS):
-            st.settling[ch.row[k]] = max(0.0, -2.0 * ch.lower[0, 2]) * 0.5 * CHATTER * rows.period
-        step, ch.found[k] = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, left - tau, shortest)
-        ch.safe[k] = tau + step
+        step, found = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, rows.period, shortest)
+        ch.known[k] = ROOT if found else EXPANDED
+        ch.safe[k] = tau + step if found else max(ch.safe[k], tau + step)
+
+
+@inlined
+def carry(st, ch, tau):
+    """Take what is known of the event functions over the end of a period, tau from the segment's start."""
+    for k in range(st.counters[CARRIED]):
+        ch.safe[k] = max(ch.safe[k] - tau, 0.0)
 
 
 @inlined
@@ -97,7 +108,7 @@ def advance_or_stop(lower, noise, second, calm, longest, shortest):
 @inlined
 def _watch(rows, flows, st, ch, s):
     """Set up the event functions of the segment. Returns how many."""
-    count = 0
+    count = ZERO
     for r in range(rows.friction_rows):
         state = st.state[r]
         if state == STICK or state == SPRUNG:
@@ -130,37 +141,57 @@ def _surely_opens(rows, st, r):
 @inlined
 def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
     """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign, for its first root."""
-    ch.row[k], ch.order[k], ch.side[k], ch.noise[k], ch.found[k], ch.safe[k] = r, order, what, 0.0, 0, 0.0
     if order == POSITION:
-        ch.k0[k], ch.k1[k], ch.k2[k] = sign * st.displacement[r], sign * st.velocity[r], sign * st.drift[r]
+        value, slope, ch.k2[k] = sign * st.displacement[r], sign * st.velocity[r], sign * st.drift[r]
+        ch.k0[k], ch.k1[k] = value, slope
     else:
-        ch.k0[k], ch.k1[k], ch.k2[k] = sign * st.velocity[r], sign * st.drift[r], 0.0
+        value, slope, ch.k2[k] = sign * st.velocity[r], sign * st.drift[r], 0.0
+        ch.k0[k], ch.k1[k] = value, slope
+    bound, curvature = 0.0, ch.k2[k]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
-        g = sign * flows.motion[s, r, j] * st.amplitude[j]
-        ch.g[k, j] = g if order == POSITION else g * flows.eigenvalue[s, j]
+        rate, g = flows.eigenvalue[s, j], flows.motion[s, r, j] * st.amplitude[j]
+        once = rate * g
+        if order == POSITION:
+            ch.g[k, j] = sign * g
+            curvature += sign * (rate.real * once.real - rate.imag * once.imag)
+        else:
+            ch.g[k, j] = sign * once
+            slope += sign * once.real
+        bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
+    _know(st, ch, r, order, what, value, slope, bound - ch.k2[k], k)
+    if what == CLOSES or what == OPENS:
+        st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
     if st.released[r] != 0:
         _leave(rows, flows, st, ch, s, r, order, sign, k)
     return k + 1
 
 
+@inlined
+def _know(st, ch, r, order, what, value, slope, bound, k):
+    """Begin event function k: its second derivative nowhere lies below -bound. What was carried over stays known."""
+    carried = k < st.counters[CARRIED]
+    if carried and ch.row[k] == r and ch.order[k] == order and ch.side[k] == what:
+        return
+    ch.row[k], ch.order[k], ch.side[k], ch.noise[k], ch.known[k], ch.safe[k] = r, order, what, 0.0, BOUNDED, 0.0
+    if value > 0.0 or (value == 0.0 and slope > 0.0):
+        ch.safe[k] = first_root_of_parabola(value, slope, -bound)
+
+
 @kernel
 def _leave(rows, flows, st, ch, s, r, order, sign, k):
     """First safe step of a row whose force was at its bound: from rest, no acceleration, and its jerk decides."""
-    curvature, jerk, snap = sign * st.drift[r], 0.0, 0.0
+    jerk, snap = 0.0, 0.0
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
         rate, g = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * st.amplitude[j]
         square = rate.real * rate.real + rate.imag * rate.imag
         second = g * rate * rate
-        curvature += second.real
         jerk += (second * rate).real
         snap += (abs(second.real) + abs(second.imag)) * square
     quick = (2.0 if order == POSITION else 1.5) * jerk / snap
     shortest = 1e3 * RESOLUTION * rows.period
-    ch.safe[k] = max(quick if quick == quick else rows.period, shortest)
-    if order == POSITION:
-        st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
+    ch.safe[k], ch.known[k] = max(quick if quick == quick else rows.period, shortest), EXPANDED
 
 
 @kernel
@@ -178,7 +209,7 @@ def longest_hop(rows, flows, st, r):
 def _watch_spring(rows, flows, st, ch, s, r, k):
     """Watch a compliant contact that has ended for the spring's wish to push again: spring gap + dashpot rate > 0."""
     spring, dashpot = rows.spring[r], rows.dashpot[r]
-    ch.row[k], ch.order[k], ch.side[k], ch.found[k], ch.safe[k] = r, POSITION, RECLOSES, 0, 0.0
+    ch.row[k], ch.order[k], ch.side[k], ch.known[k], ch.safe[k] = r, POSITION, RECLOSES, BOUNDED, 0.0
     acceleration = st.drift[r]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
@@ -198,16 +229,20 @@ def _watch_spring(rows, flows, st, ch, s, r, k):
 def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
     """Watch the force of a closed row for reaching its low (AT_LOW) or high (AT_HIGH) bound."""
     sign = 1.0 if side == AT_LOW else -1.0
-    constant, swing = sign * st.level[r] + limit, 0.0
+    constant, swing, value, slope, bound = sign * st.level[r] + limit, 0.0, 0.0, 0.0, 0.0
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
-        g = sign * flows.force[s, r, j] * st.amplitude[j]
+        rate, g = flows.eigenvalue[s, j], sign * flows.force[s, r, j] * st.amplitude[j]
         ch.g[k, j] = g
-        swing += math.sqrt(g.real * g.real + g.imag * g.imag)
+        size = math.sqrt(g.real * g.real + g.imag * g.imag)
+        swing += size
+        value += g.real
+        slope += rate.real * g.real - rate.imag * g.imag
+        bound += size * (rate.real * rate.real + rate.imag * rate.imag)
     if constant > swing:
         return k  # the force never comes near its bound: nothing to watch
-    ch.row[k], ch.order[k], ch.side[k], ch.noise[k], ch.found[k], ch.safe[k] = r, FORCE, side, 0.0, 0, 0.0
     ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
+    _know(st, ch, r, FORCE, side, constant + value, slope, bound, k)
     if st.released[r] == -side:
         curvature, third = 0.0, 0.0
         for a in range(st.counters[AWAKE]):
@@ -217,4 +252,5 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
             curvature += second.real
             third += (abs(second.real) + abs(second.imag)) * abs(rate)
         ch.safe[k] = max(2.9 * curvature / third, 1e3 * RESOLUTION * rows.period)
+        ch.known[k] = EXPANDED
     return k + 1
