@@ -77,6 +77,8 @@ def carry(st, ch, tau):
     """Take what is known of the event functions over the end of a period, tau from the segment's start."""
     for k in range(st.counters[CARRIED]):
         ch.safe[k] = max(ch.safe[k] - tau, 0.0)
+        if ch.known[k] == EXPANDED:
+            ch.known[k] = BOUNDED
 
 
 @inlined
@@ -150,14 +152,15 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
     bound, curvature = 0.0, ch.k2[k]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
-        rate, g = flows.eigenvalue[s, j], flows.motion[s, r, j] * st.amplitude[j]
+        rate, g = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * st.amplitude[j]
+        if order == VELOCITY:
+            g *= rate
         once = rate * g
-        if order == POSITION:
-            ch.g[k, j] = sign * g
-            curvature += sign * (rate.real * once.real - rate.imag * once.imag)
+        ch.g[k, j] = g
+        if order == VELOCITY:
+            slope += once.real
         else:
-            ch.g[k, j] = sign * once
-            slope += sign * once.real
+            curvature += rate.real * once.real - rate.imag * once.imag
         bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
     _know(st, ch, r, order, what, value, slope, bound - ch.k2[k], k)
     if what == CLOSES or what == OPENS:
