@@ -1,6 +1,6 @@
 """The one decorator of compiled functions.
 
-Cached on disk between processes; divisions by zero give inf as in C; no reference counting, which would cost more than
+Cached on disk between processes; divisions by zero give inf as in C; a product and a sum may be one instruction; no reference counting, which would cost more than
 the arithmetic: a compiled function allocates nothing and works in the arrays that it is given (coupling.state.Scratch).
 """
 
@@ -41,7 +41,7 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def _compile(function: Callable[..., Any], **options: bool) -> Any:
-    compiled = njit(cache=True, error_model="numpy", _nrt=False, **options)(function)  # type: ignore[call-overload]
+    compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)  # type: ignore[call-overload]
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
         return compiled
     # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls
