@@ -347,7 +347,8 @@ def _move(rows, flows, st, work, tau):
             shift_slip(st, r, shift)
     if flows.sprung[s]:
         _push(rows, flows, st, work, tau)
-    _stay_together(rows, st, work)
+    if st.key[0] != 0 or st.key[1] != 0:
+        _stay_together(rows, st, work)
     measure_gaps(rows, st)
     for a in range(count):
         st.amplitude[st.awake[a]] *= 1.0 + work.first[a]

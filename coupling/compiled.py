@@ -1,7 +1,8 @@
-"""The one decorator of compiled functions.
+"""The decorators of compiled functions.
 
-Cached on disk between processes; divisions by zero give inf as in C; a product and a sum may be one instruction; no reference counting, which would cost more than
-the arithmetic: a compiled function allocates nothing and works in the arrays that it is given (coupling.state.Scratch).
+Cached on disk between processes; divisions by zero give inf as in C; a product and a sum may be one instruction; no
+reference counting, which would cost more than the arithmetic: a compiled function allocates nothing and works in the
+arrays that it is given (coupling.state.Scratch).
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from numba import config, njit
 
 #: start of a counter: a literal 0 has a type of its own, for which numba would compile all that it is handed to again
 ZERO = np.int64(0)
+
+
+_MARKS = (b"@entry", b"@kernel", b"@inlined")
 
 
 def entry(function: Callable[..., Any]) -> Any:
@@ -55,6 +59,9 @@ def _sources() -> str:
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parent.glob("*.py")):
         text = file.read_bytes()
-        if any(mark in text for mark in (b"@entry", b"@kernel", b"@inlined")) or file.name in ("compiled.py", "state.py"):
+        if any(mark in text for mark in _MARKS) or file.name in (
+            "compiled.py",
+            "state.py",
+        ):
             digest.update(text)
     return digest.hexdigest()

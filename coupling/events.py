@@ -231,9 +231,10 @@ def safe_step(a, f, noise, second, longest):
     value, _ = _value_and_slope(a, h)
     if value + f - a[0] >= 0.0 and _stays_above(a, f, h):
         return h, False
+    # the best of the parabolas below it: over what is left of the reach, and up to behind its own minimum
     best, h = 0.0, reach
-    if a[1] < 0.0 < a[2]:
-        h = min(reach, -2.0 * a[1] / a[2])
+    if a[1] < 0.0 < a[2] and -2.0 * a[1] < a[2] * reach:
+        best = _step_by_parabola(a, f, -2.0 * a[1] / a[2])
     for _ in range(12):
         if h <= best:
             break

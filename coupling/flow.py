@@ -48,7 +48,7 @@ class Flows(NamedTuple):
     body: np.ndarray  # (s, b, m): displacement of each body
     response: np.ndarray  # (s, m)
     speed: np.ndarray  # (s, m): largest speed of a mode over all rows and the response
-    acceleration: np.ndarray  # (s, m): largest acceleration, likewise
+    acceleration: np.ndarray  # (s, m): largest acceleration of its terms, whether closed rows hold them or not
     turn: np.ndarray  # (s, m): change of its amplitude over an eighth of a period, as a factor
     # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a
     # segment is the form at its end minus the form at its start. Where the rate by which a product of two modes
@@ -155,6 +155,12 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
         flows.held[s] = kept - lift @ np.linalg.solve(stiffness, lift.T @ z_stiffness @ kept)
     flows.response[s, :m] = rows.response @ full[:n]
     flows.response[s, 0] += rows.table
+    rate = np.abs(flows.eigenvalue[s, :m])
+    size = np.abs(np.vstack([flows.motion[s, :, :m], flows.response[s, :m]])).max(axis=0)
+    # terms by their sizes: a mode may be where no row feels it as long as others are closed
+    held = np.vstack([np.abs(functional) @ np.abs(full[:n]), np.abs(rows.response) @ np.abs(full[:n])]).max(axis=0)
+    flows.speed[s, :m], flows.acceleration[s, :m] = size * rate, np.maximum(size, held) * rate**2
+    flows.turn[s, :m] = np.exp(flows.eigenvalue[s, :m] * rows.period / 8)
     _fill_forces(flows, rows, s, full[structure], rigid, sprung)
     _fill_energy(flows, rows, s, full[structure], body)
 
@@ -236,9 +242,6 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
     flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 3)
     flows.slow_square[s, count : len(listed)] = 2 * response[slow_alone]
     flows.slow_count[s] = len(listed)
-    size = np.abs(np.vstack([flows.motion[s, :, :m], flows.response[s, :m]])).max(axis=0)
-    flows.speed[s, :m], flows.acceleration[s, :m] = size * np.abs(rate), size * np.abs(rate) ** 2
-    flows.turn[s, :m] = np.exp(rate * rows.period / 8)
 
 
 def _reciprocal(rate: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:

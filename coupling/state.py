@@ -12,7 +12,7 @@ import numpy as np
 from coupling.events import DEGREE
 from coupling.rows import Rows
 
-# Names that functions are called with are numbers of numpy: numba would compile once for every literal (coupling.compiled).
+# names that functions are called with are numbers of numpy: numba would compile once for every literal
 
 # state of a friction row; a row that slips is known by its direction, one without friction coasts; HELD: at rest, but
 # another row carries its force

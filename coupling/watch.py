@@ -30,6 +30,8 @@ from coupling.state import (
 
 #: shortest step in periods: what a double can resolve within a period
 RESOLUTION = 1e-15
+#: a compliant contact ends when its spring is pulled by this share of the free travel
+ADHESION = 1e-13
 #: what is left of a chatter, in periods, when it is completed by a plastic impact; a body at rest does not leave for
 #: less. Relative displacement and speed are zero at its end either way: the motion of the structure is changed by no
 #: more than the order of (2 pi CHATTER)^3 of it
@@ -103,7 +105,8 @@ def advance_or_stop(lower, noise, second, calm, longest, shortest):
     if far > step:
         return far, False
     if step < shortest:
-        return (0.0, True) if a[1] < 0.0 else (shortest, False)
+        falls = a[1] < 0.0 and f <= 2.0 * shortest * (second * shortest - a[1])
+        return (0.0, True) if falls else (shortest, False)
     return step, found
 
 
@@ -244,6 +247,9 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
         bound += size * (rate.real * rate.real + rate.imag * rate.imag)
     if constant > swing:
         return k  # the force never comes near its bound: nothing to watch
+    if st.state[r] == SPRUNG and r >= rows.friction_rows:
+        # bodies that touch without force, as in a free flight side by side, are not parted by round-off
+        constant += ADHESION * rows.spring[r] * rows.gap[r - rows.friction_rows]
     ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
     _know(st, ch, r, FORCE, side, constant + value, slope, bound, k)
     if st.released[r] == -side:
