@@ -546,3 +546,21 @@ def test_ledger_of_a_motion_that_comes_to_nothing():
 def test_impacts_are_in_order():
     response = simulate(cluster(15e-6), events=True)
     assert all(one.time <= other.time for one, other in itertools.pairwise(response.event_list))
+
+
+@pytest.mark.xfail(strict=True, reason="a wall approached more slowly than a double resolves in a step counts as hit")
+@pytest.mark.parametrize("speed", [1e-18, 1e-25, 1e-190])
+def test_hair_of_an_approach(speed):
+    """A speed far below round-off towards a wall a fifth of the motion away changes nothing: no wall is hit at once."""
+
+    def free(velocity):
+        return scene(
+            structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.003},
+            initial={"velocity": -0.47},
+            excitation={"frequency": 0.164, "force": 0.14},
+            **row(0.5, {"position": -0.1, "velocity": velocity}),
+            time={"periods": 1, "transient": 0},
+        )
+
+    still, moving = simulate(free(0.0)), simulate(free(speed))
+    assert moving.slip[-1] == pytest.approx(still.slip[-1], abs=1e-9)
