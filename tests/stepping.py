@@ -24,7 +24,7 @@ SLIDES = (st.SLIP_LEFT, st.SLIP_RIGHT)
 class Moment:
     """A state between events, times t after its segment began (shapes (t,) and (t, ...); squeezed for one time).
 
-    gap: displacement of the rows (r,), a friction row's being the slip; speed: their velocities; force: of the rows (N);
+    gap: displacement of the rows (r,), a friction row's being the slip; speed: their velocities; force: of rows (N);
     p, p_rate: modal coordinates of the structure (n,); body: velocities of the bodies relative to the base (b,).
     """
 
@@ -100,17 +100,35 @@ class Segment:
         """(r,) accelerations at the beginning as the motion has them (rows that move)."""
         return self.drift + (self.motion @ (self.eigenvalue**2 * self.amplitude)).real
 
-    def dynamic(self, moment: Moment) -> tuple[np.ndarray, np.ndarray]:
-        """(r,) accelerations by Newton's second law under the forces of a moment, and the sizes of their terms."""
+    def dynamic(self, moment: Moment) -> np.ndarray:
+        """(r,) accelerations by Newton's second law under the forces of a moment."""
         rows = self.rows
-        loads = [
-            (rows.force * moment.phase).real, -rows.stiffness * moment.p, -rows.damping @ moment.p_rate,
-            *(rows.structure * moment.force[:, None]),
-        ]  # fmt: skip
-        on_bodies = [rows.weight, (rows.inertia * moment.phase).real, *(rows.bodies * moment.force[:, None])]
-        total = rows.structure @ sum(loads) + rows.bodies @ (sum(on_bodies) / rows.mass)
-        size = abs(rows.structure) @ sum(map(abs, loads)) + abs(rows.bodies) @ (sum(map(abs, on_bodies)) / rows.mass)
-        return total, size
+        on_structure = (rows.force * moment.phase).real + moment.force @ rows.structure
+        on_structure = on_structure - rows.stiffness * moment.p - rows.damping @ moment.p_rate
+        on_bodies = rows.weight + (rows.inertia * moment.phase).real + moment.force @ rows.bodies
+        return rows.structure @ on_structure + rows.bodies @ (on_bodies / rows.mass)
+
+    def speed_size(self) -> float:
+        """Amplitude of the fastest motion, m/s."""
+        rows, n = self.rows, len(self.constant)
+        modal = np.abs(self.shape[n:]) @ np.abs(self.amplitude)
+        moving = np.abs(self.velocity).max() + np.abs(self.motion * self.eigenvalue).max(axis=0, initial=0.0) @ np.abs(
+            self.amplitude
+        )
+        return float(max(moving, modal.max(initial=0.0), np.abs(rows.table) * rows.omega))
+
+    def force_size(self) -> np.ndarray:
+        """(r,) amplitudes of the terms that the force of each row is a sum of."""
+        return np.abs(self.held) + np.abs(self.level) + np.abs(self.force) @ np.abs(self.amplitude)
+
+    def dynamic_size(self) -> np.ndarray:
+        """(r,) amplitudes of the terms that the acceleration of each row is a sum of."""
+        rows, n, force = self.rows, len(self.constant), self.force_size()
+        y = np.abs(self.shape) @ np.abs(self.amplitude)
+        on_structure = np.abs(rows.force) + force @ np.abs(rows.structure) + np.abs(rows.damping) @ y[n:]
+        on_structure = on_structure + rows.stiffness * (np.abs(self.constant) + y[:n])
+        on_bodies = np.abs(rows.weight) + np.abs(rows.inertia) + force @ np.abs(rows.bodies)
+        return np.abs(rows.structure) @ on_structure + np.abs(rows.bodies) @ (on_bodies / rows.mass)
 
 
 @dataclass(frozen=True)
