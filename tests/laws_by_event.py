@@ -49,13 +49,15 @@ def check_events(scene: Scene) -> Worst:
     rows = stepper.run.rows
     fastest, last = 0.0, np.full(len(rows.delassus), -np.inf)
     if stepper.code == auto.DONE:
-        _check_state(worst, stepper.segment(), None)
+        first = stepper.segment()
+        _check_state(worst, first, first.at(0.0), None)
     for step in stepper.steps():
         end = _check_between(worst, step)
         fastest = max(fastest, step.before.speed_size())
-        hit = _check_event(worst, step, end, fastest, last)
+        now = step.after.at(0.0)
+        hit = _check_event(worst, step, end, now, fastest, last)
         last[hit] = step.after.begun
-        _check_state(worst, step.after, step)
+        _check_state(worst, step.after, now, step)
         worst.steps += 1
         worst.impacts += step.impacts
     assert stepper.code == auto.DONE, f"ended with code {stepper.code}"
@@ -69,13 +71,12 @@ def _contacts(rows) -> np.ndarray:
 def _check_between(worst: Worst, step: Step) -> Moment:
     """Walls and bounds of forces on the way to the next event. Returns the motion at its end."""
     segment, rows = step.before, step.before.rows
-    times = np.r_[step.span * np.linspace(0.0, 1.0, POINTS), step.span]
-    path = segment.at(times)
+    path = segment.at(step.span * np.linspace(0.0, 1.0, POINTS))
     solid = _contacts(rows) & np.isinf(rows.spring)
     depth = -path.gap[:, solid].min(axis=0, initial=0.0) / rows.gap[np.isinf(rows.spring[rows.friction_rows :])]
     worst.note("penetration", depth.max(initial=0.0), PENETRATION, step)
     _check_bounds(worst, segment, path, step)
-    return segment.at(step.span)
+    return path.take(-1)
 
 
 def _check_bounds(worst: Worst, segment: Segment, path: Moment, step: Step | None) -> None:
@@ -89,7 +90,7 @@ def _check_bounds(worst: Worst, segment: Segment, path: Moment, step: Step | Non
         worst.note("bound", excess.max(initial=0.0), BALANCE, step)
     slides = np.isin(segment.state[:k], SLIDES)
     against = (speed[:, :k] * -segment.state[:k])[:, slides]
-    worst.note("bound", against.max(initial=0.0) / segment.speed_size(), SPEED, step)
+    worst.note("bound", against.max(initial=0.0) / (segment.speed_size() + 1e-300), SPEED, step)
     assert np.array_equal(segment.held[:k][slides], -segment.state[:k][slides] * rows.limit[slides])
 
 
@@ -97,13 +98,12 @@ def _force_sizes(segment: Segment) -> np.ndarray:
     """(r,) size of the terms that the force of each row is a sum of."""
     rows = segment.rows
     loads = np.abs(rows.weight).max() + np.abs(rows.inertia).max() + np.abs(rows.limit).max(initial=0.0)
-    return np.maximum(segment.force_size(), loads)
+    return np.maximum(segment.force_size(), loads + 1e-300)
 
 
-def _check_state(worst: Worst, segment: Segment, step: Step | None) -> None:
+def _check_state(worst: Worst, segment: Segment, now: Moment, step: Step | None) -> None:
     """Newton's second law, and complementarity of gap, speed, acceleration and force, right after an event."""
-    rows, now = segment.rows, segment.at(0.0)
-    acceleration = segment.dynamic(now)
+    rows, acceleration = segment.rows, segment.dynamic(now)
     scale = segment.dynamic_size().max(initial=1e-300)
     error = np.abs(acceleration - segment.kinematic())[segment.moves]
     worst.note("balance", error.max(initial=0.0) / scale, BALANCE, step)
@@ -123,14 +123,15 @@ def _check_state(worst: Worst, segment: Segment, step: Step | None) -> None:
     starts = solid & friction & np.isin(state, SLIDES) & (segment.velocity == 0.0)
     worst.note("balance", (-state * acceleration)[starts].max(initial=0.0) / scale, BALANCE, step)
     left = ~friction & (state == st.LEAVING)
+    travel = rows.spring[left] * rows.gap[left[rows.friction_rows :]]
     pushes = -(rows.spring[left] * segment.displacement[left] + rows.dashpot[left] * segment.velocity[left])
-    worst.note("bound", pushes.max(initial=0.0) / _force_sizes(segment).max(), BALANCE, step)
+    worst.note("bound", (pushes / travel).max(initial=0.0), BALANCE, step)
 
 
-def _check_event(worst: Worst, step: Step, end: Moment, fastest: float, last: np.ndarray) -> np.ndarray:
+def _check_event(worst: Worst, step: Step, end: Moment, now: Moment, fastest: float, last: np.ndarray) -> np.ndarray:
     """Impulses at closed contacts explain every jump and obey Newton's law. Returns the contacts that were hit."""
     after, rows = step.after, step.before.rows
-    now, contacts = after.at(0.0), _contacts(rows)
+    contacts = _contacts(rows)
     scale = np.r_[np.full(rows.friction_rows, max(np.abs(end.gap).max(), 1e-300)), rows.gap]
     jumps = np.isfinite(rows.spring) & ~contacts  # a spring's elongation is set to its bound
     worst.note("jump", (np.abs(now.gap - end.gap) / scale)[~jumps].max(initial=0.0), PENETRATION, step)

@@ -36,6 +36,10 @@ class Moment:
     body: np.ndarray
     phase: np.ndarray
 
+    def take(self, index: int) -> Moment:
+        """One time of several."""
+        return Moment(*(part[index] for part in vars(self).values()))
+
 
 @dataclass(frozen=True)
 class Segment:

@@ -583,3 +583,20 @@ def test_contacts_end_without_force():
         for step in Stepper(data).steps():
             ended = (step.before.state == st.SPRUNG) & (step.after.state != st.SPRUNG)
             assert np.all(step.before.at(step.span).force[ended] < 1e-10 * stiffness)
+
+
+@pytest.mark.xfail(strict=True, reason="springs without force between bodies that fly together close and open for ever")
+@pytest.mark.parametrize("masses", [(0.13, 0.13, 0.13), (0.1, 0.2, 0.3), (0.2, 0.1)], ids=str)
+def test_bodies_that_fly_together_reach_a_spring(masses):
+    """Free bodies in touch, without force between them, until a compliant wall of a moving table meets the last."""
+    for stiffness, restitution, place in itertools.product([1.0, 7.4, 100.0], [1.0, 0.5], [0.0, 0.1, 1 / 3]):
+        bodies = [{"position": place, "mass": mass, "restitution": restitution} for mass in masses]
+        data = scene(
+            structure={"model": "prescribed", "displacement_amplitude": 1.0},
+            excitation={"frequency": 0.16},
+            **row(1.0, *bodies),
+            contact={"law": "compliant", "stiffness": stiffness},
+            time={"periods": 2, "transient": 0},
+            solver={"max_events": 5000},
+        )
+        assert simulate(data).status == Status.OK
