@@ -11,6 +11,7 @@ from coupling.engine import simulate
 from coupling.inputs import validate
 from coupling.response import Status
 from coupling.scene import Scene
+from rom.reduced import ReducedModel
 
 # a rigid structure that no body or spring can move: cavities then are laboratories at rest
 HEAVY = {"model": "rigid", "mass": 1e12, "stiffness": 1e12, "damping_ratio": 0.01}
@@ -600,3 +601,29 @@ def test_bodies_that_fly_together_reach_a_spring(masses):
             solver={"max_events": 5000},
         )
         assert simulate(data).status == Status.OK
+
+
+@pytest.mark.xfail(
+    strict=True, reason="modes that no row feels while a Coulomb element holds the structure are put to sleep"
+)
+def test_a_held_structure_vibrates_on(tmp_path):
+    """A Coulomb element that holds its point leaves the other mode its energy, as a stiff Jenkins element does."""
+    model = ReducedModel.from_matrices(
+        mass=np.eye(2), stiffness=np.diag([1.0, 6.0]), interface={"one": np.array([1.0, 0.5])}, damping_ratio=0.01
+    )
+    model.save(tmp_path / "rom.h5")
+
+    def held(**spring):
+        return simulate(
+            scene(
+                structure={"model": "rom", "file": str(tmp_path / "rom.h5")},
+                excitation={"frequency": 0.15, "force": 0.7, "at": "one"},
+                friction_damper=[{"normal_force": 0.6, "friction": 1.0, "at": "one"} | spring],
+                time={"periods": 20, "transient": 0},
+            )
+        )
+
+    rigid, sprung = held(), held(stiffness=1e7)
+    assert sprung.energy_residual < 1e-10
+    assert rigid.energy_residual < 1e-10
+    assert rigid.amplitude_max == pytest.approx(sprung.amplitude_max, rel=0.01)
