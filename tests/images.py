@@ -72,6 +72,7 @@ def compare(one: Record, other: Record, apart: list[Record], shift: float = 0.0,
 
     apart: runs that began a hair from `one`.
     """
+    assert not other.code, f"the image ended with code {other.code}"
     end, spread = one.together, ROUND_OFF
     for near in apart:
         part, difference = _difference(one, near, 0.0, np.inf)

@@ -22,6 +22,8 @@ PENETRATION = 1e-12
 BALANCE = 1e-9
 #: share of the fastest speed so far that is round-off of a velocity
 SPEED = 1e-10
+#: what counts as motion at all, as a share of the free travel
+SLOW = 1e-9
 
 
 @dataclass
@@ -47,7 +49,7 @@ def check_events(scene: Scene) -> Worst:
     """Step through a run. Raises AssertionError at the first law that is broken."""
     worst, stepper = Worst(), Stepper(scene)
     rows = stepper.run.rows
-    fastest, last = 0.0, np.full(len(rows.delassus), -np.inf)
+    fastest, last = SLOW * rows.omega * rows.gap.max(), np.full(len(rows.delassus), -np.inf)
     if stepper.code == auto.DONE:
         first = stepper.segment()
         _check_state(worst, first, first.at(0.0), None)
