@@ -1,0 +1,184 @@
+"""What holds at every event of a run: walls, forces within their bounds, Newton's laws, impulses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from stepping import SLIDES, Moment, Segment, Step, Stepper
+
+from coupling import automaton as auto
+from coupling import state as st
+from coupling.gaps import SIMULTANEOUS, rigid
+from coupling.impacts import COLLAPSE
+from coupling.scene import Scene
+from coupling.watch import CHATTER
+
+#: points at which the motion between two events is looked at
+POINTS = 9
+#: share of a gap that is round-off
+PENETRATION = 1e-12
+#: share of the terms that a sum of forces or accelerations is round-off of
+BALANCE = 1e-9
+#: share of the fastest speed so far that is round-off of a velocity
+SPEED = 1e-10
+#: what counts as motion at all, as a share of the free travel
+SLOW = 1e-9
+
+
+@dataclass
+class Worst:
+    """Largest violations met, each relative to what it is a share of."""
+
+    penetration: float = 0.0
+    bound: float = 0.0
+    balance: float = 0.0
+    momentum: float = 0.0
+    restitution: float = 0.0
+    jump: float = 0.0
+    steps: int = 0
+    impacts: int = 0
+
+    def note(self, name: str, value: float, limit: float, step: Step | None = None) -> None:
+        setattr(self, name, max(getattr(self, name), float(value)))
+        where = "" if step is None else f" at {step.before.begun:.17g} + {step.span:.3g} s"
+        assert value <= limit, f"{name} {value:.3g} above {limit:.3g}{where}"
+
+
+def check_events(scene: Scene) -> Worst:
+    """Step through a run. Raises AssertionError at the first law that is broken."""
+    worst, stepper = Worst(), Stepper(scene)
+    rows = stepper.run.rows
+    fastest, last = SLOW * rows.omega * rows.gap.max(), np.full(len(rows.delassus), -np.inf)
+    if stepper.code == auto.DONE:
+        first = stepper.segment()
+        _check_state(worst, first, first.at(0.0), None)
+    for step in stepper.steps():
+        end = _check_between(worst, step)
+        fastest = max(fastest, step.before.speed_size())
+        now = step.after.at(0.0)
+        hit = _check_event(worst, step, end, now, fastest, last)
+        last[hit] = step.after.begun
+        _check_state(worst, step.after, now, step)
+        worst.steps += 1
+        worst.impacts += step.impacts
+    assert stepper.code == auto.DONE, f"ended with code {stepper.code}"
+    return worst
+
+
+def _contacts(rows) -> np.ndarray:
+    return np.arange(len(rows.delassus)) >= rows.friction_rows
+
+
+def _check_between(worst: Worst, step: Step) -> Moment:
+    """Walls and bounds of forces on the way to the next event. Returns the motion at its end."""
+    segment, rows = step.before, step.before.rows
+    path = segment.at(step.span * np.linspace(0.0, 1.0, POINTS))
+    solid = _contacts(rows) & np.isinf(rows.spring)
+    depth = -path.gap[:, solid].min(axis=0, initial=0.0) / rows.gap[np.isinf(rows.spring[rows.friction_rows :])]
+    worst.note("penetration", depth.max(initial=0.0), PENETRATION, step)
+    _check_bounds(worst, segment, path, step)
+    return path.take(-1)
+
+
+def _check_bounds(worst: Worst, segment: Segment, path: Moment, step: Step | None) -> None:
+    """Forces within their bounds, no pull at walls, friction against its slip; springs that left do not push."""
+    rows, k = segment.rows, segment.rows.friction_rows
+    force, speed = np.atleast_2d(path.force), np.atleast_2d(path.speed)
+    size = _force_sizes(segment)
+    friction = np.abs(force[:, :k]) - rows.limit
+    pull = -force[:, k:]
+    for excess in (friction.max(axis=0) / size[:k], pull.max(axis=0, initial=0.0) / size[k:]):
+        worst.note("bound", excess.max(initial=0.0), BALANCE, step)
+    slides = np.isin(segment.state[:k], SLIDES)
+    against = (speed[:, :k] * -segment.state[:k])[:, slides]
+    worst.note("bound", against.max(initial=0.0) / (segment.speed_size() + 1e-300), SPEED, step)
+    assert np.array_equal(segment.held[:k][slides], -segment.state[:k][slides] * rows.limit[slides])
+
+
+def _force_sizes(segment: Segment) -> np.ndarray:
+    """(r,) size of the terms that the force of each row is a sum of."""
+    rows = segment.rows
+    loads = np.abs(rows.weight).max() + np.abs(rows.inertia).max() + np.abs(rows.limit).max(initial=0.0)
+    return np.maximum(segment.force_size(), loads + 1e-300)
+
+
+def _check_state(worst: Worst, segment: Segment, now: Moment, step: Step | None) -> None:
+    """Newton's second law, and complementarity of gap, speed, acceleration and force, right after an event."""
+    rows, acceleration = segment.rows, segment.dynamic(now)
+    scale = segment.dynamic_size().max(initial=1e-300)
+    error = np.abs(acceleration - segment.kinematic())[segment.moves]
+    worst.note("balance", error.max(initial=0.0) / scale, BALANCE, step)
+    friction = ~_contacts(rows)
+    solid, state = np.isinf(rows.spring), segment.state
+    still = solid & np.where(friction, state >= st.STICK, (state == st.CLOSED) | (state == st.TOUCHING))
+    worst.note("balance", np.abs(acceleration[still]).max(initial=0.0) / scale, BALANCE, step)
+    assert np.all(segment.velocity[still & (friction | rows.rides)] == 0.0), "a row at rest moves"
+    assert np.all(segment.displacement[still & ~friction] == 0.0), "a closed contact is open"
+    open_ = ~friction & (state == st.OPEN)
+    gap = rows.gap[open_[rows.friction_rows :]]
+    if np.any(open_ & solid):
+        assert np.all(now.force[open_] == 0.0), "an open contact pushes"
+    worst.note("penetration", (-segment.displacement[open_] / gap).max(initial=0.0), PENETRATION, step)
+    rests = solid & open_ & (segment.displacement == 0.0) & (segment.velocity == 0.0)
+    worst.note("balance", (-acceleration[rests]).max(initial=0.0) / scale, BALANCE, step)
+    starts = solid & friction & np.isin(state, SLIDES) & (segment.velocity == 0.0)
+    worst.note("balance", (-state * acceleration)[starts].max(initial=0.0) / scale, BALANCE, step)
+    left = ~friction & (state == st.LEAVING)
+    travel = rows.spring[left] * rows.gap[left[rows.friction_rows :]]
+    pushes = -(rows.spring[left] * segment.displacement[left] + rows.dashpot[left] * segment.velocity[left])
+    worst.note("bound", (pushes / travel).max(initial=0.0), BALANCE, step)
+
+
+def _check_event(worst: Worst, step: Step, end: Moment, now: Moment, fastest: float, last: np.ndarray) -> np.ndarray:
+    """Impulses at closed contacts explain every jump and obey Newton's law. Returns the contacts that were hit."""
+    after, rows = step.after, step.before.rows
+    contacts = _contacts(rows)
+    scale = np.r_[np.full(rows.friction_rows, max(np.abs(end.gap).max(), 1e-300)), rows.gap]
+    jumps = np.isfinite(rows.spring) & ~contacts  # a spring's elongation is set to its bound
+    worst.note("jump", (np.abs(now.gap - end.gap) / scale)[~jumps].max(initial=0.0), PENETRATION, step)
+    touching = contacts & np.isinf(rows.spring) & (after.displacement == 0.0)
+    rates, bodies = now.p_rate - end.p_rate, now.body - end.body
+    root = np.sqrt(rows.mass)
+    spread = np.hstack([rows.structure[touching], rows.bodies[touching] / root])
+    impulse = np.linalg.lstsq(spread.T, np.r_[rates, bodies * root], rcond=None)[0]
+    left = np.r_[rates - impulse @ rows.structure[touching], bodies - impulse @ rows.bodies[touching] / rows.mass]
+    worst.note("momentum", np.abs(left).max(initial=0.0) / fastest, SPEED, step)
+    if step.impacts == 0:
+        worst.note("jump", np.abs(np.r_[rates, bodies]).max() / fastest, SPEED, step)
+        return np.zeros(len(touching), bool)
+    if rigid(rows, np.flatnonzero(contacts)[0]):
+        assert touching.any(), "an impact without a contact"
+        _check_newton(worst, step, end, now, touching, impulse, fastest, last)
+    else:
+        worst.note("jump", np.abs(np.r_[rates, bodies]).max() / fastest, SPEED, step)
+    return touching & (end.speed < 0.0)
+
+
+def _check_newton(worst, step, end, now, touching, impulse, fastest, last) -> None:
+    """v+ >= -k v-, with equality under an impulse; below the tolerance of a chatter the impact may be plastic."""
+    rows = step.before.rows
+    limit = 0.5 * CHATTER * rows.period * _accelerations(step, end)[touching]
+    before, after = end.speed[touching], now.speed[touching]
+    restitution = rows.restitution[touching[rows.friction_rows :]]
+    restitution = np.where(step.after.begun - last[touching] < 2 * COLLAPSE * rows.period, 0.0, restitution)
+    approach = np.maximum(-before, 0.0)
+    completed = restitution * approach <= (1 - restitution) * limit + SPEED * fastest
+    short = restitution * approach - after
+    worst.note("restitution", (short[~completed] / fastest).max(initial=0.0), SPEED, step)
+    worst.note("restitution", (-after / fastest).max(initial=0.0), SPEED, step)
+    small = (SPEED * fastest + 4 * limit.max()) / np.diag(rows.delassus)[touching].min()
+    worst.note("restitution", max(-impulse.min() / small, 0.0) * SPEED, SPEED, step)
+    pressed = (impulse > small) & ~completed
+    worst.note("restitution", (-short[pressed] / fastest).max(initial=0.0), SPEED, step)
+
+
+def _accelerations(step: Step, end: Moment) -> np.ndarray:
+    """(r,) what the gaps were accelerated with before the event, and would be without the forces of closed contacts."""
+    start = np.abs(step.before.kinematic())
+    until = np.abs(step.before.dynamic(end))
+    pressed = np.abs(step.before.at(0.0).force).max() + np.abs(end.force).max()
+    return np.maximum(start, until) + pressed * np.diag(step.before.rows.delassus)
+
+
+assert SIMULTANEOUS <= PENETRATION

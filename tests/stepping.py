@@ -1,0 +1,204 @@
+"""The engine's automaton, one segment at a time: what it holds at both ends of it, and the motion in between.
+
+The motion is evaluated here from the modal amplitudes, and the accelerations from Newton's second law: neither is taken
+from the engine's own search or complementarity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupling import automaton as auto
+from coupling import state as st
+from coupling.engine import _Run
+from coupling.rows import Rows
+from coupling.scene import Scene
+
+SLIDES = (st.SLIP_LEFT, st.SLIP_RIGHT)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A state between events, times t after its segment began (shapes (t,) and (t, ...); squeezed for one time).
+
+    gap: displacement of the rows (r,), a friction row's being the slip; speed: their velocities; force: of rows (N);
+    p, p_rate: modal coordinates of the structure (n,); body: velocities of the bodies relative to the base (b,).
+    """
+
+    gap: np.ndarray
+    speed: np.ndarray
+    force: np.ndarray
+    p: np.ndarray
+    p_rate: np.ndarray
+    body: np.ndarray
+    phase: np.ndarray
+
+    def take(self, index: int) -> Moment:
+        """One time of several."""
+        return Moment(*(part[index] for part in vars(self).values()))
+
+
+@dataclass(frozen=True)
+class Segment:
+    """What holds from one event to the next: state of the rows and all that the motion depends on."""
+
+    rows: Rows
+    begun: float  # s
+    state: np.ndarray  # (r,)
+    displacement: np.ndarray
+    velocity: np.ndarray
+    drift: np.ndarray
+    held: np.ndarray
+    level: np.ndarray
+    constant: np.ndarray
+    amplitude: np.ndarray
+    eigenvalue: np.ndarray
+    motion: np.ndarray
+    force: np.ndarray
+    shape: np.ndarray
+
+    def at(self, tau: float | np.ndarray) -> Moment:
+        """The motion at times after the segment's beginning."""
+        single, tau = np.ndim(tau) == 0, np.atleast_1d(tau)
+        rows, n = self.rows, len(self.constant)
+        z = self.eigenvalue[:, None] * tau
+        now = self.amplitude[:, None] * np.exp(z)
+        first = self.amplitude[:, None] * np.expm1(z)
+        line = self.amplitude[:, None] * _exp_minus_line(z)
+        gap = np.repeat(self.displacement[:, None], len(tau), 1)
+        speed = np.repeat(self.velocity[:, None], len(tau), 1)
+        moves = self.moves
+        gap[moves] += (
+            self.velocity[moves, None] * tau + 0.5 * self.drift[moves, None] * tau**2 + (self.motion[moves] @ line).real
+        )
+        speed[moves] += self.drift[moves, None] * tau + ((self.motion[moves] * self.eigenvalue) @ first).real
+        springs = np.isfinite(rows.spring) & (np.arange(len(gap)) < rows.friction_rows) & (self.state != st.SPRUNG)
+        gap[springs] = self.displacement[springs, None]  # a Jenkins element slides with its spring as it is
+        _ride(rows, gap, speed)
+        y = (self.shape @ now).real
+        y[:n] += self.constant[:, None]
+        parts = (gap, speed, self._forces(now), y[:n], y[n:], speed[: len(rows.mass)] + rows.floor @ y[n:], now[0])
+        return Moment(*(part.T[0] if single else part.T for part in parts))
+
+    @property
+    def moves(self) -> np.ndarray:
+        """(r,) rows with a motion of their own."""
+        friction = np.arange(len(self.state)) < self.rows.friction_rows
+        held = np.where(friction, self.state >= st.STICK, (self.state == st.CLOSED) | (self.state == st.TOUCHING))
+        return ~(held & (self.state != st.SPRUNG)) & ~self.rows.rides
+
+    @property
+    def closed(self) -> np.ndarray:
+        """(r,) rows whose force belongs to the linear subsystem."""
+        friction = np.arange(len(self.state)) < self.rows.friction_rows
+        return np.where(friction, self.state == st.STICK, self.state == st.CLOSED) | (self.state == st.SPRUNG)
+
+    def _forces(self, now: np.ndarray) -> np.ndarray:
+        closed = self.level[:, None] + (self.force @ now).real
+        return np.where(self.closed[:, None], closed, self.held[:, None])
+
+    def kinematic(self) -> np.ndarray:
+        """(r,) accelerations at the beginning as the motion has them (rows that move)."""
+        return self.drift + (self.motion @ (self.eigenvalue**2 * self.amplitude)).real
+
+    def dynamic(self, moment: Moment) -> np.ndarray:
+        """(r,) accelerations by Newton's second law under the forces of a moment."""
+        rows = self.rows
+        on_structure = (rows.force * moment.phase).real + moment.force @ rows.structure
+        on_structure = on_structure - rows.stiffness * moment.p - rows.damping @ moment.p_rate
+        on_bodies = rows.weight + (rows.inertia * moment.phase).real + moment.force @ rows.bodies
+        return rows.structure @ on_structure + rows.bodies @ (on_bodies / rows.mass)
+
+    def speed_size(self) -> float:
+        """Amplitude of the fastest motion, m/s."""
+        rows, n = self.rows, len(self.constant)
+        modal = np.abs(self.shape[n:]) @ np.abs(self.amplitude)
+        moving = np.abs(self.velocity).max() + np.abs(self.motion * self.eigenvalue).max(axis=0, initial=0.0) @ np.abs(
+            self.amplitude
+        )
+        return float(max(moving, modal.max(initial=0.0), np.abs(rows.table) * rows.omega))
+
+    def force_size(self) -> np.ndarray:
+        """(r,) amplitudes of the terms that the force of each row is a sum of."""
+        return np.abs(self.held) + np.abs(self.level) + np.abs(self.force) @ np.abs(self.amplitude)
+
+    def dynamic_size(self) -> np.ndarray:
+        """(r,) amplitudes of the terms that the acceleration of each row is a sum of."""
+        rows, n, force = self.rows, len(self.constant), self.force_size()
+        y = np.abs(self.shape) @ np.abs(self.amplitude)
+        on_structure = np.abs(rows.force) + force @ np.abs(rows.structure) + np.abs(rows.damping) @ y[n:]
+        on_structure = on_structure + rows.stiffness * (np.abs(self.constant) + y[:n])
+        on_bodies = np.abs(rows.weight) + np.abs(rows.inertia) + force @ np.abs(rows.bodies)
+        return np.abs(rows.structure) @ on_structure + np.abs(rows.bodies) @ (on_bodies / rows.mass)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A segment of length `span` and the state right after the event (or the period's end) that ended it."""
+
+    before: Segment
+    span: float
+    after: Segment
+    impacts: int
+
+
+class Stepper:
+    """A run of a scene (or of rows made from one) from event to event."""
+
+    def __init__(self, scene: Scene, change=None) -> None:
+        """change: alters the mutable run before it begins."""
+        self.run = _Run(scene, True, 0)
+        if change is not None:
+            change(self.run)
+        self.budget = scene.solver.max_events
+        self.periods = scene.time.periods
+        self.code = self.run.begin(self.budget)
+
+    def steps(self) -> Iterator[Step]:
+        """All segments up to the end; self.code says how it came."""
+        counters, state = self.run.state.counters, self.run.state
+        before = self.segment() if self.code == auto.DONE else None
+        while self.code in (auto.DONE, auto.EVENT_BUDGET) and counters[st.PERIOD] < self.periods:
+            impacts, period, time = counters[st.IMPACTS], counters[st.PERIOD], state.time[0]
+            self.code = self.run.advance(int(period) + 1, int(counters[st.EVENTS]) + 1)
+            after = self.segment()
+            span = (counters[st.PERIOD] - period) * self.run.rows.period + state.time[0] - time
+            yield Step(before, float(span), after, int(counters[st.IMPACTS] - impacts))
+            before = after
+            if counters[st.EVENTS] >= self.budget:
+                return
+
+    def segment(self) -> Segment:
+        """The segment that begins now."""
+        run, state = self.run, self.run.state
+        s, awake = state.counters[st.FLOW], state.awake[: state.counters[st.AWAKE]]
+        flows, n = run.flows, len(state.constant)
+        return Segment(
+            rows=run.rows, begun=float(state.counters[st.PERIOD] * run.rows.period + state.time[0]),
+            state=state.state.copy(), displacement=state.displacement.copy(), velocity=state.velocity.copy(),
+            drift=state.drift.copy(), held=state.held.copy(), level=state.level.copy(),
+            constant=state.constant.copy(), amplitude=state.amplitude[awake], eigenvalue=flows.eigenvalue[s, awake],
+            motion=flows.motion[s][:, awake], force=flows.force[s][:, awake], shape=flows.shape[s, : 2 * n][:, awake],
+        )  # fmt: skip
+
+
+def _exp_minus_line(z: np.ndarray) -> np.ndarray:
+    """exp(z) - 1 - z, by its series near zero."""
+    small = np.abs(z) < 0.1
+    w = np.where(small, z, 0.0)
+    series = np.zeros_like(w)
+    for k in range(12, 1, -1):
+        series = (series + 1.0) * w / k
+    return np.where(small, series * w, np.expm1(z) - z)
+
+
+def _ride(rows: Rows, gap: np.ndarray, speed: np.ndarray) -> None:
+    """Gaps that ride are differences of slips, in place."""
+    for r in np.flatnonzero(rows.rides):
+        half = rows.gap[r - rows.friction_rows] / 2
+        before, after = rows.before[r], rows.after[r]
+        gap[r] = (gap[after] if after >= 0 else half) - (gap[before] if before >= 0 else -half)
+        speed[r] = (speed[after] if after >= 0 else 0.0) - (speed[before] if before >= 0 else 0.0)
