@@ -551,7 +551,6 @@ def test_impacts_are_in_order():
     assert all(one.time <= other.time for one, other in itertools.pairwise(response.event_list))
 
 
-@pytest.mark.xfail(strict=True, reason="a root is seen where a function falls more slowly than a double resolves")
 @pytest.mark.parametrize("speed", [1e-18, 1e-25, 1e-190])
 def test_hair_of_an_approach(speed):
     """A speed far below round-off towards a wall a fifth of the motion away changes nothing: no wall is hit at once."""
@@ -569,7 +568,6 @@ def test_hair_of_an_approach(speed):
     assert moving.slip[-1] == pytest.approx(still.slip[-1], abs=1e-9)
 
 
-@pytest.mark.xfail(strict=True, reason="a root is seen where a force falls more slowly than a double resolves")
 def test_contacts_end_without_force():
     """A body that friction stops and turns inside its contact is pushed on: forces are extremal there, not zero."""
     for stiffness, friction in itertools.product([0.1, 0.2, 0.5, 1.0, 2.0, 5.0], np.linspace(0.04, 0.16, 5)):
@@ -586,7 +584,6 @@ def test_contacts_end_without_force():
             assert np.all(step.before.at(step.span).force[ended] < 1e-10 * stiffness)
 
 
-@pytest.mark.xfail(strict=True, reason="springs without force between bodies that fly together close and open for ever")
 @pytest.mark.parametrize("masses", [(0.13, 0.13, 0.13), (0.1, 0.2, 0.3), (0.2, 0.1)], ids=str)
 def test_bodies_that_fly_together_reach_a_spring(masses):
     """Free bodies in touch, without force between them, until a compliant wall of a moving table meets the last."""
@@ -603,9 +600,6 @@ def test_bodies_that_fly_together_reach_a_spring(masses):
         assert simulate(data).status == Status.OK
 
 
-@pytest.mark.xfail(
-    strict=True, reason="modes that no row feels while a Coulomb element holds the structure are put to sleep"
-)
 def test_a_held_structure_vibrates_on(tmp_path):
     """A Coulomb element that holds its point leaves the other mode its energy, as a stiff Jenkins element does."""
     model = ReducedModel.from_matrices(
