@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
-from coupling.inputs import STRICT, InputError, Real, Whole, nearest, read_toml, validate
+from coupling.inputs import STRICT, InputError, NonNegative, Real, Whole, nearest, read_toml, validate
 from meshes import benchmarks, vane_cluster
 from meshes.benchmarks import Block
 from meshes.vane_cluster import VaneCluster
 
 if TYPE_CHECKING:
-    from modal.elasticity import Material
+    from modal.elasticity import ElasticSupport, Material
 
 Positive = Annotated[Real, Field(gt=0)]
 Ratio = Annotated[Real, Field(ge=0, lt=1)]
@@ -119,11 +119,42 @@ def _components(clamped: Any) -> Any:
     return merged
 
 
+def _axes(stiffness: Any) -> Any:
+    """One number stands for all three axes."""
+    return [stiffness] * 3 if isinstance(stiffness, int | float) else stiffness
+
+
+@dataclass(frozen=True, config=STRICT)
+class ElasticTable:
+    """Springs over a facet group, N/m^3: `stiffness` (a number or [x, y, z]) or `normal` and `tangential`."""
+
+    stiffness: Annotated[tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(_axes)] = (0.0, 0.0, 0.0)
+    normal: NonNegative = 0.0
+    tangential: NonNegative = 0.0
+
+    def __post_init__(self) -> None:
+        if not any((*self.stiffness, self.normal, self.tangential)):
+            raise ValueError("stiffness: expected N/m^3, such as 1e12 or [1e12, 5e11, 1e12], or normal and tangential")
+
+    @property
+    def springs(self) -> ElasticSupport:
+        """What the finite elements need of it."""
+        from modal.elasticity import ElasticSupport
+
+        return ElasticSupport(self.stiffness, self.normal, self.tangential)
+
+
 @dataclass(frozen=True, config=STRICT)
 class Support:
-    """Facet groups that are held: all components, or those named, as in {group = "y"}."""
+    """Facet groups that are held: all components, or those named, as in {group = "y"}, or by springs."""
 
     clamped: Annotated[dict[str, str], BeforeValidator(_components)] = field(default_factory=dict)
+    elastic: dict[str, ElasticTable] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for group in self.elastic:
+            if set(self.clamped.get(group, "")) == set("xyz"):
+                raise ValueError(f"elastic.{group}: the group is clamped, so that springs do nothing; choose one")
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -201,6 +232,11 @@ class Case:
         return {name: table.elastic for name, table in self.material.items()}
 
     @property
+    def elastic_supports(self) -> dict[str, ElasticSupport]:
+        """Springs by facet group."""
+        return {name: table.springs for name, table in self.support.elastic.items()}
+
+    @property
     def response_label(self) -> str | None:
         """The interface coordinate of the rigid model: the one named, the only one, or `shroud`.
 
@@ -217,6 +253,8 @@ class Case:
         facets, volumes = list(facets), list(volumes)
         for group in self.support.clamped:
             _check_group("support.clamped", "facet group", group, facets)
+        for group in self.support.elastic:
+            _check_group(f"support.elastic.{group}", "facet group", group, facets)
         for label, table in self.interface.items():
             _check_group(f"interface.{label}.facets", "facet group", table.facets, facets)
         for group in self.material:

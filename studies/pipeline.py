@@ -38,7 +38,7 @@ def assemble(case: Case) -> Structure:
     """Mesh, groups, matrices. Raises the errors of the modal package, and InputError for unknown groups."""
     label = case.response_label  # an open choice is refused before the work
     with _mesh(case) as path:
-        solid = Solid(path, case.materials, case.mesh.degree)
+        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports)
         case.check_groups(solid.domain.facets, solid.domain.volumes)
         matrices = solid.assemble(case.support.clamped, case.damping_ratio)
     if label is not None:

@@ -196,3 +196,32 @@ def test_unknown_groups_list_those_that_exist(old, new, message, tmp_path):
     with pytest.raises(InputError) as refused:
         case.check_groups(["clamp", "c1_floor"], ["airfoils"])
     assert str(refused.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("table", "axes", "across", "along"),
+    [
+        ("stiffness = 1e12", (1e12, 1e12, 1e12), 0.0, 0.0),
+        ("stiffness = [1e12, 0, 3e11]", (1e12, 0.0, 3e11), 0.0, 0.0),
+        ("normal = 1e12\ntangential = 5e11", (0.0, 0.0, 0.0), 1e12, 5e11),
+    ],
+)
+def test_elastic_supports(table, axes, across, along, tmp_path):
+    case = load(changed('clamped = ["clamp"]', f"[support.elastic.clamp]\n{table}"), tmp_path)
+    springs = case.elastic_supports["clamp"]
+    assert (springs.stiffness, springs.normal, springs.tangential) == (axes, across, along)
+
+
+@pytest.mark.parametrize(
+    ("support", "message"),
+    [
+        ("[support.elastic.clamp]\nstiffness = 0.0", "stiffness: expected N/m"),
+        ("[support.elastic.clamp]\nstiffness = [1.0, -1.0, 0.0]", "support.elastic.clamp.stiffness"),
+        ('[support.elastic.clamp]\nstiffness = "stiff"', "support.elastic.clamp.stiffness"),
+        ("[support.elastic.clamp]\nstifness = 1.0", "stifness"),
+        ('clamped = ["clamp"]\n[support.elastic.clamp]\nnormal = 1.0', "elastic.clamp: the group is clamped"),
+    ],
+)
+def test_refuses_elastic_supports(support, message, tmp_path):
+    with pytest.raises(InputError, match=message):
+        load(changed('clamped = ["clamp"]', support).replace("[support]\n[", "["), tmp_path)
