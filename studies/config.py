@@ -63,7 +63,8 @@ GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
 
 
 def _kind(table: Any) -> str:
-    return str(table.get("generator", "existing")) if isinstance(table, Mapping) else "existing"
+    generator = table.get("generator") if isinstance(table, Mapping) else getattr(table, "generator", None)
+    return "existing" if generator is None else str(generator)
 
 
 def _gather(table: Any) -> Any:
