@@ -223,6 +223,9 @@ def build(parameters: VaneCluster, path: str | os.PathLike[str]) -> Path:
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.optimize("Netgen")
         gmsh.model.mesh.setOrder(parameters.order)
+        if parameters.order > 1 and msh.inverted():
+            # flat elements at a coarse arc fold over when they are bent to it
+            gmsh.model.mesh.optimize("HighOrder")
         gmsh.model.mesh.renumberNodes()
         msh.check_disjoint(2, "facet")
         gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)

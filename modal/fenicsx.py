@@ -70,7 +70,11 @@ def versions() -> dict[str, str]:
 
 
 def read(path: str | os.PathLike[str]) -> Domain:
-    """Read a gmsh mesh. Raises MeshError: no file, not a mesh, no or mixed volume elements, overlapping groups."""
+    """Read a gmsh mesh.
+
+    Raises MeshError: no file, not a mesh, no or mixed volume elements, inverted elements, loose parts, overlapping
+    groups.
+    """
     file = Path(path)
     with msh.session("read"):
         msh.merge(file)
@@ -215,6 +219,8 @@ def _prepare_groups() -> None:
         gmsh.model.addPhysicalGroup(3, rest, name=_UNNAMED)
     msh.check_disjoint(2, "facet")
     msh.check_disjoint(3, "volume")
+    msh.check_volumes()
+    msh.check_connected()
     gmsh.model.mesh.renumberNodes()
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import gmsh
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 
 class MeshError(ValueError):
@@ -81,6 +83,58 @@ def check_disjoint(dimension: int, kind: str) -> None:
                     f"{kind} groups {names[first]!r} and {name!r} share {shared} elements; "
                     f"make the groups disjoint, an element can carry one label only"
                 )
+
+
+def check_volumes() -> None:
+    """Raise MeshError for elements of the current model whose Jacobian is not positive everywhere.
+
+    An element turned inside out adds its stiffness as if it were whole, and nothing downstream would tell.
+    """
+    bad = inverted()
+    if bad:
+        element, group = next(iter(bad.items()))
+        raise MeshError(
+            f"{len(bad)} elements have a negative volume or are folded, such as element {element} of volume group "
+            f"{group!r}; mesh again, or reorder their nodes (curved elements: optimise them, or use straight ones)"
+        )
+
+
+def inverted() -> dict[int, str]:
+    """Volume elements of the current model whose Jacobian is not positive everywhere, with their volume group."""
+    bad: dict[int, str] = {}
+    for _, entity in gmsh.model.getEntities(3):
+        for tags in gmsh.model.mesh.getElements(3, entity)[1]:
+            jacobians = np.asarray(gmsh.model.mesh.getElementQualities(tags, "minDetJac"))
+            bad |= dict.fromkeys(tags[~(jacobians > 0.0)].tolist(), _group_of(entity))
+    return bad
+
+
+def check_connected() -> None:
+    """Raise MeshError when the volume elements of the current model fall into parts that share no node."""
+    names, nodes = [], []
+    for _, entity in gmsh.model.getEntities(3):
+        for kind, tags, corners in zip(*gmsh.model.mesh.getElements(3, entity), strict=True):
+            per_element = gmsh.model.mesh.getElementProperties(kind)[3]
+            nodes.append(np.asarray(corners).reshape(len(tags), per_element).astype(np.int64))
+            names += [_group_of(entity)] * len(tags)
+    links = np.concatenate([block.ravel() for block in nodes])
+    elements = np.repeat(np.arange(len(names)), np.concatenate([np.full(len(b), b.shape[1]) for b in nodes]))
+    size = len(names) + int(links.max()) + 1
+    graph = sparse.coo_array((np.ones(links.size, np.int8), (elements, len(names) + links)), shape=(size, size))
+    parts = csgraph.connected_components(graph, directed=False)[1][: len(names)]
+    found, counts = np.unique(parts, return_counts=True)
+    if found.size > 1:
+        held = [sorted(set(np.array(names)[parts == part])) for part in found[:4]]
+        listed = "; ".join(f"{', '.join(map(repr, g))} ({n} elements)" for g, n in zip(held, counts, strict=False))
+        raise MeshError(
+            f"the mesh falls into {found.size} parts that share no node: {listed}; "
+            "join their volumes (OCC's fragment), or merge coincident nodes"
+        )
+
+
+def _group_of(entity: int) -> str:
+    tags = gmsh.model.getPhysicalGroupsForEntity(3, entity)
+    return (gmsh.model.getPhysicalName(3, tags[0]) or str(tags[0])) if len(tags) else "none"
 
 
 @contextlib.contextmanager

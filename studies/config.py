@@ -160,11 +160,13 @@ class Support:
 
 @dataclass(frozen=True, config=STRICT)
 class ModesTable:
-    """Which modes are computed (the first `count`, or all up to `max_frequency` Hz) and which is the first bending:
-    the one with most effective mass along `direction`. `at` names the interface coordinate of the rigid model."""
+    """Which modes are computed (the first `count`, or all from `min_frequency` to `max_frequency` Hz) and which is the
+    first bending: the one with most effective mass along `direction`. `at` names the interface coordinate of the rigid
+    model."""
 
     count: Annotated[Whole, Field(ge=1)] | None = None
     max_frequency: Positive | None = None
+    min_frequency: NonNegative = 0.0
     direction: Direction = (0.0, 1.0, 0.0)
     damping_ratio: Ratio | None = None
     at: str | None = None
@@ -172,6 +174,8 @@ class ModesTable:
     def __post_init__(self) -> None:
         if self.count is not None and self.max_frequency is not None:
             raise ValueError("give one of count and max_frequency")
+        if self.min_frequency and not self.min_frequency < (self.max_frequency or 0.0):
+            raise ValueError("min_frequency: expected a max_frequency above it, the two ends of a range")
         if not any(self.direction):
             raise ValueError("direction: expected three numbers, not all zero, such as [0, 1, 0]")
 

@@ -135,6 +135,8 @@ def test_open_choice_of_the_response_is_refused(tmp_path):
         ("count = 10", "count = 0", "modes.count: should be greater than or equal to 1"),
         ("count = 10", "count = 10.5", "modes.count: should be a valid integer"),
         ("count = 10", "count = 1\nmax_frequency = 1.0", "modes: give one of count and max_frequency"),
+        ("count = 10", "min_frequency = 1.0", "modes: min_frequency: expected a max_frequency above it"),
+        ("count = 10", "min_frequency = 5.0\nmax_frequency = 5.0", "modes: min_frequency: expected a max_frequency"),
         ("count = 10", 'at = "shroud"', "modes.at: no interface 'shroud'; known: c1"),
         ('"c1_floor"', '"c1_floor"\nkind = "mean"', "interface.c1.kind: should be 'average', 'rigid' or 'node'"),
         ('facets = "c1_floor"\n', "", "interface.c1.facets: missing"),
