@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -23,7 +24,8 @@ _PATIENCE = 2e-3  # s; a blocking receive would keep the core busy that rank 0 c
 def ranks(task: Callable[..., Any]) -> Iterator[bool]:
     """True on rank 0; on the others False, after they have served: they call `task` as rank 0 bids by `invite`.
 
-    The helpers are released when rank 0 leaves the block, by an error too.
+    The helpers are released when rank 0 leaves the block. An exception there ends all ranks, as one of them may be
+    waiting in the middle of a task.
     """
     if COMM.rank > 0:
         while (bidding := _wait()) is not None:
@@ -32,8 +34,15 @@ def ranks(task: Callable[..., Any]) -> Iterator[bool]:
         return
     try:
         yield True
-    finally:
+    except Exception:
+        if COMM.size > 1:
+            traceback.print_exc()
+            COMM.Abort(1)
+        raise
+    except BaseException:
         _send(None)
+        raise
+    _send(None)
 
 
 def invite(*arguments: Any) -> None:
