@@ -152,6 +152,10 @@ class Solid:
         equivalent = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
         return np.array(fenicsx.evaluate(equivalent, fenicsx.discontinuous_space(self.domain, 1)).x.array)
 
+    def stress_points(self) -> np.ndarray:
+        """(k, 3) m, the places of the values of `von_mises`."""
+        return fenicsx.node_coordinates(fenicsx.discontinuous_space(self.domain, 1))
+
     def vtk_mesh(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Cells, VTK cell types and points, the points in the order of the nodes; for pyvista.UnstructuredGrid."""
         return fenicsx.vtk_mesh(self.space)
