@@ -77,7 +77,7 @@ def check_disjoint(dimension: int, kind: str) -> None:
     members = [_elements(dimension, tag) for tag in groups(dimension).values()]
     for second, name in enumerate(names):
         for first in range(second):
-            shared = len(members[first] & members[second])
+            shared = np.intersect1d(members[first], members[second], assume_unique=True).size
             if shared:
                 raise MeshError(
                     f"{kind} groups {names[first]!r} and {name!r} share {shared} elements; "
@@ -111,20 +111,20 @@ def inverted() -> dict[int, str]:
 
 def check_connected() -> None:
     """Raise MeshError when the volume elements of the current model fall into parts that share no node."""
-    names, nodes = [], []
+    links, groups_of, lengths = [], [], []
     for _, entity in gmsh.model.getEntities(3):
-        for kind, tags, corners in zip(*gmsh.model.mesh.getElements(3, entity), strict=True):
-            per_element = gmsh.model.mesh.getElementProperties(kind)[3]
-            nodes.append(np.asarray(corners).reshape(len(tags), per_element).astype(np.int64))
-            names += [_group_of(entity)] * len(tags)
-    links = np.concatenate([block.ravel() for block in nodes])
-    elements = np.repeat(np.arange(len(names)), np.concatenate([np.full(len(b), b.shape[1]) for b in nodes]))
-    size = len(names) + int(links.max()) + 1
-    graph = sparse.coo_array((np.ones(links.size, np.int8), (elements, len(names) + links)), shape=(size, size))
-    parts = csgraph.connected_components(graph, directed=False)[1][: len(names)]
+        for tags, nodes in zip(*gmsh.model.mesh.getElements(3, entity)[1:], strict=True):
+            links.append(np.asarray(nodes, dtype=np.int64))
+            groups_of.append(np.full(len(tags), _group_of(entity), dtype=object))
+            lengths.append(np.full(len(tags), len(nodes) // len(tags)))
+    names, nodes = np.concatenate(groups_of), np.concatenate(links)
+    elements = np.repeat(np.arange(names.size), np.concatenate(lengths))
+    size = names.size + int(nodes.max()) + 1
+    graph = sparse.coo_array((np.ones(nodes.size, np.int8), (elements, names.size + nodes)), shape=(size, size))
+    parts = csgraph.connected_components(graph, directed=False)[1][: names.size]
     found, counts = np.unique(parts, return_counts=True)
     if found.size > 1:
-        held = [sorted(set(np.array(names)[parts == part])) for part in found[:4]]
+        held = [sorted(set(names[parts == part])) for part in found[:4]]
         listed = "; ".join(f"{', '.join(map(repr, g))} ({n} elements)" for g, n in zip(held, counts, strict=False))
         raise MeshError(
             f"the mesh falls into {found.size} parts that share no node: {listed}; "
@@ -155,12 +155,15 @@ def _native_stderr_muted() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _elements(dimension: int, tag: int) -> set[tuple[int, ...]]:
-    """The elements of a physical group as sorted corner nodes, so that copies of an element are the same."""
-    found: set[tuple[int, ...]] = set()
+def _elements(dimension: int, tag: int) -> np.ndarray:
+    """The elements of a physical group as sorted corner nodes, each once: copies of an element are the same."""
+    found = []
     for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
         for kind, _, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
             _, _, _, n_nodes, _, n_corners = gmsh.model.mesh.getElementProperties(kind)
-            corners = np.sort(np.asarray(nodes).reshape(-1, n_nodes)[:, :n_corners], axis=1)
-            found.update(map(tuple, corners.tolist()))
-    return found
+            # zeros, which are no node's number, fill up to the corners of a hexahedron
+            corners = np.zeros((len(nodes) // n_nodes, 8), dtype=np.int64)
+            corners[:, :n_corners] = np.asarray(nodes).reshape(-1, n_nodes)[:, :n_corners]
+            found.append(np.sort(corners, axis=1))
+    rows = np.concatenate([np.empty((0, 8), np.int64), *found])
+    return np.unique(rows.view(np.dtype((np.void, 8 * rows.itemsize))))

@@ -132,3 +132,22 @@ def test_inverted_and_loose_meshes(tmp_path, capfd):
         assert error.count("\n") == 1
         assert "bad.msh" in error
         assert told in error
+
+
+def test_mesh_without_names(tmp_path, capfd):
+    """A mesh whose facets are in no group cannot be held by one."""
+    header = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+    (tmp_path / "plain.msh").write_text(header + "$Elements\n1\n1 4 2 0 1 1 2 3 4\n$EndElements\n")
+    mesh = CASE[CASE.index("generator") : CASE.index("[material")]
+    status, error = modal(tmp_path, capfd, (mesh, 'file = "plain.msh"\n'))
+    assert status == BAD_INPUT
+    assert "support.clamped: no facet group 'root' in the mesh; it has none" in error
+
+
+def test_reduction_of_a_structure_on_springs(tmp_path, capfd):
+    """The reduced model keeps the frequencies, with no clamp to hold it."""
+    springs = "[support.elastic.root]\nstiffness = [1e13, 2e13, 3e13]"
+    full, _ = modal(tmp_path, capfd, ('[support]\nclamped = ["root"]', springs))
+    assert main(["reduce", str(tmp_path / "case.toml"), "--json", "-", "--modes", "8"]) == 0
+    reduced = json.loads(capfd.readouterr().out)
+    assert reduced["frequency_hz"][:3] == pytest.approx(full["frequency_hz"][:3], rel=1e-6)
