@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from modal.eigen import solve_modes
-from modal.elasticity import Material, assemble
+from modal.elasticity import ElasticSupport, Material, assemble
 from modal.msh import session
 
 RADIUS, LENGTH, SIZES = 0.5, 1.0, (0.6, 0.3, 0.15)
@@ -66,3 +66,27 @@ def test_curved_elements_know_rigid_motions_and_uniform_strain(tmp_path):
     tension = (cylinder.coordinates * [1.0, -0.3, -0.3]).ravel()
     energy = 0.5 * tension @ (cylinder.stiffness @ tension)
     assert energy == pytest.approx(0.5 * 2.6 * cylinder.total_mass, rel=1e-12)
+
+
+def test_mass_is_the_volume_of_the_curved_elements(tmp_path):
+    """Against gmsh's own integral of the Jacobian with Gauss points of degree 10."""
+    path = write_cylinder(tmp_path / "c.msh", 0.5, 2)
+    with session("volume"):
+        gmsh.merge(str(path))
+        kind = gmsh.model.mesh.getElementTypes(3)[0]
+        points, weights = gmsh.model.mesh.getIntegrationPoints(kind, "Gauss10")
+        determinants = np.asarray(gmsh.model.mesh.getJacobians(kind, points)[1])
+        volume = np.sum(determinants.reshape(-1, len(weights)) @ weights)
+    cylinder = assemble(path, UNIT, {}, degree=2)
+    assert cylinder.total_mass == pytest.approx(volume, rel=1e-9)
+
+
+def test_springs_across_a_round_face(tmp_path):
+    """A cylinder in a bed of springs normal to its mantle: k pi r l against every crosswise translation, none along."""
+    path = write_cylinder(tmp_path / "c.msh", 0.15, 2)
+    bed = {"mantle": ElasticSupport(normal=1e3)}
+    cylinder = assemble(path, {"default": Material(1e-6, 0.3, 1.0)}, {}, degree=2, elastic=bed)
+    translations = cylinder.rigid_translations()
+    crosswise = 1e3 * np.pi * RADIUS * LENGTH
+    expected = np.diag([0.0, crosswise, crosswise])
+    assert translations.T @ (cylinder.stiffness @ translations) == pytest.approx(expected, abs=2e-3 * crosswise)
