@@ -20,7 +20,7 @@ generator = "block"
 length = 0.1
 width = 0.02
 thickness = 0.01
-divisions = [8, 2, 2]
+divisions = [6, 2, 1]
 [material.default]
 young = 2e11
 poisson = 0.3
@@ -47,14 +47,16 @@ ENVIRONMENT = {
 pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mpirun")
 
 
-def on_two_ranks(*arguments, cwd):
-    command = ["mpirun", "-n", "2", sys.executable, "-m", "studies", *arguments]
+def on_two_ranks(*arguments, cwd, program=("-m", "studies")):
+    command = ["mpirun", "-n", "2", sys.executable, *program, *arguments]
     return subprocess.run(
         command, cwd=cwd, env=os.environ | ENVIRONMENT, capture_output=True, text=True, check=False, timeout=300
     )
 
 
-@pytest.mark.parametrize("modes", ["count = 6", "min_frequency = 2e3\nmax_frequency = 1.8e5"])
+@pytest.mark.parametrize(
+    "modes", ["count = 6", pytest.param("min_frequency = 2e3\nmax_frequency = 1.8e5", marks=pytest.mark.slow)]
+)
 def test_two_ranks_find_what_one_finds(modes, tmp_path):
     """The lowest modes by one shift, and some seventy by spectrum slicing."""
     (tmp_path / "case.toml").write_text(CASE.replace("count = 6", modes))
@@ -81,3 +83,9 @@ def test_bad_input_is_told_once(tmp_path):
     assert finished.returncode == BAD_INPUT
     assert finished.stderr.count("no facet group 'rot'") == 1
     assert not (tmp_path / "modes.h5").exists()
+
+
+def test_a_fault_ends_all_ranks(tmp_path):
+    finished = on_two_ranks(cwd=tmp_path, program=(str(ROOT / "tests" / "mpi_fault.py"),))
+    assert finished.returncode != 0
+    assert finished.stderr.count("RuntimeError: a fault of the program") == 1
