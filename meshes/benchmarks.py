@@ -9,7 +9,7 @@ from pathlib import Path
 
 import gmsh
 
-from meshes.vane_cluster import ParameterError
+from meshes.parameters import ParameterError
 from modal import msh, store
 
 _FACES = ("root", "tip", "left", "right", "bottom", "top")

@@ -15,14 +15,14 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
+from meshes.cluster_geometry import facets, solids
+from meshes.parameters import ParameterError
 from modal import msh, store
 
+__all__ = ["SHIPPED", "ParameterError", "VaneCluster", "build"]
+
 SHIPPED = Path(__file__).with_name("vane_cluster.msh")
-_TOLERANCE = 1e-7  # m
-
-
-class ParameterError(ValueError):
-    """A parameter of a mesh that is out of its range or does not fit the others; the message starts with its name."""
+_DAMPER = ("damper_width", "damper_height", "damper_depth")
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,14 @@ class VaneCluster:
     Facet groups: `clamp` (outer surface of the outer shroud), `shroud` (inner surface of the inner shroud: its average
     tangential displacement is the response), and for every cavity i from 1 `c<i>_left` and `c<i>_right` (walls normal
     to the tangential direction at its negative and positive end), `c<i>_floor` and `c<i>_roof` (walls at the smaller
-    and the larger radius). Volume groups: `outer_shroud`, `airfoils`, `inner_shroud`.
+    and the larger radius). Volume groups: `outer_shroud`, `airfoils`, `inner_shroud`, and `damper` for tied bodies.
 
     A cavity is a rectangular pocket, sunk from the axial end face at positive x into the middle of the inner shroud's
     wall, as an electrode erodes it; the lid that keeps the bodies in is not modelled. Cavities are spread evenly.
+
+    With a damper's width, height and depth (tangential, radial, axial; all three or none) a body of that size is
+    meshed into every cavity, tied to the middle of its floor, and to every other wall that it reaches. What it covers
+    of a wall is no part of the wall's facet group.
     """
 
     airfoils: int = 4
@@ -55,6 +59,9 @@ class VaneCluster:
     cavity_height: float = 0.005
     cavity_depth: float = 0.012
     cavity_wall: float = 0.001
+    damper_width: float = 0.0
+    damper_height: float = 0.0
+    damper_depth: float = 0.0
     element_size: float = 0.0026
     order: int = 1
 
@@ -66,12 +73,17 @@ class VaneCluster:
                     raise ParameterError(f"{item.name}: expected a whole number of at least {least}, not {value!r}")
             elif not isinstance(value, Real) or not math.isfinite(value):
                 raise ParameterError(f"{item.name}: expected a finite number, not {value!r}")
+            elif item.name in _DAMPER:
+                if value < 0.0:
+                    raise ParameterError(f"{item.name}: expected a positive number, or 0 for no body; not {value}")
             elif item.name not in ("camber_deg", "stagger_deg") and value <= 0.0:
                 raise ParameterError(f"{item.name}: expected a positive number, not {value}")
         self._check_angles()
         self._check_airfoils()
         if self.cavities:
             self._check_cavities()
+        if any(self.damper_size):
+            self._check_damper()
 
     @property
     def sector_deg(self) -> float:
@@ -97,6 +109,16 @@ class VaneCluster:
     def cavity_radius(self) -> float:
         """Radial position of the middle of the cavities, m."""
         return self.inner_radius + 0.5 * self.inner_thickness
+
+    @property
+    def damper_size(self) -> tuple[float, float, float]:
+        """Axial, tangential and radial size of the tied body in every cavity, m; zeros without bodies."""
+        return self.damper_depth, self.damper_width, self.damper_height
+
+    @property
+    def damper_volume(self) -> float:
+        """Of the tied bodies in all cavities, m^3."""
+        return self.cavities * math.prod(self.damper_size)
 
     def cavity_angles(self) -> np.ndarray:
         """(cavities,) angular position of the cavities, rad."""
@@ -175,6 +197,12 @@ class VaneCluster:
                 f"at most {2 * max(slot, 0.0):.4g} m each"
             )
 
+    def _check_damper(self) -> None:
+        for name in _DAMPER:
+            size, room = getattr(self, name), getattr(self, name.replace("damper", "cavity"))
+            if not self.cavities or not 0.0 < size <= room:
+                raise ParameterError(f"{name}: expected more than 0 and at most the cavity's {room} m, not {size}")
+
 
 def build(parameters: VaneCluster, path: str | os.PathLike[str]) -> Path:
     """Mesh the cluster and write it as gmsh 4.1 text. Returns the path.
@@ -185,139 +213,22 @@ def build(parameters: VaneCluster, path: str | os.PathLike[str]) -> Path:
     if Path(path).suffix != ".msh":
         raise ParameterError(f"path: expected a file name ending in .msh, not {path}")
     with msh.session("vane_cluster"):
-        volumes = _solids(parameters)
+        volumes = solids(parameters)
         for name, tags in volumes.items():
             gmsh.model.addPhysicalGroup(3, tags, name=name)
-        for name, tags in _facets(parameters).items():
+        for name, tags in facets(parameters).items():
             gmsh.model.addPhysicalGroup(2, tags, name=name)
         for option in ("Mesh.MeshSizeMin", "Mesh.MeshSizeMax"):
             gmsh.option.setNumber(option, parameters.element_size)
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.optimize("Netgen")
         gmsh.model.mesh.setOrder(parameters.order)
+        if parameters.order > 1 and msh.inverted():
+            # flat elements at a coarse arc fold over when they are bent to it
+            gmsh.model.mesh.optimize("HighOrder")
         gmsh.model.mesh.renumberNodes()
         msh.check_disjoint(2, "facet")
         gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
         with store.replacing(path) as temporary:
             gmsh.write(str(temporary))
     return Path(path)
-
-
-def _solids(parameters: VaneCluster) -> dict[str, list[int]]:
-    """Volume groups: shrouds with pockets, and the airfoils between them, with shared faces."""
-    occ = gmsh.model.occ
-    inner = _annular_sector(parameters, parameters.inner_radius, parameters.platform_radius)
-    outer = _annular_sector(parameters, parameters.casing_radius, parameters.outer_radius)
-    blades = [(3, _airfoil(parameters, angle)) for angle in _airfoil_angles(parameters)]
-    airfoils, _ = occ.cut(blades, [(3, inner), (3, outer)], removeTool=False)
-    if parameters.cavities:
-        pockets = [(3, _pocket(parameters, angle)) for angle in parameters.cavity_angles()]
-        occ.cut([(3, inner)], pockets)
-    _, pieces = occ.fragment([(3, outer), (3, inner)], airfoils)
-    occ.synchronize()
-    groups = {
-        "outer_shroud": [tag for _, tag in pieces[0]],
-        "airfoils": [tag for piece in pieces[2:] for _, tag in piece],
-        "inner_shroud": [tag for _, tag in pieces[1]],
-    }
-    counts = {name: len(tags) for name, tags in groups.items()}
-    if counts != {"outer_shroud": 1, "airfoils": parameters.airfoils, "inner_shroud": 1}:
-        raise ParameterError(f"span: the cluster falls into {counts} pieces; check span, stagger and chord")
-    return groups
-
-
-def _airfoil_angles(parameters: VaneCluster) -> np.ndarray:
-    pitch = math.radians(parameters.pitch_deg)
-    return (np.arange(parameters.airfoils) - 0.5 * (parameters.airfoils - 1)) * pitch
-
-
-def _annular_sector(parameters: VaneCluster, inner: float, outer: float) -> int:
-    occ = gmsh.model.occ
-    half = 0.5 * math.radians(parameters.sector_deg)
-    back = -0.5 * parameters.axial_length
-
-    def point(radius: float, angle: float) -> int:
-        return occ.addPoint(back, radius * math.sin(angle), radius * math.cos(angle))
-
-    centre = occ.addPoint(back, 0.0, 0.0)
-    corners = [point(inner, -half), point(inner, half), point(outer, half), point(outer, -half)]
-    edges = [
-        occ.addCircleArc(corners[0], centre, corners[1]),
-        occ.addLine(corners[1], corners[2]),
-        occ.addCircleArc(corners[2], centre, corners[3]),
-        occ.addLine(corners[3], corners[0]),
-    ]
-    face = occ.addPlaneSurface([occ.addCurveLoop(edges)])
-    solid = occ.extrude([(2, face)], parameters.axial_length, 0.0, 0.0)
-    occ.remove([(0, centre)])
-    return next(tag for dimension, tag in solid if dimension == 3)
-
-
-def _airfoil(parameters: VaneCluster, angle: float) -> int:
-    """A prism whose ends lie inside both shrouds."""
-    occ = gmsh.model.occ
-    foot = parameters.platform_radius - 0.5 * parameters.inner_thickness
-    tip = parameters.casing_radius + 0.5 * parameters.outer_thickness
-    suction, pressure = parameters.profile()
-    upper = [occ.addPoint(x, y, foot) for x, y in suction]
-    lower = [upper[0]] + [occ.addPoint(x, y, foot) for x, y in pressure[1:]]
-    edges = [occ.addSpline(upper), occ.addLine(upper[-1], lower[-1]), occ.addSpline(lower)]
-    face = occ.addPlaneSurface([occ.addCurveLoop(edges)])
-    solid = [entity for entity in occ.extrude([(2, face)], 0.0, 0.0, tip - foot) if entity[0] == 3]
-    occ.rotate(solid, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -angle)
-    return int(solid[0][1])
-
-
-def _pocket(parameters: VaneCluster, angle: float) -> int:
-    occ = gmsh.model.occ
-    front = 0.5 * parameters.axial_length
-    floor = parameters.cavity_radius - 0.5 * parameters.cavity_height
-    # reaching out of the end face keeps the cut free of coincident faces
-    length = parameters.cavity_depth + parameters.axial_length
-    box = occ.addBox(
-        front - parameters.cavity_depth,
-        -0.5 * parameters.cavity_width,
-        floor,
-        length,
-        parameters.cavity_width,
-        parameters.cavity_height,
-    )
-    occ.rotate([(3, box)], 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -angle)
-    return int(box)
-
-
-def _facets(parameters: VaneCluster) -> dict[str, list[int]]:
-    """Facet groups, found by where their surfaces lie."""
-    surfaces = [tag for _, tag in gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)]
-    found = {
-        "clamp": [tag for tag in surfaces if _on_cylinder(tag, parameters.outer_radius)],
-        "shroud": [tag for tag in surfaces if _on_cylinder(tag, parameters.inner_radius)],
-    }
-    axial = 0.5 * (parameters.axial_length - parameters.cavity_depth)
-    half_width, half_height = 0.5 * parameters.cavity_width, 0.5 * parameters.cavity_height
-    walls = {
-        "left": (-half_width, parameters.cavity_radius),
-        "right": (half_width, parameters.cavity_radius),
-        "floor": (0.0, parameters.cavity_radius - half_height),
-        "roof": (0.0, parameters.cavity_radius + half_height),
-    }
-    centres = {tag: np.array(gmsh.model.occ.getCenterOfMass(2, tag)) for tag in surfaces}
-    for number, angle in enumerate(parameters.cavity_angles(), start=1):
-        sine, cosine = math.sin(angle), math.cos(angle)
-        for side, (y, z) in walls.items():
-            target = np.array([axial, y * cosine + z * sine, -y * sine + z * cosine])
-            found[f"c{number}_{side}"] = [
-                tag for tag, centre in centres.items() if np.linalg.norm(centre - target) < _TOLERANCE
-            ]
-    empty = [name for name, tags in found.items() if not tags]
-    if empty:
-        raise ParameterError(f"cavity_width: no surface found for facet groups {', '.join(empty)}")
-    return found
-
-
-def _on_cylinder(surface: int, radius: float) -> bool:
-    """Whether a surface lies on the cylinder of that radius about the machine's axis."""
-    lower, upper = (np.array(bound) for bound in gmsh.model.getParametrizationBounds(2, surface))
-    shares = np.array([[0.5, 0.5], [0.2, 0.3], [0.9, 0.6]])
-    points = np.array(gmsh.model.getValue(2, surface, (lower + shares * (upper - lower)).ravel())).reshape(-1, 3)
-    return bool(np.all(np.abs(np.hypot(points[:, 1], points[:, 2]) - radius) < _TOLERANCE))

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
@@ -20,6 +20,11 @@ __all__ = ["Factorization", "Modes", "SolverError", "count_below", "factorize", 
 _KIND = "modes"
 # of the lowest straining eigenvalue: below every elastic mode, far enough from the rigid ones to factorise safely
 _SHIFT = -1e-4
+# modes beyond those asked for, among which the gap is sought where they are counted; the least gap, relative
+_SPARE = 3
+_GAP = 1e-6
+# more modes than this are found faster slice by slice
+_SLICE = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,30 +84,35 @@ class Modes:
         return cls(values["frequency"], values["shape"], values["residual"], json.loads(attributes["provenance"]))
 
 
-def solve_modes(matrices: SystemMatrices, count: int = 10, max_frequency: float | None = None) -> Modes:
-    """The lowest `count` modes, or all modes up to `max_frequency` (Hz, then `count` is not used).
+def solve_modes(
+    matrices: SystemMatrices, count: int = 10, max_frequency: float | None = None, min_frequency: float = 0.0
+) -> Modes:
+    """The lowest `count` modes, or all modes from `min_frequency` to `max_frequency` (Hz, then `count` is not used).
 
-    Free and partly held structures show their rigid modes near zero frequency. Raises SolverError for a count that the
-    structure does not have, no mode below max_frequency, or no convergence.
+    Sylvester's law of inertia proves that no mode is missed. Free and partly held structures show their rigid modes at
+    zero frequency: those whose strain energy is within round-off. Raises SolverError for a count that the structure
+    does not have, no mode in the range, or no convergence.
     """
     free = matrices.free
-    if max_frequency is not None:
-        count = count_below(matrices, max_frequency)
-        if count == 0:
-            raise SolverError(f"max_frequency: the structure has no mode up to {max_frequency} Hz; raise it")
-    if not 1 <= count <= free.size:
-        raise SolverError(f"count: expected 1 to {free.size} modes (the free DOFs), not {count}")
-    stiffness, mass = (matrix[free][:, free] for matrix in (matrices.stiffness, matrices.mass))
-    shift = _SHIFT * _straining_eigenvalue(matrices)
-    eigenvalues, vectors = petsc.lowest_eigenpairs(stiffness, mass, count, shift)
-    inertia = vectors @ mass
+    pencil = _Pencil(*(matrix[free][:, free] for matrix in (matrices.stiffness, matrices.mass)))
+    floor = _SHIFT * _straining_eigenvalue(matrices)
+    if max_frequency is None:
+        if not 1 <= count <= free.size:
+            raise SolverError(f"count: expected 1 to {free.size} modes (the free DOFs), not {count}")
+        eigenvalues, vectors = _lowest(pencil, count, floor)
+    else:
+        eigenvalues, vectors = _within(pencil, min_frequency, max_frequency, floor)
+    inertia = vectors @ pencil.mass
     scale = 1.0 / np.sqrt(np.einsum("ij,ij->i", vectors, inertia))
-    residuals = np.linalg.norm(vectors @ stiffness - eigenvalues[:, None] * inertia, axis=1)
-    residuals /= (eigenvalues - shift) * np.linalg.norm(inertia, axis=1)
+    forces = vectors @ pencil.stiffness
+    residuals = np.linalg.norm(forces - eigenvalues[:, None] * inertia, axis=1)
+    residuals /= (eigenvalues - floor) * np.linalg.norm(inertia, axis=1)
+    round_off = np.finfo(float).eps * np.einsum("ij,ij->i", np.abs(vectors), np.abs(vectors) @ abs(pencil.stiffness))
+    eigenvalues = np.where(eigenvalues > round_off * scale**2, eigenvalues, 0.0)
     scale *= _signs(vectors, inertia @ matrices.movable_translations()[free])
-    shapes = np.zeros((count, matrices.size))
+    shapes = np.zeros((len(eigenvalues), matrices.size))
     shapes[:, free] = scale[:, None] * vectors
-    return Modes(np.sqrt(np.maximum(eigenvalues, 0.0)) / (2.0 * np.pi), shapes, residuals, matrices.provenance)
+    return Modes(np.sqrt(eigenvalues) / (2.0 * np.pi), shapes, residuals, matrices.provenance)
 
 
 def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
@@ -110,8 +120,7 @@ def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
     if not frequency_hz > 0.0:
         raise SolverError(f"frequency: expected a positive number of Hz, not {frequency_hz}")
     free = matrices.free
-    shifted = matrices.stiffness - (2.0 * np.pi * frequency_hz) ** 2 * matrices.mass
-    return petsc.negative_eigenvalues(sparse.csr_array(shifted)[free][:, free])
+    return _Pencil(*(m[free][:, free] for m in (matrices.stiffness, matrices.mass))).below(_eigenvalue(frequency_hz))
 
 
 def factorize(matrix: sparse.csr_array) -> Factorization:
@@ -121,6 +130,69 @@ def factorize(matrix: sparse.csr_array) -> Factorization:
     frees it. Raises SolverError for a singular matrix.
     """
     return Factorization(matrix)
+
+
+class _Pencil(NamedTuple):
+    """Stiffness and mass of the free DOFs."""
+
+    stiffness: sparse.csr_array
+    mass: sparse.csr_array
+
+    def below(self, eigenvalue: float) -> int:
+        """Number of eigenvalues below one."""
+        return petsc.negative_eigenvalues(sparse.csr_array(self.stiffness - eigenvalue * self.mass))
+
+
+def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest eigenpairs, proved complete by the inertia in a gap of the spectrum above them."""
+    size, spare = pencil.mass.shape[0], _SPARE
+    while True:
+        asked = min(count + spare, size)
+        values, vectors = petsc.nearest_eigenpairs(*pencil, asked, floor)
+        gaps = np.diff(values[count - 1 :]) / (values[count:] - floor)
+        if asked == size or gaps.max() > _GAP:
+            break
+        spare *= 2  # more modes of one frequency than were asked for
+    if gaps.size == 0:
+        return values[:count], vectors[:count]
+    last = count + int(np.argmax(gaps))
+    ceiling = 0.5 * (values[last - 1] + values[last])
+    expected = pencil.below(ceiling)
+    if expected != last:
+        # copies of a multiple eigenvalue that the one Krylov space does not hold
+        values, vectors = _sliced(pencil, floor, ceiling, expected)
+    return values[:count], vectors[:count]
+
+
+def _within(pencil: _Pencil, low_hz: float, high_hz: float, floor: float) -> tuple[np.ndarray, np.ndarray]:
+    """All eigenpairs of a range of frequencies, as many as the inertia at its ends says."""
+    if not 0.0 <= low_hz < high_hz:
+        raise SolverError(f"min_frequency: expected 0 <= min_frequency < max_frequency, not {low_hz} and {high_hz} Hz")
+    lower, upper = _eigenvalue(low_hz) if low_hz else floor, _eigenvalue(high_hz)
+    count = pencil.below(upper) - (pencil.below(lower) if low_hz else 0)
+    if count == 0:
+        low = f"from {low_hz} " if low_hz else ""
+        raise SolverError(f"max_frequency: the structure has no mode {low}up to {high_hz} Hz; raise it")
+    if count <= _SLICE:
+        # the eigenvalues nearest to the middle of an interval are those inside
+        values, vectors = petsc.nearest_eigenpairs(*pencil, count, 0.5 * (lower + upper) if low_hz else floor)
+        if np.all((values > lower) & (values < upper)):
+            return values, vectors
+    return _sliced(pencil, lower, upper, count)
+
+
+def _sliced(pencil: _Pencil, lower: float, upper: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    values, vectors = petsc.interval_eigenpairs(*pencil, lower, upper)
+    if len(values) != count:
+        low, high = (np.sqrt(max(value, 0.0)) / (2.0 * np.pi) for value in (lower, upper))
+        raise SolverError(
+            f"{len(values)} of {count} modes found from {low:.6g} to {high:.6g} Hz; move the limits a little"
+        )
+    return values, vectors
+
+
+def _eigenvalue(frequency_hz: float) -> float:
+    return float((2.0 * np.pi * frequency_hz) ** 2)
 
 
 def _straining_eigenvalue(matrices: SystemMatrices) -> float:

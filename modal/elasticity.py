@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import ufl
+from scipy import sparse
 
 from modal import fenicsx
 from modal.matrices import Patch, SystemMatrices
@@ -48,21 +49,52 @@ class Material:
         return 2.0 * shear * self.poisson / (1.0 - 2.0 * self.poisson), shear
 
 
+@dataclass(frozen=True)
+class ElasticSupport:
+    """Springs to the ground, spread over a facet group (a Winkler foundation), N/m^3: force per area and displacement.
+
+    stiffness           along the axes x, y, z
+    normal, tangential  across the facets, and along them in every direction; added to the ones along the axes
+
+    Raises ElasticityError unless they are finite, not negative and not all zero.
+    """
+
+    stiffness: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    normal: float = 0.0
+    tangential: float = 0.0
+
+    def __post_init__(self) -> None:
+        values = (*self.stiffness, self.normal, self.tangential)
+        if len(values) != 5 or not all(math.isfinite(value) and value >= 0.0 for value in values) or not any(values):
+            raise ElasticityError(
+                f"stiffness: expected stiffnesses in N/m^3 along x, y, z, not negative and not all zero; not {self}"
+            )
+
+
 class Solid:
     """An elastic body on a mesh: its forms, and what needs the mesh after the matrices are made.
 
     materials  volume group -> Material; the key "default" serves every group that is not named
-    degree     of the displacements, 1 or more; 2 is right for bending
+    degree     of the displacements, 1 to 3; 2 is right for bending
+    elastic    facet group -> ElasticSupport
 
-    Raises modal.msh.MeshError for the mesh and ElasticityError for the rest.
+    Elements may be curved (of geometric order 2). Raises modal.msh.MeshError for the mesh and ElasticityError for the
+    rest.
     """
 
-    def __init__(self, mesh: str | os.PathLike[str], materials: Mapping[str, Material], degree: int = 2) -> None:
+    def __init__(
+        self,
+        mesh: str | os.PathLike[str],
+        materials: Mapping[str, Material],
+        degree: int = 2,
+        elastic: Mapping[str, ElasticSupport] | None = None,
+    ) -> None:
         if degree not in (1, 2, 3):
             raise ElasticityError(f"degree: expected 1, 2 or 3, not {degree}")
         self.domain = fenicsx.read(mesh)
         self.degree = degree
         self.materials = _by_group(materials, self.domain)
+        self.elastic = dict(elastic or {})
         self.space = fenicsx.vector_space(self.domain, degree)
         self._lame = fenicsx.cell_constants(self.domain, {name: m.lame[0] for name, m in self.materials.items()})
         self._shear = fenicsx.cell_constants(self.domain, {name: m.lame[1] for name, m in self.materials.items()})
@@ -74,11 +106,17 @@ class Solid:
         return self._lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * self._shear * strain
 
     def assemble(self, clamped: Mapping[str, str], damping_ratio: float) -> SystemMatrices:
-        """Unconstrained matrices, every facet group as a patch, and the supports {facet group: "xyz" or components}."""
+        """Unconstrained matrices, every facet group as a patch, and the supports {facet group: "xyz" or components}.
+
+        Elastic supports are part of the stiffness.
+        """
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         patches = {name: self._patch(facets) for name, facets in self.domain.facets.items()}
+        stiffness = self._material_stiffness(ufl.dx)
+        for name in self.elastic:
+            stiffness = stiffness + self._support_stiffness(name)
         return SystemMatrices(
-            stiffness=fenicsx.matrix(ufl.inner(self.stress(trial), ufl.sym(ufl.grad(test))) * ufl.dx),
+            stiffness=stiffness,
             mass=fenicsx.matrix(self._density * ufl.inner(trial, test) * ufl.dx),
             coordinates=fenicsx.node_coordinates(self.space),
             fixed=self._fixed(clamped),
@@ -90,9 +128,21 @@ class Solid:
                 "degree": self.degree,
                 "materials": {name: asdict(material) for name, material in self.materials.items()},
                 "clamped": dict(clamped),
+                "elastic": {name: asdict(support) for name, support in self.elastic.items()},
                 "versions": fenicsx.versions(),
             },
         )
+
+    def stiffness_parts(self) -> dict[str, sparse.csr_array]:
+        """What the stiffness is the sum of, (N, N) N/m each: "material.<volume group>" and "support.<facet group>".
+
+        Each is proportional to its Young's modulus or to its support's stiffnesses: the derivatives that tuning needs.
+        """
+        parts = {
+            f"material.{name}": self._material_stiffness(fenicsx.over_cells(self.domain, cells))
+            for name, cells in self.domain.volumes.items()
+        }
+        return parts | {f"support.{name}": self._support_stiffness(name) for name in self.elastic}
 
     def von_mises(self, displacement: np.ndarray) -> np.ndarray:
         """Von Mises stress, Pa, of displacements (N,) at the corners of all cells, each cell from its own side."""
@@ -101,6 +151,10 @@ class Solid:
         deviator = ufl.dev(self.stress(fenicsx.field(self.space, displacement)))
         equivalent = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
         return np.array(fenicsx.evaluate(equivalent, fenicsx.discontinuous_space(self.domain, 1)).x.array)
+
+    def stress_points(self) -> np.ndarray:
+        """(k, 3) m, the places of the values of `von_mises`."""
+        return fenicsx.node_coordinates(fenicsx.discontinuous_space(self.domain, 1))
 
     def vtk_mesh(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Cells, VTK cell types and points, the points in the order of the nodes; for pyvista.UnstructuredGrid."""
@@ -111,6 +165,20 @@ class Solid:
         if os.path.splitext(path)[1] != ".xdmf":
             raise ElasticityError(f"path: expected a file name ending in .xdmf, not {path}")
         fenicsx.write_fields(self.space, fields, path)
+
+    def _material_stiffness(self, measure: Any) -> sparse.csr_array:
+        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        return fenicsx.matrix(ufl.inner(self.stress(trial), ufl.sym(ufl.grad(test))) * measure)
+
+    def _support_stiffness(self, name: str) -> sparse.csr_array:
+        support, domain = self.elastic[name], self.domain
+        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        axes = fenicsx.constant(domain, support.stiffness)
+        normal, tangential = (fenicsx.constant(domain, value) for value in (support.normal, support.tangential))
+        outward = ufl.FacetNormal(domain.mesh)
+        traction = ufl.as_vector([axes[i] * trial[i] for i in range(3)]) + tangential * trial
+        traction += (normal - tangential) * ufl.inner(trial, outward) * outward
+        return fenicsx.matrix(ufl.inner(traction, test) * fenicsx.over_facets(domain, domain.facet_group(name)))
 
     def _patch(self, facets: np.ndarray) -> Patch:
         nodes = fenicsx.group_nodes(self.space, facets)
@@ -132,9 +200,10 @@ def assemble(
     clamped: Mapping[str, str],
     degree: int = 2,
     damping_ratio: float = 0.0,
+    elastic: Mapping[str, ElasticSupport] | None = None,
 ) -> SystemMatrices:
     """Matrices of the elastic body on a gmsh mesh; see Solid for the arguments and the errors raised."""
-    return Solid(mesh, materials, degree).assemble(clamped, damping_ratio)
+    return Solid(mesh, materials, degree, elastic).assemble(clamped, damping_ratio)
 
 
 def _by_group(materials: Mapping[str, Material], domain: fenicsx.Domain) -> dict[str, Material]:

@@ -11,7 +11,7 @@ import hashlib
 import importlib
 import logging
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,7 +70,11 @@ def versions() -> dict[str, str]:
 
 
 def read(path: str | os.PathLike[str]) -> Domain:
-    """Read a gmsh mesh. Raises MeshError: no file, not a mesh, no or mixed volume elements, overlapping groups."""
+    """Read a gmsh mesh.
+
+    Raises MeshError: no file, not a mesh, no or mixed volume elements, inverted elements, loose parts, overlapping
+    groups.
+    """
     file = Path(path)
     with msh.session("read"):
         msh.merge(file)
@@ -147,14 +151,26 @@ def matrix(form: Any) -> sparse.csr_array:
     return result
 
 
+def over_facets(domain: Domain, facets: np.ndarray) -> Any:
+    """UFL measure of the integral over boundary facets."""
+    return _measure("ds", domain, 2, facets)
+
+
+def over_cells(domain: Domain, cells: np.ndarray) -> Any:
+    """UFL measure of the integral over cells."""
+    return _measure("dx", domain, 3, cells)
+
+
+def constant(domain: Domain, values: float | Sequence[float]) -> Any:
+    """A number or vector in UFL whose value is no part of the compiled form."""
+    return fem.Constant(domain.mesh, np.array(values, dtype=float))
+
+
 def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
     """(n_nodes,) m^2, integral of every nodal shape function over the facets."""
-    # one tag value for all groups, so that one compiled form serves them all
-    tags = dolfinx.mesh.meshtags(domain.mesh, 2, facets, np.ones_like(facets))
-    surface = ufl.Measure("ds", domain=domain.mesh, subdomain_data=tags)
-    along_x = fem.Constant(domain.mesh, np.array([1.0, 0.0, 0.0]))
+    along_x = constant(domain, [1.0, 0.0, 0.0])
     with _quiet():
-        compiled = fem.form(ufl.inner(along_x, ufl.TestFunction(space)) * surface(1))
+        compiled = fem.form(ufl.inner(along_x, ufl.TestFunction(space)) * over_facets(domain, facets))
     return np.array(fem.assemble_vector(compiled).array.reshape(-1, 3)[:, 0])
 
 
@@ -203,6 +219,8 @@ def _prepare_groups() -> None:
         gmsh.model.addPhysicalGroup(3, rest, name=_UNNAMED)
     msh.check_disjoint(2, "facet")
     msh.check_disjoint(3, "volume")
+    msh.check_volumes()
+    msh.check_connected()
     gmsh.model.mesh.renumberNodes()
 
 
@@ -218,6 +236,12 @@ def _check_kinds() -> None:
     for kind in gmsh.model.mesh.getElementTypes(2):
         if gmsh.model.mesh.getElementProperties(kind)[2] != order:
             raise MeshError(f"facets are not of the volume elements' order {order}; set the order of the whole mesh")
+
+
+def _measure(kind: str, domain: Domain, dimension: int, entities: np.ndarray) -> Any:
+    # one tag value for all groups, so that one compiled form serves them all
+    tags = dolfinx.mesh.meshtags(domain.mesh, dimension, entities, np.ones_like(entities))
+    return ufl.Measure(kind, domain=domain.mesh, subdomain_data=tags)(1)
 
 
 def _vectors(mesh: Any, degree: int) -> Any:

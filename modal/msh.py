@@ -9,6 +9,8 @@ from pathlib import Path
 
 import gmsh
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 
 class MeshError(ValueError):
@@ -75,12 +77,64 @@ def check_disjoint(dimension: int, kind: str) -> None:
     members = [_elements(dimension, tag) for tag in groups(dimension).values()]
     for second, name in enumerate(names):
         for first in range(second):
-            shared = len(members[first] & members[second])
+            shared = np.intersect1d(members[first], members[second], assume_unique=True).size
             if shared:
                 raise MeshError(
                     f"{kind} groups {names[first]!r} and {name!r} share {shared} elements; "
                     f"make the groups disjoint, an element can carry one label only"
                 )
+
+
+def check_volumes() -> None:
+    """Raise MeshError for elements of the current model whose Jacobian is not positive everywhere.
+
+    An element turned inside out adds its stiffness as if it were whole, and nothing downstream would tell.
+    """
+    bad = inverted()
+    if bad:
+        element, group = next(iter(bad.items()))
+        raise MeshError(
+            f"{len(bad)} elements have a negative volume or are folded, such as element {element} of volume group "
+            f"{group!r}; mesh again, or reorder their nodes (curved elements: optimise them, or use straight ones)"
+        )
+
+
+def inverted() -> dict[int, str]:
+    """Volume elements of the current model whose Jacobian is not positive everywhere, with their volume group."""
+    bad: dict[int, str] = {}
+    for _, entity in gmsh.model.getEntities(3):
+        for tags in gmsh.model.mesh.getElements(3, entity)[1]:
+            jacobians = np.asarray(gmsh.model.mesh.getElementQualities(tags, "minDetJac"))
+            bad |= dict.fromkeys(tags[~(jacobians > 0.0)].tolist(), _group_of(entity))
+    return bad
+
+
+def check_connected() -> None:
+    """Raise MeshError when the volume elements of the current model fall into parts that share no node."""
+    links, groups_of, lengths = [], [], []
+    for _, entity in gmsh.model.getEntities(3):
+        for tags, nodes in zip(*gmsh.model.mesh.getElements(3, entity)[1:], strict=True):
+            links.append(np.asarray(nodes, dtype=np.int64))
+            groups_of.append(np.full(len(tags), _group_of(entity), dtype=object))
+            lengths.append(np.full(len(tags), len(nodes) // len(tags)))
+    names, nodes = np.concatenate(groups_of), np.concatenate(links)
+    elements = np.repeat(np.arange(names.size), np.concatenate(lengths))
+    size = names.size + int(nodes.max()) + 1
+    graph = sparse.coo_array((np.ones(nodes.size, np.int8), (elements, names.size + nodes)), shape=(size, size))
+    parts = csgraph.connected_components(graph, directed=False)[1][: names.size]
+    found, counts = np.unique(parts, return_counts=True)
+    if found.size > 1:
+        held = [sorted(set(names[parts == part])) for part in found[:4]]
+        listed = "; ".join(f"{', '.join(map(repr, g))} ({n} elements)" for g, n in zip(held, counts, strict=False))
+        raise MeshError(
+            f"the mesh falls into {found.size} parts that share no node: {listed}; "
+            "join their volumes (OCC's fragment), or merge coincident nodes"
+        )
+
+
+def _group_of(entity: int) -> str:
+    tags = gmsh.model.getPhysicalGroupsForEntity(3, entity)
+    return (gmsh.model.getPhysicalName(3, tags[0]) or str(tags[0])) if len(tags) else "none"
 
 
 @contextlib.contextmanager
@@ -101,12 +155,15 @@ def _native_stderr_muted() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _elements(dimension: int, tag: int) -> set[tuple[int, ...]]:
-    """The elements of a physical group as sorted corner nodes, so that copies of an element are the same."""
-    found: set[tuple[int, ...]] = set()
+def _elements(dimension: int, tag: int) -> np.ndarray:
+    """The elements of a physical group as sorted corner nodes, each once: copies of an element are the same."""
+    found = []
     for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
         for kind, _, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
             _, _, _, n_nodes, _, n_corners = gmsh.model.mesh.getElementProperties(kind)
-            corners = np.sort(np.asarray(nodes).reshape(-1, n_nodes)[:, :n_corners], axis=1)
-            found.update(map(tuple, corners.tolist()))
-    return found
+            # zeros, which are no node's number, fill up to the corners of a hexahedron
+            corners = np.zeros((len(nodes) // n_nodes, 8), dtype=np.int64)
+            corners[:, :n_corners] = np.asarray(nodes).reshape(-1, n_nodes)[:, :n_corners]
+            found.append(np.sort(corners, axis=1))
+    rows = np.concatenate([np.empty((0, 8), np.int64), *found])
+    return np.unique(rows.view(np.dtype((np.void, 8 * rows.itemsize))))

@@ -1,12 +1,13 @@
 """Sparse symmetric algebra on PETSc and SLEPc: a factorisation and an eigenvalue solver for scipy matrices.
 
-Both lean on MUMPS' LDL^T. All PETSc objects are destroyed before a function returns or when its context ends.
+Both lean on MUMPS' LDL^T. All PETSc objects are destroyed before a function returns or when its context ends. Under MPI
+all ranks share eigenvalue problems and inertia counts (see `parallel`); a Factorization stays on its own rank.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any
 
@@ -15,8 +16,13 @@ from petsc4py import PETSc
 from scipy import sparse
 from slepc4py import SLEPc
 
+from modal import parallel
+
 # a round trip through a well-posed finite element matrix loses 5 to 8 digits, through a singular one all of them
 _ROUND_TRIP = 1e-2
+# MUMPS' controls: detect zero pivots; factorise the root on one rank, as its inertia is not known otherwise
+_FOR_INERTIA = {24: 1, 13: 1}
+_PREFIX = "vanedamp_"
 
 
 class SolverError(ValueError):
@@ -89,46 +95,128 @@ class Factorization:
 
 def negative_eigenvalues(matrix: sparse.csr_array) -> int:
     """Number of negative eigenvalues of a symmetric matrix, from its factors (Sylvester's law of inertia)."""
-    with _petsc(_petsc_matrix(matrix)) as operator, _petsc(PETSc.KSP().create(PETSc.COMM_SELF)) as ksp:
-        ksp.setOperators(operator)
-        _configure_direct(ksp)
-        ksp.setUp()
-        return int(ksp.getPC().getFactorMatrix().getInertia()[0])
+    found: int = _together("inertia", (matrix,))
+    return found
 
 
-def lowest_eigenpairs(
+def nearest_eigenpairs(
     stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues (count,) ascending and vectors (count, n) of K x = lambda M x nearest to a shift below them all.
+    """Eigenvalues (count,) ascending and vectors (count, n) of K x = lambda M x nearest to a shift.
 
     Krylov-Schur with shift and invert (Stewart 2001, SIAM J. Matrix Anal. Appl. 23). Raises SolverError when fewer
     converge than were asked for.
     """
-    with contextlib.ExitStack() as stack:
-        matrices = [stack.enter_context(_petsc(_petsc_matrix(matrix))) for matrix in (stiffness, mass)]
-        eps = stack.enter_context(_petsc(SLEPc.EPS().create(PETSc.COMM_SELF)))
-        eps.setOperators(*matrices)
-        eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-        eps.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        eps.setTarget(shift)
-        eps.setDimensions(count)
-        eps.setTolerances(1e-11, 500)
-        transform = eps.getST()
-        transform.setType(SLEPc.ST.Type.SINVERT)
-        transform.setShift(shift)
-        _set_direct(transform.getKSP())
-        eps.solve()
-        if eps.getConverged() < count:
-            raise SolverError(
-                f"{eps.getConverged()} of {count} modes converged in {eps.getIterationNumber()} iterations"
-            )
-        vector = stack.enter_context(_petsc(matrices[0].createVecRight()))
-        values, vectors = np.empty(count), np.empty((count, stiffness.shape[0]))
-        for index in range(count):
-            values[index] = eps.getEigenpair(index, vector).real
-            vectors[index] = vector.getArray()
-    order = np.argsort(values)
+    values, vectors = _together("nearest", (stiffness, mass), count, shift)
+    nearest = np.argsort(np.abs(values - shift), kind="stable")[:count]
+    order = nearest[np.argsort(values[nearest], kind="stable")]
     return values[order], vectors[order]
+
+
+def interval_eigenpairs(
+    stiffness: sparse.csr_array, mass: sparse.csr_array, lower: float, upper: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """All eigenvalues (m,) ascending in an interval and their vectors (m, n), by spectrum slicing.
+
+    Shifts walk through the interval, and inertia counts tell how many eigenvalues lie between two of them (Campos and
+    Roman 2012, Numer. Algorithms 60). Raises SolverError.
+    """
+    values, vectors = _together("interval", (stiffness, mass), lower, upper)
+    order = np.argsort(values, kind="stable")
+    return values[order], vectors[order]
+
+
+@contextlib.contextmanager
+def ranks() -> Iterator[bool]:
+    """True on MPI's rank 0, which runs the program; the other ranks help with its factorisations, then see False."""
+    with parallel.ranks(_help) as first:
+        yield first
+
+
+def _together(task: str, matrices: tuple[sparse.csr_array, ...], *arguments: Any) -> Any:
+    """A task on all ranks with the matrices of rank 0."""
+    parallel.invite(task, len(matrices), arguments)
+    return _take_part(task, matrices, arguments)
+
+
+def _help(task: str, matrices: int, arguments: tuple[Any, ...]) -> None:
+    # what fails, fails on rank 0 too, and is told there
+    with contextlib.suppress(SolverError, PETSc.Error):
+        _take_part(task, (None,) * matrices, arguments)
+
+
+def _take_part(task: str, matrices: tuple[sparse.csr_array | None, ...], arguments: tuple[Any, ...]) -> Any:
+    with contextlib.ExitStack() as stack:
+        operators = [stack.enter_context(_petsc(_distributed(matrix))) for matrix in matrices]
+        return _TASKS[task](stack, operators, *arguments)
+
+
+def _inertia(stack: contextlib.ExitStack, operators: list[Any]) -> int:
+    ksp = stack.enter_context(_petsc(PETSc.KSP().create(parallel.COMM)))
+    ksp.setOperators(operators[0])
+    _configure_direct(ksp)
+    ksp.setUp()
+    factor = ksp.getPC().getFactorMatrix()
+    if factor.getMumpsInfog(1) < 0:
+        raise SolverError(f"MUMPS cannot factorise a matrix of size {operators[0].getSize()[0]}: {_complaint(factor)}")
+    return int(factor.getInertia()[0])
+
+
+def _nearest(
+    stack: contextlib.ExitStack, operators: list[Any], count: int, shift: float
+) -> tuple[np.ndarray, np.ndarray]:
+    eps = _eigenproblem(stack, operators)
+    eps.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    eps.setTarget(shift)
+    eps.setDimensions(count)
+    eps.getST().setShift(shift)
+    _set_direct(eps.getST().getKSP())
+    _solve(eps)
+    if eps.getConverged() < count:
+        raise SolverError(f"{eps.getConverged()} of {count} modes converged in {eps.getIterationNumber()} iterations")
+    return _eigenpairs(stack, eps, operators[0])
+
+
+def _interval(
+    stack: contextlib.ExitStack, operators: list[Any], lower: float, upper: float
+) -> tuple[np.ndarray, np.ndarray]:
+    eps = _eigenproblem(stack, operators)
+    eps.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
+    eps.setInterval(lower, upper)
+    _set_direct(eps.getKrylovSchurKSP())
+    _solve(eps)
+    return _eigenpairs(stack, eps, operators[0])
+
+
+_TASKS: dict[str, Callable[..., Any]] = {"inertia": _inertia, "nearest": _nearest, "interval": _interval}
+
+
+def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any]) -> Any:
+    eps = stack.enter_context(_petsc(SLEPc.EPS().create(parallel.COMM)))
+    eps.setOptionsPrefix(_PREFIX)
+    eps.setOperators(*operators)
+    eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    eps.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
+    eps.setTolerances(1e-11, 500)
+    eps.getST().setType(SLEPc.ST.Type.SINVERT)
+    return eps
+
+
+def _solve(eps: Any) -> None:
+    try:
+        eps.solve()
+    except PETSc.Error as error:
+        raise SolverError(f"the eigenvalue solver failed ({' '.join(str(error).split())})") from error
+
+
+def _eigenpairs(stack: contextlib.ExitStack, eps: Any, operator: Any) -> tuple[np.ndarray, np.ndarray]:
+    """All converged values and, on rank 0, vectors."""
+    vector = stack.enter_context(_petsc(operator.createVecRight()))
+    values, vectors = np.empty(eps.getConverged()), np.empty((eps.getConverged(), vector.getLocalSize()))
+    for index in range(len(values)):
+        values[index] = eps.getEigenpair(index, vector).real
+        vectors[index] = vector.getArray()
+    return values, parallel.gathered(vectors)
 
 
 @contextlib.contextmanager
@@ -140,9 +228,18 @@ def _petsc(created: Any) -> Iterator[Any]:
 
 
 def _petsc_matrix(matrix: sparse.csr_array) -> Any:
-    """A PETSc matrix from a symmetric CSR one; the caller destroys it."""
+    """A PETSc matrix of this rank alone from a symmetric CSR one; the caller destroys it."""
     csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), np.array(matrix.data))
     created = PETSc.Mat().createAIJ(size=matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
+    created.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    return created
+
+
+def _distributed(matrix: sparse.csr_array | None) -> Any:
+    """A PETSc matrix over all ranks from rank 0's symmetric CSR one; the caller destroys it."""
+    size, csr = parallel.rows(matrix)
+    local = (len(csr[0]) - 1, size)
+    created = PETSc.Mat().createAIJ(size=(local, local), csr=csr, comm=parallel.COMM)
     created.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     return created
 
@@ -156,7 +253,18 @@ def _set_direct(ksp: Any) -> None:
 
 
 def _configure_direct(ksp: Any) -> None:
-    """As `_set_direct`, with the detection of zero pivots that inertia counts need."""
+    """As `_set_direct`, with what inertia counts need."""
     _set_direct(ksp)
     ksp.getPC().setFactorSetUpSolverType()
-    ksp.getPC().getFactorMatrix().setMumpsIcntl(24, 1)
+    for number, value in _FOR_INERTIA.items():
+        ksp.getPC().getFactorMatrix().setMumpsIcntl(number, value)
+
+
+def _complaint(factor: Any) -> str:
+    """What MUMPS says about a failure."""
+    status, detail = factor.getMumpsInfog(1), factor.getMumpsInfog(2)
+    return f"status {status} ({detail})" + (", not enough memory" if status in (-9, -13) else "")
+
+
+for _number, _value in _FOR_INERTIA.items():
+    PETSc.Options()[f"{_PREFIX}st_mat_mumps_icntl_{_number}"] = _value

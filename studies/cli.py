@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,7 +24,19 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line. Returns the exit status: 0, or 2 for bad input, told in one line on standard error."""
+    """Run the command line. Returns the exit status: 0, or 2 for bad input, told in one line on standard error.
+
+    Under mpirun the first rank runs it, and the others help with the factorisations.
+    """
+    if not _under_mpi() or _stranger() is not None:
+        return _main(argv)
+    from modal.petsc import ranks
+
+    with ranks() as first:
+        return _main(argv) if first else 0
+
+
+def _main(argv: Sequence[str] | None) -> int:
     arguments = _parser().parse_args(argv)
     stranger = _stranger()
     if stranger is not None:
@@ -54,6 +67,11 @@ def _refuse(message: str) -> int:
 def _located(message: str, file: str | None) -> str:
     """The message with the input file in front, unless it says so itself."""
     return message if file is None or message.startswith(f"{file}:") else f"{file}: {message}"
+
+
+def _under_mpi() -> bool:
+    """Whether a launcher of Open MPI, MPICH or Intel MPI started several ranks."""
+    return any(int(os.environ.get(name, 1)) > 1 for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"))
 
 
 def _stranger() -> str | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import sys
 import time
 from argparse import Namespace
 from collections.abc import Mapping
@@ -50,6 +51,8 @@ def modal(arguments: Namespace) -> None:
         save_vtk(analysis.modes, variables["coordinates"].values, variables["cell"].values, cell_type, arguments.vtk)
     result = analysis.to_json()
     _write_json(arguments.json, result)
+    for warning in analysis.warnings:
+        print(f"vanedamp: {arguments.input}: warning: {warning}", file=sys.stderr)
     if arguments.json != "-":
         tell_modes(result)
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
-from coupling.inputs import STRICT, InputError, Real, Whole, nearest, read_toml, validate
+from coupling.inputs import STRICT, InputError, NonNegative, Real, Whole, nearest, read_toml, validate
 from meshes import benchmarks, vane_cluster
 from meshes.benchmarks import Block
 from meshes.vane_cluster import VaneCluster
 
 if TYPE_CHECKING:
-    from modal.elasticity import Material
+    from modal.elasticity import ElasticSupport, Material
 
 Positive = Annotated[Real, Field(gt=0)]
 Ratio = Annotated[Real, Field(ge=0, lt=1)]
@@ -63,7 +63,8 @@ GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
 
 
 def _kind(table: Any) -> str:
-    return str(table.get("generator", "existing")) if isinstance(table, Mapping) else "existing"
+    generator = table.get("generator") if isinstance(table, Mapping) else getattr(table, "generator", None)
+    return "existing" if generator is None else str(generator)
 
 
 def _gather(table: Any) -> Any:
@@ -119,20 +120,53 @@ def _components(clamped: Any) -> Any:
     return merged
 
 
+def _axes(stiffness: Any) -> Any:
+    """One number stands for all three axes."""
+    return [stiffness] * 3 if isinstance(stiffness, int | float) else stiffness
+
+
+@dataclass(frozen=True, config=STRICT)
+class ElasticTable:
+    """Springs over a facet group, N/m^3: `stiffness` (a number or [x, y, z]) or `normal` and `tangential`."""
+
+    stiffness: Annotated[tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(_axes)] = (0.0, 0.0, 0.0)
+    normal: NonNegative = 0.0
+    tangential: NonNegative = 0.0
+
+    def __post_init__(self) -> None:
+        if not any((*self.stiffness, self.normal, self.tangential)):
+            raise ValueError("stiffness: expected N/m^3, such as 1e12 or [1e12, 5e11, 1e12], or normal and tangential")
+
+    @property
+    def springs(self) -> ElasticSupport:
+        """What the finite elements need of it."""
+        from modal.elasticity import ElasticSupport
+
+        return ElasticSupport(self.stiffness, self.normal, self.tangential)
+
+
 @dataclass(frozen=True, config=STRICT)
 class Support:
-    """Facet groups that are held: all components, or those named, as in {group = "y"}."""
+    """Facet groups that are held: all components, or those named, as in {group = "y"}, or by springs."""
 
     clamped: Annotated[dict[str, str], BeforeValidator(_components)] = field(default_factory=dict)
+    elastic: dict[str, ElasticTable] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for group in self.elastic:
+            if set(self.clamped.get(group, "")) == set("xyz"):
+                raise ValueError(f"elastic.{group}: the group is clamped, so that springs do nothing; choose one")
 
 
 @dataclass(frozen=True, config=STRICT)
 class ModesTable:
-    """Which modes are computed (the first `count`, or all up to `max_frequency` Hz) and which is the first bending:
-    the one with most effective mass along `direction`. `at` names the interface coordinate of the rigid model."""
+    """Which modes are computed (the first `count`, or all from `min_frequency` to `max_frequency` Hz) and which is the
+    first bending: the one with most effective mass along `direction`. `at` names the interface coordinate of the rigid
+    model."""
 
     count: Annotated[Whole, Field(ge=1)] | None = None
     max_frequency: Positive | None = None
+    min_frequency: NonNegative = 0.0
     direction: Direction = (0.0, 1.0, 0.0)
     damping_ratio: Ratio | None = None
     at: str | None = None
@@ -140,6 +174,8 @@ class ModesTable:
     def __post_init__(self) -> None:
         if self.count is not None and self.max_frequency is not None:
             raise ValueError("give one of count and max_frequency")
+        if self.min_frequency and not self.min_frequency < (self.max_frequency or 0.0):
+            raise ValueError("min_frequency: expected a max_frequency above it, the two ends of a range")
         if not any(self.direction):
             raise ValueError("direction: expected three numbers, not all zero, such as [0, 1, 0]")
 
@@ -201,6 +237,11 @@ class Case:
         return {name: table.elastic for name, table in self.material.items()}
 
     @property
+    def elastic_supports(self) -> dict[str, ElasticSupport]:
+        """Springs by facet group."""
+        return {name: table.springs for name, table in self.support.elastic.items()}
+
+    @property
     def response_label(self) -> str | None:
         """The interface coordinate of the rigid model: the one named, the only one, or `shroud`.
 
@@ -217,6 +258,8 @@ class Case:
         facets, volumes = list(facets), list(volumes)
         for group in self.support.clamped:
             _check_group("support.clamped", "facet group", group, facets)
+        for group in self.support.elastic:
+            _check_group(f"support.elastic.{group}", "facet group", group, facets)
         for label, table in self.interface.items():
             _check_group(f"interface.{label}.facets", "facet group", table.facets, facets)
         for group in self.material:

@@ -16,13 +16,15 @@ from modal.calibrate import FATIGUE_SHARE, RigidModel, fatigue_amplitude, rigid_
 from modal.eigen import Modes, factorize, solve_modes
 from modal.elasticity import Solid
 from modal.matrices import SystemMatrices
-from modal.participation import effective_masses, first_bending
+from modal.participation import ParticipationError, effective_masses, first_bending
 from modal.store import Variable
 from rom.craig_bampton import reduce
 from rom.interface import Interface, InterfaceCoordinate
 from rom.reduced import ReducedModel
 from studies.config import Case, MeshFile
 from studies.provenance import versions
+
+_PLAUSIBLE_HZ = (1.0, 1e6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +40,7 @@ def assemble(case: Case) -> Structure:
     """Mesh, groups, matrices. Raises the errors of the modal package, and InputError for unknown groups."""
     label = case.response_label  # an open choice is refused before the work
     with _mesh(case) as path:
-        solid = Solid(path, case.materials, case.mesh.degree)
+        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports)
         case.check_groups(solid.domain.facets, solid.domain.volumes)
         matrices = solid.assemble(case.support.clamped, case.damping_ratio)
     if label is not None:
@@ -72,17 +74,20 @@ class ModalAnalysis:
     """Modes and what they mean.
 
     effective_mass  (m, 3) kg along x, y, z; movable_mass (3,) kg is what they would sum to over all modes
-    first_bending   index of the mode that carries most mass along `direction`
-    rigid           that mode as one mass on a spring, at its interface coordinate; None without an interface
+    first_bending   index of the mode that carries most mass along `direction`; None when a free structure, or a range
+                    of frequencies, has no such mode
+    rigid           that mode as one mass on a spring, at its interface coordinate; None without either
     amplitude       m, displacement there at which the mode's stress reaches 70 % of the fatigue strength; None without
+    warnings        what to look at: frequencies that hint at wrong units, and why there is no first bending
     """
 
     structure: Structure
     modes: Modes
     effective_mass: np.ndarray
-    first_bending: int
+    first_bending: int | None
     rigid: RigidModel | None
     amplitude: float | None
+    warnings: tuple[str, ...]
     wall_time_s: float
 
     def to_json(self) -> dict[str, Any]:
@@ -94,6 +99,7 @@ class ModalAnalysis:
             "residual": self.modes.residuals.tolist(),
             "first_bending": self.first_bending,
             "rigid": None if self.rigid is None else asdict(self.rigid),
+            "warnings": list(self.warnings),
             "wall_time_s": self.wall_time_s,
         }
         if self.amplitude is not None:
@@ -132,17 +138,50 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     """Modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
-    modes = solve_modes(matrices, case.modes.count or 10, case.modes.max_frequency)
-    bending = first_bending(modes, matrices, case.modes.direction)
+    table = case.modes
+    modes = solve_modes(matrices, table.count or 10, table.max_frequency, table.min_frequency)
+    bending, warnings = _first_bending(case, modes, matrices)
+    if not table.min_frequency:
+        warnings += _unit_slip(modes)
     label, rigid, amplitude = case.response_label, None, None
-    if label is not None:
+    if label is not None and bending is not None:
         functional = _functional(case, matrices, label)
         rigid = rigid_model(modes, bending, functional, label, case.damping_ratio)
         if case.fatigue_strength is not None:
             peak = float(structure.solid.von_mises(modes.shapes[bending]).max())
             amplitude = fatigue_amplitude(modes, bending, functional, peak, case.fatigue_strength)
     masses = effective_masses(modes, matrices)
-    return ModalAnalysis(structure, modes, masses, bending, rigid, amplitude, time.perf_counter() - started)
+    elapsed = time.perf_counter() - started
+    return ModalAnalysis(structure, modes, masses, bending, rigid, amplitude, warnings, elapsed)
+
+
+def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[int | None, tuple[str, ...]]:
+    """The first bending among the modes that strain the structure, or None and why there is none.
+
+    Raises ParticipationError for a held structure whose lowest modes lack it.
+    """
+    elastic = np.flatnonzero(modes.frequencies_hz > 0.0)
+    rigid = len(modes) - elastic.size
+    why = f"{rigid} rigid modes carry the mass"
+    if elastic.size:
+        chosen = Modes(modes.frequencies_hz[elastic], modes.shapes[elastic], modes.residuals[elastic])
+        try:
+            return int(elastic[first_bending(chosen, matrices, case.modes.direction)]), ()
+        except ParticipationError as error:
+            if not rigid and not case.modes.min_frequency:
+                raise
+            why = why if rigid else str(error)
+    return None, (f"modes: no first bending and no rigid model: {why}",)
+
+
+def _unit_slip(modes: Modes) -> tuple[str, ...]:
+    """A warning when the first straining mode is where wrong units put it."""
+    first = next((frequency for frequency in modes.frequencies_hz if frequency > 0.0), 1.0)
+    if _PLAUSIBLE_HZ[0] <= first <= _PLAUSIBLE_HZ[1]:
+        return ()
+    return (
+        f"modes: the first frequency is {first:.4g} Hz; check the units: mesh in m, young in Pa, density in kg/m^3",
+    )
 
 
 def reduction(structure: Structure, modes: int) -> ReducedModel:

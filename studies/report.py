@@ -134,8 +134,8 @@ def _key_figures(response: ForcedResponse) -> dict[str, Any]:
 
 
 def _analysis(name: str, values: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
-    bending = int(attributes["first_bending"])
-    picture = mode_picture(name, bending)
+    bending = int(attributes["first_bending"]) if "first_bending" in attributes else None
+    picture = None if bending is None else mode_picture(name, bending)
     return {
         "file": Path(name).name,
         "picture": None if picture is None else base64.b64encode(picture).decode(),

@@ -109,11 +109,37 @@ def test_same_parameters_same_file(tmp_path):
         ({"cavity_depth": 0.0235}, "cavity_depth"),
         ({"cavity_height": 0.0095}, "cavity_height"),
         ({"cavities": 5}, "cavity_width"),
+        ({"damper_width": 0.010}, "damper_height"),
+        ({"damper_width": 0.015, "damper_height": 0.004, "damper_depth": 0.01}, "damper_width"),
+        ({"damper_width": -0.01, "damper_height": 0.004, "damper_depth": 0.01}, "damper_width"),
+        ({"damper_width": 0.010, "damper_height": 0.004, "damper_depth": 0.01, "cavities": 0}, "damper_width"),
     ],
 )
 def test_refuses_by_name(changes, name):
     with pytest.raises(ParameterError, match=f"^{name}: "):
         VaneCluster(**changes)
+
+
+def test_tied_bodies_share_the_nodes_of_the_floor(tmp_path):
+    """Bodies on the floors of two cavities: their volume, one connected mesh, and what is left of each floor."""
+    size = {"damper_width": 0.008, "damper_height": 0.004, "damper_depth": 0.010}
+    parameters = VaneCluster(cavities=2, cavity_width=0.010, **COARSE, **size)
+    path = build(parameters, tmp_path / "tied.msh")
+    assert set(fenicsx.read(path).volumes) == {"outer_shroud", "airfoils", "inner_shroud", "damper"}
+    materials = UNIT_DENSITY | {"damper": Material(young=1.0, poisson=0.25, density=1001.0)}
+    heavy = assemble(path, materials, {"clamp": "xyz"}, degree=1)
+    light = assemble(path, UNIT_DENSITY, {"clamp": "xyz"}, degree=1)
+    assert parameters.damper_volume == pytest.approx(2 * 0.008 * 0.004 * 0.010)
+    assert (heavy.total_mass - light.total_mass) / 1000.0 == pytest.approx(parameters.damper_volume, rel=1e-9)
+    for number in (1, 2):
+        floor, roof = (heavy.patches[f"c{number}_{side}"].area for side in ("floor", "roof"))
+        assert (floor, roof) == pytest.approx((0.010 * 0.012 - 0.008 * 0.010, 0.010 * 0.012), rel=1e-9)
+
+
+def test_a_body_that_fills_its_cavity_covers_the_walls(tmp_path):
+    size = {"damper_width": 0.014, "damper_height": 0.005, "damper_depth": 0.012}
+    domain = fenicsx.read(build(VaneCluster(**COARSE, **size), tmp_path / "full.msh"))
+    assert set(domain.facets) == {"clamp", "shroud"}
 
 
 def test_five_cavities_fit_when_the_message_is_followed():
@@ -126,13 +152,13 @@ def test_five_cavities_fit_when_the_message_is_followed():
 def test_failure_keeps_the_old_file_and_ends_the_session(tmp_path, monkeypatch, capfd):
     path = tmp_path / "cluster.msh"
     path.write_text("old")
-    facets = vane_cluster._facets
+    facets = vane_cluster.facets
 
     def overlapping(parameters):
         found = facets(parameters)
         return found | {"again": found["clamp"]}
 
-    monkeypatch.setattr(vane_cluster, "_facets", overlapping)
+    monkeypatch.setattr(vane_cluster, "facets", overlapping)
     with pytest.raises(MeshError, match="facet groups 'clamp' and 'again' share"):
         build(VaneCluster(**COARSE), path)
     assert path.read_text() == "old"

@@ -81,6 +81,17 @@ def test_sixty_modes_fill_the_movable_mass_from_below(coarse):
     assert np.all(carried[-1] > [0.9, 0.9, 0.6])
 
 
+def test_free_cluster_has_six_rigid_modes(coarse):
+    path, _ = coarse
+    matrices = assemble(path, MATERIALS, {})
+    modes = solve_modes(matrices, 8)
+    assert np.all(modes.frequencies_hz[:6] < 1e-3)
+    assert modes.frequencies_hz[6] > 1000.0
+    assert modes.shapes @ (matrices.mass @ modes.shapes.T) == pytest.approx(np.eye(8), abs=1e-9)
+    rotation = np.cross([1.0, 2.0, 3.0], matrices.coordinates).ravel()
+    assert modes.shapes[:6].T @ (modes.shapes[:6] @ (matrices.mass @ rotation)) == pytest.approx(rotation, abs=1e-6)
+
+
 def independent_frequencies(path, count):
     """Natural frequencies (Hz) by scikit-fem from the mesh file, the outer radius held."""
     with session("read"):

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy import linalg, optimize
+from scipy import linalg, optimize, sparse
 from scipy.sparse.linalg import eigsh, spsolve
+from structures import truss
 
 from meshes.benchmarks import Block, build
 from modal.eigen import Modes, SolverError, count_below, factorize, solve_modes
@@ -81,17 +82,90 @@ def test_all_modes_up_to_a_frequency(beam):
         solve_modes(beam, max_frequency=0.5 * many[0])
 
 
+def test_all_modes_of_a_range(beam):
+    many = solve_modes(beam, 12).frequencies_hz
+    low, high = 0.5 * (many[2] + many[3]), 0.5 * (many[9] + many[10])
+    inside = solve_modes(beam, max_frequency=high, min_frequency=low)
+    assert inside.frequencies_hz == pytest.approx(many[3:10], rel=1e-9)
+    with pytest.raises(SolverError, match="no mode from"):
+        solve_modes(beam, max_frequency=1.001 * many[4], min_frequency=0.999 * many[4] + 0.001 * many[5])
+    with pytest.raises(SolverError, match="min_frequency: expected"):
+        solve_modes(beam, max_frequency=low, min_frequency=high)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_a_range_of_many_modes_is_sliced(beam, share):
+    """More than a hundred modes against LAPACK's."""
+    stiffness, mass = (matrix.toarray() for matrix in free_pair(beam))
+    frequencies = np.sqrt(linalg.eigh(stiffness, mass, eigvals_only=True)) / (2 * np.pi)
+    high, low = 0.5 * (frequencies[149] + frequencies[150]), share * frequencies[149]
+    expected = frequencies[(frequencies > low) & (frequencies < high)]
+    assert expected.size > 100
+    modes = solve_modes(beam, max_frequency=high, min_frequency=low)
+    assert modes.frequencies_hz == pytest.approx(expected, rel=1e-8)
+    assert modes.shapes @ (beam.mass @ modes.shapes.T) == pytest.approx(np.eye(len(modes)), abs=1e-8)
+    assert modes.residuals.max() < 1e-7
+
+
+@pytest.mark.parametrize("count", [5, 20, 33])
+def test_no_copy_of_a_multiple_frequency_is_missed(count):
+    """Twenty equal trusses side by side: every frequency is twentyfold."""
+    one, copies = truss(seed=3), 20
+    together = SystemMatrices(
+        stiffness=sparse.block_diag([one.stiffness] * copies, format="csr"),
+        mass=sparse.block_diag([one.mass] * copies, format="csr"),
+        coordinates=np.tile(one.coordinates, (copies, 1)),
+        fixed=np.concatenate([one.fixed + one.size * copy for copy in range(copies)]),
+        patches={},
+        damping_ratio=0.0,
+    )
+    expected = np.repeat(solve_modes(one, 5).frequencies_hz, copies)
+    modes = solve_modes(together, count)
+    assert modes.frequencies_hz == pytest.approx(expected[:count], rel=1e-9)
+    assert modes.shapes @ (together.mass @ modes.shapes.T) == pytest.approx(np.eye(count), abs=1e-8)
+    limit = 0.5 * (expected[20] + expected[40])
+    assert solve_modes(together, max_frequency=limit).frequencies_hz == pytest.approx(expected[:40], rel=1e-9)
+
+
+def test_pairs_of_a_square_section(tmp_path):
+    """Bending about two axes: pairs of equal frequencies, both found and orthonormal, nearly equal ones told apart."""
+    for width, spread in ((0.05, 1e-9), (0.05 * (1 + 1e-5), 1e-4)):
+        block = Block(0.5, width, 0.05, divisions=(8, 1, 1), hexahedra=True)
+        beam = matrices_of(block, tmp_path, {"root": "xyz"})
+        modes = solve_modes(beam, 7)
+        assert np.ptp(modes.frequencies_hz[[0, 1]]) < spread * modes.frequencies_hz[0]
+        assert modes.shapes @ (beam.mass @ modes.shapes.T) == pytest.approx(np.eye(7), abs=1e-9)
+        y, z = effective_masses(modes, beam)[:2, 1:].T
+        assert y.sum() == pytest.approx(z.sum(), rel=1e-4)
+        if width != 0.05:
+            assert np.ptp(modes.frequencies_hz[[0, 1]]) > 1e-6 * modes.frequencies_hz[0]
+            assert y == pytest.approx([0.0, y.sum()], abs=1e-3 * y.sum())
+
+
 def test_free_block_has_six_rigid_modes(free_block):
     modes = solve_modes(free_block, 9)
     stiffness, mass = (matrix.toarray() for matrix in free_pair(free_block))
     eigenvalues = linalg.eigh(stiffness, mass, eigvals_only=True, subset_by_index=(6, 8))
     assert modes.frequencies_hz[6:] == pytest.approx(np.sqrt(eigenvalues) / (2 * np.pi), rel=1e-8)
-    assert modes.frequencies_hz[:6].max() < 1e-4 * modes.frequencies_hz[6]
+    assert modes.frequencies_hz[:6].max() < 1e-3
+    assert modes.shapes @ (free_block.mass @ modes.shapes.T) == pytest.approx(np.eye(9), abs=1e-9)
     assert modes.residuals.max() < 1e-8
     rigid = modes.shapes[:6]
     for translation in free_block.rigid_translations().T:
         projected = rigid.T @ (rigid @ (free_block.mass @ translation))
         assert projected == pytest.approx(translation, abs=1e-6)
+
+
+@pytest.mark.parametrize("count", [1, 3, 6, 7])
+def test_some_of_the_rigid_modes(free_block, count):
+    assert np.count_nonzero(solve_modes(free_block, count).frequencies_hz < 1e-3) == min(count, 6)
+
+
+def test_a_body_on_rollers_keeps_three_rigid_modes(tmp_path):
+    block = Block(0.4, 0.15, 0.1, divisions=(3, 2, 1), hexahedra=True)
+    sliding = solve_modes(matrices_of(block, tmp_path, {"bottom": "z"}), 5).frequencies_hz
+    assert np.all(sliding[:3] < 1e-3)
+    assert sliding[3] > 100.0
 
 
 @pytest.mark.parametrize("count", [0, -1, 10**6])

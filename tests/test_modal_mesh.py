@@ -7,6 +7,7 @@ import sys
 import gmsh
 import numpy as np
 import pytest
+from boxes import write_boxes
 from scipy.sparse.linalg import spsolve
 
 from meshes.benchmarks import Block, build
@@ -17,28 +18,6 @@ from modal.matrices import patch_average
 from modal.msh import MeshError, session
 
 UNIT = {"default": Material(young=1.0, poisson=0.25, density=1.0)}
-
-
-def write_boxes(path, volumes=None, facets=None, save_all=False, size=0.5):
-    """Two unit cubes that share the face x = 1, meshed with tetrahedra, with groups {name: entity tags}."""
-    with session("boxes"):
-        first, second = gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1), gmsh.model.occ.addBox(1, 0, 0, 1, 1, 1)
-        gmsh.model.occ.fragment([(3, first)], [(3, second)])
-        gmsh.model.occ.synchronize()
-        faces = {}
-        for _, tag in gmsh.model.getEntities(2):
-            x, y, z = gmsh.model.occ.getCenterOfMass(2, tag)
-            faces[round(2 * x), round(2 * y), round(2 * z)] = tag
-        for name, tags in (volumes or {}).items():
-            gmsh.model.addPhysicalGroup(3, tags, name=name)
-        for name, centres in (facets or {}).items():
-            gmsh.model.addPhysicalGroup(2, [faces[centre] for centre in centres], name=name)
-        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
-        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-        gmsh.model.mesh.generate(3)
-        gmsh.option.setNumber("Mesh.SaveAll", int(save_all))
-        gmsh.write(str(path))
-    return path
 
 
 BOTH = {"both": [1, 2]}
@@ -106,6 +85,56 @@ def test_volume_in_two_groups(tmp_path):
 def test_facets_inside(tmp_path):
     path = write_boxes(tmp_path / "inside.msh", BOTH, {"middle": [MIDDLE]})
     with pytest.raises(MeshError, match="facet group 'middle' is not on the boundary"):
+        fenicsx.read(path)
+
+
+def write_elements(path, points, *corners, kind=4):
+    """Volume elements from points, each element a volume of its own in a group "part<number>"."""
+    with session("elements"):
+        points = np.array(points, dtype=float)
+        for number, element in enumerate(corners, start=1):
+            gmsh.model.addDiscreteEntity(3, number)
+            if number == 1:
+                gmsh.model.mesh.addNodes(3, 1, np.arange(len(points)) + 1, points.ravel())
+            gmsh.model.mesh.addElementsByType(number, kind, [number], np.array(element) + 1)
+            gmsh.model.addPhysicalGroup(3, [number], name=f"part{number}")
+        gmsh.write(str(path))
+    return path
+
+
+TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+
+
+def test_inverted_element(tmp_path):
+    points = [*TETRAHEDRON, (1, 1, 1)]
+    path = write_elements(tmp_path / "inverted.msh", points, (0, 1, 2, 3), (1, 2, 4, 3))
+    with pytest.raises(MeshError, match=r"inverted\.msh: 1 elements have a negative volume .* element 2 .*'part2'"):
+        fenicsx.read(path)
+
+
+def test_flat_element(tmp_path):
+    path = write_elements(tmp_path / "flat.msh", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], (0, 1, 2, 3))
+    with pytest.raises(MeshError, match="negative volume or are folded, such as element 1"):
+        fenicsx.read(path)
+
+
+def test_curved_element_folded_by_its_middle_node(tmp_path):
+    corners = np.array(TETRAHEDRON, dtype=float)
+    middles = [(corners[i] + corners[j]) / 2 for i, j in ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3))]
+    path = write_elements(tmp_path / "curved.msh", [*corners, *middles], range(10), kind=11)
+    assert assemble(path, UNIT, {}, degree=2).total_mass == pytest.approx(1 / 6, rel=1e-12)
+    middles[0] = np.array([0.5, 0.6, 0.6])
+    write_elements(path, [*corners, *middles], range(10), kind=11)
+    with pytest.raises(MeshError, match="negative volume or are folded"):
+        fenicsx.read(path)
+
+
+def test_loose_parts(tmp_path):
+    """Two tetrahedra whose common corners are doubled: nothing ties them."""
+    points = np.array([*TETRAHEDRON, *TETRAHEDRON[1:], (1, 1, 1)])
+    path = write_elements(tmp_path / "loose.msh", points, (0, 1, 2, 3), (4, 5, 6, 7))
+    gap = r"loose\.msh: the mesh falls into 2 parts that share no node: 'part1' \(1 elements\); 'part2' \(1 elements\)"
+    with pytest.raises(MeshError, match=gap):
         fenicsx.read(path)
 
 

@@ -135,6 +135,8 @@ def test_open_choice_of_the_response_is_refused(tmp_path):
         ("count = 10", "count = 0", "modes.count: should be greater than or equal to 1"),
         ("count = 10", "count = 10.5", "modes.count: should be a valid integer"),
         ("count = 10", "count = 1\nmax_frequency = 1.0", "modes: give one of count and max_frequency"),
+        ("count = 10", "min_frequency = 1.0", "modes: min_frequency: expected a max_frequency above it"),
+        ("count = 10", "min_frequency = 5.0\nmax_frequency = 5.0", "modes: min_frequency: expected a max_frequency"),
         ("count = 10", 'at = "shroud"', "modes.at: no interface 'shroud'; known: c1"),
         ('"c1_floor"', '"c1_floor"\nkind = "mean"', "interface.c1.kind: should be 'average', 'rigid' or 'node'"),
         ('facets = "c1_floor"\n', "", "interface.c1.facets: missing"),
@@ -196,3 +198,32 @@ def test_unknown_groups_list_those_that_exist(old, new, message, tmp_path):
     with pytest.raises(InputError) as refused:
         case.check_groups(["clamp", "c1_floor"], ["airfoils"])
     assert str(refused.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("table", "axes", "across", "along"),
+    [
+        ("stiffness = 1e12", (1e12, 1e12, 1e12), 0.0, 0.0),
+        ("stiffness = [1e12, 0, 3e11]", (1e12, 0.0, 3e11), 0.0, 0.0),
+        ("normal = 1e12\ntangential = 5e11", (0.0, 0.0, 0.0), 1e12, 5e11),
+    ],
+)
+def test_elastic_supports(table, axes, across, along, tmp_path):
+    case = load(changed('clamped = ["clamp"]', f"[support.elastic.clamp]\n{table}"), tmp_path)
+    springs = case.elastic_supports["clamp"]
+    assert (springs.stiffness, springs.normal, springs.tangential) == (axes, across, along)
+
+
+@pytest.mark.parametrize(
+    ("support", "message"),
+    [
+        ("[support.elastic.clamp]\nstiffness = 0.0", "stiffness: expected N/m"),
+        ("[support.elastic.clamp]\nstiffness = [1.0, -1.0, 0.0]", "support.elastic.clamp.stiffness"),
+        ('[support.elastic.clamp]\nstiffness = "stiff"', "support.elastic.clamp.stiffness"),
+        ("[support.elastic.clamp]\nstifness = 1.0", "stifness"),
+        ('clamped = ["clamp"]\n[support.elastic.clamp]\nnormal = 1.0', "elastic.clamp: the group is clamped"),
+    ],
+)
+def test_refuses_elastic_supports(support, message, tmp_path):
+    with pytest.raises(InputError, match=message):
+        load(changed('clamped = ["clamp"]', support).replace("[support]\n[", "["), tmp_path)

@@ -1,0 +1,91 @@
+"""`mpirun -n 2 vanedamp modal`: the figures of one rank, and every file and line written once."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modal.eigen import Modes
+from studies.cli import BAD_INPUT, main
+
+ROOT = Path(__file__).resolve().parent.parent
+CASE = """
+[mesh]
+generator = "block"
+length = 0.1
+width = 0.02
+thickness = 0.01
+divisions = [6, 2, 1]
+[material.default]
+young = 2e11
+poisson = 0.3
+density = 8000.0
+[support]
+clamped = ["root"]
+[modes]
+count = 6
+direction = [0, 0, 1]
+[interface.tip]
+facets = "tip"
+direction = [0, 0, 1]
+"""
+# Open MPI 4 and 5: more ranks than cores, as root in a container
+ENVIRONMENT = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    "OMP_NUM_THREADS": "1",
+    "PYTHONPATH": str(ROOT),
+}
+pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mpirun")
+
+
+def on_two_ranks(*arguments, cwd, program=("-m", "studies")):
+    command = ["mpirun", "-n", "2", sys.executable, *program, *arguments]
+    return subprocess.run(
+        command, cwd=cwd, env=os.environ | ENVIRONMENT, capture_output=True, text=True, check=False, timeout=300
+    )
+
+
+@pytest.mark.parametrize(
+    "modes", ["count = 6", pytest.param("min_frequency = 2e3\nmax_frequency = 1.8e5", marks=pytest.mark.slow)]
+)
+def test_two_ranks_find_what_one_finds(modes, tmp_path):
+    """The lowest modes by one shift, and some seventy by spectrum slicing."""
+    (tmp_path / "case.toml").write_text(CASE.replace("count = 6", modes))
+    outputs = ["-o", str(tmp_path / "one.h5"), "--json", str(tmp_path / "one.json")]
+    assert main(["modal", str(tmp_path / "case.toml"), *outputs]) == 0
+    alone = json.loads((tmp_path / "one.json").read_text())
+    finished = on_two_ranks("modal", "case.toml", "-o", "two.h5", "--json", "-", cwd=tmp_path)
+    assert finished.returncode == 0, finished.stderr
+    # one JSON document: what both ranks wrote would be two
+    shared = json.loads(finished.stdout)
+    assert (len(alone["frequency_hz"]) > 50) == (modes != "count = 6")
+    for key in ("frequency_hz", "effective_mass", "movable_mass"):
+        assert np.array(shared[key]) == pytest.approx(np.array(alone[key]), rel=1e-7, abs=1e-9)
+    assert shared["rigid"].pop("at") == alone["rigid"].pop("at") == "tip"
+    assert shared["rigid"] == pytest.approx(alone["rigid"], rel=1e-7)
+    one, two = (Modes.load(tmp_path / f"{name}.h5") for name in ("one", "two"))
+    assert two.shapes[0] == pytest.approx(one.shapes[0], abs=1e-6 * np.abs(one.shapes[0]).max())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["case.toml", "one.h5", "one.json", "two.h5"]
+
+
+def test_bad_input_is_told_once(tmp_path):
+    (tmp_path / "case.toml").write_text(CASE.replace('["root"]', '["rot"]'))
+    finished = on_two_ranks("modal", "case.toml", "-o", "modes.h5", cwd=tmp_path)
+    assert finished.returncode == BAD_INPUT
+    assert finished.stderr.count("no facet group 'rot'") == 1
+    assert not (tmp_path / "modes.h5").exists()
+
+
+def test_a_fault_ends_all_ranks(tmp_path):
+    finished = on_two_ranks(cwd=tmp_path, program=(str(ROOT / "tests" / "mpi_fault.py"),))
+    assert finished.returncode != 0
+    assert finished.stderr.count("RuntimeError: a fault of the program") == 1
