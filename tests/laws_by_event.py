@@ -9,7 +9,7 @@ from stepping import SLIDES, Moment, Segment, Step, Stepper
 
 from coupling import automaton as auto
 from coupling import state as st
-from coupling.gaps import SIMULTANEOUS, rigid
+from coupling.gaps import SIMULTANEOUS
 from coupling.impacts import COLLAPSE
 from coupling.scene import Scene
 from coupling.watch import CHATTER
@@ -147,7 +147,7 @@ def _check_event(worst: Worst, step: Step, end: Moment, now: Moment, fastest: fl
     if step.impacts == 0:
         worst.note("jump", np.abs(np.r_[rates, bodies]).max() / fastest, SPEED, step)
         return np.zeros(len(touching), bool)
-    if rigid(rows, np.flatnonzero(contacts)[0]):
+    if np.isinf(rows.spring[contacts]).any():
         assert touching.any(), "an impact without a contact"
         _check_newton(worst, step, end, now, touching, impulse, fastest, last)
     else:
