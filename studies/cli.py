@@ -1,4 +1,4 @@
-"""The command `vanedamp`: mesh, modal, reduce, run, sweep, report, demo, bench."""
+"""The command `vanedamp`: mesh, modal, calibrate, reduce, run, sweep, report, demo, bench."""
 
 from __future__ import annotations
 
@@ -93,6 +93,15 @@ def _parser() -> argparse.ArgumentParser:
         )
     )
     modal.add_argument("--vtk", metavar="FILE.vtu", help="the mode shapes for ParaView (.vtu or .vtk)")
+
+    with_json(
+        command(
+            "calibrate",
+            "tune to measurements; rigid model, damping ratio and excitation",
+            "CASE.toml",
+            "CALIBRATION.h5",
+        )
+    )
 
     reduce = with_json(command("reduce", "Craig-Bampton reduction onto the case's interface", "CASE.toml", "ROM.h5"))
     reduce.add_argument(

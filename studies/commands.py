@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from coupling.inputs import InputError
 from modal.store import replacing
-from studies.terminal import progress, tell_modes, tell_sweep
+from studies.terminal import progress, tell_calibration, tell_modes, tell_sweep
 from studies.workers import workers
 
 if TYPE_CHECKING:
@@ -52,6 +52,23 @@ def modal(arguments: Namespace) -> None:
     _write_json(arguments.json, result)
     if arguments.json != "-":
         tell_modes(result)
+
+
+def calibrate(arguments: Namespace) -> None:
+    """Tuning, damping, rigid model, excitation."""
+    from studies.config import Case
+
+    _check_outputs(arguments)
+    case = Case.load(arguments.input)
+    from studies import calibration
+
+    found = calibration.calibrate(case)
+    if arguments.output:
+        found.save(arguments.output)
+    result = found.to_json()
+    _write_json(arguments.json, result)
+    if arguments.json != "-":
+        tell_calibration(result)
 
 
 def reduce(arguments: Namespace) -> None:

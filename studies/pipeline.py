@@ -12,15 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from modal.calibrate import FATIGUE_SHARE, RigidModel, fatigue_amplitude, rigid_model
+from modal.calibrate import RigidModel, fatigue_amplitude, rigid_model
+from modal.correlation import mode_like
 from modal.eigen import Modes, factorize, solve_modes
 from modal.elasticity import Solid
+from modal.exchange import read_shapes
 from modal.matrices import SystemMatrices
 from modal.participation import effective_masses, first_bending
 from modal.store import Variable
+from modal.stress import HotSpot, hot_spot
 from rom.craig_bampton import reduce
 from rom.interface import Interface, InterfaceCoordinate
 from rom.reduced import ReducedModel
+from studies.calibration_tables import CalibrationTable
 from studies.config import Case, MeshFile
 from studies.provenance import versions
 
@@ -74,7 +78,11 @@ class ModalAnalysis:
     effective_mass  (m, 3) kg along x, y, z; movable_mass (3,) kg is what they would sum to over all modes
     first_bending   index of the mode that carries most mass along `direction`
     rigid           that mode as one mass on a spring, at its interface coordinate; None without an interface
-    amplitude       m, displacement there at which the mode's stress reaches 70 % of the fatigue strength; None without
+    functional      (N,) that coordinate; None without
+    amplitude       m, displacement there at which the mode's stress reaches a share of the fatigue strength; None
+                    without one
+    hot_spot        where it does; None without
+    share           of the fatigue strength
     """
 
     structure: Structure
@@ -82,7 +90,10 @@ class ModalAnalysis:
     effective_mass: np.ndarray
     first_bending: int
     rigid: RigidModel | None
+    functional: np.ndarray | None
     amplitude: float | None
+    hot_spot: HotSpot | None
+    share: float
     wall_time_s: float
 
     def to_json(self) -> dict[str, Any]:
@@ -97,8 +108,14 @@ class ModalAnalysis:
             "wall_time_s": self.wall_time_s,
         }
         if self.amplitude is not None:
-            strength = self.structure.case.fatigue_strength
-            data["fatigue"] = {"strength": strength, "share": FATIGUE_SHARE, "amplitude": self.amplitude}
+            assert self.hot_spot is not None
+            data["fatigue"] = {
+                "strength": self.hot_spot.strength,
+                "share": self.share,
+                "amplitude": self.amplitude,
+                "coordinates": list(self.hot_spot.coordinates),
+                "group": self.hot_spot.group,
+            }
         return data
 
     def mesh(self) -> tuple[dict[str, Variable], int]:
@@ -133,16 +150,27 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
     modes = solve_modes(matrices, case.modes.count or 10, case.modes.max_frequency)
-    bending = first_bending(modes, matrices, case.modes.direction)
-    label, rigid, amplitude = case.response_label, None, None
+    bending = bending_mode(case, modes, matrices)
+    table = case.calibration or CalibrationTable()
+    label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
     if label is not None:
         functional = _functional(case, matrices, label)
         rigid = rigid_model(modes, bending, functional, label, case.damping_ratio)
-        if case.fatigue_strength is not None:
-            peak = float(structure.solid.von_mises(modes.shapes[bending]).max())
-            amplitude = fatigue_amplitude(modes, bending, functional, peak, case.fatigue_strength)
-    masses = effective_masses(modes, matrices)
-    return ModalAnalysis(structure, modes, masses, bending, rigid, amplitude, time.perf_counter() - started)
+        strengths = case.strengths(structure.solid.domain.volumes)
+        if strengths:
+            spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
+            amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
+    return ModalAnalysis(
+        structure, modes, effective_masses(modes, matrices), bending, rigid, functional, amplitude, spot, table.share,
+        time.perf_counter() - started,
+    )  # fmt: skip
+
+
+def bending_mode(case: Case, modes: Modes, matrices: SystemMatrices) -> int:
+    """Index of the first bending: most like the case's shape, or else with most effective mass along its direction."""
+    if case.modes.shape is not None:
+        return mode_like(modes, matrices, read_shapes(case.modes.shape))
+    return first_bending(modes, matrices, case.modes.direction)
 
 
 def reduction(structure: Structure, modes: int) -> ReducedModel:
