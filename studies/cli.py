@@ -1,4 +1,4 @@
-"""The command `vanedamp`: mesh, modal, calibrate, reduce, run, sweep, report, demo, bench."""
+"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, run, sweep, report, demo, bench."""
 
 from __future__ import annotations
 
@@ -102,6 +102,11 @@ def _parser() -> argparse.ArgumentParser:
             "CALIBRATION.h5",
         )
     )
+
+    command(
+        "matrices", "stiffness, mass, nodes and sets for other codes (Matrix Market, CSV)", "CASE.toml", "DIR",
+        required=True,
+    )  # fmt: skip
 
     reduce = with_json(command("reduce", "Craig-Bampton reduction onto the case's interface", "CASE.toml", "ROM.h5"))
     reduce.add_argument(

@@ -71,6 +71,20 @@ def calibrate(arguments: Namespace) -> None:
         tell_calibration(result)
 
 
+def matrices(arguments: Namespace) -> None:
+    """Matrices for other codes."""
+    from studies.config import Case
+
+    folder = _folder(arguments)
+    case = Case.load(arguments.input)
+    from modal.matrix_files import write_folder
+    from studies.pipeline import assemble
+
+    system = assemble(case).matrices
+    write_folder(system, folder)
+    print(f"{folder}: stiffness and mass ({system.size} x {system.size}), nodes, sets, fixed nodes")
+
+
 def reduce(arguments: Namespace) -> None:
     """Craig-Bampton reduction."""
     from studies.config import Case
@@ -155,13 +169,18 @@ def demo(arguments: Namespace) -> None:
 
 def bench(arguments: Namespace) -> None:
     """Speed and accuracy, measured on this machine."""
-    folder = Path(arguments.output)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--output {folder}: expected a folder, not a file")
+    folder = _folder(arguments)
     from studies.bench_engine import FULL, QUICK, run_bench, tell
 
     tell(run_bench(folder, QUICK if arguments.quick else FULL))
     print(f"{folder}: bench_engine.json, bench_engine.csv and figures")
+
+
+def _folder(arguments: Namespace) -> Path:
+    folder = Path(arguments.output)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--output {folder}: expected a folder, not a file")
+    return folder
 
 
 def _load_scene(path: str) -> Scene:

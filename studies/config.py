@@ -27,10 +27,23 @@ Direction = tuple[Real, Real, Real]
 
 @dataclass(frozen=True, config=STRICT)
 class MeshFile:
-    """A gmsh mesh, and the polynomial degree of the displacements on it."""
+    """A mesh, and the polynomial degree of the displacements on it.
+
+    A gmsh file (.msh) in metres, or a file of another program (.inp, .bdf ...) with `scale` metres a unit of length.
+    """
 
     file: str
     degree: Degree = 2
+    scale: Positive = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.foreign and self.scale != 1.0:
+            raise ValueError("scale: a gmsh mesh is in metres; scale it in gmsh")
+
+    @property
+    def foreign(self) -> bool:
+        """Whether another program than gmsh wrote it."""
+        return not self.file.endswith(".msh")
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -267,6 +280,11 @@ class Case:
             return "shroud" if "shroud" in self.interface else next(iter(self.interface))
         raise InputError(f"modes.at: name the interface of the rigid model, one of {', '.join(self.interface)}")
 
+    @property
+    def facet_groups(self) -> set[str]:
+        """Every facet group that the case names."""
+        return {*self.support.clamped, *self.support.elastic, *(table.facets for table in self.interface.values())}
+
     def check_groups(self, facets: Iterable[str], volumes: Iterable[str]) -> None:
         """Raise InputError for a facet or volume group that the mesh does not have."""
         facets, volumes = list(facets), list(volumes)
@@ -297,7 +315,7 @@ def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
     generator, file = mesh.get("generator"), mesh.get("file")
     if (generator is None) == (file is None):
         raise InputError(f"{path}: mesh: give one of file and generator")
-    known = ["file", "degree"]
+    known = ["file", "degree", "scale"]
     if generator is not None:
         if str(generator) not in GENERATORS:
             raise InputError(

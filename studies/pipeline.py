@@ -17,6 +17,7 @@ from modal.correlation import mode_like
 from modal.eigen import Modes, factorize, solve_modes
 from modal.elasticity import Solid
 from modal.exchange import read_shapes
+from modal.imports import convert
 from modal.matrices import SystemMatrices
 from modal.participation import effective_masses, first_bending
 from modal.store import Variable
@@ -52,12 +53,17 @@ def assemble(case: Case) -> Structure:
 
 @contextlib.contextmanager
 def _mesh(case: Case) -> Iterator[Path]:
-    """The mesh file, or one that the generator writes for the moment."""
-    if isinstance(case.mesh, MeshFile):
-        yield Path(case.mesh.file)
+    """The mesh file, or one that the generator or the import writes for the moment."""
+    mesh = case.mesh
+    if isinstance(mesh, MeshFile) and not mesh.foreign:
+        yield Path(mesh.file)
         return
     with tempfile.TemporaryDirectory() as folder:
-        yield case.mesh.build(Path(folder) / f"{case.mesh.generator}.msh")
+        if isinstance(mesh, MeshFile):
+            target = Path(folder) / f"{Path(mesh.file).stem}.msh"
+            yield convert(mesh.file, target, set(case.material) - {"default"}, case.facet_groups, mesh.scale)
+        else:
+            yield mesh.build(Path(folder) / f"{mesh.generator}.msh")
 
 
 def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
