@@ -129,8 +129,10 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = command("bench", "how fast and how exact the methods are, measured here", None, "DIR", required=True)
     bench.add_argument(
-        "study", choices=("engine",), help="engine: the exact engine against a hand-written loop and solve_ivp"
-    )
+        "study", choices=("engine", "modal"),
+        help="engine: the exact engine against a hand-written loop and solve_ivp; modal: time and memory of ten modes "
+        "beside scipy's solvers",
+    )  # fmt: skip
     bench.add_argument("--quick", action="store_true", help="seconds instead of minutes, and rougher figures")
     return parser
 

@@ -170,6 +170,13 @@ def demo(arguments: Namespace) -> None:
 def bench(arguments: Namespace) -> None:
     """Speed and accuracy, measured on this machine."""
     folder = _folder(arguments)
+    if arguments.study == "modal":
+        from studies import bench_modal
+
+        effort = bench_modal.QUICK if arguments.quick else bench_modal.FULL
+        bench_modal.tell(bench_modal.run_bench(folder, effort))
+        print(f"{folder}: bench_modal.json, bench_modal.csv and a figure")
+        return
     from studies.bench_engine import FULL, QUICK, run_bench, tell
 
     tell(run_bench(folder, QUICK if arguments.quick else FULL))
