@@ -75,8 +75,13 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
                     entry["solvers"][name] = _rounds(name, matrices, effort)
             entry["agree"] = _agree(entry["solvers"])
             entry["ratio"] = _ratios(entry["solvers"])
-    result["ahead"] = _ahead(result["sizes"])
-    result["wall_time_s"] = time.perf_counter() - started
+            result["ahead"] = _ahead(result["sizes"])
+            result["wall_time_s"] = time.perf_counter() - started
+            _write(result, folder)  # a large size may end in a kill: what is measured stays
+    return result
+
+
+def _write(result: Mapping[str, Any], folder: Path) -> None:
     from studies.bench_figures import modal_figure
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -84,7 +89,6 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
         temporary.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     _write_csv(result, folder / "bench_modal.csv")
     modal_figure(result, folder / "bench_modal.png")
-    return result
 
 
 def tell(result: Mapping[str, Any]) -> None:
