@@ -4,10 +4,10 @@
 PYTHON = .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all check bench
+.PHONY: help setup demo test test-all test-versions check bench
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 setup: ## install what is missing: system packages (apt, with sudo when not root) and .venv
 ifeq ($(origin PYTHON), file)
@@ -22,6 +22,9 @@ test: setup ## the tests, fast tier
 
 test-all: setup ## the tests with the slow verification tier
 	$(PYTHON) -m pytest -q -m "slow or not slow"
+
+test-versions: ## the finite element tests on Debian 13 and unstable, in root folders of their own (root, debootstrap)
+	scripts/test_versions.sh
 
 check: setup ## ruff, mypy, import contracts
 	$(PYTHON) -m ruff check

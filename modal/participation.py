@@ -1,11 +1,10 @@
-"""How modes take part in rigid translations: effective masses, MAC, and which mode is the first bending."""
+"""How modes take part in rigid translations: effective masses, and which mode is the first bending."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import sparse
 
 from modal.eigen import Modes
 from modal.matrices import SystemMatrices, unit_direction
@@ -56,13 +55,3 @@ def first_bending(
         )
     # symmetric structures have pairs whose shares differ by round-off alone
     return int(np.flatnonzero(shares > (1.0 - 1e-6) * largest)[0])
-
-
-def modal_assurance(first: np.ndarray, second: np.ndarray, mass: sparse.csr_array | None = None) -> np.ndarray:
-    """(m1, m2) modal assurance criterion of shapes (m1, N) and (m2, N), weighted by a mass matrix if one is given.
-
-    |a^T W b|^2 / ((a^T W a)(b^T W b)), 1 for shapes that agree up to a factor (Allemang and Brown 1982).
-    """
-    weigh = (lambda shapes: shapes) if mass is None else (lambda shapes: shapes @ mass)
-    norms = [np.einsum("ij,ij->i", shapes, weigh(shapes)) for shapes in (first, second)]
-    return (first @ weigh(second).T) ** 2 / np.outer(*norms)

@@ -1,4 +1,4 @@
-"""Figures of the engine's benchmark."""
+"""Figures of the benchmarks."""
 
 from __future__ import annotations
 
@@ -83,6 +83,31 @@ def scaling_figure(result: Mapping[str, Any], path: Path) -> None:
         axes.set_ylabel("CPU time per excitation period, µs")
         axes.grid(True, which="major", color="#e2e8f0")
     _parts(right, result["costs"])
+    _save(figure, path)
+
+
+def modal_figure(result: Mapping[str, Any], path: Path) -> None:
+    """Processor time and peak memory against the degrees of freedom, a line a solver."""
+    from studies.bench_modal import COUNT, NAMES
+
+    figure, panels = plt.subplots(1, 3, figsize=(14, 4.6), layout="constrained")
+    titles = ("factorisation", f"{COUNT} modes with it", "peak memory")
+    colours = dict(zip(NAMES, (_BLUE, _RED, _GOLD, _GREEN), strict=True))
+    sizes = [entry for entry in result["sizes"] if entry["assembly"]["status"] == "ok"]
+    for axes, title, part in zip(panels, titles, ("factorisation", "modes", "peak_bytes"), strict=True):
+        for name, label in NAMES.items():
+            done = [
+                (e["assembly"]["dofs"], e["solvers"][name])
+                for e in sizes
+                if e["solvers"].get(name, {}).get("status") == "ok"
+            ]
+            values = [f[part] / 1e9 if part == "peak_bytes" else f[part]["cpu_s"] for _, f in done]
+            axes.loglog([dofs for dofs, _ in done], values, "o-", color=colours[name], label=label)
+        axes.set_title(title)
+        axes.set_xlabel("degrees of freedom")
+        axes.set_ylabel("GB" if part == "peak_bytes" else "processor time, s")
+        axes.grid(True, which="major", color="#e2e8f0")
+    panels[0].legend(fontsize=9)
     _save(figure, path)
 
 

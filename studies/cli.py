@@ -1,4 +1,4 @@
-"""The command `vanedamp`: mesh, modal, reduce, run, sweep, report, demo, bench."""
+"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, run, sweep, report, demo, bench."""
 
 from __future__ import annotations
 
@@ -112,6 +112,20 @@ def _parser() -> argparse.ArgumentParser:
     )
     modal.add_argument("--vtk", metavar="FILE.vtu", help="the mode shapes for ParaView (.vtu or .vtk)")
 
+    with_json(
+        command(
+            "calibrate",
+            "tune to measurements; rigid model, damping ratio and excitation",
+            "CASE.toml",
+            "CALIBRATION.h5",
+        )
+    )
+
+    command(
+        "matrices", "stiffness, mass, nodes and sets for other codes (Matrix Market, CSV)", "CASE.toml", "DIR",
+        required=True,
+    )  # fmt: skip
+
     reduce = with_json(command("reduce", "Craig-Bampton reduction onto the case's interface", "CASE.toml", "ROM.h5"))
     reduce.add_argument(
         "--modes", type=_count, default=12, metavar="N", help="fixed-interface modes to keep (default: %(default)s)"
@@ -133,8 +147,10 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = command("bench", "how fast and how exact the methods are, measured here", None, "DIR", required=True)
     bench.add_argument(
-        "study", choices=("engine",), help="engine: the exact engine against a hand-written loop and solve_ivp"
-    )
+        "study", choices=("engine", "modal"),
+        help="engine: the exact engine against a hand-written loop and solve_ivp; modal: time and memory of ten modes "
+        "beside scipy's solvers",
+    )  # fmt: skip
     bench.add_argument("--quick", action="store_true", help="seconds instead of minutes, and rougher figures")
     return parser
 

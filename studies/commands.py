@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from coupling.inputs import InputError
 from modal.store import replacing
-from studies.terminal import progress, tell_modes, tell_sweep
+from studies.terminal import progress, tell_calibration, tell_modes, tell_sweep
 from studies.workers import workers
 
 if TYPE_CHECKING:
@@ -55,6 +55,37 @@ def modal(arguments: Namespace) -> None:
         print(f"vanedamp: {arguments.input}: warning: {warning}", file=sys.stderr)
     if arguments.json != "-":
         tell_modes(result)
+
+
+def calibrate(arguments: Namespace) -> None:
+    """Tuning, damping, rigid model, excitation."""
+    from studies.config import Case
+
+    _check_outputs(arguments)
+    case = Case.load(arguments.input)
+    from studies import calibration
+
+    found = calibration.calibrate(case)
+    if arguments.output:
+        found.save(arguments.output)
+    result = found.to_json()
+    _write_json(arguments.json, result)
+    if arguments.json != "-":
+        tell_calibration(result)
+
+
+def matrices(arguments: Namespace) -> None:
+    """Matrices for other codes."""
+    from studies.config import Case
+
+    folder = _folder(arguments)
+    case = Case.load(arguments.input)
+    from modal.matrix_files import write_folder
+    from studies.pipeline import assemble
+
+    system = assemble(case).matrices
+    write_folder(system, folder)
+    print(f"{folder}: stiffness and mass ({system.size} x {system.size}), nodes, sets, fixed nodes")
 
 
 def reduce(arguments: Namespace) -> None:
@@ -141,13 +172,25 @@ def demo(arguments: Namespace) -> None:
 
 def bench(arguments: Namespace) -> None:
     """Speed and accuracy, measured on this machine."""
-    folder = Path(arguments.output)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--output {folder}: expected a folder, not a file")
+    folder = _folder(arguments)
+    if arguments.study == "modal":
+        from studies import bench_modal
+
+        effort = bench_modal.QUICK if arguments.quick else bench_modal.FULL
+        bench_modal.tell(bench_modal.run_bench(folder, effort))
+        print(f"{folder}: bench_modal.json, bench_modal.csv and a figure")
+        return
     from studies.bench_engine import FULL, QUICK, run_bench, tell
 
     tell(run_bench(folder, QUICK if arguments.quick else FULL))
     print(f"{folder}: bench_engine.json, bench_engine.csv and figures")
+
+
+def _folder(arguments: Namespace) -> Path:
+    folder = Path(arguments.output)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--output {folder}: expected a folder, not a file")
+    return folder
 
 
 def _load_scene(path: str) -> Scene:

@@ -14,6 +14,7 @@ from coupling.inputs import STRICT, InputError, NonNegative, Real, Whole, neares
 from meshes import benchmarks, vane_cluster
 from meshes.benchmarks import Block
 from meshes.vane_cluster import VaneCluster
+from studies.calibration_tables import CalibrationTable
 
 if TYPE_CHECKING:
     from modal.elasticity import ElasticSupport, Material
@@ -26,10 +27,23 @@ Direction = tuple[Real, Real, Real]
 
 @dataclass(frozen=True, config=STRICT)
 class MeshFile:
-    """A gmsh mesh, and the polynomial degree of the displacements on it."""
+    """A mesh, and the polynomial degree of the displacements on it.
+
+    A gmsh file (.msh) in metres, or a file of another program (.inp, .bdf ...) with `scale` metres a unit of length.
+    """
 
     file: str
     degree: Degree = 2
+    scale: Positive = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.foreign and self.scale != 1.0:
+            raise ValueError("scale: a gmsh mesh is in metres; scale it in gmsh")
+
+    @property
+    def foreign(self) -> bool:
+        """Whether another program than gmsh wrote it."""
+        return not self.file.endswith(".msh")
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -57,6 +71,9 @@ class BlockMesh:
         """Write the mesh. Raises what meshes.benchmarks.build raises."""
         return benchmarks.build(self.parameters, path)
 
+
+#: keys that name a file of measurements
+_FILES = (("modes", "shape"), ("calibration", "damping", "frf"), ("calibration", "tune", "shapes"))
 
 #: the records of the generators' parameters
 GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
@@ -161,8 +178,8 @@ class Support:
 @dataclass(frozen=True, config=STRICT)
 class ModesTable:
     """Which modes are computed (the first `count`, or all from `min_frequency` to `max_frequency` Hz) and which is the
-    first bending: the one with most effective mass along `direction`. `at` names the interface coordinate of the rigid
-    model."""
+    first bending: the one with most effective mass along `direction`, or the one most like the first shape of the file
+    `shape`. `at` names the interface coordinate of the rigid model."""
 
     count: Annotated[Whole, Field(ge=1)] | None = None
     max_frequency: Positive | None = None
@@ -170,6 +187,7 @@ class ModesTable:
     direction: Direction = (0.0, 1.0, 0.0)
     damping_ratio: Ratio | None = None
     at: str | None = None
+    shape: str | None = None
 
     def __post_init__(self) -> None:
         if self.count is not None and self.max_frequency is not None:
@@ -202,6 +220,7 @@ class Case:
     support: Support = field(default_factory=Support)
     modes: ModesTable = field(default_factory=ModesTable)
     interface: dict[str, InterfaceTable] = field(default_factory=dict)
+    calibration: CalibrationTable | None = None
 
     def __post_init__(self) -> None:
         given = {table.damping_ratio for table in self.material.values()} - {None}
@@ -217,6 +236,8 @@ class Case:
         mesh = data.get("mesh")
         if isinstance(mesh, dict):
             _check_mesh(mesh, path)
+        for keys in _FILES:
+            _find_file(data, keys, path)
         return validate(cls, data, str(path))
 
     @property
@@ -230,6 +251,14 @@ class Case:
     def fatigue_strength(self) -> float | None:
         """The least of the materials' fatigue strengths, Pa."""
         return min((t.fatigue_strength for t in self.material.values() if t.fatigue_strength is not None), default=None)
+
+    def strengths(self, volumes: Iterable[str]) -> dict[str, float]:
+        """Fatigue strength of every volume group, Pa; the least of all where a group's material has none."""
+        least = self.fatigue_strength
+        if least is None:
+            return {}
+        tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
+        return {name: (table.fatigue_strength if table else None) or least for name, table in tables.items()}
 
     @property
     def materials(self) -> dict[str, Material]:
@@ -253,6 +282,11 @@ class Case:
             return "shroud" if "shroud" in self.interface else next(iter(self.interface))
         raise InputError(f"modes.at: name the interface of the rigid model, one of {', '.join(self.interface)}")
 
+    @property
+    def facet_groups(self) -> set[str]:
+        """Every facet group that the case names."""
+        return {*self.support.clamped, *self.support.elastic, *(table.facets for table in self.interface.values())}
+
     def check_groups(self, facets: Iterable[str], volumes: Iterable[str]) -> None:
         """Raise InputError for a facet or volume group that the mesh does not have."""
         facets, volumes = list(facets), list(volumes)
@@ -266,12 +300,24 @@ class Case:
             _check_group(f"material.{group}", "volume group", group, [*volumes, "default"])
 
 
+def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) -> None:
+    """Take a file that a key names relative to the case, and see that it is there."""
+    table: Any = data
+    for key in keys[:-1]:
+        table = table.get(key) if isinstance(table, dict) else None
+    name = table.get(keys[-1]) if isinstance(table, dict) else None
+    if isinstance(name, str):
+        table[keys[-1]] = str(Path(path).parent / name)
+        if not Path(table[keys[-1]]).is_file():
+            raise InputError(f"{path}: {'.'.join(keys)}: no such file {table[keys[-1]]}")
+
+
 def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
     """Settle what the union of mesh tables cannot say in one line, and find the file."""
     generator, file = mesh.get("generator"), mesh.get("file")
     if (generator is None) == (file is None):
         raise InputError(f"{path}: mesh: give one of file and generator")
-    known = ["file", "degree"]
+    known = ["file", "degree", "scale"]
     if generator is not None:
         if str(generator) not in GENERATORS:
             raise InputError(

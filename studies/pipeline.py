@@ -12,15 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from modal.calibrate import FATIGUE_SHARE, RigidModel, fatigue_amplitude, rigid_model
+from modal.calibrate import RigidModel, fatigue_amplitude, rigid_model
+from modal.correlation import mode_like
 from modal.eigen import Modes, factorize, solve_modes
 from modal.elasticity import Solid
+from modal.exchange import read_shapes
+from modal.imports import convert
 from modal.matrices import SystemMatrices
 from modal.participation import ParticipationError, effective_masses, first_bending
 from modal.store import Variable
+from modal.stress import HotSpot, hot_spot
 from rom.craig_bampton import reduce
 from rom.interface import Interface, InterfaceCoordinate
 from rom.reduced import ReducedModel
+from studies.calibration_tables import CalibrationTable
 from studies.config import Case, MeshFile
 from studies.provenance import versions
 
@@ -50,12 +55,17 @@ def assemble(case: Case) -> Structure:
 
 @contextlib.contextmanager
 def _mesh(case: Case) -> Iterator[Path]:
-    """The mesh file, or one that the generator writes for the moment."""
-    if isinstance(case.mesh, MeshFile):
-        yield Path(case.mesh.file)
+    """The mesh file, or one that the generator or the import writes for the moment."""
+    mesh = case.mesh
+    if isinstance(mesh, MeshFile) and not mesh.foreign:
+        yield Path(mesh.file)
         return
     with tempfile.TemporaryDirectory() as folder:
-        yield case.mesh.build(Path(folder) / f"{case.mesh.generator}.msh")
+        if isinstance(mesh, MeshFile):
+            target = Path(folder) / f"{Path(mesh.file).stem}.msh"
+            yield convert(mesh.file, target, set(case.material) - {"default"}, case.facet_groups, mesh.scale)
+        else:
+            yield mesh.build(Path(folder) / f"{mesh.generator}.msh")
 
 
 def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
@@ -74,10 +84,14 @@ class ModalAnalysis:
     """Modes and what they mean.
 
     effective_mass  (m, 3) kg along x, y, z; movable_mass (3,) kg is what they would sum to over all modes
-    first_bending   index of the mode that carries most mass along `direction`; None when a free structure, or a range
-                    of frequencies, has no such mode
+    first_bending   index of the mode that carries most mass along `direction`, or is most like the case's shape; None
+                    when a free structure, or a range of frequencies, has no such mode
     rigid           that mode as one mass on a spring, at its interface coordinate; None without either
-    amplitude       m, displacement there at which the mode's stress reaches 70 % of the fatigue strength; None without
+    functional      (N,) that coordinate; None without
+    amplitude       m, displacement there at which the mode's stress reaches a share of the fatigue strength; None
+                    without one
+    hot_spot        where it does; None without
+    share           of the fatigue strength
     warnings        what to look at: frequencies that hint at wrong units, and why there is no first bending
     """
 
@@ -86,7 +100,10 @@ class ModalAnalysis:
     effective_mass: np.ndarray
     first_bending: int | None
     rigid: RigidModel | None
+    functional: np.ndarray | None
     amplitude: float | None
+    hot_spot: HotSpot | None
+    share: float
     warnings: tuple[str, ...]
     wall_time_s: float
 
@@ -103,8 +120,14 @@ class ModalAnalysis:
             "wall_time_s": self.wall_time_s,
         }
         if self.amplitude is not None:
-            strength = self.structure.case.fatigue_strength
-            data["fatigue"] = {"strength": strength, "share": FATIGUE_SHARE, "amplitude": self.amplitude}
+            assert self.hot_spot is not None
+            data["fatigue"] = {
+                "strength": self.hot_spot.strength,
+                "share": self.share,
+                "amplitude": self.amplitude,
+                "coordinates": list(self.hot_spot.coordinates),
+                "group": self.hot_spot.group,
+            }
         return data
 
     def mesh(self) -> tuple[dict[str, Variable], int]:
@@ -138,21 +161,30 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     """Modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
-    table = case.modes
-    modes = solve_modes(matrices, table.count or 10, table.max_frequency, table.min_frequency)
+    modes = solve_modes(matrices, case.modes.count or 10, case.modes.max_frequency, case.modes.min_frequency)
     bending, warnings = _first_bending(case, modes, matrices)
-    if not table.min_frequency:
+    if not case.modes.min_frequency:
         warnings += _unit_slip(modes)
-    label, rigid, amplitude = case.response_label, None, None
+    table = case.calibration or CalibrationTable()
+    label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
     if label is not None and bending is not None:
         functional = _functional(case, matrices, label)
         rigid = rigid_model(modes, bending, functional, label, case.damping_ratio)
-        if case.fatigue_strength is not None:
-            peak = float(structure.solid.von_mises(modes.shapes[bending]).max())
-            amplitude = fatigue_amplitude(modes, bending, functional, peak, case.fatigue_strength)
-    masses = effective_masses(modes, matrices)
-    elapsed = time.perf_counter() - started
-    return ModalAnalysis(structure, modes, masses, bending, rigid, amplitude, warnings, elapsed)
+        strengths = case.strengths(structure.solid.domain.volumes)
+        if strengths:
+            spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
+            amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
+    return ModalAnalysis(
+        structure, modes, effective_masses(modes, matrices), bending, rigid, functional, amplitude, spot, table.share,
+        warnings, time.perf_counter() - started,
+    )  # fmt: skip
+
+
+def bending_mode(case: Case, modes: Modes, matrices: SystemMatrices) -> int:
+    """Index of the first bending: most like the case's shape, or else with most effective mass along its direction."""
+    if case.modes.shape is not None:
+        return mode_like(modes, matrices, read_shapes(case.modes.shape))
+    return first_bending(modes, matrices, case.modes.direction)
 
 
 def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[int | None, tuple[str, ...]]:
@@ -166,7 +198,7 @@ def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[
     if elastic.size:
         chosen = Modes(modes.frequencies_hz[elastic], modes.shapes[elastic], modes.residuals[elastic])
         try:
-            return int(elastic[first_bending(chosen, matrices, case.modes.direction)]), ()
+            return int(elastic[bending_mode(case, chosen, matrices)]), ()
         except ParticipationError as error:
             if not rigid and not case.modes.min_frequency:
                 raise

@@ -11,7 +11,6 @@ from modal.participation import (
     effective_mass_shares,
     effective_masses,
     first_bending,
-    modal_assurance,
     participation_factors,
 )
 
@@ -71,11 +70,3 @@ def test_equal_shares_give_the_lower_mode(blade, blade_modes):
     twice = np.repeat(blade_modes.shapes[:1], 2, axis=0) * [[1.0], [1.0 + 1e-12]]
     pair = Modes(blade_modes.frequencies_hz[:2], twice, blade_modes.residuals[:2])
     assert first_bending(pair, blade, [0, 0, 1]) == 0
-
-
-def test_modal_assurance(blade, blade_modes):
-    shapes = blade_modes.shapes
-    assert modal_assurance(shapes, -3.0 * shapes, blade.mass) == pytest.approx(np.eye(len(shapes)), abs=1e-9)
-    mixed = shapes[:1] + shapes[1:2]
-    assert modal_assurance(mixed, shapes[:3], blade.mass)[0] == pytest.approx([0.5, 0.5, 0.0], abs=1e-9)
-    assert modal_assurance(np.array([[1.0, 0.0]]), np.array([[1.0, 1.0]]))[0, 0] == pytest.approx(0.5)

@@ -15,6 +15,7 @@ import xarray
 from coupling.scene import Scene
 from coupling.sweep import Sweep
 from modal.eigen import Modes
+from modal.matrix_files import read_folder
 from rom.reduced import ReducedModel
 from studies import commands
 from studies.cli import BAD_INPUT, _parser, main
@@ -102,6 +103,16 @@ def test_mesh(folder, capsys):
     assert main(["mesh", "case.toml", "-o", "block.msh"]) == 0
     assert (folder / "block.msh").read_text().startswith("$MeshFormat")
     assert "block.msh" in capsys.readouterr().out
+
+
+def test_matrices_for_other_codes(folder, capsys):
+    assert main(["matrices", "case.toml", "-o", "matrices"]) == 0
+    assert "stiffness and mass" in capsys.readouterr().out
+    again = read_folder("matrices")
+    assert again.total_mass == pytest.approx(8000.0 * 0.1 * 0.02 * 0.01, rel=1e-9)
+    assert {"root", "tip"} <= set(again.patches)
+    assert again.fixed.size == 3 * again.patches["root"].nodes.size
+    assert main(["matrices", "case.toml", "-o", "case.toml"]) == BAD_INPUT
 
 
 @pytest.fixture(scope="module")

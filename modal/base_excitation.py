@@ -1,0 +1,83 @@
+"""A structure on a shaker: its response to an acceleration of the base, from few modes and a static correction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from modal.eigen import Modes, factorize
+from modal.matrices import SystemMatrices, unit_direction
+from modal.store import frozen
+
+
+class BaseExcitationError(ValueError):
+    """Modes, functionals or frequencies that do not fit; the message names which and the remedy."""
+
+
+@dataclass(frozen=True, eq=False)
+class BaseResponse:
+    """Responses to a unit acceleration of the base, k displacements at n frequencies.
+
+    frequencies_hz    (n,)
+    relative          (k, n) complex, m per m/s^2: displacement relative to the base
+    transmissibility  (k, n) complex: absolute displacement (or acceleration) over that of the base
+    """
+
+    frequencies_hz: np.ndarray
+    relative: np.ndarray
+    transmissibility: np.ndarray
+
+
+def base_response(
+    modes: Modes,
+    matrices: SystemMatrices,
+    functionals: np.ndarray,
+    direction: Sequence[float] | np.ndarray,
+    frequencies_hz: Sequence[float] | np.ndarray,
+    damping_ratios: float | Sequence[float] | np.ndarray | None = None,
+    static_correction: bool = True,
+) -> BaseResponse:
+    """Response of u = functionals^T q when all supports move along a direction.
+
+    functionals        (N, k) or (N,), such as patch_average gives
+    damping_ratios     of every mode or (m,); left out: the matrices' own
+    static_correction  the modes that are left out move quasi-statically, with the residual of the static shape
+                       K^-1 M r (Craig 1981, section 15.2; mode acceleration): costs one factorisation, and makes few
+                       modes enough below their last frequency
+
+    In coordinates relative to the base, M q'' + C q' + K q = -M r a with r the translation of every node. Springs of
+    elastic supports stand on the base. Raises BaseExcitationError for what does not fit or has rigid motions.
+    """
+    observed = np.asarray(functionals, dtype=float).reshape(matrices.size, -1)
+    omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies_hz, dtype=float))
+    if not np.all(np.isfinite(omega)) or omega.min() < 0.0:
+        raise BaseExcitationError("frequencies_hz: expected finite numbers of Hz, not negative")
+    own = modes.angular_frequencies
+    if own.min() <= 1e-6 * own.max():
+        raise BaseExcitationError("modes: the structure has rigid motions; hold it at the base")
+    ratios = np.broadcast_to(matrices.damping_ratio if damping_ratios is None else damping_ratios, own.shape)
+    translation = matrices.rigid_translations() @ unit_direction(direction)
+    load = matrices.mass @ translation  # the whole base moves, so nodes that it holds push their neighbours
+    factors = modes.shapes @ load
+    resonances = own[:, None] ** 2 - omega**2 + 2j * ratios[:, None] * own[:, None] * omega
+    seen = modes.shapes @ observed
+    relative = -np.einsum("mk,m,mn->kn", seen, factors, 1.0 / resonances)
+    if static_correction:
+        residual = observed.T @ static_shape(matrices, load) - (factors / own**2) @ seen
+        relative = relative - residual[:, None]
+    rigid = observed.T @ translation
+    return BaseResponse(frozen(omega / (2.0 * np.pi)), frozen(relative, complex), _absolute(rigid, omega, relative))
+
+
+def static_shape(matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
+    """(N,) m, displacements under a static load (N,) N. Raises SolverError if the supports do not hold."""
+    free, shape = matrices.free, np.zeros(matrices.size)
+    with factorize(matrices.stiffness[free][:, free]) as factors:
+        shape[free] = factors.solve(load[free])
+    return shape
+
+
+def _absolute(rigid: np.ndarray, omega: np.ndarray, relative: np.ndarray) -> np.ndarray:
+    return frozen(rigid[:, None] - omega**2 * relative, complex)

@@ -1,0 +1,190 @@
+"""System matrices from and for other codes: Matrix Market or scipy's .npz, with nodes and sets as CSV.
+
+A folder holds stiffness.mtx, mass.mtx, nodes.csv (node, x, y, z), sets.csv (set, node, weight) and fixed.csv (node,
+components); the degrees of freedom are x, y, z of the nodes in the order of nodes.csv.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from scipy import io, sparse
+
+from modal.matrices import MatricesError, Patch, SystemMatrices
+from modal.store import replacing
+
+_COMPONENTS = "xyz"
+
+
+def read_matrices(
+    stiffness: str | os.PathLike[str],
+    mass: str | os.PathLike[str],
+    nodes: str | os.PathLike[str],
+    sets: str | os.PathLike[str] | None = None,
+    fixed: Mapping[str, str] | None = None,
+    damping_ratio: float = 0.0,
+) -> SystemMatrices:
+    """Matrices of another code.
+
+    stiffness, mass  .mtx (Matrix Market, symmetric or general) or .npz (scipy.sparse.save_npz), N/m and kg
+    nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels
+    sets             CSV: set, node and perhaps weight (area, m^2); every set becomes a patch
+    fixed            sets that are held, with their components: {"root": "xyz"}
+
+    Raises MatricesError, with the file, for shapes that do not fit, one triangle alone, unknown nodes or sets.
+    """
+    labels, coordinates = _nodes(Path(nodes))
+    patches = {} if sets is None else _patches(Path(sets), labels)
+    held = [np.empty(0, dtype=int)]
+    for name, components in (fixed or {}).items():
+        if name not in patches:
+            raise MatricesError(f"{sets}: no set {name!r} to hold; there are: {', '.join(sorted(patches)) or 'none'}")
+        held += [3 * patches[name].nodes + _component(sets, component) for component in components]
+    return _system(stiffness, mass, coordinates, np.concatenate(held), patches, damping_ratio)
+
+
+def read_folder(folder: str | os.PathLike[str], damping_ratio: float = 0.0) -> SystemMatrices:
+    """What `write_folder` wrote, or another code in its place. Raises MatricesError."""
+    home = Path(folder)
+    labels, coordinates = _nodes(home / "nodes.csv")
+    patches = _patches(home / "sets.csv", labels) if (home / "sets.csv").is_file() else {}
+    fixed = np.empty(0, dtype=int)
+    if (home / "fixed.csv").is_file():
+        rows = _rows(home / "fixed.csv", ("node", "components"))
+        held = [
+            3 * _index(home / "fixed.csv", labels, node) + _component(home / "fixed.csv", component)
+            for node, components in rows
+            for component in components.strip()
+        ]
+        fixed = np.array(held, dtype=int)
+    found = {name: _either(home, name) for name in ("stiffness", "mass")}
+    return _system(found["stiffness"], found["mass"], coordinates, fixed, patches, damping_ratio)
+
+
+def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> None:
+    """Write the matrices for other codes; see the top of this file. Nodes are numbered from 1."""
+    home = Path(folder)
+    home.mkdir(parents=True, exist_ok=True)
+    for name, matrix in (("stiffness", matrices.stiffness), ("mass", matrices.mass)):
+        # round-off of the assembly differs above and below the diagonal; a symmetric file holds one of them
+        whole = sparse.coo_matrix(0.5 * (matrix + matrix.T))
+        with replacing(home / f"{name}.mtx") as temporary:
+            io.mmwrite(str(temporary), whole, symmetry="symmetric", precision=17)
+    nodes = [[index, *xyz] for index, xyz in enumerate(matrices.coordinates.tolist(), 1)]
+    _write(home / "nodes.csv", ("node", "x", "y", "z"), nodes)
+    entries = [
+        [label, int(node) + 1, float(weight)]
+        for label, patch in matrices.patches.items()
+        for node, weight in zip(patch.nodes, patch.weights, strict=True)
+    ]
+    _write(home / "sets.csv", ("set", "node", "weight"), entries)
+    held: dict[int, str] = {}
+    for dof in matrices.fixed.tolist():
+        held[dof // 3 + 1] = held.get(dof // 3 + 1, "") + _COMPONENTS[dof % 3]
+    _write(home / "fixed.csv", ("node", "components"), [list(item) for item in held.items()])
+
+
+def _system(
+    stiffness: str | os.PathLike[str],
+    mass: str | os.PathLike[str],
+    coordinates: np.ndarray,
+    fixed: np.ndarray,
+    patches: dict[str, Patch],
+    damping_ratio: float,
+) -> SystemMatrices:
+    provenance = {"stiffness": os.path.basename(stiffness), "mass": os.path.basename(mass)}
+    loaded = {}
+    for name, path in (("stiffness", stiffness), ("mass", mass)):
+        loaded[name] = matrix = _matrix(Path(path))
+        if matrix.shape != (coordinates.size, coordinates.size):
+            raise MatricesError(
+                f"{path}: shape {matrix.shape} for {len(coordinates)} nodes; expected "
+                f"{(coordinates.size, coordinates.size)}, three degrees of freedom a node"
+            )
+    return SystemMatrices(
+        stiffness=loaded["stiffness"], mass=loaded["mass"], coordinates=coordinates, fixed=fixed, patches=patches,
+        damping_ratio=damping_ratio, provenance=provenance,
+    )  # fmt: skip
+
+
+def _matrix(path: Path) -> sparse.csr_array:
+    if not path.is_file():
+        raise MatricesError(f"{path}: no such matrix file")
+    if path.suffix not in (".mtx", ".npz"):
+        raise MatricesError(f"{path}: expected a matrix as .mtx (Matrix Market) or .npz (scipy.sparse.save_npz)")
+    try:
+        return sparse.csr_array(io.mmread(str(path)) if path.suffix == ".mtx" else sparse.load_npz(path))
+    except Exception as error:  # the readers raise what they stumble over
+        raise MatricesError(f"{path}: not a readable matrix ({error})") from error
+
+
+def _either(home: Path, name: str) -> Path:
+    npz = home / f"{name}.npz"
+    return npz if npz.is_file() else home / f"{name}.mtx"
+
+
+def _nodes(path: Path) -> tuple[dict[int, int], np.ndarray]:
+    rows = _rows(path, ("node", "x", "y", "z"))
+    try:
+        labels = [int(row[0]) for row in rows]
+        coordinates = np.array([[float(word) for word in row[1:4]] for row in rows]).reshape(-1, 3)
+    except ValueError as error:
+        raise MatricesError(f"{path}: expected a whole number and three coordinates a line ({error})") from error
+    if len(set(labels)) < len(labels):
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise MatricesError(f"{path}: node {twice} occurs twice")
+    return {label: index for index, label in enumerate(labels)}, coordinates
+
+
+def _patches(path: Path, labels: dict[int, int]) -> dict[str, Patch]:
+    members: dict[str, list[tuple[int, float]]] = {}
+    for row in _rows(path, ("set", "node")):
+        try:
+            weight = float(row[2]) if len(row) > 2 else 1.0
+        except ValueError as error:
+            raise MatricesError(f"{path}: set {row[0]!r}: expected a weight, not {row[2]!r}") from error
+        members.setdefault(row[0], []).append((_index(path, labels, row[1]), weight))
+    try:
+        return {
+            name: Patch(np.array([node for node, _ in found]), np.array([weight for _, weight in found]))
+            for name, found in members.items()
+        }
+    except MatricesError as error:
+        raise MatricesError(f"{path}: {error}") from error
+
+
+def _index(path: Path, labels: dict[int, int], word: str) -> int:
+    if not word.strip().isdecimal() or int(word) not in labels:
+        raise MatricesError(f"{path}: node {word!r} is not among the nodes")
+    return labels[int(word)]
+
+
+def _component(path: str | os.PathLike[str] | None, component: str) -> int:
+    if component not in _COMPONENTS:
+        raise MatricesError(f"{path}: expected components out of 'xyz', not {component!r}")
+    return _COMPONENTS.index(component)
+
+
+def _rows(path: Path, columns: tuple[str, ...]) -> list[list[str]]:
+    """Lines of a CSV, without its header."""
+    if not path.is_file():
+        raise MatricesError(f"{path}: no such file; expected the columns {', '.join(columns)}")
+    with path.open(newline="", encoding="utf-8-sig") as stream:
+        rows = [[word.strip() for word in row] for row in csv.reader(stream) if row and not row[0].startswith("#")]
+    if rows and rows[0][0].lower() == columns[0]:
+        rows = rows[1:]
+    for number, row in enumerate(rows, start=1):
+        if len(row) < len(columns):
+            raise MatricesError(f"{path}: row {number} has {len(row)} columns; expected {', '.join(columns)}")
+    return rows
+
+
+def _write(path: Path, header: tuple[str, ...], rows: list[list[object]]) -> None:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(header)
+        writer.writerows(rows)

@@ -1,0 +1,76 @@
+#!/usr/bin/env bash
+# The tests of finite elements and reduction on other releases of dolfinx: clean Debian root folders, set up by
+# scripts/setup.sh as on a fresh machine. As root, with debootstrap; some 4 GB a release.
+#
+#     scripts/test_versions.sh [trixie] [sid] [TEST ...]      default: both releases, all tests of modal/ and rom/
+#
+# The folders stay in $VERSIONS (/var/tmp/vanedamp-versions), so that a second call takes the tests' time alone.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+home=${VERSIONS:-/var/tmp/vanedamp-versions}
+mirror=${MIRROR:-http://deb.debian.org/debian}
+
+say() { echo "test-versions: $*" >&2; }
+
+[ "$(id -u)" = 0 ] || { say "this needs root, for debootstrap and chroot"; exit 1; }
+command -v debootstrap >/dev/null || { say "apt-get install debootstrap first"; exit 1; }
+
+# A root folder with the mounts that its programs need; they are gone when the shell ends, whatever happens.
+inside() {
+    local root=$1
+    shift
+    unshare --mount --propagation private bash -c '
+        root=$1; shift
+        mount -t proc proc "$root/proc"
+        mount --rbind /dev "$root/dev"
+        mount --rbind /sys "$root/sys"
+        exec env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 OMP_NUM_THREADS="${OMP_NUM_THREADS:-}" \
+            OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 DEBIAN_FRONTEND=noninteractive \
+            chroot "$root" "$@"' -- "$root" "$@"
+}
+
+prepare() {
+    local suite=$1 root=$2
+    if [ ! -f "$root/bootstrapped" ]; then
+        say "$suite: a clean root folder in $root"
+        rm -rf "$root"
+        mkdir -p "$root"
+        # the date on an archive's mirror may have passed
+        debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" "$mirror" >"$root.log" 2>&1 ||
+            { say "$suite: debootstrap failed, see $root.log"; return 1; }
+        echo 'Acquire::Check-Valid-Until "false";' >"$root/etc/apt/apt.conf.d/10archive"
+        touch "$root/bootstrapped"
+    fi
+    cp -L /etc/resolv.conf "$root/etc/resolv.conf"
+    # how this machine reaches package servers
+    [ ! -f /etc/ssl/certs/ca-certificates.crt ] || cp -L /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/"
+    [ ! -f /etc/pip.conf ] || cp /etc/pip.conf "$root/etc/pip.conf"
+    mkdir -p "$root/vanedamp"
+    git ls-files -z | tar --null -T - -cf - | tar -xf - -C "$root/vanedamp"
+}
+
+run() {
+    local suite=$1 root=$home/$1
+    prepare "$suite" "$root" || return 1
+    inside "$root" /vanedamp/scripts/setup.sh || { say "$suite: the set-up failed"; return 1; }
+    inside "$root" bash -c 'cd /vanedamp && exec .venv/bin/python -m pytest -q "$@"' -- "${tests[@]}"
+}
+
+suites=() tests=()
+for word in "$@"; do
+    case $word in
+        trixie | sid | forky) suites+=("$word") ;;
+        *) tests+=("$word") ;;
+    esac
+done
+[ ${#suites[@]} -gt 0 ] || suites=(trixie sid)
+[ ${#tests[@]} -gt 0 ] || tests=(tests/test_modal_*.py tests/test_rom_*.py)
+
+mkdir -p "$home"
+failed=()
+for suite in "${suites[@]}"; do
+    run "$suite" || failed+=("$suite")
+done
+[ ${#failed[@]} = 0 ] || { say "failed: ${failed[*]}"; exit 1; }
+say "passed: ${suites[*]}"

@@ -1,0 +1,209 @@
+"""From measurements to a calibrated case: stiffness, damping, rigid model and excitation, one after the other."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from coupling.inputs import InputError
+from modal.calibrate import RigidModel, rigid_model
+from modal.exchange import read_frf, read_shapes
+from modal.frf import Poles, identify
+from modal.store import Variable, save
+from modal.stress import HotSpot
+from modal.tuning import Tuning, tune
+from studies.calibration_tables import CalibrationTable, DampingTable, TuneTable, check_vary, parts_by_name
+from studies.config import Case, MaterialTable
+from studies.pipeline import ModalAnalysis, Structure, assemble, modal_analysis
+from studies.provenance import versions
+
+# a pole farther from the computed mode than this share of its frequency belongs to another one
+_NEAR = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A case brought to its measurements.
+
+    analysis  modes of the calibrated case
+    rigid     the first bending at the response coordinate, with the calibrated damping ratio
+    tuning    None where nothing was tuned
+    poles     of the measured response; None where the damping ratio is the case's; `pole` is the one used
+    """
+
+    case: Case
+    analysis: ModalAnalysis
+    rigid: RigidModel
+    tuning: Tuning | None
+    poles: Poles | None
+    pole: int | None
+    wall_time_s: float
+
+    @property
+    def force(self) -> float | None:
+        """N, at resonance gives the fatigue amplitude; None without a fatigue strength."""
+        amplitude = self.analysis.amplitude
+        return None if amplitude is None else self.rigid.resonance_force(amplitude)
+
+    def to_json(self) -> dict[str, Any]:
+        """The result as plain data."""
+        return {
+            "status": "ok",
+            "first_bending": self.analysis.first_bending,
+            "frequency_hz": self.analysis.modes.frequencies_hz.tolist(),
+            "rigid": asdict(self.rigid),
+            "damping": self._damping(),
+            "excitation": self._excitation(),
+            "tuning": None if self.tuning is None else _told(self.tuning, self.case),
+            "wall_time_s": self.wall_time_s,
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write an HDF5 record: the numbers as attributes, what the tuning did as arrays."""
+        result = self.to_json()
+        frequencies = self.analysis.modes.frequencies_hz
+        variables = {"frequency": Variable(frequencies, ("mode",), "Hz")}
+        if self.tuning is not None:
+            tuning = self.tuning
+            variables |= {
+                "part": Variable(np.array(tuning.names, dtype=object), ("part",)),
+                "factor": Variable(tuning.factors, ("part",)),
+                "factor_deviation": Variable(tuning.deviations, ("part",)),
+                "target_frequency": Variable(tuning.target_hz, ("target",), "Hz"),
+                "frequency_before": Variable(tuning.before_hz, ("target",), "Hz"),
+                "frequency_after": Variable(tuning.after_hz, ("target",), "Hz"),
+                "mac_before": Variable(tuning.mac_before, ("target",)),
+                "mac_after": Variable(tuning.mac_after, ("target",)),
+                "sensitivity": Variable(tuning.sensitivities, ("target", "part")),
+            }
+        attributes = {name: result[name] for name in ("first_bending", "rigid", "damping", "excitation")}
+        attributes = {name: value for name, value in attributes.items() if value is not None}
+        attributes |= {"versions": versions(), "provenance": dict(self.analysis.structure.matrices.provenance)}
+        save(path, "calibration", variables, attributes)
+
+    def _damping(self) -> dict[str, Any]:
+        told: dict[str, Any] = {"ratio": self.rigid.damping_ratio, "source": "case"}
+        if self.poles is not None and self.pole is not None:
+            told |= {
+                "source": "frf",
+                "deviation": float(self.poles.deviations[self.pole, 1]),
+                "frequency_hz": float(self.poles.frequencies_hz[self.pole]),
+                "misfit": self.poles.misfit,
+            }
+        return told
+
+    def _excitation(self) -> dict[str, Any] | None:
+        spot, amplitude = self.analysis.hot_spot, self.analysis.amplitude
+        if spot is None or amplitude is None:
+            return None
+        return {
+            "share": self.analysis.share,
+            "amplitude": amplitude,
+            "force": self.force,
+            "hot_spot": _spot(spot, self.analysis.share, amplitude),
+        }
+
+
+def calibrate(case: Case) -> Calibration:
+    """Tune the stiffness if frequencies are given, take the damping from a response if one is given, then calibrate.
+
+    Raises InputError for a case without an interface or a first bending, and the errors of the modal package for what cannot be met.
+    """
+    started = time.perf_counter()
+    if case.response_label is None:
+        raise InputError("interface: missing; a rigid model needs one [interface.<label>] table to be seen at")
+    table = case.calibration or CalibrationTable()
+    structure, tuning = assemble(case), None
+    if table.tune is not None:
+        tuning = _tuned(structure, table.tune)
+        structure = assemble(tuned_case(case, dict(zip(tuning.names, tuning.factors.tolist(), strict=True)), structure))
+    analysis = modal_analysis(structure)
+    if analysis.first_bending is None or analysis.functional is None:
+        raise InputError("; ".join(analysis.warnings))
+    poles, pole, ratio = None, None, case.damping_ratio
+    frequency = float(analysis.modes.frequencies_hz[analysis.first_bending])
+    if table.damping is not None:
+        poles = _poles(table.damping, frequency)
+        pole = poles.nearest(frequency)
+        ratio = float(poles.damping_ratios[pole])
+        _check_near(float(poles.frequencies_hz[pole]), frequency)
+    rigid = rigid_model(analysis.modes, analysis.first_bending, analysis.functional, case.response_label, ratio)
+    return Calibration(structure.case, analysis, rigid, tuning, poles, pole, time.perf_counter() - started)
+
+
+def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> Case:
+    """The case with Young's moduli and support stiffnesses times their factors."""
+    material: dict[str, MaterialTable] = dict(case.material)
+    elastic = dict(case.support.elastic)
+    known = parts_by_name(case, structure.solid.domain.volumes)
+    for name, factor in factors.items():
+        for part in known[name]:
+            kind, group = part.split(".", 1)
+            if kind == "support":
+                springs = elastic[group]
+                x, y, z = (factor * value for value in springs.stiffness)
+                elastic[group] = replace(
+                    springs,
+                    stiffness=(x, y, z),
+                    normal=factor * springs.normal,
+                    tangential=factor * springs.tangential,
+                )
+            else:
+                own = material.get(group, case.material.get("default"))
+                assert own is not None
+                material[group] = replace(own, young=factor * own.young)
+    return replace(case, material=material, support=replace(case.support, elastic=elastic))
+
+
+def _tuned(structure: Structure, table: TuneTable) -> Tuning:
+    known = parts_by_name(structure.case, structure.solid.domain.volumes)
+    check_vary(table, known)
+    parts = structure.solid.stiffness_parts()
+    varied = {name: sparse.csr_array(sum(parts[part] for part in known[name])) for name in table.vary}
+    measured = None if table.shapes is None else read_shapes(table.shapes)
+    return tune(structure.matrices, varied, table.frequencies, measured, table.modes, starts=table.starts)
+
+
+def _poles(table: DampingTable, frequency: float) -> Poles:
+    low, high = table.band or (0.95 * frequency, 1.05 * frequency)
+    return identify(read_frf(table.frf, table.quantity).band(low, high), table.modes)
+
+
+def _check_near(found: float, computed: float) -> None:
+    if abs(found / computed - 1.0) > _NEAR:
+        raise InputError(
+            f"calibration.damping: the nearest pole of the response lies at {found:.6g} Hz, the first bending at "
+            f"{computed:.6g} Hz; check the band, or tune the frequencies first"
+        )
+
+
+def _spot(spot: HotSpot, share: float, amplitude: float) -> dict[str, Any]:
+    return {
+        "stress_per_amplitude": share * spot.strength / amplitude,
+        "strength": spot.strength,
+        "coordinates": list(spot.coordinates),
+        "group": spot.group,
+    }
+
+
+def _told(tuning: Tuning, case: Case) -> dict[str, Any]:
+    return {
+        "factor": dict(zip(tuning.names, tuning.factors.tolist(), strict=True)),
+        "deviation": dict(zip(tuning.names, tuning.deviations.tolist(), strict=True)),
+        "young": {name: table.young for name, table in case.material.items()},
+        "support": {name: asdict(table) for name, table in case.support.elastic.items()},
+        "target_hz": tuning.target_hz.tolist(),
+        "before_hz": tuning.before_hz.tolist(),
+        "after_hz": tuning.after_hz.tolist(),
+        "mode_before": tuning.modes_before.tolist(),
+        "mode_after": tuning.modes_after.tolist(),
+        "mac_before": tuning.mac_before.tolist(),
+        "mac_after": tuning.mac_after.tolist(),
+        "sensitivity": tuning.sensitivities.tolist(),
+        "evaluations": tuning.evaluations,
+    }

@@ -1,0 +1,81 @@
+"""The [calibration] table of a case file: what was measured, and what may be tuned to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from coupling.inputs import STRICT, InputError, Positive, Real, Whole, nearest
+
+if TYPE_CHECKING:
+    from studies.config import Case
+
+
+@dataclass(frozen=True, config=STRICT)
+class DampingTable:
+    """A frequency response (CSV: Hz, real, imaginary ...; or UFF 58) that gives the damping ratio of the first bending.
+
+    quantity  what a CSV holds; band in Hz, left out: 5 % to either side of the mode; modes in that band
+    """
+
+    frf: str
+    quantity: Literal["receptance", "mobility", "accelerance"] = "receptance"
+    band: tuple[Positive, Positive] | None = None
+    modes: Annotated[Whole, Field(ge=1)] = 1
+
+    def __post_init__(self) -> None:
+        if self.band is not None and not self.band[0] < self.band[1]:
+            raise ValueError("band: expected two ascending frequencies in Hz")
+
+
+@dataclass(frozen=True, config=STRICT)
+class TuneTable:
+    """Measured frequencies (Hz), the modes they belong to (shapes in a file, or indices of computed modes from 0) and
+    the parts of the stiffness that may change: material.<group>, support.<facet group>."""
+
+    frequencies: Annotated[list[Positive], Field(min_length=1)]
+    vary: Annotated[list[str], Field(min_length=1)]
+    shapes: str | None = None
+    modes: list[Annotated[Whole, Field(ge=0)]] | None = None
+    starts: Annotated[Whole, Field(ge=1)] = 1
+
+    def __post_init__(self) -> None:
+        if self.shapes is not None and self.modes is not None:
+            raise ValueError("give one of shapes and modes")
+        if self.modes is not None and len(self.modes) != len(self.frequencies):
+            raise ValueError("modes: expected as many as frequencies")
+
+
+@dataclass(frozen=True, config=STRICT)
+class CalibrationTable:
+    """What `vanedamp calibrate` uses beside the case itself; `share` of the fatigue strength sets the excitation,
+    looked for in the volume groups `hot_spot` (left out: all)."""
+
+    share: Annotated[Real, Field(gt=0, le=1)] = 0.7
+    hot_spot: list[str] | None = None
+    damping: DampingTable | None = None
+    tune: TuneTable | None = None
+
+
+def parts_by_name(case: Case, volumes: Iterable[str]) -> dict[str, list[str]]:
+    """Every name that `vary` may hold, with the parts of Solid.stiffness_parts that it stands for."""
+    groups = list(volumes)
+    names = {f"material.{group}": [f"material.{group}"] for group in groups}
+    rest = [f"material.{group}" for group in groups if group not in case.material]
+    if "default" in case.material and rest:
+        names["material.default"] = rest
+    return names | {f"support.{group}": [f"support.{group}"] for group in case.support.elastic}
+
+
+def check_vary(table: TuneTable, known: dict[str, list[str]]) -> None:
+    """Raise InputError for a name in `vary` that is no part, or parts that overlap."""
+    seen: set[str] = set()
+    for name in table.vary:
+        if name not in known:
+            raise InputError(f"calibration.tune.vary: no part '{name}'; {nearest(name, list(known))}")
+        if seen & set(known[name]):
+            raise InputError(f"calibration.tune.vary: '{name}' holds a part that another name holds, too; name it once")
+        seen |= set(known[name])

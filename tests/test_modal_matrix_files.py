@@ -1,0 +1,87 @@
+"""Matrices of other codes come in with their nodes and sets, and go out again; what does not fit is told."""
+
+import numpy as np
+import pytest
+from scipy import io, sparse
+from structures import truss
+
+from modal.eigen import solve_modes
+from modal.matrices import MatricesError
+from modal.matrix_files import read_folder, read_matrices, write_folder
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_folder(truss(), tmp_path)
+    return tmp_path
+
+
+def test_round_trip(folder):
+    given, again = truss(), read_folder(folder, damping_ratio=0.01)
+    for name in ("stiffness", "mass"):
+        ours, theirs = getattr(given, name), getattr(again, name)
+        assert abs(ours - theirs).max() <= 1e-15 * abs(ours).max()
+    assert np.array_equal(again.coordinates, given.coordinates)
+    assert np.array_equal(again.fixed, given.fixed)
+    assert list(again.patches) == list(given.patches)
+    for label, patch in given.patches.items():
+        assert np.array_equal(again.patches[label].nodes, patch.nodes)
+        assert np.array_equal(again.patches[label].weights, patch.weights)
+
+
+def test_npz_with_labels_of_its_own_and_held_sets(folder, tmp_path):
+    """Another numbering of the nodes, and supports named by sets."""
+    given = truss()
+    for name in ("stiffness", "mass"):
+        sparse.save_npz(tmp_path / f"{name}.npz", sparse.csr_matrix(getattr(given, name)))
+    labels = 1000 - 7 * np.arange(14)
+    rows = [f"{label},{x!r},{y!r},{z!r}" for label, (x, y, z) in zip(labels, given.coordinates.tolist(), strict=True)]
+    (tmp_path / "own.csv").write_text("\n".join(rows) + "\n")
+    (tmp_path / "own_sets.csv").write_text(
+        "".join(f"feet,{label}\n" for label in labels[:4]) + f"head,{labels[-1]},2.5\n"
+    )
+    again = read_matrices(
+        tmp_path / "stiffness.npz",
+        tmp_path / "mass.npz",
+        tmp_path / "own.csv",
+        tmp_path / "own_sets.csv",
+        {"feet": "xyz"},
+    )
+    assert np.array_equal(again.fixed, given.fixed)
+    assert again.patches["head"].area == 2.5
+    assert solve_modes(again, 3).frequencies_hz == pytest.approx(solve_modes(given, 3).frequencies_hz, rel=1e-9)
+
+
+def lower_triangle(folder):
+    io.mmwrite(str(folder / "stiffness.mtx"), sparse.tril(truss().stiffness), symmetry="general")
+
+
+def smaller(folder):
+    io.mmwrite(str(folder / "mass.mtx"), sparse.eye(9))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lower_triangle, "stiffness: not symmetric; if only one triangle"),
+        (smaller, r"mass\.mtx: shape \(9, 9\) for 14 nodes; expected \(42, 42\)"),
+        (lambda f: (f / "mass.mtx").unlink(), r"mass\.mtx: no such matrix file"),
+        (lambda f: (f / "mass.mtx").write_text("no matrix"), r"mass\.mtx: not a readable matrix"),
+        (lambda f: (f / "sets.csv").write_text("tip,99\n"), r"sets\.csv: node '99' is not among the nodes"),
+        (lambda f: (f / "sets.csv").write_text("tip,1\ntip,1\n"), r"sets\.csv: patch: a node occurs twice"),
+        (lambda f: (f / "fixed.csv").write_text("1,xw\n"), r"fixed\.csv: expected components out of 'xyz', not 'w'"),
+        (lambda f: (f / "nodes.csv").unlink(), r"nodes\.csv: no such file; expected the columns node, x, y, z"),
+        (lambda f: (f / "nodes.csv").write_text("1,0,0\n"), r"nodes\.csv: row 1 has 3 columns"),
+        (lambda f: (f / "nodes.csv").write_text("1,0,0,0\n1,0,0,1\n"), r"nodes\.csv: node 1 occurs twice"),
+    ],
+)
+def test_what_does_not_fit_is_told_with_its_file(folder, spoil, message):
+    spoil(folder)
+    with pytest.raises(MatricesError, match=message):
+        read_folder(folder)
+
+
+def test_unknown_sets_cannot_be_held(folder):
+    files = [folder / name for name in ("stiffness.mtx", "mass.mtx", "nodes.csv", "sets.csv")]
+    with pytest.raises(MatricesError, match="no set 'foot' to hold; there are: a, b, c, held"):
+        read_matrices(*files, {"foot": "xyz"})

@@ -1,0 +1,178 @@
+"""`vanedamp calibrate` finds the structure that made the measurements."""
+
+import json
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+
+from modal.correlation import MeasuredShapes, observed_shapes
+from modal.eigen import solve_modes
+from modal.exchange import write_frf, write_shapes
+from modal.frf import Frf
+from studies.cli import BAD_INPUT, main
+from studies.config import Case
+from studies.pipeline import assemble
+
+YOUNG, SPRINGS, RATIO = 1.9e11, 3e13, 0.004
+CASE = """
+[mesh]
+generator = "block"
+length = 0.1
+width = 0.02
+thickness = 0.01
+divisions = [6, 2, 1]
+[material.default]
+young = {young}
+poisson = 0.3
+density = 8000.0
+damping_ratio = 0.01
+fatigue_strength = 4e8
+[support.elastic.root]
+stiffness = {springs}
+[modes]
+count = 6
+direction = [0, 0, 1]
+[interface.tip]
+facets = "tip"
+direction = [0, 0, 1]
+"""
+TABLE = """
+[calibration]
+share = 0.5
+[calibration.damping]
+frf = "tip.csv"
+quantity = "accelerance"
+[calibration.tune]
+frequencies = {frequencies}
+shapes = "shapes.csv"
+vary = ["material.default", "support.root"]
+"""
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """A folder with what a test rig would give of the true structure, and a case that does not know it."""
+    folder = tmp_path_factory.mktemp("rig")
+    (folder / "true.toml").write_text(CASE.format(young=YOUNG, springs=SPRINGS))
+    structure = assemble(Case.load(folder / "true.toml"))
+    matrices = structure.matrices
+    modes = solve_modes(matrices, 6)
+    rng = np.random.default_rng(0)
+    points = np.repeat(rng.uniform([0.03, -0.01, 0], [0.1, 0.01, 0.01], (12, 3)), 3, axis=0)
+    bare = MeasuredShapes(points, np.tile(np.eye(3), (12, 1)), np.ones((1, 36)))
+    order = [2, 0, 1]
+    shapes = observed_shapes(modes, matrices, bare)[order] * np.array([[-1.0], [2.0], [1.0]])
+    write_shapes(replace(bare, shapes=shapes, frequencies_hz=[], damping_ratios=[]), folder / "shapes.csv")
+    tip = observed_shapes(modes, matrices, MeasuredShapes([[0.1, 0, 0.005]], [[0, 0, 1]], [[1.0]]))[:, 0]
+    line = np.linspace(0.8, 1.2, 2001) * modes.frequencies_hz[0]
+    omega, own = 2 * np.pi * line, modes.angular_frequencies[:, None]
+    terms = tip[:, None] ** 2 / (own**2 - omega**2 + 2j * RATIO * own * omega)
+    accelerance = -(omega**2) * terms.sum(axis=0)
+    noise = 0.002 * np.abs(accelerance).max() * (rng.standard_normal(line.size) + 1j * rng.standard_normal(line.size))
+    write_frf(Frf(line, accelerance + noise, "accelerance"), folder / "tip.csv")
+    table = TABLE.format(frequencies=modes.frequencies_hz[order].tolist())
+    (folder / "case.toml").write_text(CASE.format(young=2.1e11, springs=1e14) + table)
+    return folder, modes
+
+
+@pytest.fixture(scope="module")
+def result(measured):
+    folder, _ = measured
+    outputs = ["-o", str(folder / "calibration.h5"), "--json", str(folder / "calibration.json")]
+    assert main(["calibrate", str(folder / "case.toml"), *outputs]) == 0
+    return json.loads((folder / "calibration.json").read_text())
+
+
+def test_modulus_and_springs_are_recovered(measured, result):
+    _, modes = measured
+    tuning = result["tuning"]
+    assert tuning["young"]["block"] == pytest.approx(YOUNG, rel=1e-3)
+    assert tuning["support"]["root"]["stiffness"] == pytest.approx([SPRINGS] * 3, rel=1e-3)
+    assert result["frequency_hz"][:3] == pytest.approx(modes.frequencies_hz[:3], rel=1e-4)
+    assert tuning["mode_after"] == [2, 0, 1]
+    assert min(tuning["mac_after"]) > 0.99
+    misfit = [np.abs(np.array(tuning[name]) / tuning["target_hz"] - 1).max() for name in ("before_hz", "after_hz")]
+    assert misfit[0] > 0.02
+    assert misfit[1] < 1e-4
+
+
+def test_damping_comes_from_the_response(result):
+    damping, rigid = result["damping"], result["rigid"]
+    assert damping["source"] == "frf"
+    assert damping["ratio"] == pytest.approx(RATIO, rel=0.01)
+    assert abs(damping["ratio"] - RATIO) < 4 * damping["deviation"]
+    expected = 2 * damping["ratio"] * np.sqrt(rigid["stiffness"] * rigid["mass"])
+    assert rigid["damping"] == pytest.approx(expected, rel=1e-9)
+
+
+def test_excitation_and_hot_spot(result):
+    """d w X at resonance; the stress there is half the strength; a clamped beam is strained most at its root."""
+    excitation, rigid = result["excitation"], result["rigid"]
+    amplitude = excitation["amplitude"]
+    assert excitation["force"] == pytest.approx(
+        rigid["damping"] * 2 * np.pi * rigid["frequency_hz"] * amplitude, rel=1e-9
+    )
+    spot = excitation["hot_spot"]
+    assert spot["stress_per_amplitude"] * amplitude == pytest.approx(0.5 * 4e8, rel=1e-9)
+    assert spot["group"] == "block"
+    assert spot["coordinates"][0] == pytest.approx(0.0, abs=0.02)
+    assert min(abs(spot["coordinates"][2]), abs(spot["coordinates"][2] - 0.01)) < 1e-9
+
+
+def test_the_record_holds_the_tuning(measured, result):
+    folder, _ = measured
+    with h5py.File(folder / "calibration.h5") as file:
+        assert file.attrs["kind"] == "calibration"
+        assert file["factor"].asstr is not None
+        assert list(file["part"].asstr()) == ["material.default", "support.root"]
+        assert file["factor"][0] == pytest.approx(YOUNG / 2.1e11, rel=1e-3)
+        assert json.loads(file.attrs["excitation"])["force"] == pytest.approx(result["excitation"]["force"])
+
+
+def test_a_case_without_measurements_is_calibrated_as_it_is(measured, capsys):
+    folder, _ = measured
+    (folder / "plain.toml").write_text(CASE.format(young=YOUNG, springs=SPRINGS))
+    assert main(["calibrate", str(folder / "plain.toml")]) == 0
+    shown = capsys.readouterr().out
+    assert "damping ratio: 0.01, from the case" in shown
+    assert "70% of the fatigue strength" in shown
+    assert main(["modal", str(folder / "plain.toml"), "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["fatigue"]["group"] == "block"
+
+
+def test_the_first_bending_can_be_named_by_its_shape(measured, capsys):
+    """The shape file's first shape is that of mode 2, whatever carries most mass."""
+    folder, _ = measured
+    text = CASE.format(young=YOUNG, springs=SPRINGS).replace("count = 6", 'count = 6\nshape = "shapes.csv"')
+    (folder / "shape.toml").write_text(text)
+    assert main(["modal", str(folder / "shape.toml"), "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["first_bending"] == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('"tip.csv"', '"top.csv"', "calibration.damping.frf: no such file"),
+        (
+            '"support.root"',
+            '"support.rot"',
+            "calibration.tune.vary: no part 'support.rot'; did you mean 'support.root'?",
+        ),
+        ('"support.root"', '"material.block"', "'material.block' holds a part that another name holds"),
+        ("share = 0.5", "share = 1.5", "calibration.share: should be less than or equal to 1"),
+        ('shapes = "shapes.csv"', "modes = [0, 1]", "calibration.tune: modes: expected as many as frequencies"),
+        ('quantity = "accelerance"', "band = [1.0, 2.0]", "band: 1 to 2 Hz holds 0 lines"),
+        ("share = 0.5", 'hot_spot = ["blade"]', "'blade' is not there"),
+    ],
+)
+def test_bad_input(measured, capfd, old, new, told):
+    folder, _ = measured
+    text = (folder / "case.toml").read_text()
+    assert text.count(old) == 1
+    (folder / "bad.toml").write_text(text.replace(old, new))
+    assert main(["calibrate", str(folder / "bad.toml")]) == BAD_INPUT
+    error = capfd.readouterr().err
+    assert told in error
+    assert error.count("\n") == 1
