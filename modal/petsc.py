@@ -1,6 +1,6 @@
 """Sparse symmetric algebra on PETSc and SLEPc: a factorisation and an eigenvalue solver for scipy matrices.
 
-Both lean on MUMPS' LDL^T. All PETSc objects are destroyed before a function returns or when its context ends. Under MPI
+Both lean on MUMPS' LDL^T; the lowest modes of a held structure on CHOLMOD, whose single solves are quicker. All PETSc objects are destroyed before a function returns or when its context ends. Under MPI
 all ranks share eigenvalue problems and inertia counts (see `parallel`); a Factorization stays on its own rank.
 """
 
@@ -32,19 +32,23 @@ class SolverError(ValueError):
 class Factorization:
     """A regular symmetric matrix, factorised once and solved for many right-hand sides; a context manager.
 
-    Raises SolverError for a matrix that is singular to working precision.
+    direct: PETSc's name of the solver, such as "cholmod" for a positive definite matrix. Raises SolverError for a
+    matrix that is singular to working precision.
     """
 
-    def __init__(self, matrix: sparse.csr_array) -> None:
+    def __init__(self, matrix: sparse.csr_array, direct: str = "mumps") -> None:
         self.size = int(matrix.shape[0])
         self._matrix = _petsc_matrix(matrix)
         self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
         try:
             self._ksp.setOperators(self._matrix)
-            _configure_direct(self._ksp)
+            if direct == "mumps":
+                _configure_direct(self._ksp)
+            else:
+                _set_direct(self._ksp, direct)
             self._ksp.setUp()
             self._factor = self._ksp.getPC().getFactorMatrix()
-            self._check(matrix)
+            self._check(matrix, self._factor.getMumpsInfog(1) if direct == "mumps" else 0)
         except BaseException:
             self.destroy()
             raise
@@ -80,15 +84,14 @@ class Factorization:
     ) -> None:
         self.destroy()
 
-    def _check(self, matrix: sparse.csr_array) -> None:
-        status = self._factor.getMumpsInfog(1)
+    def _check(self, matrix: sparse.csr_array, status: int) -> None:
         error = np.inf
         if status >= 0:
             known = np.random.default_rng(0).standard_normal(self.size)
             error = np.abs(self.solve(matrix @ known) - known).max()
         if not error < _ROUND_TRIP:
             raise SolverError(
-                f"the matrix of size {self.size} is singular to working precision (MUMPS status {status}); "
+                f"the matrix of size {self.size} is singular to working precision (status {status}); "
                 "hold the structure against every rigid motion"
             )
 
@@ -100,14 +103,15 @@ def negative_eigenvalues(matrix: sparse.csr_array) -> int:
 
 
 def nearest_eigenpairs(
-    stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float
+    stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float, direct: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues (count,) ascending and vectors (count, n) of K x = lambda M x nearest to a shift.
 
-    Krylov-Schur with shift and invert (Stewart 2001, SIAM J. Matrix Anal. Appl. 23). Raises SolverError when fewer
-    converge than were asked for.
+    Krylov-Schur with shift and invert (Stewart 2001, SIAM J. Matrix Anal. Appl. 23). direct: PETSc's name of the solver
+    that factorises; left out, CHOLMOD where the shift is below the spectrum and the matrix on one rank, otherwise
+    MUMPS. Raises SolverError when fewer converge than were asked for.
     """
-    values, vectors = _together("nearest", (stiffness, mass), count, shift)
+    values, vectors = _together("nearest", (stiffness, mass), count, shift, direct)
     nearest = np.argsort(np.abs(values - shift), kind="stable")[:count]
     order = nearest[np.argsort(values[nearest], kind="stable")]
     return values[order], vectors[order]
@@ -163,14 +167,26 @@ def _inertia(stack: contextlib.ExitStack, operators: list[Any]) -> int:
 
 
 def _nearest(
-    stack: contextlib.ExitStack, operators: list[Any], count: int, shift: float
+    stack: contextlib.ExitStack, operators: list[Any], count: int, shift: float, direct: str | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    eps = _eigenproblem(stack, operators)
-    eps.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-    eps.setTarget(shift)
-    eps.setDimensions(count)
-    eps.getST().setShift(shift)
-    _set_direct(eps.getST().getKSP())
+    def prepared(direct: str) -> Any:
+        eps = _eigenproblem(stack, operators)
+        eps.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+        eps.setTarget(shift)
+        eps.setDimensions(count)
+        eps.getST().setShift(shift)
+        _set_direct(eps.getST().getKSP(), direct)
+        return eps
+
+    eps = None
+    if direct is None and shift <= 0.0 and parallel.COMM.size == 1:
+        eps = prepared("cholmod")
+        try:
+            eps.setUp()
+        except PETSc.Error:  # singular, or a PETSc without SuiteSparse
+            eps.reset()
+            eps = None
+    eps = eps or prepared(direct or "mumps")
     _solve(eps)
     if eps.getConverged() < count:
         raise SolverError(f"{eps.getConverged()} of {count} modes converged in {eps.getIterationNumber()} iterations")
@@ -244,12 +260,12 @@ def _distributed(matrix: sparse.csr_array | None) -> Any:
     return created
 
 
-def _set_direct(ksp: Any) -> None:
-    """Make a Krylov solver a direct one on MUMPS."""
+def _set_direct(ksp: Any, direct: str = "mumps") -> None:
+    """Make a Krylov solver a direct one."""
     ksp.setType(PETSc.KSP.Type.PREONLY)
     pc = ksp.getPC()
     pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType("mumps")
+    pc.setFactorSolverType(direct)
 
 
 def _configure_direct(ksp: Any) -> None:
