@@ -86,7 +86,7 @@ def collide(rows, st, rec, work):
         work.jerk[p], work.acceleration[p] = speed, min(speed, 0.0)
         restitution = rows.restitution[r - friction]
         collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * rows.period
-        if collapsed or -speed * restitution < (1.0 - restitution) * st.settling[r]:
+        if collapsed or -speed * restitution < _share(restitution) * st.settling[r]:
             restitution = 0.0
         problem.restitution[p] = restitution
         # a contact that separates already may not be driven together: its law starts from zero
@@ -111,6 +111,15 @@ def collide(rows, st, rec, work):
     return True
 
 
+@inlined
+def _share(restitution):
+    """Share of the time that is left of a chatter that its next flight takes.
+
+    An elastic contact has no chatter of its own, but what other contacts lose may shorten its flights without end.
+    """
+    return max(1.0 - restitution, 0.1)
+
+
 @kernel
 def _hold_back(rows, st, work, k):
     """Tie contacts that would separate too slowly. Returns whether there are any."""
@@ -119,7 +128,7 @@ def _hold_back(rows, st, work, k):
         problem.forced[p] = 0  # the solver's own mark
         r = work.rows[p]
         after = problem.acceleration[p] - problem.restitution[p] * work.acceleration[p]
-        slow = (1.0 - rows.restitution[r - rows.friction_rows]) * st.settling[r]
+        slow = _share(rows.restitution[r - rows.friction_rows]) * st.settling[r]
         if problem.state[p] == AT_LOW and problem.low[p] == 0.0 and after < slow:
             problem.b[p] -= problem.restitution[p] * work.acceleration[p]
             problem.low[p], problem.restitution[p], found = -np.inf, 0.0, True

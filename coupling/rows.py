@@ -19,6 +19,9 @@ from coupling.laws import Element
 from coupling.scene import Scene
 from coupling.structure import LinearStructure
 
+#: coefficients of friction below this are none
+_SMOOTH = 1e-9
+
 
 class Rows(NamedTuple):
     """What the compiled engine needs to know besides the subsystems. n modes, b bodies, r rows."""
@@ -89,7 +92,7 @@ def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray,
         delassus=j_structure @ j_structure.T + (j_bodies / mass) @ j_bodies.T,
         limit=np.array(
             [_friction_force(scene, i) for i in range(bodies)]
-            + [damper.friction * damper.normal_force for damper in scene.friction_damper]
+            + [_coefficient(damper.friction) * damper.normal_force for damper in scene.friction_damper]
         ),
         spring=np.array(
             [np.inf] * bodies
@@ -163,4 +166,9 @@ def _rides(structure: np.ndarray, bodies: np.ndarray, friction_rows: int, r: int
 def _friction_force(scene: Scene, index: int) -> float:
     damper = scene.damper[index]
     normal = damper.mass * scene.gravity.normal if damper.normal_load is None else damper.normal_load
-    return damper.friction * max(normal, 0.0)
+    return _coefficient(damper.friction) * max(normal, 0.0)
+
+
+def _coefficient(friction: float) -> float:
+    """A coefficient of friction, zero where it is nothing beside the round-off of other forces."""
+    return friction if friction > _SMOOTH else 0.0

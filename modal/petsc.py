@@ -1,7 +1,8 @@
 """Sparse symmetric algebra on PETSc and SLEPc: a factorisation and an eigenvalue solver for scipy matrices.
 
-Both lean on MUMPS' LDL^T; the lowest modes of a held structure on CHOLMOD, whose single solves are quicker. All PETSc objects are destroyed before a function returns or when its context ends. Under MPI
-all ranks share eigenvalue problems and inertia counts (see `parallel`); a Factorization stays on its own rank.
+Both lean on MUMPS' LDL^T; the lowest modes of a held structure on CHOLMOD, whose single solves are quicker. All PETSc
+objects are destroyed before a function returns or when its context ends. Under MPI all ranks share eigenvalue problems
+and inertia counts (see `parallel`), on MUMPS; a Factorization stays on its own rank.
 """
 
 from __future__ import annotations

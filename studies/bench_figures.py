@@ -92,7 +92,7 @@ def modal_figure(result: Mapping[str, Any], path: Path) -> None:
 
     figure, panels = plt.subplots(1, 3, figsize=(14, 4.6), layout="constrained")
     titles = ("factorisation", f"{COUNT} modes with it", "peak memory")
-    colours = dict(zip(NAMES, (_BLUE, _RED, _GOLD, _GREEN), strict=True))
+    colours = dict(zip(NAMES, (_BLUE, _GREY, _RED, _GOLD, _GREEN), strict=True))
     sizes = [entry for entry in result["sizes"] if entry["assembly"]["status"] == "ok"]
     for axes, title, part in zip(panels, titles, ("factorisation", "modes", "peak_bytes"), strict=True):
         for name, label in NAMES.items():

@@ -112,7 +112,8 @@ class Calibration:
 def calibrate(case: Case) -> Calibration:
     """Tune the stiffness if frequencies are given, take the damping from a response if one is given, then calibrate.
 
-    Raises InputError for a case without an interface or a first bending, and the errors of the modal package for what cannot be met.
+    Raises InputError for a case without an interface or a first bending, and the errors of the modal package for what
+    cannot be met.
     """
     started = time.perf_counter()
     if case.response_label is None:

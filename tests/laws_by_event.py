@@ -21,7 +21,7 @@ PENETRATION = 1e-12
 #: share of the terms that a sum of forces or accelerations is round-off of
 BALANCE = 1e-9
 #: share of the fastest speed so far that is round-off of a velocity
-SPEED = 1e-10
+SPEED = 1e-9
 #: what counts as motion at all, as a share of the free travel
 SLOW = 1e-9
 
@@ -136,7 +136,7 @@ def _check_event(worst: Worst, step: Step, end: Moment, now: Moment, fastest: fl
     contacts = _contacts(rows)
     scale = np.r_[np.full(rows.friction_rows, max(np.abs(end.gap).max(), 1e-300)), rows.gap]
     jumps = np.isfinite(rows.spring) & ~contacts  # a spring's elongation is set to its bound
-    worst.note("jump", (np.abs(now.gap - end.gap) / scale)[~jumps].max(initial=0.0), PENETRATION, step)
+    worst.note("jump", (np.abs(now.gap - end.gap) / scale)[~jumps].max(initial=0.0), 2 * SIMULTANEOUS, step)
     touching = contacts & np.isinf(rows.spring) & (after.displacement == 0.0)
     rates, bodies = now.p_rate - end.p_rate, now.body - end.body
     root = np.sqrt(rows.mass)
@@ -163,7 +163,7 @@ def _check_newton(worst, step, end, now, touching, impulse, fastest, last) -> No
     restitution = rows.restitution[touching[rows.friction_rows :]]
     restitution = np.where(step.after.begun - last[touching] < 2 * COLLAPSE * rows.period, 0.0, restitution)
     approach = np.maximum(-before, 0.0)
-    completed = restitution * approach <= (1 - restitution) * limit + SPEED * fastest
+    completed = restitution * approach <= np.maximum(1 - restitution, 0.1) * limit + SPEED * fastest
     short = restitution * approach - after
     worst.note("restitution", (short[~completed] / fastest).max(initial=0.0), SPEED, step)
     worst.note("restitution", (-after / fastest).max(initial=0.0), SPEED, step)
