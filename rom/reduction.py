@@ -40,8 +40,7 @@ def reduce(
 
     Raises ReductionError for an unknown basis, and what the two functions named raise.
     """
-    if basis not in BASES:
-        raise ReductionError(f"basis: expected one of {', '.join(BASES)}, not {basis!r}")
+    check_basis(basis)
     if basis in ("craig-bampton", "massless"):
         fixed = max(2 * modes, modes + 10) if basis == "massless" else modes
         most = interface.motions.shape[1] - len(interface.labels) - interface.full.size
@@ -53,3 +52,9 @@ def reduce(
     blocks = {"rubin": 1 + quasi_static, "macneal": 1, "truncated": 0}[basis]
     model = free_interface.reduce_free(matrices, interface, modes, factorize, keep_recovery, blocks)
     return model.massless(modes) if basis == "macneal" else model
+
+
+def check_basis(basis: str) -> None:
+    """Raise ReductionError for an unknown basis."""
+    if basis not in BASES:
+        raise ReductionError(f"basis: expected one of {', '.join(BASES)}, not {basis!r}")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -112,10 +113,22 @@ def _parser() -> argparse.ArgumentParser:
     )
     modal.add_argument("--vtk", metavar="FILE.vtu", help="the mode shapes for ParaView (.vtu or .vtk)")
 
-    reduce = with_json(command("reduce", "Craig-Bampton reduction onto the case's interface", "CASE.toml", "ROM.h5"))
+    reduce = with_json(command("reduce", "reduced model at the case's interface", "CASE.toml", "ROM.h5"))
     reduce.add_argument(
-        "--modes", type=_count, default=12, metavar="N", help="fixed-interface modes to keep (default: %(default)s)"
+        "--modes", type=_modes, default=12, metavar="N|auto",
+        help="modes to keep, or as few as the tolerance needs (default: %(default)s)",
+    )  # fmt: skip
+    reduce.add_argument(
+        "--basis", default="craig-bampton", metavar="BASIS",
+        help="craig-bampton (default), rubin, macneal, massless or truncated",
+    )  # fmt: skip
+    reduce.add_argument(
+        "--tolerance", type=_ratio, default=0.01, metavar="R", help="error of --modes auto (default: %(default)s)"
     )
+    reduce.add_argument(
+        "--max-frequency", type=_hertz, metavar="HZ",
+        help="up to which the error is estimated (default: 1.5 times the first natural frequency)",
+    )  # fmt: skip
 
     run = with_json(command("run", "one scene at one excitation frequency", "SCENE.toml", "RESPONSE.h5"))
     run.add_argument("--events", action="store_true", help="keep the list of events")
@@ -143,6 +156,28 @@ def _count(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"expected a count, not {text!r}")
     return int(text)
+
+
+def _modes(text: str) -> int | None:
+    return None if text == "auto" else _count(text)
+
+
+def _ratio(text: str) -> float:
+    return _number(text, "a number between 0 and 1", lambda value: 0.0 < value < 1.0)
+
+
+def _hertz(text: str) -> float:
+    return _number(text, "a frequency in Hz", lambda value: 0.0 < value < math.inf)
+
+
+def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not fits(value):
+        raise argparse.ArgumentTypeError(f"expected {expected}, not {text!r}")
+    return value
 
 
 def _some(text: str) -> int:

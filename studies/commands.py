@@ -58,28 +58,35 @@ def modal(arguments: Namespace) -> None:
 
 
 def reduce(arguments: Namespace) -> None:
-    """Craig-Bampton reduction."""
+    """A reduced model, with the estimate of its error."""
+    from rom.reduction import check_basis
     from studies.config import Case
 
     _check_outputs(arguments)
+    check_basis(arguments.basis)
     case = Case.load(arguments.input)
     if not case.interface:
         raise InputError("interface: missing; a reduction needs at least one [interface.<label>] table")
     from studies.pipeline import assemble, reduction
 
     started = time.perf_counter()
-    model = reduction(assemble(case), arguments.modes)
+    model = reduction(assemble(case), arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency)
+    estimate = model.provenance["estimate"]
     if arguments.output:
         model.save(arguments.output)
     result = {
         "frequency_hz": model.natural_frequencies_hz.tolist(),
-        "modes": model.fixed_interface_modes,
+        "modes": model.modes,
+        "basis": arguments.basis,
         "interface": list(model.interface),
+        "estimate": estimate,
         "wall_time_s": time.perf_counter() - started,
     }
     _write_json(arguments.json, result)
     if arguments.json != "-":
-        print(f"{model.size} coordinates: {', '.join(model.interface)} and {arguments.modes} fixed-interface modes")
+        kind = "natural" if model.free_modes else "fixed-interface"
+        print(f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}")
+        print(f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz")
         print("frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8]))
 
 
