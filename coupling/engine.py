@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from coupling import automaton as auto
 from coupling import state as st
+from coupling.choice import settle
 from coupling.flow import add_flow, empty_flows
 from coupling.response import Event, Response, Status, classify
 from coupling.rows import Rows, rows_of
@@ -34,6 +35,8 @@ def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) ->
     Raises InputError for a scene that the model does not allow; numerical trouble is a status of the response.
     """
     started = time.perf_counter()
+    settled = settle(scene)
+    scene = settled.scene
     run = _Run(scene, events, samples_per_period)
     code = run.begin(scene.solver.max_events)
     transient, status = scene.time.dropped, _STATUS[code]
@@ -41,7 +44,7 @@ def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) ->
         status, transient = _until_steady(run, scene)
     elif status is Status.OK:
         status = _STATUS[run.advance(scene.time.periods, scene.solver.max_events)]
-    return _response(scene, run, status, transient, started)
+    return replace(_response(scene, run, status, transient, started), estimate=settled.estimate)
 
 
 def _until_steady(run: _Run, scene: Scene) -> tuple[Status, int]:

@@ -18,7 +18,7 @@ Needs numpy and reduced models alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -92,21 +92,26 @@ def frf_errors(
     richer: ReducedModel,
     frequencies_hz: Sequence[float] | np.ndarray,
     labels: Sequence[str] | None = None,
+    forces: Sequence[str] | None = None,
 ) -> np.ndarray:
     """(f,) estimated error of a model's receptance matrix (Frobenius norm), relative.
 
     richer: the same model with at least two blocks of quasi-static coordinates more. labels: the interface coordinates
-    that count (default: all).
+    that count (default: all); forces: those at which forces act (default: the same).
     """
-    kept = [richer.interface.index(label) for label in labels or richer.interface]
-    own = [model.interface.index(label) for label in labels or richer.interface]
-    better = richer.receptance(frequencies_hz)[:, kept][:, :, kept]
-    errors = model.receptance(frequencies_hz)[:, own][:, :, own] - better
+    rows = [richer.interface.index(label) for label in labels or richer.interface]
+    columns = [richer.interface.index(label) for label in forces or labels or richer.interface]
+    better = richer.receptance(frequencies_hz)[:, rows][:, :, columns]
+    errors = model.receptance(frequencies_hz)[:, rows][:, :, columns] - better
     return np.linalg.norm(errors, axis=(1, 2)) / np.linalg.norm(better, axis=(1, 2))
 
 
 def rigid_errors(
-    richer: ReducedModel, frequencies_hz: Sequence[float] | np.ndarray, at: str, labels: Sequence[str] | None = None
+    richer: ReducedModel,
+    frequencies_hz: Sequence[float] | np.ndarray,
+    at: str,
+    labels: Sequence[str] | None = None,
+    forces: Sequence[str] | None = None,
 ) -> np.ndarray:
     """(f,) the same of the rigid model: the first natural mode, in which every coordinate moves as `at`."""
     first = richer.projected(
@@ -117,7 +122,7 @@ def rigid_errors(
         first, selection=np.tile(first.row(at), (len(first.interface), 1)), residual_flexibility=None,
         residual_recovery=None, output_residual=None,
     )  # fmt: skip
-    return frf_errors(rigid, richer, frequencies_hz, labels)
+    return frf_errors(rigid, richer, frequencies_hz, labels, forces)
 
 
 def contact_frequency(model: ReducedModel, label: str, stiffness: float, mass: float) -> float:
@@ -135,9 +140,10 @@ def pulse_spectrum(ratio: np.ndarray | float) -> np.ndarray:
 
 
 def collision_share(model: ReducedModel, modes: int, collision: Collision) -> float:
-    """Share of a collision's energy of approach that natural modes beyond the first `modes` would take; the worst wall.
+    """Share of a collision's energy that natural modes beyond the first `modes` would take; the worst wall.
 
-    The impulse is that of an isolated collision with restitution at the mass of the first natural mode.
+    The impulse is that of an isolated collision with restitution at the mass of the first natural mode; the energy,
+    that of its approach and of the modes above the first.
     """
     squares, shapes = linalg.eigh(model.stiffness, model.mass)
     omegas = np.sqrt(np.maximum(squares, 0.0))
@@ -147,8 +153,23 @@ def collision_share(model: ReducedModel, modes: int, collision: Collision) -> fl
         reduced = 1.0 / (row[0] ** 2 + 1.0 / collision.mass)
         spectrum = pulse_spectrum(omegas / math.sqrt(collision.stiffness / reduced))
         impulse = (1.0 + collision.restitution) * reduced  # of a unit speed of approach
-        energy = 0.5 * (row * impulse * spectrum)[modes:] ** 2
-        worst = max(worst, float(energy.sum() / (0.5 * reduced)))
+        energy = 0.5 * (row * impulse * spectrum) ** 2
+        worst = max(worst, float(energy[modes:].sum() / (0.5 * reduced + energy[1:].sum())))
+    return worst
+
+
+def compliance_error(model: ReducedModel, frequency_hz: float, collision: Collision) -> float:
+    """How much of a period a collision's duration is wrong by, when its wall lacks the residual flexibility of a model.
+
+    A flexibility G in series lengthens the contact's half period by G k_c / 2 of itself.
+    """
+    assert model.residual_flexibility is not None
+    worst = 0.0
+    for label in collision.labels:
+        index = model.interface.index(label)
+        lost = 0.5 * collision.stiffness * float(model.residual_flexibility[index, index])
+        duration = 0.5 / contact_frequency(model, label, collision.stiffness, collision.mass)
+        worst = max(worst, lost * duration * frequency_hz)
     return worst
 
 
@@ -156,22 +177,32 @@ def natural_ladder(
     richer: ReducedModel,
     frequencies_hz: np.ndarray,
     labels: Sequence[str] | None = None,
-    collisions: Sequence[Collision] = (),
+    forces: Sequence[str] | None = None,
+    collisions: Callable[[ReducedModel], Sequence[Collision]] = lambda model: (),
     residual: bool = False,
 ) -> list[Rung]:
     """Models of 1, 2, 3, ... natural modes of a model, with the errors of each against the whole.
 
-    residual: the flexibility that the modes lack counts as kept (a massless boundary); otherwise as lost.
+    collisions: the contacts, which may depend on the model with so many modes. residual: the contacts have the
+    flexibility that the modes lack (a massless boundary); otherwise it is lost.
     """
     rungs = []
-    for modes in range(1, richer.size + 1):
+    for modes in range(_least(richer), richer.size + 1):
         model = richer.massless(modes)
-        if not residual:
-            model = replace(model, residual_flexibility=None, residual_recovery=None, output_residual=None)
-        receptance = float(frf_errors(model, richer, frequencies_hz, labels).max())
-        share = max((collision_share(richer, modes, collision) for collision in collisions), default=0.0)
+        plain = replace(model, residual_flexibility=None, residual_recovery=None, output_residual=None)
+        receptance = float(frf_errors(plain, richer, frequencies_hz, labels, forces).max())
+        share = 0.0
+        for collision in collisions(model):
+            lost = 0.0 if residual else compliance_error(model, float(frequencies_hz.max()), collision)
+            share = max(share, collision_share(richer, modes, collision) + lost)
         rungs.append(Rung(modes, modes, receptance, share))
     return rungs
+
+
+def _least(model: ReducedModel) -> int:
+    """The fewest natural modes of a model: one, or its rigid motions."""
+    natural = model.natural_frequencies_hz
+    return max(1, int(np.count_nonzero(natural < 1e-6 * natural[-1])))
 
 
 def choose(ladder: Sequence[Rung], tolerance: float, rigid: float, what: str = "modes") -> Choice:

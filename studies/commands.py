@@ -101,6 +101,7 @@ def run(arguments: Namespace) -> None:
     if arguments.output:
         response.save(arguments.output, {"versions": versions(), "scene": scene.to_dict()})
     result = response.to_json(events=arguments.events)
+    _tell_choice(arguments.input, response.estimate)
     _write_json(arguments.json, result)
     if arguments.json != "-":
         for name, value in result.items():
@@ -112,11 +113,12 @@ def sweep(arguments: Namespace) -> None:
     """A grid of runs; finished points are kept beside the result and taken up again after a kill."""
     _check_outputs(arguments)
     scene = _load_scene(arguments.input)
-    from coupling.sweep import grid
+    from coupling.sweep import estimate_of, grid
     from coupling.sweep import sweep as run_sweep
     from studies.provenance import versions
 
     grid(scene)  # processes are slow to start: a bad grid is told before
+    _tell_choice(arguments.input, estimate_of(scene))
 
     checkpoint = None if arguments.output is None else Path(f"{arguments.output}.partial")
     with workers(arguments.workers) as pool, progress("sweep") as report:
@@ -155,6 +157,12 @@ def bench(arguments: Namespace) -> None:
 
     tell(run_bench(folder, QUICK if arguments.quick else FULL))
     print(f"{folder}: bench_engine.json, bench_engine.csv and figures")
+
+
+def _tell_choice(source: str, estimate: Mapping[str, Any] | None) -> None:
+    """What was chosen automatically is said, with its reason, wherever the results go."""
+    if estimate is not None:
+        print(f"vanedamp: {source}: structure.modes: {estimate['sentence']}", file=sys.stderr)
 
 
 def _load_scene(path: str) -> Scene:
