@@ -47,6 +47,19 @@ def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) ->
     return replace(_response(scene, run, status, transient, started), estimate=settled.estimate)
 
 
+def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:
+    """A run whose response is another functional (n,) of the structure's modes; with a fixed number of periods.
+
+    `scene` has no open choices. Raises InputError as `simulate` does.
+    """
+    started = time.perf_counter()
+    run = _Run(scene, False, samples_per_period, functional)
+    status = _STATUS[run.begin(scene.solver.max_events)]
+    if status is Status.OK:
+        status = _STATUS[run.advance(scene.time.periods, scene.solver.max_events)]
+    return _response(scene, run, status, scene.time.dropped, started)
+
+
 def _until_steady(run: _Run, scene: Scene) -> tuple[Status, int]:
     """Advance until the mean amplitude is known well enough. Returns the status and the length of the transient."""
     status, dropped = Status.NOT_STEADY, scene.time.dropped
@@ -81,8 +94,12 @@ class _Log:
 class _Run:
     """The mutable state of one run and the subsystems it has met."""
 
-    def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
+    def __init__(
+        self, scene: Scene, events: bool, samples_per_period: int, functional: np.ndarray | None = None
+    ) -> None:
         structure = linear_structure(scene)
+        if functional is not None:
+            structure = replace(structure, response=functional)
         self.rows, displacement, velocity = rows_of(scene, structure)
         self.flows = empty_flows(self.rows)
         self.log = _Log(events, [])

@@ -130,6 +130,11 @@ def _parser() -> argparse.ArgumentParser:
         help="up to which the error is estimated (default: 1.5 times the first natural frequency)",
     )  # fmt: skip
 
+    reduce.add_argument(
+        "--hot-spots", type=_count, default=0, metavar="N",
+        help="keep the stresses at the N most stressed places of the first mode as outputs",
+    )  # fmt: skip
+
     run = with_json(command("run", "one scene at one excitation frequency", "SCENE.toml", "RESPONSE.h5"))
     run.add_argument("--events", action="store_true", help="keep the list of events")
     run.add_argument("--samples", type=_count, default=0, metavar="N", help="keep N samples of every period")

@@ -9,6 +9,7 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,10 +68,18 @@ def reduce(arguments: Namespace) -> None:
     case = Case.load(arguments.input)
     if not case.interface:
         raise InputError("interface: missing; a reduction needs at least one [interface.<label>] table")
-    from studies.pipeline import assemble, reduction
+    from studies.pipeline import assemble, reduction, with_hot_spots
 
     started = time.perf_counter()
-    model = reduction(assemble(case), arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency)
+    structure = assemble(case)
+    spots = arguments.hot_spots
+    model = reduction(
+        structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, bool(spots)
+    )
+    if spots:
+        model = replace(
+            with_hot_spots(structure, model, spots), recovery=None, residual_recovery=None, coordinates=None
+        )
     estimate = model.provenance["estimate"]
     if arguments.output:
         model.save(arguments.output)
@@ -79,6 +88,7 @@ def reduce(arguments: Namespace) -> None:
         "modes": model.modes,
         "basis": arguments.basis,
         "interface": list(model.interface),
+        "outputs": list(model.outputs),
         "estimate": estimate,
         "wall_time_s": time.perf_counter() - started,
     }

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from modal.calibrate import FATIGUE_SHARE, RigidModel, fatigue_amplitude, rigid_model
 from modal.eigen import Modes, factorize, solve_modes
@@ -20,6 +21,7 @@ from modal.participation import ParticipationError, effective_masses, first_bend
 from modal.store import Variable
 from rom.interface import Interface, InterfaceCoordinate
 from rom.ladder import LadderError, choose, grid, rigid_errors
+from rom.recovery import with_stresses
 from rom.reduced import ReducedModel
 from rom.truncation import basis_ladder, basis_model, rich_model
 from studies.config import Case, MeshFile
@@ -187,12 +189,43 @@ def _unit_slip(modes: Modes) -> tuple[str, ...]:
     )
 
 
+def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:
+    """The model with the stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
+
+    A hot spot is where a natural mode of the model has its largest von Mises stress, or the largest one away from the
+    spots before it; the first `modes` modes have `spots` each. Needs a model with its recovery.
+    """
+    assert model.recovery is not None
+    solid = structure.solid
+    places = solid.stress_points()
+    apart = 0.02 * np.ptp(places, axis=0).max()
+    shapes = linalg.eigh(model.stiffness, model.mass)[1][:, :modes]
+    found: list[int] = []
+    for shape in shapes.T:
+        stress = np.array(solid.von_mises(model.recovery @ shape))
+        for place in found:
+            stress[np.linalg.norm(places - places[place], axis=1) < apart] = 0.0
+        for _ in range(spots):
+            found.append(int(np.argmax(stress)))
+            stress[np.linalg.norm(places - places[found[-1]], axis=1) < apart] = 0.0
+    values = np.array([solid.stress_components(column, np.array(found)) for column in model.recovery.T])
+    residual = None
+    if model.residual_recovery is not None:
+        static = np.array([solid.stress_components(column, np.array(found)) for column in model.residual_recovery.T])
+        residual = {f"hot{index + 1}": static[:, :, index].T for index in range(len(found))}
+    stresses = {f"hot{index + 1}": values[:, :, index].T for index in range(len(found))}
+    spots_at = {f"hot{index + 1}": places[place].tolist() for index, place in enumerate(found)}
+    model = replace(model, provenance=dict(model.provenance) | {"hot_spots": spots_at})
+    return with_stresses(model, stresses, residual)
+
+
 def reduction(
     structure: Structure,
     modes: int | None,
     basis: str = "craig-bampton",
     tolerance: float = 0.01,
     max_frequency: float | None = None,
+    keep_recovery: bool = False,
 ) -> ReducedModel:
     """The case's structure at its interface, with so many modes or (None) as many as a tolerance needs.
 
@@ -205,7 +238,7 @@ def reduction(
     most = min(_MOST, structure.matrices.free.size // 4)
     asked = min(_START, most) if modes is None else modes
     while True:
-        rich = rich_model(structure.matrices, coordinates, basis, asked, factorize)
+        rich = rich_model(structure.matrices, coordinates, basis, asked, factorize, keep_recovery=keep_recovery)
         frequencies = _of_interest(rich, max_frequency)
         rigid = float(rigid_errors(rich, frequencies, at).max())
         ladder = basis_ladder(rich, basis, frequencies)
