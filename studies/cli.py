@@ -1,4 +1,4 @@
-"""The command `vanedamp`: mesh, modal, reduce, run, sweep, report, demo, bench."""
+"""The command `vanedamp`: mesh, modal, reduce, import, run, sweep, report, demo, bench."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _main(argv: Sequence[str] | None) -> int:
     from studies import commands  # what each command needs is loaded when it is wanted
 
     try:
-        getattr(commands, arguments.command)(arguments)
+        getattr(commands, "import_model" if arguments.command == "import" else arguments.command)(arguments)
     except ValueError as error:
         # bad input has error classes of our own; any other ValueError is a fault of the program
         if type(error).__module__.split(".")[0] not in _PACKAGES:
@@ -130,6 +130,9 @@ def _parser() -> argparse.ArgumentParser:
         help="up to which the error is estimated (default: 1.5 times the first natural frequency)",
     )  # fmt: skip
 
+    with_json(
+        command("import", "reduced model of another code: dense matrices with a meaning", "EXTERNAL.toml", "ROM.h5")
+    )
     reduce.add_argument(
         "--hot-spots", type=_count, default=0, metavar="N",
         help="keep the stresses at the N most stressed places of the first mode as outputs",

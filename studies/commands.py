@@ -9,7 +9,7 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,6 +98,29 @@ def reduce(arguments: Namespace) -> None:
         print(f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}")
         print(f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz")
         print("frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8]))
+
+
+def import_model(arguments: Namespace) -> None:
+    """Check another code's reduced model and keep it as one of ours."""
+    from studies.external import External
+
+    _check_outputs(arguments)
+    model, findings = External.load(arguments.input)
+    if arguments.output:
+        model.save(arguments.output)
+    result = {
+        "frequency_hz": model.natural_frequencies_hz.tolist(),
+        "interface": list(model.interface),
+        "checks": asdict(findings),
+    }
+    _write_json(arguments.json, result)
+    if arguments.json != "-":
+        print(f"{model.size} coordinates; interface: {', '.join(model.interface)}")
+        print("frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8]))
+        print(
+            f"checks: asymmetry {findings.asymmetry:.1e}, {findings.rigid_motions} rigid motions, "
+            f"{findings.condensed} coordinates without mass condensed"
+        )
 
 
 def run(arguments: Namespace) -> None:
