@@ -154,7 +154,10 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = command("bench", "how fast and how exact the methods are, measured here", None, "DIR", required=True)
     bench.add_argument(
-        "study", choices=("engine",), help="engine: the exact engine against a hand-written loop and solve_ivp"
+        "study",
+        choices=("engine", "ladder"),
+        help="engine: the exact engine against a hand-written loop and solve_ivp; ladder: contact laws and numbers of "
+        "modes of reduced models, error against cost",
     )
     bench.add_argument("--quick", action="store_true", help="seconds instead of minutes, and rougher figures")
     return parser

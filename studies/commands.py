@@ -186,6 +186,12 @@ def bench(arguments: Namespace) -> None:
     folder = Path(arguments.output)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--output {folder}: expected a folder, not a file")
+    if arguments.study == "ladder":
+        from studies import model_ladder
+
+        model_ladder.tell(model_ladder.run_ladder(folder, model_ladder.QUICK if arguments.quick else model_ladder.FULL))
+        print(f"{folder}: ladder.json and figures")
+        return
     from studies.bench_engine import FULL, QUICK, run_bench, tell
 
     tell(run_bench(folder, QUICK if arguments.quick else FULL))

@@ -20,7 +20,7 @@ from studies.provenance import versions
 class MatricesTable:
     """Where the matrices are: names in one `file` (npz, OP4), or files of their own (Matrix Market, npy).
 
-    damping is a matrix too; or else damping_ratio is that of every mode. base_load: (n, 3) T^T M r of the base's motion.
+    damping is a matrix too; or else damping_ratio is that of every mode. base_load: (n, 3) T^T M r.
     """
 
     mass: str
