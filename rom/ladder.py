@@ -205,7 +205,7 @@ def _least(model: ReducedModel) -> int:
     return max(1, int(np.count_nonzero(natural < 1e-6 * natural[-1])))
 
 
-def choose(ladder: Sequence[Rung], tolerance: float, rigid: float, what: str = "modes") -> Choice:
+def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
     """The smallest rung from which on the error stays within the tolerance, or the best one if none does."""
     if not 0.0 < tolerance < 1.0:
         raise LadderError(f"tolerance: expected a relative error between 0 and 1, not {tolerance}")
@@ -213,6 +213,7 @@ def choose(ladder: Sequence[Rung], tolerance: float, rigid: float, what: str = "
     late = np.maximum.accumulate(errors[::-1])[::-1]  # a small error by accident, with larger ones after it, is none
     within = np.flatnonzero(late <= tolerance)
     chosen = ladder[int(within[0])] if within.size else ladder[int(np.argmin(errors))]
+    what = "mode" if chosen.modes == 1 else "modes"
     sentence = f"{chosen.modes} {what}: estimated error {_percent(chosen.error)}, rigid model {_percent(rigid)}"
     if not within.size:
         sentence += f"; none within the tolerance of {_percent(tolerance)}, keep more modes"
