@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from coupling import automaton as auto
 from coupling import state as st
+from coupling.choice import settle
 from coupling.flow import add_flow, empty_flows
 from coupling.response import Event, Response, Status, classify
 from coupling.rows import Rows, rows_of
@@ -34,6 +35,8 @@ def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) ->
     Raises InputError for a scene that the model does not allow; numerical trouble is a status of the response.
     """
     started = time.perf_counter()
+    settled = settle(scene)
+    scene = settled.scene
     run = _Run(scene, events, samples_per_period)
     code = run.begin(scene.solver.max_events)
     transient, status = scene.time.dropped, _STATUS[code]
@@ -41,7 +44,20 @@ def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) ->
         status, transient = _until_steady(run, scene)
     elif status is Status.OK:
         status = _STATUS[run.advance(scene.time.periods, scene.solver.max_events)]
-    return _response(scene, run, status, transient, started)
+    return replace(_response(scene, run, status, transient, started), estimate=settled.estimate)
+
+
+def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:
+    """A run whose response is another functional (n,) of the structure's modes; with a fixed number of periods.
+
+    `scene` has no open choices. Raises InputError as `simulate` does.
+    """
+    started = time.perf_counter()
+    run = _Run(scene, False, samples_per_period, functional)
+    status = _STATUS[run.begin(scene.solver.max_events)]
+    if status is Status.OK:
+        status = _STATUS[run.advance(scene.time.periods, scene.solver.max_events)]
+    return _response(scene, run, status, scene.time.dropped, started)
 
 
 def _until_steady(run: _Run, scene: Scene) -> tuple[Status, int]:
@@ -78,8 +94,12 @@ class _Log:
 class _Run:
     """The mutable state of one run and the subsystems it has met."""
 
-    def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
+    def __init__(
+        self, scene: Scene, events: bool, samples_per_period: int, functional: np.ndarray | None = None
+    ) -> None:
         structure = linear_structure(scene)
+        if functional is not None:
+            structure = replace(structure, response=functional)
         self.rows, displacement, velocity = rows_of(scene, structure)
         self.flows = empty_flows(self.rows)
         self.log = _Log(events, [])

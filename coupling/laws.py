@@ -41,19 +41,46 @@ class Newton:
 class Compliant:
     """Spring (`stiffness`, N/m) and dashpot while the gap is closed; the contact ends when its force vanishes.
 
-    The dashpot gives an isolated collision of the pair's reduced mass the restitution asked for.
+    The dashpot gives an isolated collision of the pair's reduced mass the restitution asked for. With `residual` the
+    spring is in series with what a reduced model's modes lack of its walls' static flexibility; without a `stiffness`
+    it is that alone (coupling.choice).
     """
 
-    stiffness: Positive
+    stiffness: Positive | None = None
+    residual: bool = False
     law: Literal["compliant"] = field(default="compliant", kw_only=True)
+
+    def __post_init__(self) -> None:
+        if self.stiffness is None and not self.residual:
+            raise ValueError("give stiffness (N/m), or residual = true on a reduced model, or both")
 
     def element(self, restitution: float, mass: float) -> Element:
         """The element of a pair with a coefficient of restitution and a reduced mass (kg). Raises InputError at 0."""
-        dashpot = 2 * damping_ratio(restitution) * math.sqrt(self.stiffness * mass)
-        return Element(restitution, self.stiffness, dashpot)
+        stiffness = 1.0 if self.stiffness is None else self.stiffness  # until coupling.choice knows better
+        dashpot = 2 * damping_ratio(restitution) * math.sqrt(stiffness * mass)
+        return Element(restitution, stiffness, dashpot)
 
 
-Contact = Annotated[Newton | Compliant, Field(discriminator="law")]
+@dataclass(frozen=True, config=STRICT)
+class Massless:
+    """Contact on a boundary without mass: quasi-static, without loss and without impact law.
+
+    The boundary follows its contact force by the static flexibility that the reduced model's modes lack, so that the
+    contact is a spring of that flexibility (Monjaraz-Tec, Gross and Krack 2022). Restitution has no meaning here.
+    """
+
+    law: Literal["massless"] = "massless"
+
+    def element(self, restitution: float, mass: float) -> Element:
+        """Refuses a restitution. Raises InputError."""
+        if restitution != 1.0:
+            raise InputError(
+                f"restitution: a massless contact loses nothing and has no impact law; drop it (got {restitution:g})"
+            )
+        return Element(1.0, 1.0, 0.0)  # until coupling.choice knows the spring
+
+
+Contact = Annotated[Newton | Compliant | Massless, Field(discriminator="law")]
 
 
 def damping_ratio(restitution: float) -> float:

@@ -54,7 +54,8 @@ class Response:
     energy_residual: imbalance of the whole run's ledger relative to its largest term; attached_mass_fraction: share
     of the bodies' mass that the structure feels (None without bodies or motion); peak: (periods,) largest |x| of each
     period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
-    time, displacement, body_displacement: samples, empty if none were asked for.
+    time, displacement, body_displacement: samples, empty if none were asked for; estimate: of the error of a reduced
+    model whose number of modes was chosen automatically (coupling.choice), None otherwise.
     """
 
     status: Status
@@ -83,6 +84,7 @@ class Response:
     time: np.ndarray
     displacement: np.ndarray
     body_displacement: np.ndarray
+    estimate: dict[str, Any] | None = None
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """The result as plain data, with the list of events if wanted."""
@@ -93,6 +95,8 @@ class Response:
             "wall_time_s", "periods", "transient", "counters",
         )  # fmt: skip
         data: dict[str, Any] = {"status": self.status.value} | {name: getattr(self, name) for name in names}
+        if self.estimate is not None:
+            data["estimate"] = self.estimate
         if events:
             data["event_list"] = [vars(event) for event in self.event_list]
         return data

@@ -25,7 +25,7 @@ from coupling.inputs import (
     read_toml,
     validate,
 )
-from coupling.laws import Contact, Newton
+from coupling.laws import Compliant, Contact, Massless, Newton
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -60,11 +60,17 @@ class Rigid:
 
 @dataclass(frozen=True, config=STRICT)
 class Rom:
-    """A reduced model from a file (`vanedamp reduce`), with its first `modes` fixed-interface modes (default: all)."""
+    """A reduced model from a file (`vanedamp reduce`), with the first `modes` of its modes (default: all).
+
+    natural: take the model's own lowest natural modes instead of those of its basis. modes = "auto": as many natural
+    modes as keep the estimated error within `tolerance`.
+    """
 
     model: Literal["rom"]
     file: str
-    modes: Annotated[Whole, Field(ge=0)] | None = None
+    modes: Annotated[Whole, Field(ge=0)] | Literal["auto"] | None = None
+    natural: bool = False
+    tolerance: Annotated[Real, Field(gt=0, lt=1)] = 0.01
 
 
 Structure = Annotated[Prescribed | Rigid | Rom, Field(discriminator="model")]
@@ -274,6 +280,10 @@ class Scene:
                     raise ValueError(f"cavity[{index}].floor: name an interface label of the reduced model")
             if self.initial != Initial():
                 raise ValueError("initial: an initial state is for rigid structures; a reduced model starts at rest")
+        elif isinstance(self.contact, Massless) or (isinstance(self.contact, Compliant) and self.contact.residual):
+            raise ValueError(
+                'contact: the residual flexibility is that of a reduced model; take structure.model = "rom"'
+            )
         if isinstance(self.structure, Prescribed):
             excitation = self.excitation
             if excitation.force or excitation.base_acceleration or excitation.resonance_amplitude:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
+from coupling.choice import file_stamp, kept, restricted, settle
 from coupling.inputs import InputError
 from coupling.scene import Prescribed, Rigid, Rom, Scene
 from modal.store import frozen
@@ -174,16 +174,14 @@ def _basis(scene: Scene) -> _ModalBasis:
             frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
             {"structure": row}, {"structure": frozen([root])},
         )  # fmt: skip
-    assert isinstance(structure, Rom)
-    path = Path(structure.file)
-    stamp = path.stat().st_mtime_ns if path.is_file() else 0
-    return _rom_basis(structure.file, stamp, structure.modes)
+    settled = settle(scene).scene.structure
+    assert isinstance(settled, Rom)
+    return _rom_basis(settled.file, file_stamp(settled.file), kept(settled), settled.natural)
 
 
 @lru_cache(maxsize=8)
-def _rom_basis(file: str, _stamp: int, modes: int | None) -> _ModalBasis:
-    model = ReducedModel.load(file)
-    return modal_basis(model if modes is None else model.truncated(modes))
+def _rom_basis(file: str, _stamp: int, modes: int | None, natural: bool) -> _ModalBasis:
+    return modal_basis(restricted(file, _stamp, modes, natural))
 
 
 def modal_basis(model: ReducedModel) -> _ModalBasis:

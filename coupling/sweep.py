@@ -14,6 +14,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from coupling.choice import settle_all
 from coupling.engine import simulate
 from coupling.inputs import InputError, validate
 from coupling.scene import Rom, Scene
@@ -81,10 +82,14 @@ class Sweep:
     def to_json(self) -> dict[str, Any]:
         """Plain data: axes and units by path, measures as nested lists (nan where there is none)."""
         names = (*MEASURES, "energy_share", "status", "classification")
+        estimate = self.provenance.get("estimate")
+        told = {} if estimate is None else {"estimate": estimate}
         axes = {path: values.tolist() for path, values in self.axes.items()}
-        return {"axes": axes, "units": self.units() | MEASURES, "loss": list(LOSSES)} | {
-            name: getattr(self, name).tolist() for name in names
-        }
+        return (
+            {"axes": axes, "units": self.units() | MEASURES, "loss": list(LOSSES)}
+            | told
+            | {name: getattr(self, name).tolist() for name in names}
+        )
 
     def save(self, path: str | Path) -> None:
         """Write HDF5 that xarray opens. Dimensions are the axes' paths with _ for dots."""
@@ -131,6 +136,7 @@ def sweep(
     is a point with the status "error: ...".
     """
     axes, scenes = grid(scene)
+    estimate = estimate_of(scene)
     shape = tuple(len(values) for values in axes.values())
     with _Checkpoint(checkpoint, scene) as done:
         missing = [index for index in range(len(scenes)) if index not in done.records]
@@ -149,8 +155,14 @@ def sweep(
         energy_share=frozen([record["energy_share"] for record in records]).reshape(*shape, len(LOSSES)),
         **arrays,
         **{name: frozen(values, object).reshape(shape) for name, values in texts.items()},
-        provenance=dict(provenance or {}),
+        provenance=dict(provenance or {}) | ({} if estimate is None else {"estimate": estimate}),
     )
+
+
+def estimate_of(scene: Scene) -> dict[str, Any] | None:
+    """The estimate of the model that a sweep chooses by itself; None where it has no choice."""
+    points = [_at(dataclasses.replace(scene, sweep={}), values) for values in scene.sweep_points()[1]]
+    return settle_all(points)[0].estimate if points else None
 
 
 def grid(scene: Scene) -> tuple[dict[str, np.ndarray], list[Scene]]:
@@ -162,6 +174,7 @@ def grid(scene: Scene) -> tuple[dict[str, np.ndarray], list[Scene]]:
         )
     base = dataclasses.replace(scene, sweep={})
     scenes = [_at(base, values) for values in combinations]
+    scenes = [settled.scene for settled in settle_all(scenes)]
     linear_structure(scenes[0])
     return axes, scenes
 

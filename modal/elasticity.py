@@ -152,6 +152,19 @@ class Solid:
         equivalent = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
         return np.array(fenicsx.evaluate(equivalent, fenicsx.discontinuous_space(self.domain, 1)).x.array)
 
+    def stress_components(self, displacement: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
+        """(6, k) stresses xx, yy, zz, xy, yz, zx, Pa, of displacements (N,), where `von_mises` has its values.
+
+        points: indices of the places wanted; default: all. They are linear in the displacements.
+        """
+        if np.shape(displacement) != (3 * len(fenicsx.node_coordinates(self.space)),):
+            raise ElasticityError(f"displacement: shape {np.shape(displacement)} is not that of this mesh and degree")
+        stress = self.stress(fenicsx.field(self.space, displacement))
+        space = fenicsx.discontinuous_space(self.domain, 1)
+        pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+        values = [np.array(fenicsx.evaluate(stress[pair], space).x.array) for pair in pairs]
+        return np.array(values) if points is None else np.array(values)[:, points]
+
     def stress_points(self) -> np.ndarray:
         """(k, 3) m, the places of the values of `von_mises`."""
         return fenicsx.node_coordinates(fenicsx.discontinuous_space(self.domain, 1))

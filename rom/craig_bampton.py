@@ -65,36 +65,82 @@ def reduce(
     modes: int = 12,
     factorize: Factorize = superlu,
     keep_recovery: bool = False,
-    quasi_static: bool = False,
+    quasi_static: bool | int = False,
+    characteristic: int = 6,
 ) -> ReducedModel:
     """The structure in its interface displacements and the lowest fixed-interface modes (0 modes: Guyan's reduction).
 
     factorize      solves with a symmetric indefinite matrix, such as modal.eigen.factorize
     keep_recovery  keep the basis, to reconstruct full displacements
     quasi_static   insert the quasi-static modes between interface and fixed-interface modes: for the price of as many
-                   coordinates as the interface has, frequencies and receptances are right by orders of magnitude more
+                   coordinates as the interface has, frequencies and receptances are right by orders of magnitude more;
+                   a number: so many blocks of them, each the quasi-static response to the inertia of the one before
+    characteristic how many characteristic constraint modes an interface with patches of kind "full" keeps; its own
+                   coordinates stay statically exact
 
     Raises ReductionError for more modes than the structure has, and when it can move with its interface held.
     """
     stiffness, mass, vectors = interface.restrict(matrices)
-    held = _Held(stiffness, vectors, factorize)
+    boundary, labels = _boundary(interface, vectors)
+    held = _Held(stiffness, boundary, factorize)
     constraint = held.constraint_modes()
+    if interface.full.size:
+        constraint = constraint @ _characteristic(constraint, stiffness, mass, labels, characteristic)
     fixed = _fixed_interface_modes(held, stiffness, mass, modes)
-    lag = _quasi_static_modes(held, mass, constraint, fixed) if quasi_static else fixed[:, :0]
-    basis = np.hstack([constraint, lag, fixed])
+    blocks = _quasi_static_blocks(held, mass, constraint, fixed, int(quasi_static))
+    basis = np.hstack([constraint, *blocks, fixed])
     recovery = interface.motions @ basis
     return ReducedModel.from_matrices(
         _symmetrised(basis.T @ (mass @ basis)),
         _symmetrised(basis.T @ (stiffness @ basis)),
-        dict(zip(interface.labels, np.eye(held.count, basis.shape[1]), strict=True)),
+        dict(zip(interface.labels, np.eye(len(interface.labels), basis.shape[1]), strict=True)),
         damping_ratio=matrices.damping_ratio,
         directions=dict(zip(interface.labels, interface.directions, strict=True)),
         base_load=recovery.T @ (matrices.mass @ matrices.rigid_translations()),
         fixed_interface_modes=modes,
-        provenance=_provenance(matrices, interface, modes, quasi_static),
+        blocks=tuple(block.shape[1] for block in blocks),
+        provenance=provenance(matrices, interface, "craig-bampton", modes, int(quasi_static)),
         recovery=recovery if keep_recovery else None,
         coordinates=matrices.coordinates if keep_recovery else None,
     )
+
+
+def _boundary(interface: Interface, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What is held: functionals (n, b) of the nodes of full patches, and of what else the interface has.
+
+    Second, the interface coordinates (k, b) in these.
+    """
+    if not interface.full.size:
+        return vectors, np.eye(vectors.shape[1])
+    nodal = interface.motions[interface.full].T.toarray()
+    inside = nodal.T @ vectors
+    others = np.linalg.norm(vectors - nodal @ inside, axis=0) > 1e-12 * np.linalg.norm(vectors, axis=0)
+    labels = np.hstack([np.where(others, 0.0, inside).T, np.eye(len(others))[:, others]])
+    return np.hstack([nodal, vectors[:, others]]), labels
+
+
+def _characteristic(
+    constraint: np.ndarray, stiffness: sparse.csr_array, mass: sparse.csr_array, labels: np.ndarray, count: int
+) -> np.ndarray:
+    """(b, k + count) boundary displacements: of least energy for unit interface coordinates, then characteristic modes.
+
+    Castanier, Tan and Pierre (2001), AIAA J. 39(6): the lowest modes of the constraint modes' own stiffness and mass.
+    What they share with the former is taken out, so that each moves the interface as its place says.
+    """
+    size, own = len(labels[0]), len(labels)
+    if not 0 <= count <= size - own:
+        raise ReductionError(f"characteristic: expected 0 to {size - own} (the boundary has no more), not {count}")
+    condensed, inertia = (_symmetrised(constraint.T @ (matrix @ constraint)) for matrix in (stiffness, mass))
+    scale = np.abs(condensed).max()
+    saddle = np.block([[condensed, scale * labels.T], [scale * labels, np.zeros((own, own))]])
+    static = np.linalg.solve(saddle, np.eye(size + own)[:, size:] * scale)[:size]
+    if count == 0:
+        return static
+    modes = linalg.eigh(condensed, inertia, subset_by_index=[0, min(count + own, size) - 1])[1]
+    # in their order, without those that repeat the static displacements and the modes before
+    kept = np.linalg.qr(linalg.cholesky(inertia) @ np.hstack([static, modes]), mode="r")
+    news = np.flatnonzero(np.abs(np.diag(kept))[own:] > 1e-6)[:count]
+    return np.hstack([static, (modes - static @ (labels @ modes))[:, news]])
 
 
 class _Held:
@@ -144,7 +190,7 @@ def _fixed_interface_modes(held: _Held, stiffness: sparse.csr_array, mass: spars
         flexibility = inertia @ held.solve(np.eye(held.size)) @ inertia
         wanted = [held.size - modes, held.size - 1]
         shapes = linalg.eigh(_symmetrised(flexibility), inertia, subset_by_index=wanted)[1][:, ::-1]
-    return shapes * _signs(shapes)
+    return shapes * mode_signs(shapes)
 
 
 def _lanczos(
@@ -159,22 +205,46 @@ def _lanczos(
     return shapes[:, np.argsort(values)]
 
 
-def _quasi_static_modes(held: _Held, mass: sparse.csr_array, constraint: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """(n, m <= k) M-orthonormal, without combinations that the fixed-interface modes have already.
+def _quasi_static_blocks(
+    held: _Held, mass: sparse.csr_array, constraint: np.ndarray, fixed: np.ndarray, count: int
+) -> list[np.ndarray]:
+    """Blocks (n, m <= k), each M-orthonormal, without combinations that blocks before and fixed-interface modes have.
 
     They are not made orthogonal to the latter: a truncated model keeps them whole.
     """
-    lag = held.solve(mass @ constraint)
-    values, vectors = np.linalg.eigh(lag.T @ (mass @ lag))
-    kept = values > _OWN_SHARE * values[-1]
-    lag = lag @ (vectors[:, kept] / np.sqrt(values[kept]))
-    rest = lag - fixed @ (fixed.T @ (mass @ lag))
-    shares, vectors = np.linalg.eigh(rest.T @ (mass @ rest))
-    lag = lag @ vectors[:, shares > _OWN_SHARE]
-    return lag * _signs(lag)
+    blocks: list[np.ndarray] = []
+    lag = constraint
+    for _ in range(count):
+        lag = held.solve(mass @ lag)
+        known = np.hstack([fixed, *blocks])
+        if blocks:
+            known = _orthonormal(known, mass)
+            lag = (
+                lag
+                - (before := np.hstack(blocks))
+                @ np.linalg.lstsq(before.T @ (mass @ before), before.T @ (mass @ lag), rcond=None)[0]
+            )
+        values, vectors = np.linalg.eigh(lag.T @ (mass @ lag))
+        kept = values > _OWN_SHARE * values[-1]
+        lag = lag @ (vectors[:, kept] / np.sqrt(values[kept]))
+        rest = lag - known @ (known.T @ (mass @ lag))
+        shares, vectors = np.linalg.eigh(rest.T @ (mass @ rest))
+        lag = lag @ vectors[:, shares > _OWN_SHARE]
+        if lag.shape[1] == 0:
+            break
+        lag = lag * mode_signs(lag)
+        blocks.append(lag)
+    return blocks
 
 
-def _signs(shapes: np.ndarray) -> np.ndarray:
+def _orthonormal(fields: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
+    """M-orthonormal basis of independent fields (n, m)."""
+    gram = fields.T @ (mass @ fields)
+    values, vectors = np.linalg.eigh(gram)
+    return fields @ (vectors / np.sqrt(values))
+
+
+def mode_signs(shapes: np.ndarray) -> np.ndarray:
     """(m,) +-1 that make the largest component positive; near ties go to the first, so round-off does not choose."""
     size = np.abs(shapes)
     first = np.argmax(size > (1.0 - 1e-6) * size.max(axis=0), axis=0)
@@ -185,10 +255,14 @@ def _symmetrised(matrix: np.ndarray) -> np.ndarray:
     return 0.5 * (matrix + matrix.T)
 
 
-def _provenance(matrices: SystemMatrices, interface: Interface, modes: int, quasi_static: bool) -> dict[str, Any]:
+def provenance(
+    matrices: SystemMatrices, interface: Interface, basis: str, modes: int, quasi_static: int
+) -> dict[str, Any]:
+    """Where a reduced model comes from, JSON-able."""
     return {
         "matrices": dict(matrices.provenance),
         "interface": [asdict(item) | {"direction": list(item.direction)} for item in interface.coordinates],
+        "basis": basis,
         "modes": modes,
         "quasi_static": quasi_static,
         "versions": {"numpy": np.__version__, "scipy": scipy.__version__},

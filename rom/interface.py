@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
@@ -11,7 +11,8 @@ from scipy import sparse
 from modal import store
 from modal.matrices import Patch, SystemMatrices, patch_average, unit_direction
 
-KINDS = ("average", "rigid", "node")
+KINDS = ("average", "rigid", "node", "full")
+MOTIONS = ("translation", "rotation")
 # of the largest singular value: below it a functional, or a rigid motion of a patch, is a combination of the others
 _DEPENDENT = 1e-10
 
@@ -29,21 +30,48 @@ class InterfaceCoordinate:
     direction  three numbers, scaled to length one
     kind       "average": mean displacement over the area; the patch deforms freely, a load on it is a constant
                traction. "rigid": the patch moves as a rigid body, which stiffens the structure, and this is the
-               translation of its centroid. "node": the node nearest to the centroid.
+               translation of its centroid. "node": the node nearest to the centroid. "full": the mean displacement of
+               a patch of which every node is a boundary coordinate; the reduction keeps the lowest characteristic
+               constraint modes of these (Castanier, Tan and Pierre 2001)
+    motion     "translation", or "rotation": the small rotation about the direction through the centroid, rad
 
-    The least-squares rigid motion of a patch that deforms needs no kind of its own: fitted over the area about the
-    centroid, its translation is the mean displacement. Raises InterfaceError or modal.matrices.MatricesError.
+    The motion of a patch that deforms is that of the rigid motion which fits it best over the area (least squares); its
+    translation is the mean displacement. Raises InterfaceError or modal.matrices.MatricesError.
     """
 
     label: str
     facets: str
     direction: tuple[float, float, float]
     kind: str = "average"
+    motion: str = "translation"
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise InterfaceError(f"{self.label}: kind must be one of {', '.join(KINDS)}, not {self.kind!r}")
+        if self.motion not in MOTIONS:
+            raise InterfaceError(f"{self.label}: motion must be one of {', '.join(MOTIONS)}, not {self.motion!r}")
+        if self.motion == "rotation" and self.kind == "node":
+            raise InterfaceError(f'{self.label}: a node has no rotation; take kind "average" or "rigid"')
         object.__setattr__(self, "direction", tuple(unit_direction(self.direction).tolist()))
+
+
+def patch_motions(
+    label: str, facets: str, motions: Sequence[str] = ("x", "y", "z", "rx", "ry", "rz"), kind: str = "rigid"
+) -> list[InterfaceCoordinate]:
+    """Translations and rotations of a patch along and about the axes, all six or those named: labels "<label>.rx" ...
+
+    Raises InterfaceError for a name other than x, y, z, rx, ry, rz.
+    """
+    axes = dict(zip("xyz", np.eye(3).tolist(), strict=True))
+    for name in motions:
+        if name.removeprefix("r") not in axes:
+            raise InterfaceError(f"{label}: expected motions out of x, y, z, rx, ry, rz, not {name!r}")
+    return [
+        InterfaceCoordinate(
+            f"{label}.{name}", facets, axes[name[-1]], kind, "rotation" if len(name) == 2 else "translation"
+        )
+        for name in motions
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +81,13 @@ class Interface:
     coordinates  their definitions, in order
     vectors      (N, k) functionals: the displacements are vectors^T q
     motions      (N, n) sparse, the motions q = motions @ y that supports and rigid patches leave to the structure
+    full         (m,) sorted DOFs of the patches of kind "full" that can move
     """
 
     coordinates: tuple[InterfaceCoordinate, ...]
     vectors: np.ndarray
     motions: sparse.csr_array
+    full: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coordinates", tuple(self.coordinates))
@@ -79,7 +109,7 @@ class Interface:
         vectors = np.column_stack([_functional(matrices, coordinate) for coordinate in coordinates])
         motions = _motions(matrices, {item.facets: item.label for item in coordinates if item.kind == "rigid"})
         _check_independent(labels, motions.T @ vectors)
-        return cls(tuple(coordinates), vectors, motions)
+        return cls(tuple(coordinates), vectors, motions, _full_dofs(matrices, coordinates))
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -88,8 +118,8 @@ class Interface:
 
     @property
     def directions(self) -> np.ndarray:
-        """(k, 3) unit directions."""
-        return np.array([coordinate.direction for coordinate in self.coordinates])
+        """(k, 3) unit directions; zeros for a rotation, which has none that a base can move along."""
+        return np.array([item.direction if item.motion == "translation" else (0.0,) * 3 for item in self.coordinates])
 
     def restrict(self, matrices: SystemMatrices) -> tuple[sparse.csr_array, sparse.csr_array, np.ndarray]:
         """Stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure."""
@@ -100,6 +130,8 @@ class Interface:
 
 
 def _functional(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.ndarray:
+    if coordinate.motion == "rotation":
+        return _rotation(matrices, coordinate)
     if coordinate.kind != "node":
         return patch_average(matrices, coordinate.facets, coordinate.direction)
     patch = matrices.patch(coordinate.facets)
@@ -108,6 +140,33 @@ def _functional(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np
     functional = np.zeros(matrices.size)
     functional[3 * nearest : 3 * nearest + 3] = coordinate.direction
     return functional
+
+
+def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.ndarray:
+    """(N,) functional of the rotation in the best rigid motion of a patch. Raises InterfaceError where it has none."""
+    patch = matrices.patch(coordinate.facets)
+    offsets = matrices.coordinates[patch.nodes] - _centroid(matrices, patch)
+    length = np.abs(offsets).max() or 1.0
+    root = np.sqrt(np.maximum(np.repeat(patch.weights, 3), 0.0))
+    wanted = np.concatenate([np.zeros(3), coordinate.direction])
+    weighted = root[:, None] * rigid_motions(offsets / length)
+    fit = wanted @ np.linalg.pinv(weighted, rcond=_DEPENDENT)
+    if not np.allclose(fit @ weighted, wanted, atol=1e-6):
+        raise InterfaceError(f"{coordinate.label}: the nodes of {coordinate.facets!r} have no rotation about that axis")
+    functional = np.zeros((len(matrices.coordinates), 3))
+    functional[patch.nodes] = (fit * root / length).reshape(-1, 3)
+    return functional.ravel()
+
+
+def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> np.ndarray:
+    """Sorted DOFs of all nodes of patches of kind "full", without those at the supports."""
+    full = {item.facets: item.label for item in coordinates if item.kind == "full"}
+    nodes = np.unique(np.concatenate([np.empty(0, np.int64), *(matrices.patch(facets).nodes for facets in full)]))
+    dofs = np.setdiff1d((3 * nodes[:, None] + np.arange(3)).ravel(), matrices.fixed)
+    for item in coordinates:
+        if item.kind == "rigid" and np.intersect1d(matrices.patch(item.facets).nodes, nodes).size:
+            raise InterfaceError(f'{item.label}: the rigid patch {item.facets!r} shares nodes with one of kind "full"')
+    return dofs
 
 
 def _motions(matrices: SystemMatrices, rigid: dict[str, str]) -> sparse.csr_array:

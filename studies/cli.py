@@ -1,12 +1,13 @@
-"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, run, sweep, report, demo, bench."""
+"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, import, run, sweep, report, demo, bench."""
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
+import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -47,7 +48,7 @@ def _main(argv: Sequence[str] | None) -> int:
     from studies import commands  # what each command needs is loaded when it is wanted
 
     try:
-        getattr(commands, arguments.command)(arguments)
+        getattr(commands, "import_model" if arguments.command == "import" else arguments.command)(arguments)
     except ValueError as error:
         # bad input has error classes of our own; any other ValueError is a fault of the program
         if type(error).__module__.split(".")[0] not in _PACKAGES:
@@ -126,9 +127,30 @@ def _parser() -> argparse.ArgumentParser:
         required=True,
     )  # fmt: skip
 
-    reduce = with_json(command("reduce", "Craig-Bampton reduction onto the case's interface", "CASE.toml", "ROM.h5"))
+    reduce = with_json(command("reduce", "reduced model at the case's interface", "CASE.toml", "ROM.h5"))
     reduce.add_argument(
-        "--modes", type=_count, default=12, metavar="N", help="fixed-interface modes to keep (default: %(default)s)"
+        "--modes", type=_modes, default=12, metavar="N|auto",
+        help="modes to keep, or as few as the tolerance needs (default: %(default)s)",
+    )  # fmt: skip
+    reduce.add_argument(
+        "--basis", default="craig-bampton", metavar="BASIS",
+        help="craig-bampton (default), rubin, macneal, massless or truncated",
+    )  # fmt: skip
+    reduce.add_argument(
+        "--tolerance", type=_ratio, default=0.01, metavar="R", help="error of --modes auto (default: %(default)s)"
+    )
+    reduce.add_argument(
+        "--max-frequency", type=_hertz, metavar="HZ",
+        help="up to which the error is estimated (default: 1.5 times the first natural frequency)",
+    )  # fmt: skip
+
+    reduce.add_argument(
+        "--hot-spots", type=_count, default=0, metavar="N",
+        help="keep the stresses at the N most stressed places of the first mode as outputs",
+    )  # fmt: skip
+
+    with_json(
+        command("import", "reduced model of another code: dense matrices with a meaning", "EXTERNAL.toml", "ROM.h5")
     )
 
     run = with_json(command("run", "one scene at one excitation frequency", "SCENE.toml", "RESPONSE.h5"))
@@ -147,9 +169,9 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = command("bench", "how fast and how exact the methods are, measured here", None, "DIR", required=True)
     bench.add_argument(
-        "study", choices=("engine", "modal"),
+        "study", choices=("engine", "modal", "ladder"),
         help="engine: the exact engine against a hand-written loop and solve_ivp; modal: time and memory of ten modes "
-        "beside scipy's solvers",
+        "beside scipy's solvers; ladder: contact laws and numbers of modes of reduced models, error against cost",
     )  # fmt: skip
     bench.add_argument("--quick", action="store_true", help="seconds instead of minutes, and rougher figures")
     return parser
@@ -159,6 +181,28 @@ def _count(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"expected a count, not {text!r}")
     return int(text)
+
+
+def _modes(text: str) -> int | None:
+    return None if text == "auto" else _count(text)
+
+
+def _ratio(text: str) -> float:
+    return _number(text, "a number between 0 and 1", lambda value: 0.0 < value < 1.0)
+
+
+def _hertz(text: str) -> float:
+    return _number(text, "a frequency in Hz", lambda value: 0.0 < value < math.inf)
+
+
+def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not fits(value):
+        raise argparse.ArgumentTypeError(f"expected {expected}, not {text!r}")
+    return value
 
 
 def _some(text: str) -> int:

@@ -9,6 +9,7 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -89,29 +90,68 @@ def matrices(arguments: Namespace) -> None:
 
 
 def reduce(arguments: Namespace) -> None:
-    """Craig-Bampton reduction."""
+    """A reduced model, with the estimate of its error."""
+    from rom.reduction import check_basis
     from studies.config import Case
 
     _check_outputs(arguments)
+    check_basis(arguments.basis)
     case = Case.load(arguments.input)
     if not case.interface:
         raise InputError("interface: missing; a reduction needs at least one [interface.<label>] table")
-    from studies.pipeline import assemble, reduction
+    from studies.pipeline import assemble, reduction, with_hot_spots
 
     started = time.perf_counter()
-    model = reduction(assemble(case), arguments.modes)
+    structure = assemble(case)
+    spots = arguments.hot_spots
+    model = reduction(
+        structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, bool(spots)
+    )
+    if spots:
+        model = replace(
+            with_hot_spots(structure, model, spots), recovery=None, residual_recovery=None, coordinates=None
+        )
+    estimate = model.provenance["estimate"]
     if arguments.output:
         model.save(arguments.output)
     result = {
         "frequency_hz": model.natural_frequencies_hz.tolist(),
-        "modes": model.fixed_interface_modes,
+        "modes": model.modes,
+        "basis": arguments.basis,
         "interface": list(model.interface),
+        "outputs": list(model.outputs),
+        "estimate": estimate,
         "wall_time_s": time.perf_counter() - started,
     }
     _write_json(arguments.json, result)
     if arguments.json != "-":
-        print(f"{model.size} coordinates: {', '.join(model.interface)} and {arguments.modes} fixed-interface modes")
+        kind = "natural" if model.free_modes else "fixed-interface"
+        print(f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}")
+        print(f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz")
         print("frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8]))
+
+
+def import_model(arguments: Namespace) -> None:
+    """Check another code's reduced model and keep it as one of ours."""
+    from studies.external import External
+
+    _check_outputs(arguments)
+    model, findings = External.load(arguments.input)
+    if arguments.output:
+        model.save(arguments.output)
+    result = {
+        "frequency_hz": model.natural_frequencies_hz.tolist(),
+        "interface": list(model.interface),
+        "checks": asdict(findings),
+    }
+    _write_json(arguments.json, result)
+    if arguments.json != "-":
+        print(f"{model.size} coordinates; interface: {', '.join(model.interface)}")
+        print("frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8]))
+        print(
+            f"checks: asymmetry {findings.asymmetry:.1e}, {findings.rigid_motions} rigid motions, "
+            f"{findings.condensed} coordinates without mass condensed"
+        )
 
 
 def run(arguments: Namespace) -> None:
@@ -125,6 +165,7 @@ def run(arguments: Namespace) -> None:
     if arguments.output:
         response.save(arguments.output, {"versions": versions(), "scene": scene.to_dict()})
     result = response.to_json(events=arguments.events)
+    _tell_choice(arguments.input, response.estimate)
     _write_json(arguments.json, result)
     if arguments.json != "-":
         for name, value in result.items():
@@ -136,11 +177,12 @@ def sweep(arguments: Namespace) -> None:
     """A grid of runs; finished points are kept beside the result and taken up again after a kill."""
     _check_outputs(arguments)
     scene = _load_scene(arguments.input)
-    from coupling.sweep import grid
+    from coupling.sweep import estimate_of, grid
     from coupling.sweep import sweep as run_sweep
     from studies.provenance import versions
 
     grid(scene)  # processes are slow to start: a bad grid is told before
+    _tell_choice(arguments.input, estimate_of(scene))
 
     checkpoint = None if arguments.output is None else Path(f"{arguments.output}.partial")
     with workers(arguments.workers) as pool, progress("sweep") as report:
@@ -180,6 +222,12 @@ def bench(arguments: Namespace) -> None:
         bench_modal.tell(bench_modal.run_bench(folder, effort))
         print(f"{folder}: bench_modal.json, bench_modal.csv and a figure")
         return
+    if arguments.study == "ladder":
+        from studies import model_ladder
+
+        model_ladder.tell(model_ladder.run_ladder(folder, model_ladder.QUICK if arguments.quick else model_ladder.FULL))
+        print(f"{folder}: ladder.json and figures")
+        return
     from studies.bench_engine import FULL, QUICK, run_bench, tell
 
     tell(run_bench(folder, QUICK if arguments.quick else FULL))
@@ -191,6 +239,12 @@ def _folder(arguments: Namespace) -> Path:
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--output {folder}: expected a folder, not a file")
     return folder
+
+
+def _tell_choice(source: str, estimate: Mapping[str, Any] | None) -> None:
+    """What was chosen automatically is said, with its reason, wherever the results go."""
+    if estimate is not None:
+        print(f"vanedamp: {source}: structure.modes: {estimate['sentence']}", file=sys.stderr)
 
 
 def _load_scene(path: str) -> Scene:

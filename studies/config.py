@@ -200,11 +200,12 @@ class ModesTable:
 
 @dataclass(frozen=True, config=STRICT)
 class InterfaceTable:
-    """One interface coordinate: the displacement of a facet group along a direction."""
+    """One interface coordinate: the displacement of a facet group along a direction, or its rotation about it."""
 
     facets: str
     direction: Direction
-    kind: Literal["average", "rigid", "node"] = "average"
+    kind: Literal["average", "rigid", "node", "full"] = "average"
+    motion: Literal["translation", "rotation"] = "translation"
 
     def __post_init__(self) -> None:
         if not any(self.direction):

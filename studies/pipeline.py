@@ -6,11 +6,12 @@ import contextlib
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from modal.calibrate import RigidModel, fatigue_amplitude, rigid_model
 from modal.correlation import mode_like
@@ -22,14 +23,18 @@ from modal.matrices import SystemMatrices
 from modal.participation import ParticipationError, effective_masses, first_bending
 from modal.store import Variable
 from modal.stress import HotSpot, hot_spot
-from rom.craig_bampton import reduce
 from rom.interface import Interface, InterfaceCoordinate
+from rom.ladder import LadderError, choose, grid, rigid_errors
+from rom.recovery import with_stresses
 from rom.reduced import ReducedModel
+from rom.truncation import basis_ladder, basis_model, rich_model
 from studies.calibration_tables import CalibrationTable
 from studies.config import Case, MeshFile
 from studies.provenance import versions
 
 _PLAUSIBLE_HZ = (1.0, 1e6)
+# modes at which the search for enough of them starts and gives up
+_START, _MOST = 16, 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +80,7 @@ def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
 def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
     """The case's interface coordinates on its matrices, all of them or those named."""
     tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
-    coordinates = [InterfaceCoordinate(label, t.facets, t.direction, t.kind) for label, t in tables.items()]
+    coordinates = [InterfaceCoordinate(label, t.facets, t.direction, t.kind, t.motion) for label, t in tables.items()]
     return Interface.on_patches(matrices, coordinates)
 
 
@@ -216,7 +221,72 @@ def _unit_slip(modes: Modes) -> tuple[str, ...]:
     )
 
 
-def reduction(structure: Structure, modes: int) -> ReducedModel:
-    """Craig-Bampton model on the case's interface with that many fixed-interface modes and the quasi-static ones."""
+def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:
+    """The model with the stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
+
+    A hot spot is where a natural mode of the model has its largest von Mises stress, or the largest one away from the
+    spots before it; the first `modes` modes have `spots` each. Needs a model with its recovery.
+    """
+    assert model.recovery is not None
+    solid = structure.solid
+    places = solid.stress_points()
+    apart = 0.02 * np.ptp(places, axis=0).max()
+    shapes = linalg.eigh(model.stiffness, model.mass)[1][:, :modes]
+    found: list[int] = []
+    for shape in shapes.T:
+        stress = np.array(solid.von_mises(model.recovery @ shape))
+        for place in found:
+            stress[np.linalg.norm(places - places[place], axis=1) < apart] = 0.0
+        for _ in range(spots):
+            found.append(int(np.argmax(stress)))
+            stress[np.linalg.norm(places - places[found[-1]], axis=1) < apart] = 0.0
+    values = np.array([solid.stress_components(column, np.array(found)) for column in model.recovery.T])
+    residual = None
+    if model.residual_recovery is not None:
+        static = np.array([solid.stress_components(column, np.array(found)) for column in model.residual_recovery.T])
+        residual = {f"hot{index + 1}": static[:, :, index].T for index in range(len(found))}
+    stresses = {f"hot{index + 1}": values[:, :, index].T for index in range(len(found))}
+    spots_at = {f"hot{index + 1}": places[place].tolist() for index, place in enumerate(found)}
+    model = replace(model, provenance=dict(model.provenance) | {"hot_spots": spots_at})
+    return with_stresses(model, stresses, residual)
+
+
+def reduction(
+    structure: Structure,
+    modes: int | None,
+    basis: str = "craig-bampton",
+    tolerance: float = 0.01,
+    max_frequency: float | None = None,
+    keep_recovery: bool = False,
+) -> ReducedModel:
+    """The case's structure at its interface, with so many modes or (None) as many as a tolerance needs.
+
+    The estimate of its error is in the model's provenance. It covers receptances of the whole interface up to
+    max_frequency, by default 1.5 times the first natural frequency. Craig-Bampton models have a block of quasi-static
+    modes. Raises LadderError when no model of up to _MOST modes meets the tolerance.
+    """
     coordinates = interface(structure.case, structure.matrices)
-    return reduce(structure.matrices, coordinates, modes, factorize=factorize, quasi_static=True)
+    at = structure.case.response_label or coordinates.labels[0]
+    most = min(_MOST, structure.matrices.free.size // 4)
+    asked = min(_START, most) if modes is None else modes
+    while True:
+        rich = rich_model(structure.matrices, coordinates, basis, asked, factorize, keep_recovery=keep_recovery)
+        frequencies = _of_interest(rich, max_frequency)
+        rigid = float(rigid_errors(rich, frequencies, at).max())
+        ladder = basis_ladder(rich, basis, frequencies)
+        choice = choose(ladder if modes is None else ladder[-1:], tolerance, rigid)
+        if modes is not None or choice.met:
+            break
+        if asked == most:
+            raise LadderError(f"tolerance: {choice.sentence}; raise it, or lower the highest frequency")
+        asked = min(2 * asked, most)
+    estimate = choice.to_json() | {"frequencies_hz": [float(frequencies[0]), float(frequencies[-1])]}
+    model = basis_model(rich, basis, choice.chosen.modes)
+    return replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
+
+
+def _of_interest(model: ReducedModel, max_frequency: float | None) -> np.ndarray:
+    natural = model.natural_frequencies_hz
+    elastic = natural[natural > 1e-6 * natural[-1]]
+    top = max_frequency or 1.5 * float(elastic[0])
+    return grid(model, 0.0 if elastic.size == natural.size else 0.05 * top, top)

@@ -157,7 +157,7 @@ def _reduction(name: str, model: ReducedModel) -> dict[str, Any]:
     return {
         "file": Path(name).name,
         "interface": [(label, model.contact_mass(label)) for label in model.interface],
-        "modes": model.fixed_interface_modes,
+        "modes": model.modes,
         "frequencies": model.natural_frequencies_hz,
         "damping_ratio": model.damping_ratio,
     }

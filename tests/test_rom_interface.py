@@ -97,7 +97,7 @@ def test_refuses_what_the_structure_does_not_have(coordinates, message):
 def test_refuses_unknown_patches_kinds_and_directions():
     with pytest.raises(MatricesError, match="no patch 'left'; there are: a, b, c, held"):
         Interface.on_patches(truss(), [InterfaceCoordinate("x", "left", Y)])
-    with pytest.raises(InterfaceError, match="x: kind must be one of average, rigid, node, not 'mean'"):
+    with pytest.raises(InterfaceError, match="x: kind must be one of average, rigid, node, full, not 'mean'"):
         InterfaceCoordinate("x", "a", Y, "mean")
     with pytest.raises(MatricesError, match=r"direction: .*not all zero"):
         InterfaceCoordinate("x", "a", (0, 0, 0))

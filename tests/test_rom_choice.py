@@ -1,0 +1,160 @@
+"""What a scene leaves open about its reduced model: `modes = "auto"`, and walls that yield by what modes lack."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from structures import rod
+from test_studies_cli import CASE
+
+from coupling.choice import settle
+from coupling.engine import simulate
+from coupling.inputs import InputError, validate
+from coupling.laws import Compliant
+from coupling.scene import Scene
+from coupling.sweep import sweep
+from rom.interface import Interface, InterfaceCoordinate
+from rom.reduction import reduce
+from studies.cli import main
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """The rod in Craig-Bampton form with 40 modes."""
+    interface = Interface.on_patches(rod(100), [InterfaceCoordinate("tip", "tip", (1, 0, 0))])
+    model = reduce(rod(100, damping_ratio=0.01), interface, modes=40)
+    path = tmp_path_factory.mktemp("rod") / "rom.h5"
+    model.save(path)
+    return str(path)
+
+
+def scene(file, **changes):
+    """A body between walls that are both the tip of the rod, driven near its first resonance."""
+    data = {
+        "structure": {"model": "rom", "file": file},
+        "excitation": {"frequency": 0.24, "force": 0.05, "at": "tip"},
+        "cavity": [{"name": "c", "gap": 0.5, "floor": "tip"}],
+        "damper": [{"cavity": "c", "mass": 0.05}],
+        "gravity": {"acceleration": 0.0},
+        "time": {"periods": 30, "transient": 10},
+    }
+    for path, value in changes.items():
+        table = data.setdefault(path.split("__")[0], {})
+        if "__" in path:
+            (table[0] if isinstance(table, list) else table)[path.split("__")[1]] = value
+        else:
+            data[path] = value
+    return validate(Scene, data, "scene")
+
+
+def test_massless_wall_yields_by_what_the_modes_lack(file):
+    for modes in (1, 4, 16):
+        settled, estimate = settle(
+            scene(file, contact={"law": "massless"}, structure__natural=True, structure__modes=modes)
+        )
+        # flexibility of the unit rod, 1, less that of its modes sqrt(2) sin(omega x) at the tip
+        omegas = (np.arange(1, modes + 1) - 0.5) * np.pi
+        assert settled.contact.stiffness == pytest.approx(1 / (1 - np.sum(2 / omegas**2)), rel=1e-3)
+        assert estimate is None
+    both = scene(
+        file, contact={"law": "compliant", "stiffness": 7.0, "residual": True}, structure__natural=True,
+        structure__modes=1,
+    )  # fmt: skip
+    assert 1 / settle(both).scene.contact.stiffness == pytest.approx(1 / 7.0 + 1 - 8 / np.pi**2, rel=1e-4)
+
+
+def test_massless_contact_is_a_collision_in_closed_form(tmp_path):
+    """A body meets an undamped mode through the boundary's spring: two masses and a spring while they touch."""
+    interface = Interface.on_patches(rod(100), [InterfaceCoordinate("tip", "tip", (1, 0, 0))])
+    path = tmp_path / "rom.h5"
+    reduce(rod(100), interface, "macneal", modes=1).save(path)
+    made = scene(
+        str(path),
+        contact={"law": "massless"},
+        excitation__force=0.0,
+        damper__velocity=1e-3,
+        damper__position=0.249,
+        time={"periods": 2},
+    )
+    response = simulate(made, events=True)
+    assert response.status == "ok"
+    omega, mass, body = np.pi / 2, 0.5, 0.05
+    stiffness = 1 / (1 - 8 / np.pi**2)
+    matrix = np.array(
+        [[(mass * omega**2 + stiffness) / mass, -stiffness / mass], [-stiffness / body, stiffness / body]]
+    )
+    squares, shapes = np.linalg.eig(matrix)
+    start = np.linalg.solve(shapes, [0.0, 1e-3])
+    times = np.linspace(0, 3, 300001)[1:]
+    waves = start[:, None] * np.sin(np.sqrt(squares)[:, None] * times) / np.sqrt(squares)[:, None]
+    gap = np.diff(shapes @ waves, axis=0)[0]
+    end = np.argmax(gap < 0)
+    speeds = shapes @ (start[:, None] * np.cos(np.sqrt(squares)[:, None] * times[end]))
+    impact, detach = (next(e for e in response.event_list if e.kind == kind) for kind in ("impact", "detach"))
+    assert detach.time - impact.time == pytest.approx(times[end], abs=2e-5)
+    assert impact.relative_velocity_after == pytest.approx((speeds[1] - speeds[0]).item(), rel=1e-4)
+    assert response.energy["impact"] == 0.0
+    assert response.energy_residual < 1e-9
+
+
+def test_auto_chooses_and_says_so(file):
+    law = {"law": "compliant", "stiffness": 50.0}
+    made = scene(file, contact=law, structure__modes="auto", structure__tolerance=0.05, damper__restitution=0.7)
+    settled, estimate = settle(made)
+    assert settled.structure.natural
+    assert 1 < settled.structure.modes < 41
+    assert estimate["modes"] == settled.structure.modes
+    assert estimate["error"] <= 0.05
+    assert f"{settled.structure.modes} modes: estimated error" in estimate["sentence"]
+    assert isinstance(settled.contact, Compliant)
+    assert settle(settled).scene == settled
+    response = simulate(made)
+    assert response.estimate == estimate
+    assert response.to_json()["estimate"]["sentence"] == estimate["sentence"]
+    stricter = settle(scene(file, contact=law, structure__modes="auto", structure__tolerance=0.02)).scene
+    assert stricter.structure.modes > settled.structure.modes
+    newton = settle(scene(file, structure__modes="auto", structure__tolerance=0.05)).estimate
+    assert "Newton's impacts have no limit" in newton["sentence"]
+
+
+def test_sweep_has_one_model(file):
+    made = scene(file, contact={"law": "compliant", "stiffness": 50.0}, structure__modes="auto",
+                 sweep={"excitation.frequency": [0.2, 0.3]}, time={"periods": 4})  # fmt: skip
+    result = sweep(made)
+    assert set(result.status) == {"ok"}
+    assert json.loads(json.dumps(result.to_json()["estimate"]))["modes"] >= 1
+
+
+def test_what_does_not_fit(file):
+    with pytest.raises(InputError, match="give stiffness"):
+        scene(file, contact={"law": "compliant"})
+    with pytest.raises(InputError, match="massless contact loses nothing"):
+        scene(file, contact={"law": "massless"}, damper__restitution=0.5)
+    with pytest.raises(InputError, match="lacks no flexibility at the walls"):
+        settle(scene(file, contact={"law": "massless"}))
+    rigid = {"structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1}}
+    with pytest.raises(InputError, match="residual flexibility is that of a reduced model"):
+        validate(Scene, rigid | {"excitation": {"frequency": 1.0}, "contact": {"law": "massless"}}, "scene")
+
+
+def test_command_chooses_modes_and_bases(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.toml").write_text(CASE)
+    counts = {}
+    for basis in ("craig-bampton", "rubin", "macneal", "truncated"):
+        tolerance = "0.3" if basis == "truncated" else "1e-3"
+        arguments = ["reduce", "case.toml", "--modes", "auto", "--basis", basis, "--tolerance", tolerance]
+        assert main([*arguments, "-o", "rom.h5", "--json", "-"]) == 0
+        result = json.loads(capsys.readouterr().out)
+        estimate = result["estimate"]
+        assert estimate["met"]
+        assert estimate["error"] <= float(tolerance)
+        assert result["modes"] == estimate["modes"]
+        assert math.isfinite(estimate["rigid"])
+        counts[basis] = result["modes"]
+    assert counts["rubin"] <= counts["macneal"]
+    assert main(["reduce", "case.toml", "--modes", "2"]) == 0
+    assert "2 modes: estimated error" in capsys.readouterr().out
+    assert main(["reduce", "case.toml", "--basis", "guyan"]) == 2
+    assert "basis: expected one of" in capsys.readouterr().err
