@@ -158,7 +158,7 @@ def _response(scene: Scene, run: _Run, status: Status, transient: int, started: 
         events=int(counters[st.EVENTS]),
         classification=classify(section[first:], records.impacts[window], evaluated["friction"]),
         energy=evaluated,
-        energy_residual=_residual(records.ledger[: done + 1], _kinetic(rows, section, run.state.fastest[0])),
+        energy_residual=_residual(records.ledger[: done + 1], _energy_scale(rows, section, run.state.fastest[0])),
         attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
         wall_time_s=time.perf_counter() - started,
         periods=done,
@@ -180,21 +180,26 @@ def _response(scene: Scene, run: _Run, status: Status, transient: int, started: 
     )
 
 
-def _residual(ledger: np.ndarray, bodies: float) -> float:
+def _residual(ledger: np.ndarray, scale: float) -> float:
     """Imbalance of the energy ledger (periods + 1, 6), relative to its largest term.
 
-    At least to the energy of the bodies, J: what comes and goes within a period.
+    At least to `scale`, J: what comes and goes within a period.
     """
     change = ledger[-1] - ledger[0]
     imbalance = change[st.EXCITATION] - change[st.VISCOUS : st.STORED].sum() - change[st.STORED]
-    largest = max(np.abs(change).max(), np.abs(ledger[:, st.STORED]).max(), bodies)
+    largest = max(np.abs(change).max(), np.abs(ledger[:, st.STORED]).max(), scale)
     return float(abs(imbalance) / largest) if largest > 0 else 0.0
 
 
-def _kinetic(rows: Rows, section: np.ndarray, fastest: float) -> float:
-    """Energy of the bodies at the structure's speed or at the largest of their own at the periods' starts, J."""
+def _energy_scale(rows: Rows, section: np.ndarray, fastest: float) -> float:
+    """An energy below which all is round-off, J.
+
+    That of the bodies at the structure's speed or at the largest of their own at the periods' starts, or that of the
+    structure under its loads at rest.
+    """
     own = section[:, 3 + len(rows.mass) :] ** 2 @ rows.mass
-    return float(max(rows.mass.sum() * fastest**2, own.max()) / 2)
+    static = (np.abs(rows.force) ** 2 / rows.stiffness).sum() if len(rows.force) else 0.0
+    return float(max(rows.mass.sum() * fastest**2, own.max(), static) / 2)
 
 
 def _attached(

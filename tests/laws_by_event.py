@@ -23,7 +23,7 @@ BALANCE = 1e-9
 #: share of the fastest speed so far that is round-off of a velocity
 SPEED = 1e-9
 #: what counts as motion at all, as a share of the free travel
-SLOW = 1e-9
+SLOW = 1e-6
 
 
 @dataclass
