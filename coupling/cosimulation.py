@@ -1,10 +1,10 @@
 """Co-simulation: structure and bodies are separate units that exchange motion and forces once a macro-step.
 
-The structure's unit is exact between two exchanges (matrix exponential); the bodies' unit takes smaller steps of central
-differences with penalty contacts. Each extrapolates what it got from the other by a constant (hold 0) or a line (hold
-1); the structure gets the mean force of a macro-step, so that no impulse is lost. Jacobi: both units start from the last
-exchange; Gauss-Seidel: the bodies already know the structure's new motion. Kuebler and Schiehlen (2000); Gomes and others,
-Co-simulation: a survey (2018).
+The structure's unit is exact between two exchanges (matrix exponential); the bodies' unit takes smaller steps of
+central differences with penalty contacts. Each extrapolates what it got from the other by a constant (hold 0) or a line
+(hold 1); the structure gets the mean force of a macro-step, so that no impulse is lost. Jacobi: both units start from
+the last exchange; Gauss-Seidel: the bodies already know the structure's new motion. Kuebler and Schiehlen (2000);
+Gomes and others, Co-simulation: a survey (2018).
 """
 
 from __future__ import annotations
@@ -128,8 +128,9 @@ def _bodies(system, motion, slow, substeps, k, place, rate, bend, mean):
             for i in range(n, size):
                 displacement += system.J[r, i] * motion.q[i]
                 speed += system.J[r, i] * motion.half[i]
+            mean[r] += 0.5 * motion.force[r] / substeps
             row_force(system, motion, r, displacement, speed, slow, small * speed)
-            mean[r] += motion.force[r] / substeps
+            mean[r] += 0.5 * motion.force[r] / substeps
         for i in range(n, size):
             force = system.weight[i] + system.load[i, 0] * cosine - system.load[i, 1] * sine
             for r in range(rows):

@@ -26,6 +26,7 @@ _STATUS = {
     auto.UNDECIDED: Status.UNDECIDED,
 }
 
+
 def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) -> Response:
     """Run a scene from time zero over `scene.time.periods` excitation periods.
 

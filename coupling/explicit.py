@@ -11,7 +11,18 @@ import numpy as np
 
 from coupling.newmark import first_forces, net_load, row_force
 from coupling.system import DONE, PERIOD, System, compiled
-from coupling.tally import copy, damped, end_period, follow_contacts, load_at, record_start, row_speed, sample, solve_inverse, tally
+from coupling.tally import (
+    copy,
+    damped,
+    end_period,
+    follow_contacts,
+    load_at,
+    record_start,
+    row_speed,
+    sample,
+    solve_inverse,
+    tally,
+)
 
 
 def explicit_matrix(system: System) -> np.ndarray:
@@ -63,5 +74,3 @@ def march_explicit(system, motion, records, log, inverse, slow, periods, budget,
         if code != DONE:
             return code
     return DONE
-
-

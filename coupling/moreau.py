@@ -21,7 +21,18 @@ from coupling.system import (
     System,
     compiled,
 )
-from coupling.tally import copy, damped, end_period, follow_contacts, load_at, record_start, row_speed, sample, solve_inverse, tally
+from coupling.tally import (
+    copy,
+    damped,
+    end_period,
+    follow_contacts,
+    load_at,
+    record_start,
+    row_speed,
+    sample,
+    solve_inverse,
+    tally,
+)
 
 
 def moreau_matrices(system: System, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

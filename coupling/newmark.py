@@ -20,9 +20,20 @@ from coupling.system import (
     UNDECIDED,
     System,
     compiled,
-    inlined,
+    inserted,
 )
-from coupling.tally import copy, damped, end_period, follow_contacts, load_at, record_start, row_speed, sample, solve_inverse, tally
+from coupling.tally import (
+    copy,
+    damped,
+    end_period,
+    follow_contacts,
+    load_at,
+    record_start,
+    row_speed,
+    sample,
+    solve_inverse,
+    tally,
+)
 
 
 def newmark_matrices(system: System, alpha: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -110,7 +121,7 @@ def first_forces(system, motion, slow):
         row_force(system, motion, r, row_speed(system, r, motion.q), row_speed(system, r, motion.v), slow, 0.0)
 
 
-@inlined
+@inserted
 def row_force(system, motion, r, displacement, speed, slow, moved):
     """Set the force of row r by its law. moved: displacement of a Jenkins element since its last force."""
     if r >= system.friction_rows:
@@ -129,7 +140,7 @@ def row_force(system, motion, r, displacement, speed, slow, moved):
         motion.force[r] = -system.limit[r] * np.sign(speed)
 
 
-@inlined
+@inserted
 def net_load(system, motion, q, v, k, i):
     """Sum of the forces on coordinate i at step k of the period."""
     force = load_at(system, k, i) - damped(system, v, i) - system.stiffness[i] * q[i]

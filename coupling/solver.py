@@ -36,10 +36,10 @@ class Solver:
     steps_per_period: steps (macro-steps of cosim) in an excitation period, 1000 unless given; for solve_ivp the least
     number, 32; penetration: share of the free travel by which a body may overlap a rigid wall, 0.1 (solve_ivp: 1e-3).
     moreau: theta of the one-step scheme (0.5). penalty: scheme; alpha of "hht" (-0.1). penalty and cosim, for rigid
-    contacts: contact_stiffness (N/m), or contact_steps, the duration of a contact in steps (2 steps_per_period^(1/3)); slip_velocity below
-    which friction is viscous (m/s; from the stability limit unless given). cosim: exchange ("gauss_seidel"), hold (order
-    of extrapolation within a macro-step, 1), substeps of the bodies (10). solve_ivp: relative tolerance rtol (1e-9),
-    complete_chatter (true).
+    contacts: contact_stiffness (N/m), or contact_steps, the duration of a contact in steps (2 steps_per_period^(1/3));
+    slip_velocity below which friction is viscous (m/s; from the stability limit unless given). cosim: exchange
+    ("gauss_seidel"), hold (order of extrapolation within a macro-step, 1), substeps of the bodies (10). solve_ivp:
+    relative tolerance rtol (1e-9), complete_chatter (true).
     """
 
     method: Literal["exact", "moreau", "penalty", "cosim", "solve_ivp"] = "exact"
@@ -59,7 +59,7 @@ class Solver:
     complete_chatter: bool | None = None
 
     def __post_init__(self) -> None:
-        for option in fields(self):  # type: ignore[arg-type]
+        for option in fields(self):
             users = _USERS.get(option.name)
             if users is None or getattr(self, option.name) is None or self.method in users:
                 continue

@@ -47,7 +47,9 @@ class SteppedRun:
         """Raises InputError where samples do not fall on steps."""
         steps = scene.solver.steps
         if samples_per_period and steps % samples_per_period:
-            raise InputError(f"solver.steps_per_period: {steps} is no multiple of {samples_per_period} samples a period")
+            raise InputError(
+                f"solver.steps_per_period: {steps} is no multiple of {samples_per_period} samples a period"
+            )
         structure = linear_structure(scene)
         self.rows, displacement, velocity = rows_of(scene, structure)
         system = sy.system_of(scene, self.rows)
@@ -141,4 +143,3 @@ def _cosimulation(scene: Scene, run: SteppedRun, slow: np.ndarray) -> March:
         run.system, run.motion, run.records, log, matrices, memory, slow, gauss_seidel, hold, solver.substeps or 10,
         periods, solver.max_events, solver.deepest,
     )  # fmt: skip
-

@@ -35,7 +35,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     return _compile(function)
 
 
-def inlined(function: Callable[..., Any]) -> Any:
+def inserted(function: Callable[..., Any]) -> Any:
     """Compile a function of a stepping method into its callers."""
     return _compile(function, forceinline=True)
 
@@ -147,8 +147,9 @@ def start(
 def with_penalty(system: System, rows: Rows, scene: Scene) -> tuple[System, np.ndarray]:
     """Rigid contacts as springs and dashpots, and the slip speed (friction rows,) below which friction is viscous.
 
-    The spring makes a contact last `contact_steps` steps: unless given, 2 steps^(1/3) of them, which makes the error of a
-    contact that is too soft and that of one resolved by too few steps fall alike. The dashpot gives an isolated collision its restitution.
+    The spring makes a contact last `contact_steps` steps: unless given, 2 steps^(1/3) of them, which makes the error of
+    a contact that is too soft and that of one resolved by too few steps fall alike. The dashpot gives an isolated
+    collision its restitution.
     Raises InputError for a restitution of 0.
     """
     solver = scene.solver

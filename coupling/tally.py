@@ -5,13 +5,24 @@ from __future__ import annotations
 import math
 
 from coupling.state import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, STORED, VISCOUS
-from coupling.system import DIVERGED, DONE, EVENT_BUDGET, IMPACTS, LOGGED, PENETRATION, PERIOD, STEPS, compiled, inlined
+from coupling.system import (
+    DIVERGED,
+    DONE,
+    EVENT_BUDGET,
+    IMPACTS,
+    LOGGED,
+    PENETRATION,
+    PERIOD,
+    STEPS,
+    compiled,
+    inserted,
+)
 
 #: a motion above this, in m or m/s, has no physical meaning
 _BOUND = 1e30
 
 
-@inlined
+@inserted
 def response_of(system, q, cosine, sine):
     """Displacement at the response."""
     x = system.table[0] * cosine - system.table[1] * sine
@@ -20,7 +31,7 @@ def response_of(system, q, cosine, sine):
     return x
 
 
-@inlined
+@inserted
 def rate_of(system, v, cosine, sine):
     """Velocity at the response."""
     rate = -system.omega * (system.table[0] * sine + system.table[1] * cosine)
@@ -29,7 +40,7 @@ def rate_of(system, v, cosine, sine):
     return rate
 
 
-@inlined
+@inserted
 def row_speed(system, r, v):
     """Velocity of row r."""
     speed = 0.0
@@ -62,7 +73,7 @@ def record_start(system, motion, records):
         records.ledger[p, i] = motion.losses[i]
 
 
-@inlined
+@inserted
 def tally(system, motion, records, k, q, v, impulse, before, deepest):
     """Account for step k of the period, from q, v to motion.q, motion.v, with the impulses (r,) of the rows.
 
@@ -114,7 +125,7 @@ def tally(system, motion, records, k, q, v, impulse, before, deepest):
     return PENETRATION if deep > deepest else DONE
 
 
-@inlined
+@inserted
 def _waves(system, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after):
     """Peak, mean square, harmonic and momentum of a step."""
     largest = abs(x1)
@@ -133,7 +144,7 @@ def _waves(system, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after
     records.momentum[p] += h / 2.0 * complex(m0 * c0 + m1 * c1, -m0 * s0 - m1 * s1)
 
 
-@inlined
+@inserted
 def follow_contacts(system, motion, records, log, k, speed, impulse):
     """Count and log impacts: contacts that have begun to carry force, with the speeds (r,) at the step's start.
 
@@ -157,10 +168,10 @@ def follow_contacts(system, motion, records, log, k, speed, impulse):
         motion.active[r] = 1 if pushed else 0
 
 
-@inlined
+@inserted
 def sample(system, motion, records, k, q):
     """Keep a sample if step k of the period begins at one."""
-    steps, n, b = len(system.phase) - 1, system.modes, len(system.mass) - system.modes
+    steps, b = len(system.phase) - 1, len(system.mass) - system.modes
     each = len(records.samples) // max(len(records.peak) - 1, 1)
     if each == 0:
         return
@@ -172,7 +183,7 @@ def sample(system, motion, records, k, q):
             entry[1 + i] = row_speed(system, i, q)
 
 
-@inlined
+@inserted
 def solve_inverse(inverse, diagonal, vector, result):
     """result = inverse vector; a diagonal inverse is used as such."""
     for i in range(len(vector)):
@@ -184,7 +195,7 @@ def solve_inverse(inverse, diagonal, vector, result):
                 result[i] += inverse[i, j] * vector[j]
 
 
-@inlined
+@inserted
 def damped(system, v, i):
     """Viscous force on coordinate i."""
     if i >= system.modes:
@@ -195,21 +206,20 @@ def damped(system, v, i):
     return force
 
 
-@inlined
+@inserted
 def load_at(system, k, i):
     """Load on coordinate i at step k of the period, weight included, N."""
     return system.load[i, 0] * system.phase[k, 0] - system.load[i, 1] * system.phase[k, 1] + system.weight[i]
 
 
-
-@inlined
+@inserted
 def copy(source, target):
     """Copy (N,) numbers."""
     for i in range(len(target)):
         target[i] = source[i]
 
 
-@inlined
+@inserted
 def end_period(system, motion, records, budget):
     """Close a period. Returns DONE, DIVERGED or EVENT_BUDGET."""
     total = 0.0
