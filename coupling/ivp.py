@@ -359,7 +359,9 @@ class IvpRun:
         problem.forced[:k] = [
             (AT_LOW if kind == "low" else AT_HIGH) if r == row and kind in ("low", "high") else 0 for r in listed
         ]
-        scale = float((np.abs(self.direct[rows]) @ np.abs(total)).max())
+        # the terms of an acceleration may cancel: what is round-off is told by the size of the motion
+        terms = np.abs(self.direct[rows]) @ (np.abs(self.system.load).sum(axis=1) + np.abs(self.system.weight))
+        scale = float(max((np.abs(self.direct[rows]) @ np.abs(total)).max(), terms.max()))
         if kind in ("low", "high"):
             # a force at its bound leaves with an acceleration of round-off: it does leave
             problem.b[listed.index(row)] += (1 if kind == "low" else -1) * _TOUCH * scale
