@@ -338,6 +338,7 @@ class IvpRun:
     def _settle(self, t: float, still: np.ndarray, speeds: np.ndarray, rest: float, row: int, kind: str) -> bool:
         """States of contacts without speed and of friction, from the accelerations."""
         system, state = self.system, self.state
+        bounds = self._at_bounds(t, speeds, rest, row, kind)
         listed = [int(r) for r in np.flatnonzero(still)]
         for r in range(system.friction_rows):
             if system.limit[r] > 0:
@@ -356,15 +357,13 @@ class IvpRun:
         problem.matrix[:k, :k] = self.rows.delassus[np.ix_(rows, rows)]
         problem.b[:k] = self.direct[rows] @ total
         problem.low[:k], problem.high[:k] = np.where(friction, -limit, 0.0), limit
-        problem.forced[:k] = [
-            (AT_LOW if kind == "low" else AT_HIGH) if r == row and kind in ("low", "high") else 0 for r in listed
-        ]
+        problem.forced[:k] = [bounds.get(int(r), 0) for r in rows]
         # the terms of an acceleration may cancel: what is round-off is told by the size of the motion
         terms = np.abs(self.direct[rows]) @ (np.abs(self.system.load).sum(axis=1) + np.abs(self.system.weight))
         scale = float(max((np.abs(self.direct[rows]) @ np.abs(total)).max(), terms.max()))
-        if kind in ("low", "high"):
+        for a in range(k):
             # a force at its bound leaves with an acceleration of round-off: it does leave
-            problem.b[listed.index(row)] += (1 if kind == "low" else -1) * _TOUCH * scale
+            problem.b[a] += {0: 0.0, AT_LOW: 1.0, AT_HIGH: -1.0}[int(problem.forced[a])] * _TOUCH * scale
         if not solve_box(problem, k, scale):
             return False
         for a, r in enumerate(listed):
@@ -376,6 +375,20 @@ class IvpRun:
             else:
                 state[r] = _STICKING
         return True
+
+    def _at_bounds(self, t: float, speeds: np.ndarray, rest: float, row: int, kind: str) -> dict[int, int]:
+        """Rows whose force has just reached a bound, or has let go there at this instant, when that is the event."""
+        if kind not in ("low", "high"):
+            return {}
+        system, found = self.system, {row: int(AT_LOW if kind == "low" else AT_HIGH)}
+        force = self._forces(t, self.y)[1]
+        for r in range(system.friction_rows):
+            slack = _TOUCH * system.limit[r]
+            if self.state[r] == _SLIDING and abs(speeds[r]) <= rest:
+                found.setdefault(r, int(AT_LOW if self.sign[r] > 0 else AT_HIGH))
+            elif self.state[r] == _STICKING and abs(force[r]) >= system.limit[r] - slack:
+                found.setdefault(r, int(AT_LOW if force[r] < 0 else AT_HIGH))
+        return found
 
     # -- records
 

@@ -133,7 +133,10 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = command("bench", "how fast and how exact the methods are, measured here", None, "DIR", required=True)
     bench.add_argument(
-        "study", choices=("engine",), help="engine: the exact engine against a hand-written loop and solve_ivp"
+        "study",
+        choices=("engine", "work-precision", "stability"),
+        help="engine: the exact engine against a hand-written loop and solve_ivp; work-precision: speed against "
+        "accuracy of all methods; stability: where methods fail",
     )
     bench.add_argument("--quick", action="store_true", help="seconds instead of minutes, and rougher figures")
     return parser

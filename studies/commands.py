@@ -144,10 +144,21 @@ def bench(arguments: Namespace) -> None:
     folder = Path(arguments.output)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--output {folder}: expected a folder, not a file")
-    from studies.bench_engine import FULL, QUICK, run_bench, tell
+    if arguments.study == "work-precision":
+        from studies import work_precision
 
-    tell(run_bench(folder, QUICK if arguments.quick else FULL))
-    print(f"{folder}: bench_engine.json, bench_engine.csv and figures")
+        effort = work_precision.QUICK if arguments.quick else work_precision.FULL
+        work_precision.tell(work_precision.run_work_precision(folder, effort))
+    elif arguments.study == "stability":
+        from studies import stability
+
+        stability.tell(stability.run_stability(folder, stability.QUICK if arguments.quick else stability.FULL))
+    else:
+        from studies import bench_engine
+
+        bench_engine.tell(bench_engine.run_bench(folder, bench_engine.QUICK if arguments.quick else bench_engine.FULL))
+    name = {"engine": "bench_engine", "work-precision": "work_precision"}.get(arguments.study, arguments.study)
+    print(f"{folder}: {name}.json, {name}.csv and figures")
 
 
 def _load_scene(path: str) -> Scene:
