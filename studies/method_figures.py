@@ -12,6 +12,7 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 
 from modal.store import replacing
 
@@ -73,6 +74,29 @@ def _ladder(axes: Axes, ladder: Mapping[str, Any]) -> None:
     axes.set_xlabel("CPU time per period, µs")
     axes.set_ylabel("error of the mean amplitude")
     axes.grid(True, which="major", color="#e2e8f0")
+
+
+def stability_figure(result: Mapping[str, Any], path: Path) -> None:
+    """A panel a part: measured edges of failure as points, analytic limits as lines."""
+    figure, axes = plt.subplots(2, 4, figsize=(19, 9), layout="constrained")
+    for panel, (name, part) in zip(axes.flat, result["parts"].items(), strict=True):
+        for (curve, values), colour in zip(part["curves"].items(), _COLOURS, strict=False):
+            line = curve in ("limit", "1 - duration / step")
+            panel.plot(
+                part["x"], values, "--" if line else "o", color="#7a7f87" if line else colour,
+                label="analytic limit" if curve == "limit" else curve,
+            )  # fmt: skip
+        if part["log"]:
+            panel.set_xscale("log")
+            panel.set_yscale("log")
+            panel.xaxis.set_minor_formatter(NullFormatter())
+            panel.yaxis.set_minor_formatter(NullFormatter())
+        panel.set_title(name)
+        panel.set_xlabel(part["x_label"])
+        panel.set_ylabel(part["y_label"])
+        panel.grid(True, which="major", color="#e2e8f0")
+        panel.legend(fontsize=9)
+    _save(figure, path)
 
 
 def _save(figure: Any, path: Path) -> None:

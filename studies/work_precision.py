@@ -38,7 +38,8 @@ EXACT, IVP = "exact engine", "solve_ivp, DOP853 with events"
 class Effort:
     """Rounds of timing, steps per period, tolerances of solve_ivp, periods of comparison, of means, of the reference.
 
-    modes: fixed-interface modes of the cluster; ladder: those of the model ladder; None: without finite elements.
+    timed: steps of a timed run; modes: fixed-interface modes of the cluster (None: no finite elements); ladder: those of
+    the model ladder.
     """
 
     rounds: int
@@ -48,13 +49,14 @@ class Effort:
     means: int
     reference: int
     ivp: int
+    timed: int
     modes: int | None
     ladder: tuple[int, ...]
 
 
-FULL = Effort(3, (100, 300, 1000, 3000, 10_000, 30_000), (1e-4, 1e-6, 1e-8, 1e-10), 10, 3000, 30_000, 60, 10,
+FULL = Effort(3, (100, 300, 1000, 3000, 10_000, 30_000), (1e-4, 1e-6, 1e-8, 1e-10), 10, 3000, 30_000, 60, 500_000, 10,
               (0, 1, 2, 4, 7, 10, 15, 20))  # fmt: skip
-QUICK = Effort(2, (100, 1000), (1e-4, 1e-8), 3, 200, 600, 5, None, ())
+QUICK = Effort(2, (100, 1000), (1e-4, 1e-8), 3, 200, 600, 5, 50_000, None, ())
 
 
 def run_work_precision(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
@@ -178,9 +180,8 @@ def _lengths(point: Mapping[str, Any], effort: Effort) -> tuple[int, int]:
     """Two lengths of a run in periods, so that the longer takes some tenths of a second."""
     if point["method"] == IVP:
         return 1, 3
-    long = 20_000 if point["method"] == EXACT else int(np.clip(5e5 / point["setting"], 12, 20_000))
-    if effort is QUICK:
-        long = max(long // 10, 6)
+    long = effort.timed / (25 if point["method"] == EXACT else point["setting"])
+    long = int(np.clip(long, 12, 20_000))
     return max(long // 6, 1), long
 
 
