@@ -38,7 +38,7 @@ EXACT, IVP = "exact engine", "solve_ivp, DOP853 with events"
 class Effort:
     """Rounds of timing, steps per period, tolerances of solve_ivp, periods of comparison, of means, of the reference.
 
-    timed: steps of a timed run; modes: fixed-interface modes of the cluster (None: no finite elements); ladder: those of
+    timed: steps of a timed run; modes: fixed-interface modes of the cluster (None: none); ladder: those of
     the model ladder.
     """
 

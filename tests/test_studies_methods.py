@@ -22,7 +22,7 @@ def test_methods_fail_where_theory_says(part):
 
 
 def test_contact_mass_of_the_rod():
-    """The tip of a clamped unit rod with 0, 1, 2, 5 and 10 fixed-interface modes, by the Schur complement of its mass."""
+    """The tip of a clamped unit rod with 0, 1, 2, 5 and 10 modes, by the Schur complement of its mass."""
     curves = stability.restitution_and_modes(SMALL)["curves"]
     np.testing.assert_allclose(curves["measured"][:5], [0.333, 0.131, 0.080, 0.0367, 0.0193], rtol=5e-3)
     newton, compliant = curves["Newton's law"], curves["compliant"]
