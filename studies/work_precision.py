@@ -54,7 +54,7 @@ class Effort:
     ladder: tuple[int, ...]
 
 
-FULL = Effort(3, (100, 300, 1000, 3000, 10_000, 30_000), (1e-4, 1e-6, 1e-8, 1e-10), 10, 3000, 30_000, 60, 500_000, 10,
+FULL = Effort(3, (100, 300, 1000, 3000, 10_000), (1e-4, 1e-6, 1e-8, 1e-10), 10, 3000, 30_000, 20, 200_000, 10,
               (0, 1, 2, 4, 7, 10, 15, 20))  # fmt: skip
 QUICK = Effort(2, (100, 1000), (1e-4, 1e-8), 3, 200, 600, 5, 50_000, None, ())
 
@@ -157,7 +157,8 @@ def _point(key: tuple[str, float], scene: Scene, reference: Response, repeats: b
     # long enough for a mean, short enough for a chart of many points
     longest = effort.ivp if method == IVP else effort.means
     if setting > 1:
-        longest = int(min(longest, max(1e7 / setting, 100)))
+        small = 10 if scene.solver.method == "cosim" else 1  # steps of the bodies within a macro-step
+        longest = int(min(longest, max(3e6 / setting / small, 100)))
     periods = effort.checked if repeats else longest
     response = _run(scene, periods, repeats)
     error, floor, interval = None, 0.0, None
