@@ -16,6 +16,8 @@ from modal.store import Variable, save
 class Status(StrEnum):
     """How a run ended.
 
+    PENETRATION: a body is deeper in a wall than `solver.penetration` allows, an impact was missed; DIVERGED: the motion
+    grew beyond all bounds; ENERGY: the ledger of a stepping method is open by a tenth, its figures are not to be used.
     NOT_STEADY: no end of the transient in sight; UNCERTAIN: the mean's confidence interval is still too wide. The other
     troubles mean that the figures cover only the periods that were completed.
     """
@@ -24,6 +26,9 @@ class Status(StrEnum):
     EVENT_BUDGET = "event_budget"
     ACCURACY_LOST = "accuracy_lost"
     UNDECIDED = "undecided_contact"
+    PENETRATION = "penetration"
+    DIVERGED = "diverged"
+    ENERGY = "energy_not_balanced"
     NOT_STEADY = "not_steady"
     UNCERTAIN = "confidence_not_reached"
 
@@ -54,8 +59,9 @@ class Response:
     energy_residual: imbalance of the whole run's ledger relative to its largest term; attached_mass_fraction: share
     of the bodies' mass that the structure feels (None without bodies or motion); peak: (periods,) largest |x| of each
     period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
-    time, displacement, body_displacement: samples, empty if none were asked for; estimate: of the error of a reduced
-    model whose number of modes was chosen automatically (coupling.choice), None otherwise.
+    time, displacement, body_displacement: samples, empty if none were asked for; penetration: deepest overlap of bodies
+    and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model
+    whose number of modes was chosen automatically (coupling.choice), None otherwise.
     """
 
     status: Status
@@ -84,6 +90,7 @@ class Response:
     time: np.ndarray
     displacement: np.ndarray
     body_displacement: np.ndarray
+    penetration: float = 0.0
     estimate: dict[str, Any] | None = None
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
@@ -92,7 +99,7 @@ class Response:
             "frequency", "amplitude_max", "amplitude_mean", "amplitude_mean_confidence", "amplitude_rms",
             "amplitude_harmonic", "phase",
             "impacts_per_period", "events", "classification", "energy", "energy_residual", "attached_mass_fraction",
-            "wall_time_s", "periods", "transient", "counters",
+            "wall_time_s", "periods", "transient", "counters", "penetration",
         )  # fmt: skip
         data: dict[str, Any] = {"status": self.status.value} | {name: getattr(self, name) for name in names}
         if self.estimate is not None:

@@ -26,6 +26,7 @@ from coupling.inputs import (
     validate,
 )
 from coupling.laws import Compliant, Contact, Massless, Newton
+from coupling.solver import Solver
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -189,14 +190,6 @@ class Time:
     def dropped(self) -> int:
         """Periods left out of the evaluation unless the state tells: two thirds if nothing was said."""
         return self.periods * 2 // 3 if self.transient is None else self.transient
-
-
-@dataclass(frozen=True, config=STRICT)
-class Solver:
-    """The method, and the budget of events after which a run ends with status 'event_budget'."""
-
-    method: Literal["exact"] = "exact"
-    max_events: Annotated[Whole, Field(gt=0)] = 20_000_000
 
 
 @dataclass(frozen=True, config=STRICT)

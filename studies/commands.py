@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
 import os
@@ -212,26 +213,23 @@ def demo(arguments: Namespace) -> None:
     run_demo(Path(arguments.output), arguments.workers)
 
 
+#: module of studies, function and files of each benchmark
+_BENCHES = {
+    "engine": ("bench_engine", "run_bench", "bench_engine"),
+    "modal": ("bench_modal", "run_bench", "bench_modal"),
+    "ladder": ("model_ladder", "run_ladder", "ladder"),
+    "work-precision": ("work_precision", "run_work_precision", "work_precision"),
+    "stability": ("stability", "run_stability", "stability"),
+}
+
+
 def bench(arguments: Namespace) -> None:
     """Speed and accuracy, measured on this machine."""
     folder = _folder(arguments)
-    if arguments.study == "modal":
-        from studies import bench_modal
-
-        effort = bench_modal.QUICK if arguments.quick else bench_modal.FULL
-        bench_modal.tell(bench_modal.run_bench(folder, effort))
-        print(f"{folder}: bench_modal.json, bench_modal.csv and a figure")
-        return
-    if arguments.study == "ladder":
-        from studies import model_ladder
-
-        model_ladder.tell(model_ladder.run_ladder(folder, model_ladder.QUICK if arguments.quick else model_ladder.FULL))
-        print(f"{folder}: ladder.json and figures")
-        return
-    from studies.bench_engine import FULL, QUICK, run_bench, tell
-
-    tell(run_bench(folder, QUICK if arguments.quick else FULL))
-    print(f"{folder}: bench_engine.json, bench_engine.csv and figures")
+    module, function, files = _BENCHES[arguments.study]
+    study = importlib.import_module(f"studies.{module}")
+    study.tell(getattr(study, function)(folder, study.QUICK if arguments.quick else study.FULL))
+    print(f"{folder}: {files}.json and figures")
 
 
 def _folder(arguments: Namespace) -> Path:

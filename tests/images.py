@@ -15,7 +15,7 @@ from stepping import Segment, Stepper
 from worlds import scene_of
 
 from coupling import state as st
-from coupling.engine import _events
+from coupling.evaluation import events_of
 from coupling.rows import Rows
 
 #: how far apart the runs that measure chaos begin, as a share of the free travel
@@ -55,7 +55,7 @@ def record(data: dict, change=None) -> Record:
     cavities = [damper["cavity"] for damper in data["damper"]]
     hits: dict = defaultdict(list)
     before, together = {}, np.inf
-    for event in _events(run.rows, run.log.chunks):
+    for event in events_of(run.rows, run.log.chunks):
         if event.kind == "impact":
             time, contact = event.time / run.rows.period, (event.damper, event.side)
             hits[contact].append((time, event.relative_velocity_before))

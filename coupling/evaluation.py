@@ -1,0 +1,192 @@
+"""From what a run has recorded to its response: means, harmonic, ledger, attached mass, list of events.
+
+Every method leaves the same records behind, so that figures of different methods mean the same.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from coupling import state as st
+from coupling.response import Event, Response, Status, classify
+from coupling.rows import Rows
+from coupling.scene import Scene
+from coupling.state import Records
+from coupling.statistics import mean_confidence, transient_length
+
+#: periods between two looks at whether the response is steady
+_CHUNK = 100
+
+
+class Run(Protocol):
+    """A run of any method that can be continued."""
+
+    @property
+    def peaks(self) -> np.ndarray:
+        """Largest |x| of the periods done, m."""
+
+    def advance_to(self, periods: int) -> Status:
+        """Continue to the end of so many periods, or to what ends the run."""
+
+    def outcome(self) -> Outcome:
+        """What the run leaves behind."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run leaves behind: records of `periods` periods, counters, chunks of its log.
+
+    fastest: largest speed in the structure, m/s; penetration: relative to the free travel.
+    """
+
+    rows: Rows
+    records: Records
+    periods: int
+    events: int
+    fastest: float
+    counters: dict[str, int]
+    log: Sequence[np.ndarray]
+    penetration: float = 0.0
+
+
+def run_scene(run: Run, scene: Scene) -> tuple[Status, int]:
+    """Run all periods, or until the mean amplitude is known well enough. Returns status and length of the transient."""
+    if scene.time.steady != "auto":
+        return run.advance_to(scene.time.periods), scene.time.dropped
+    status, dropped = Status.NOT_STEADY, scene.time.dropped
+    for periods in range(_CHUNK, scene.time.periods + _CHUNK, _CHUNK):
+        ended = run.advance_to(min(periods, scene.time.periods))
+        if ended is not Status.OK:
+            return ended, dropped
+        peaks = run.peaks
+        transient = transient_length(peaks)
+        if transient is None:
+            status, dropped = Status.NOT_STEADY, scene.time.dropped
+            continue
+        confidence = mean_confidence(peaks[transient:])
+        if confidence is not None and confidence <= scene.time.tolerance * peaks[transient:].mean():
+            return Status.OK, transient
+        status, dropped = Status.UNCERTAIN, transient
+    return status, dropped
+
+
+def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started: float) -> Response:
+    """The response of a run that began at `started` (time.perf_counter) and dropped `transient` periods."""
+    rows, records, done = run.rows, run.records, run.periods
+    first = min(transient, max(done - 1, 0))
+    window = slice(first, done)
+    span = max(done - first, 1) * rows.period
+    ledger = records.ledger[: done + 1] - records.ledger[first]
+    b = len(rows.mass)
+    section = records.section[: done + 1]
+    harmonic = 2 / span * records.harmonic[window].sum()
+    evaluated = {name: float(value) for name, value in zip(st.ENERGIES, ledger[-1], strict=True)}
+    peaks = records.peak[window]
+    samples = len(records.samples) // scene.time.periods
+    return Response(
+        status=status,
+        frequency=scene.excitation.frequency,
+        amplitude_max=float(peaks.max(initial=0.0)),
+        amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
+        amplitude_mean_confidence=mean_confidence(peaks),
+        amplitude_rms=float(np.sqrt(max(records.square[window].sum() / span, 0.0))),
+        amplitude_harmonic=float(abs(harmonic)),
+        phase=float(np.angle(1j * harmonic)),
+        impacts_per_period=float(records.impacts[window].sum() / max(done - first, 1)),
+        events=run.events,
+        classification=classify(section[first:], records.impacts[window], evaluated["friction"]),
+        energy=evaluated,
+        energy_residual=residual(records.ledger[: done + 1], _energy_scale(rows, section, run.fastest)),
+        attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
+        wall_time_s=time.perf_counter() - started,
+        periods=done,
+        transient=first,
+        counters=run.counters,
+        peak=records.peak[:done].copy(),
+        section=section[:, :2].copy(),
+        slip=section[:, 3 : 3 + b].copy(),
+        slip_velocity=section[:, 3 + b :].copy(),
+        event_list=events_of(rows, run.log),
+        time=np.arange(done * samples) * (rows.period / max(samples, 1)),
+        displacement=records.samples[: done * samples, 0].copy(),
+        body_displacement=records.samples[: done * samples, 1:].copy(),
+        penetration=run.penetration,
+    )
+
+
+def residual(ledger: np.ndarray, scale: float) -> float:
+    """Imbalance of the energy ledger (periods + 1, 6), relative to its largest term.
+
+    At least to `scale`, J: what comes and goes within a period.
+    """
+    change = ledger[-1] - ledger[0]
+    imbalance = change[st.EXCITATION] - change[st.VISCOUS : st.STORED].sum() - change[st.STORED]
+    largest = max(np.abs(change).max(), np.abs(ledger[:, st.STORED]).max(), scale)
+    return float(abs(imbalance) / largest) if largest > 0 else 0.0
+
+
+def _energy_scale(rows: Rows, section: np.ndarray, fastest: float) -> float:
+    """An energy below which all is round-off, J.
+
+    That of the bodies at the structure's speed or at the largest of their own at the periods' starts, or that of the
+    structure under its loads at rest.
+    """
+    own = section[:, 3 + len(rows.mass) :] ** 2 @ rows.mass
+    static = (np.abs(rows.force) ** 2 / rows.stiffness).sum() if len(rows.force) else 0.0
+    return float(max(rows.mass.sum() * fastest**2, own.max(), static) / 2)
+
+
+def _attached(
+    rows: Rows, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
+) -> float | None:
+    """Share of the bodies' mass that the structure feels: Re(F / (omega^2 X)) / sum m, F all contact forces on it."""
+    if not len(rows.mass) or abs(harmonic) == 0 or len(section) <= first + 1:
+        return None
+    change = section[-1, 2] - section[first, 2]
+    on_bodies = 2 / span * (change + 1j * rows.omega * momentum) - rows.inertia.sum()
+    return float((-on_bodies / (rows.omega**2 * harmonic)).real / rows.mass.sum())
+
+
+def events_of(rows: Rows, chunks: Sequence[np.ndarray]) -> list[Event]:
+    """The events of a compiled log: chunks of entries time, kind, row, velocity before and after, impulse."""
+    events = []
+    entries = np.concatenate(chunks) if chunks else np.zeros((0, 6))
+    _complete(rows, entries)
+    for entry in entries:
+        row = int(entry[2])
+        body, side = _place(rows, row)
+        # speeds of the gap, turned into speeds of the body relative to what it meets
+        sign = -1.0 if side in ("right", "body") else 1.0
+        before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
+        events.append(Event(float(entry[0]), st.KINDS[int(entry[1])], body, side, before, after, impulse))
+    return events
+
+
+def _complete(rows: Rows, entries: np.ndarray) -> None:
+    """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end brought."""
+    begun: dict[int, np.ndarray] = {}
+    for entry in entries:
+        kind, row = int(entry[1]), int(entry[2])
+        if not np.isfinite(rows.spring[row]):
+            continue
+        if kind == st.IMPACT:
+            begun[row] = entry
+        elif kind == st.DETACHES and row in begun:
+            begun[row][4:6] = entry[4:6]
+
+
+def _place(rows: Rows, row: int) -> tuple[int, str]:
+    """Number of the body (or of the friction damper, side "casing") and the side on which a row acts."""
+    if len(rows.mass) <= row < rows.friction_rows:
+        return row - len(rows.mass), "casing"
+    bodies = np.flatnonzero(rows.bodies[row])
+    if row < rows.friction_rows:
+        return int(bodies[0]), "floor"
+    if len(bodies) == 2:
+        return int(bodies[0]), "body"
+    return int(bodies[0]), "left" if rows.bodies[row, bodies[0]] > 0 else "right"

@@ -1,0 +1,145 @@
+"""Methods that take time steps, and solve_ivp: the same scene in, the same response out as of the exact engine.
+
+`solver.method` chooses: "moreau" (coupling.moreau), "penalty" (coupling.explicit, coupling.newmark), "cosim"
+(coupling.cosimulation) and "solve_ivp" (coupling.ivp).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from coupling import system as sy
+from coupling.cosimulation import cosimulation_matrices, march_cosimulation
+from coupling.evaluation import Outcome, Run, residual
+from coupling.explicit import explicit_matrix, march_explicit
+from coupling.inputs import InputError
+from coupling.moreau import march_moreau, moreau_matrices
+from coupling.newmark import march_newmark, newmark_matrices
+from coupling.response import Status
+from coupling.rows import rows_of
+from coupling.scene import Scene
+from coupling.state import new_problem, new_records
+from coupling.structure import linear_structure
+
+_STATUS = {
+    sy.DONE: Status.OK,
+    sy.DIVERGED: Status.DIVERGED,
+    sy.UNDECIDED: Status.UNDECIDED,
+    sy.PENETRATION: Status.PENETRATION,
+    sy.EVENT_BUDGET: Status.EVENT_BUDGET,
+}
+
+#: imbalance of the ledger above which a response is not to be used
+_OPEN_LEDGER = 0.1
+#: entries of the log of impacts between two looks at it
+_LOG = 100_000
+
+#: steps to the end of so many periods with this log; returns a code of coupling.system
+March = Callable[[np.ndarray, int], int]
+
+
+class SteppedRun:
+    """A run of a stepping method: matrices, motion and records."""
+
+    def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
+        """Raises InputError where samples do not fall on steps."""
+        steps = scene.solver.steps
+        if samples_per_period and steps % samples_per_period:
+            raise InputError(
+                f"solver.steps_per_period: {steps} is no multiple of {samples_per_period} samples a period"
+            )
+        structure = linear_structure(scene)
+        self.rows, displacement, velocity = rows_of(scene, structure)
+        system = sy.system_of(scene, self.rows)
+        self.system, self.motion = sy.start(
+            system, self.rows, displacement, velocity, structure.displacement, structure.velocity
+        )
+        self.records = new_records(self.rows, scene.time.periods, samples_per_period)
+        self.log = np.zeros((_LOG if events else 0, 6))
+        self.chunks: list[np.ndarray] = []
+        self.march = _march(scene, self)
+
+    def advance_to(self, periods: int) -> Status:
+        """Continue to the end of `periods`, or to what ends the run."""
+        counters = self.motion.counters
+        while True:
+            # with a log, period by period, so that it can be emptied
+            target = min(periods, int(counters[sy.PERIOD]) + 1) if len(self.log) else periods
+            code = self.march(self.log, target)
+            self.chunks.append(self.log[: counters[sy.LOGGED]].copy())
+            counters[sy.LOGGED] = 0
+            if code != sy.DONE:
+                return _STATUS[code]
+            if counters[sy.PERIOD] >= periods:
+                break
+        open_ledger = residual(self.records.ledger[: counters[sy.PERIOD] + 1], self._body_energy) > _OPEN_LEDGER
+        return Status.ENERGY if open_ledger else Status.OK
+
+    @property
+    def _body_energy(self) -> float:
+        return float(self.rows.mass.sum() * self.motion.extremes[1] ** 2 / 2)
+
+    @property
+    def peaks(self) -> np.ndarray:
+        """Largest |x| of the periods done, m."""
+        peaks: np.ndarray = self.records.peak[: self.motion.counters[sy.PERIOD]]
+        return peaks
+
+    def outcome(self) -> Outcome:
+        """What the run leaves behind."""
+        counters = self.motion.counters
+        numbers = {
+            "impacts": int(counters[sy.IMPACTS]), "steps": int(counters[sy.STEPS]), "solves": int(counters[sy.SOLVES])
+        }  # fmt: skip
+        return Outcome(
+            self.rows, self.records, int(counters[sy.PERIOD]), numbers["impacts"], float(self.motion.extremes[1]),
+            numbers, [chunk for chunk in self.chunks if len(chunk)], float(self.motion.extremes[0]),
+        )  # fmt: skip
+
+
+def begin_run(scene: Scene, events: bool, samples_per_period: int) -> Run:
+    """A run of the scene's method, at time zero. Raises InputError for what the method cannot do."""
+    if scene.solver.method == "solve_ivp":
+        from coupling.ivp import IvpRun
+
+        return IvpRun(scene, events, samples_per_period)
+    return SteppedRun(scene, events, samples_per_period)
+
+
+def _march(scene: Scene, run: SteppedRun) -> March:
+    solver, motion, records = scene.solver, run.motion, run.records
+    deepest, budget, problem = solver.deepest, solver.max_events, new_problem(len(run.rows.delassus))
+    if solver.method == "moreau":
+        theta = 0.5 if solver.theta is None else solver.theta
+        matrices = moreau_matrices(run.system, theta)
+        return lambda log, periods: march_moreau(
+            run.system, motion, records, log, problem, *matrices, theta, periods, budget, deepest
+        )
+    run.system, slow = sy.with_penalty(run.system, run.rows, scene)
+    if solver.method == "cosim":
+        return _cosimulation(scene, run, slow)
+    if solver.scheme in ("newmark", "hht"):
+        alpha = (-0.1 if solver.alpha is None else solver.alpha) if solver.scheme == "hht" else 0.0
+        implicit = newmark_matrices(run.system, alpha)
+        if solver.slip_velocity is None:
+            slow = np.zeros_like(slow)  # implicit: Coulomb's law as it is
+        return lambda log, periods: march_newmark(
+            run.system, motion, records, log, problem, *implicit, slow, periods, budget, deepest
+        )
+    inverse = explicit_matrix(run.system)
+    return lambda log, periods: march_explicit(
+        run.system, motion, records, log, inverse, slow, periods, budget, deepest
+    )
+
+
+def _cosimulation(scene: Scene, run: SteppedRun, slow: np.ndarray) -> March:
+    solver = scene.solver
+    matrices = cosimulation_matrices(run.system)
+    memory = np.zeros((3, 4 * run.system.modes + 2 + len(run.rows.delassus)))
+    gauss_seidel, hold = solver.exchange != "jacobi", 1 if solver.hold is None else solver.hold
+    return lambda log, periods: march_cosimulation(
+        run.system, run.motion, run.records, log, matrices, memory, slow, gauss_seidel, hold, solver.substeps or 10,
+        periods, solver.max_events, solver.deepest,
+    )  # fmt: skip

@@ -1,0 +1,105 @@
+"""Figures of the comparison of methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
+
+from modal.store import replacing
+
+_COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#65a30d", "#0e7490", "#7e22ce", "#be185d", "#a16207")
+_MARKERS = "*osD^v<>"
+
+
+def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
+    """A panel a scene: error against CPU time per period, and the model ladder if there is one."""
+    charts, ladder = result["charts"], result.get("ladder")
+    figure, axes = plt.subplots(2, 3, figsize=(16, 9.5), layout="constrained")
+    panels = list(axes.flat)
+    for panel, (name, chart) in zip(panels, charts.items(), strict=False):
+        _chart(panel, name, chart)
+    used = len(charts)
+    if ladder is not None:
+        _ladder(panels[used], ladder)
+        used += 1
+    for panel in panels[used:]:
+        panel.set_visible(False)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    _save(figure, path)
+
+
+def _chart(axes: Axes, name: str, chart: Mapping[str, Any]) -> None:
+    methods = list(dict.fromkeys(point["method"] for point in chart["points"]))
+    for method, colour, marker in zip(methods, _COLOURS, _MARKERS, strict=True):
+        points = [point for point in chart["points"] if point["method"] == method and point["time"]]
+        times = [1e6 * point["time"]["median"] for point in points]
+        errors = [max(point["error"], 1e-14) for point in points]
+        axes.loglog(
+            times, errors, marker + "-", color=colour, markersize=14 if marker == "*" else 5, label=method,
+            zorder=3 if marker == "*" else 2,
+        )  # fmt: skip
+    failed = sum(point["status"] != "ok" for point in chart["points"])
+    note = f"{failed} runs failed, and said so" if failed else ""
+    if not chart["repeats"]:
+        floor = chart["points"][0]["floor"]
+        axes.axhspan(1e-9, floor, color="#e2e8f0", zorder=0)
+        axes.set_ylim(bottom=floor / 100)
+        note += ("; " if note else "") + "grey: not to be told from zero (95 %)"
+    front = "exact on the Pareto front" if not chart["dominated_by"] else "exact NOT on the Pareto front"
+    axes.set_title(f"{name}\n{front}" + (f"; {note}" if note else ""), fontsize=10)
+    axes.set_xlabel("CPU time per period, µs")
+    axes.set_ylabel("error of the state" if chart["repeats"] else "error of the mean amplitude")
+    axes.grid(True, which="major", color="#e2e8f0")
+
+
+def _ladder(axes: Axes, ladder: Mapping[str, Any]) -> None:
+    times = [1e6 * time["median"] for time in ladder["time"]][:-1]
+    errors, floors = np.array(ladder["error"][:-1]), np.array(ladder["floor"][:-1])
+    axes.errorbar(times, errors, yerr=[np.minimum(floors, 0.9 * errors), floors], fmt="o", color=_COLOURS[0], capsize=2)
+    for count, time, error in zip(ladder["modes"], times, errors, strict=False):
+        axes.annotate(str(count), (time, error), (5, 5), textcoords="offset points", fontsize=9)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_title(f"model ladder: exact engine, n fixed-interface modes against {ladder['modes'][-1]}", fontsize=10)
+    axes.set_xlabel("CPU time per period, µs")
+    axes.set_ylabel("error of the mean amplitude")
+    axes.grid(True, which="major", color="#e2e8f0")
+
+
+def stability_figure(result: Mapping[str, Any], path: Path) -> None:
+    """A panel a part: measured edges of failure as points, analytic limits as lines."""
+    figure, axes = plt.subplots(2, 4, figsize=(19, 9), layout="constrained")
+    for panel, (name, part) in zip(axes.flat, result["parts"].items(), strict=True):
+        for (curve, values), colour in zip(part["curves"].items(), _COLOURS, strict=False):
+            line = curve in ("limit", "1 - duration / step")
+            panel.plot(
+                part["x"], values, "--" if line else "o", color="#7a7f87" if line else colour,
+                label="analytic limit" if curve == "limit" else curve,
+            )  # fmt: skip
+        if part["log"]:
+            panel.set_xscale("log")
+            panel.set_yscale("log")
+            panel.xaxis.set_minor_formatter(NullFormatter())
+            panel.yaxis.set_minor_formatter(NullFormatter())
+        panel.set_title(name)
+        panel.set_xlabel(part["x_label"])
+        panel.set_ylabel(part["y_label"])
+        panel.grid(True, which="major", color="#e2e8f0")
+        panel.legend(fontsize=9)
+    _save(figure, path)
+
+
+def _save(figure: Any, path: Path) -> None:
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=130, format="png")
+    plt.close(figure)

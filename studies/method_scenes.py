@@ -1,0 +1,113 @@
+"""Scenes and methods of the comparison of methods: speed against accuracy, and where methods fail."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+from coupling.inputs import validate
+from coupling.scene import Scene
+from studies import bench_scenes
+
+#: methods by the name in charts: options of [solver] besides the number of steps
+STEPPING: dict[str, dict[str, Any]] = {
+    "Moreau-Jean": {"method": "moreau"},
+    "penalty, central differences": {"method": "penalty"},
+    "penalty, Newmark": {"method": "penalty", "scheme": "newmark"},
+    "penalty, HHT": {"method": "penalty", "scheme": "hht"},
+    "co-simulation, Jacobi, hold 0": {"method": "cosim", "exchange": "jacobi", "hold": 0},
+    "co-simulation, Gauss-Seidel, hold 1": {"method": "cosim", "exchange": "gauss_seidel", "hold": 1},
+}
+
+
+def by(scene: Scene, **solver: Any) -> Scene:
+    """The scene with another [solver] table."""
+    return validate(Scene, scene.to_dict() | {"solver": solver}, "scene")
+
+
+def periodic(settle: int) -> Scene:
+    """One mode, one body, two impacts a period, settled."""
+    return bench_scenes.settled(bench_scenes.one_mode(), settle)
+
+
+def chatter() -> Scene:
+    """A ball on a shaken plate that comes to rest and is thrown up in every period."""
+    data = {
+        "structure": {"model": "prescribed", "displacement_amplitude": 1e-3},
+        "excitation": {"frequency": 17.0},
+        "gravity": {"orientation_deg": 90.0},
+        "cavity": [{"name": "c", "gap": 0.1}],
+        "damper": [{"cavity": "c", "mass": 1.0, "restitution": 0.5, "position": -0.0495}],
+    }
+    return validate(Scene, data, "scene")
+
+
+def single() -> Scene:
+    """One mode, one body with friction, below resonance: a response that never repeats."""
+    changes = {"damper.0.friction": 0.1, "gravity.acceleration": 9.81}
+    return bench_scenes.one_mode(0.99, 1.0).replace(changes)
+
+
+def double() -> Scene:
+    """Two bodies in a row that share the cavity of the single one."""
+    data = single().to_dict()
+    body = data["damper"][0] | {"mass": data["damper"][0]["mass"] / 2}
+    data["damper"] = [body | {"position": -data["cavity"][0]["gap"] / 4}, body]
+    return validate(Scene, data, "scene")
+
+
+def cluster(folder: Path, modes: int) -> Scene:
+    """The shipped cluster, of linear elements, as a reduced model (made in the folder once), with soft walls."""
+    file = folder / f"cluster_{modes}.h5"
+    if not file.is_file():
+        _cluster_model(file, modes)
+    data = {
+        "structure": {"model": "rom", "file": str(file)},
+        "excitation": {
+            "frequency": 0.99 * _first(file), "at": "shroud", "resonance_amplitude": bench_scenes.AMPLITUDE
+        },
+        "gravity": {"acceleration": 0.0},
+        "contact": {"law": "compliant", "stiffness": 3e7},
+        "cavity": [{"name": "c1", "gap": 0.5 * bench_scenes.AMPLITUDE, "floor": "c1_floor"}],
+        "damper": [{"cavity": "c1", "mass": 0.003, "restitution": 0.7}],
+    }  # fmt: skip
+    return validate(Scene, data, "scene")
+
+
+def _cluster_model(file: Path, modes: int) -> None:
+    from meshes.vane_cluster import SHIPPED
+    from studies.config import Case
+    from studies.pipeline import assemble, reduction
+
+    shutil.copy(SHIPPED, file.parent / "vane_cluster.msh")
+    text = Path(__file__).with_name("demo_case.toml").read_text(encoding="utf-8")
+    case = file.with_suffix(".toml")
+    case.write_text(text.replace("degree = 2", "degree = 1"), encoding="utf-8")
+    reduction(assemble(Case.load(case)), modes).save(file)
+
+
+def _first(file: Path) -> float:
+    from rom.reduced import ReducedModel
+
+    return float(ReducedModel.load(file).natural_frequencies_hz[0])
+
+
+def rod(folder: Path, modes: int) -> Path:
+    """Craig-Bampton model of a clamped unit rod (mass, length, stiffness 1) in closed form, interface "tip"."""
+    import numpy as np
+
+    from rom.reduced import ReducedModel
+
+    k = np.arange(1, modes + 1)
+    mass, stiffness = np.eye(modes + 1), np.diag(np.r_[1.0, (k * math.pi) ** 2])
+    mass[0, 0] = 1 / 3
+    mass[0, 1:] = mass[1:, 0] = math.sqrt(2) * (-1.0) ** (k + 1) / (k * math.pi)
+    file = folder / f"rod_{modes}.h5"
+    # damping in proportion to stiffness: 1 % in the first mode
+    model = ReducedModel.from_matrices(
+        mass, stiffness, {"tip": np.eye(modes + 1)[0]}, damping=0.02 / (math.pi / 2) * stiffness
+    )
+    model.save(file)
+    return file

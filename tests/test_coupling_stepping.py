@@ -1,0 +1,244 @@
+"""Stepping methods and solve_ivp: orders by theory, convergence to the exact engine, and what they say when they fail.
+
+Orders: Newmark (1959), Hilber, Hughes and Taylor (1977), Jean (1999); held inputs of co-simulation, Kuebler and
+Schiehlen (2000).
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from coupling.engine import simulate
+from coupling.inputs import InputError, validate
+from coupling.response import Status
+from coupling.scene import Scene
+
+METHODS = {
+    "moreau": {"method": "moreau"},
+    "explicit": {"method": "penalty"},
+    "newmark": {"method": "penalty", "scheme": "newmark"},
+    "hht": {"method": "penalty", "scheme": "hht"},
+    "jacobi": {"method": "cosim", "exchange": "jacobi"},
+    "gauss-seidel": {"method": "cosim"},
+}
+STRUCTURE = {"model": "rigid", "mass": 1.0, "stiffness": (2 * math.pi) ** 2, "damping_ratio": 0.02}
+
+
+def made(data):
+    return validate(Scene, data, "scene")
+
+
+def by(scene, **solver):
+    data = scene.to_dict()
+    data["solver"] = solver
+    return made(data)
+
+
+@pytest.fixture(scope="module")
+def periodic():
+    """Two impacts a period from the first period on."""
+    scene = made(
+        {"structure": STRUCTURE, "excitation": {"frequency": 1.0, "resonance_amplitude": 1.0},
+         "gravity": {"acceleration": 0.0}, "cavity": [{"name": "c", "gap": 1.0}],
+         "damper": [{"cavity": "c", "mass": 0.05, "restitution": 0.7}],
+         "time": {"periods": 400}}
+    )  # fmt: skip
+    end = simulate(scene)
+    assert end.impacts_per_period == 2
+    state = {
+        "initial.displacement": end.section[-1, 0], "initial.velocity": end.section[-1, 1],
+        "damper.0.position": end.slip[-1, 0], "damper.0.velocity": end.slip_velocity[-1, 0],
+        "time.periods": 4, "time.transient": 0,
+    }  # fmt: skip
+    return scene.replace({key: value if "time" in key else float(value) for key, value in state.items()})
+
+
+@pytest.fixture(scope="module")
+def chatter():
+    """A ball on a shaken plate that comes to rest in every period."""
+    return made(
+        {"structure": {"model": "prescribed", "displacement_amplitude": 1e-3}, "excitation": {"frequency": 17.0},
+         "gravity": {"orientation_deg": 90.0}, "cavity": [{"name": "c", "gap": 0.1}],
+         "damper": [{"cavity": "c", "mass": 1.0, "restitution": 0.5, "position": -0.0495}],
+         "time": {"periods": 8, "transient": 0}}
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def stick_slip():
+    """A body that sticks and slips on its floor, far from the walls."""
+    return made(
+        {"structure": STRUCTURE, "excitation": {"frequency": 0.8, "force": 1.0}, "cavity": [{"name": "c", "gap": 1.0}],
+         "damper": [{"cavity": "c", "mass": 0.3, "friction": 0.02}], "time": {"periods": 5, "transient": 0}}
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """A body that stays on its soft wall all the time: a linear system of two coupled units."""
+    return made(
+        {"structure": STRUCTURE, "excitation": {"frequency": 1.3, "force": 3.0}, "gravity": {"acceleration": 0.0},
+         "cavity": [{"name": "c", "gap": 2.0}], "contact": {"law": "compliant", "stiffness": 0.5},
+         "damper": [{"cavity": "c", "mass": 0.5, "position": -1.0, "velocity": -1.0}],
+         "time": {"periods": 1, "transient": 0}}
+    )  # fmt: skip
+
+
+def states(response):
+    return np.column_stack([response.section, response.slip, response.slip_velocity])
+
+
+def error(scene, exact, **solver):
+    response = simulate(by(scene, **solver))
+    assert response.status is Status.OK, response.status
+    size = np.abs(states(exact)).max(axis=0) + np.finfo(float).tiny
+    return float((np.abs(states(response) - states(exact))[-1] / size).max())
+
+
+@pytest.mark.parametrize(
+    ("solver", "order"),
+    [
+        ({"method": "moreau"}, 2), ({"method": "moreau", "theta": 1.0}, 1),
+        (METHODS["explicit"], 2), (METHODS["newmark"], 2), (METHODS["hht"], 2),
+        (METHODS["jacobi"] | {"hold": 0}, 1), (METHODS["jacobi"] | {"hold": 1}, 2),
+        (METHODS["gauss-seidel"] | {"hold": 0}, 1), (METHODS["gauss-seidel"] | {"hold": 1}, 2),
+    ],
+)  # fmt: skip
+def test_orders_of_the_smooth_motion(pressed, solver, order):
+    exact = simulate(pressed)
+    assert exact.impacts_per_period == 1
+    steps = np.array([200, 400, 800])
+    errors = [error(pressed, exact, **solver, steps_per_period=int(count)) for count in steps]
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(order, abs=0.2)
+
+
+def test_moreau_is_of_first_order_over_impacts(periodic):
+    exact = simulate(periodic)
+    # averages over many steps, as an impact falls anywhere in its step
+    errors = [
+        np.mean([error(periodic, exact, method="moreau", steps_per_period=count + 7 * i) for i in range(40)])
+        for count in (200, 800, 3200)
+    ]
+    assert -np.polyfit(np.log([200, 800, 3200]), np.log(errors), 1)[0] == pytest.approx(1, abs=0.2)
+
+
+def test_penalty_without_a_stiffness_is_of_order_two_thirds(periodic):
+    """Time and depth of a contact are of the size of its duration, 2 steps^(1/3) steps."""
+    exact = simulate(periodic)
+    errors = [
+        np.mean([error(periodic, exact, method="penalty", steps_per_period=count + 7 * i) for i in range(10)])
+        for count in (2000, 8000, 32000)
+    ]
+    assert -np.polyfit(np.log([2000, 8000, 32000]), np.log(errors), 1)[0] == pytest.approx(2 / 3, abs=0.2)
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize(("scene", "tolerance"), [("periodic", 0.06), ("stick_slip", 1e-3)])
+def test_converges_to_the_exact_engine(scene, tolerance, name, request):
+    scene = request.getfixturevalue(scene)
+    exact = simulate(scene)
+    coarse, fine = (error(scene, exact, **METHODS[name], steps_per_period=count) for count in (2000, 32000))
+    assert fine < min(tolerance, 0.4 * coarse)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_chatter_comes_to_rest_like_the_exact_engine(chatter, name):
+    exact = simulate(chatter)
+    response = simulate(by(chatter, **METHODS[name], steps_per_period=20000))
+    assert response.status is Status.OK
+    assert response.energy["impact"] + response.energy["contact"] == pytest.approx(exact.energy["impact"], rel=2e-2)
+    assert np.abs(response.slip - exact.slip).max() < 2e-3 * exact.amplitude_max
+
+
+@pytest.mark.parametrize("scene", ["periodic", "chatter", "stick_slip", "pressed"])
+def test_solve_ivp_follows_the_exact_engine(scene, request):
+    scene = request.getfixturevalue(scene)
+    exact, response = simulate(scene), simulate(by(scene, method="solve_ivp", rtol=1e-10))
+    assert response.status is Status.OK
+    size = np.abs(states(exact)).max(axis=0)
+    assert (np.abs(states(response) - states(exact)) <= 1e-5 * size + 1e-12).all()
+    for name in ("excitation", "friction", "impact", "contact"):
+        assert response.energy[name] == pytest.approx(exact.energy[name], rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["moreau", "newmark"])
+def test_ledgers_of_energy_keeping_schemes_close(periodic, name):
+    assert simulate(by(periodic, **METHODS[name], steps_per_period=500)).energy_residual < 1e-12
+
+
+@pytest.mark.parametrize("name", ["moreau", "newmark", "explicit"])
+def test_bodies_in_one_cavity_share_their_losses(periodic, name):
+    """Two bodies in a row, whose motion is soon chaotic: mean amplitude and attached mass within their spread."""
+    data = periodic.to_dict() | {"time": {"periods": 400, "transient": 100}}
+    body = data["damper"][0] | {"velocity": 0.0}
+    data["damper"] = [body | {"position": -0.2, "mass": 0.02}, body | {"position": 0.1, "mass": 0.03}]
+    scene = made(data)
+    exact = simulate(scene)
+    response = simulate(by(scene, **METHODS[name], steps_per_period=2000))
+    assert response.status is Status.OK and response.energy_residual < 1e-3
+    assert response.amplitude_mean == pytest.approx(exact.amplitude_mean, rel=0.08)
+
+
+def test_impacts_are_logged(periodic):
+    exact = simulate(periodic, events=True)
+    impacts = [event for event in exact.event_list if event.kind == "impact"]
+    for solver in (METHODS["moreau"], METHODS["newmark"], {"method": "solve_ivp"}):
+        steps = {} if solver["method"] == "solve_ivp" else {"steps_per_period": 20000}
+        ours = simulate(by(periodic, **solver, **steps), events=True).event_list
+        assert len(ours) == len(impacts)
+        for one, other in zip(ours, impacts, strict=True):
+            assert one.side == other.side
+            assert one.time == pytest.approx(other.time, abs=1e-2)
+            assert one.relative_velocity_before == pytest.approx(other.relative_velocity_before, rel=0.05)
+            assert one.impulse == pytest.approx(other.impulse, rel=0.05)
+
+
+def test_samples_are_those_of_the_exact_engine(stick_slip):
+    exact = simulate(stick_slip, samples_per_period=20)
+    for solver in ({"method": "moreau", "steps_per_period": 4000}, {"method": "solve_ivp", "steps_per_period": 40}):
+        response = simulate(by(stick_slip, **solver), samples_per_period=20)
+        np.testing.assert_allclose(response.displacement, exact.displacement, atol=1e-3 * exact.amplitude_max)
+    with pytest.raises(InputError, match="no multiple"):
+        simulate(by(stick_slip, method="moreau", steps_per_period=50), samples_per_period=20)
+
+
+def test_beyond_its_limit_the_explicit_method_says_so(periodic):
+    # omega_max h = 2 at pi steps a period: beyond it the motion of 3.08 steps would grow by e every 2 steps
+    stiff = periodic.replace({"structure.stiffness": (2 * math.pi * 10) ** 2, "time.periods": 200})
+    response = simulate(by(stiff, method="penalty", steps_per_period=30))
+    assert response.status in (Status.DIVERGED, Status.PENETRATION, Status.ENERGY)
+    assert all(np.isfinite(value) for value in (response.amplitude_max, *response.energy.values()))
+
+
+def test_a_missed_impact_is_flagged():
+    """A body that the wall meets and leaves within one step: the solver sees no sign change, and the check sees it."""
+    scene = made(
+        {"structure": {"model": "prescribed", "displacement_amplitude": 1.0}, "excitation": {"frequency": 1.0},
+         "gravity": {"acceleration": 0.0}, "cavity": [{"name": "c", "gap": 0.2}],
+         "damper": [{"cavity": "c", "mass": 1.0, "velocity": 20.0, "restitution": 0.5}],
+         "time": {"periods": 1, "transient": 0}}
+    )  # fmt: skip
+    assert simulate(scene).status is Status.OK
+    response = simulate(by(scene, method="moreau", steps_per_period=10))
+    assert response.status is Status.PENETRATION
+
+
+def test_without_completion_chatter_spends_the_budget(chatter):
+    response = simulate(by(chatter, method="solve_ivp", complete_chatter=False, max_events=60, rtol=1e-7))
+    assert response.status in (Status.EVENT_BUDGET, Status.PENETRATION, Status.UNDECIDED)
+
+
+@pytest.mark.parametrize(
+    ("solver", "words"),
+    [
+        ({"method": "penalty", "theta": 0.5}, "is for method moreau"),
+        ({"method": "exact", "steps_per_period": 100}, "is for method moreau or penalty"),
+        ({"method": "penalty", "alpha": -0.1}, 'scheme = "hht"'),
+        ({"method": "cosim", "contact_steps": 10.0, "contact_stiffness": 1.0}, "one of"),
+        ({"method": "verlet"}, "solver.method"),
+    ],
+)
+def test_options_of_another_method_are_refused(stick_slip, solver, words):
+    with pytest.raises(InputError, match=words):
+        by(stick_slip, **solver)
