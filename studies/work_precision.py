@@ -31,6 +31,8 @@ from studies.timing import Clock, in_turns, machine, seconds, spread
 _SEED = 20_260_102
 #: samples a period by which periodic responses are compared; also the least number of solve_ivp's steps
 _SAMPLES = 10
+#: periods over which models are compared, before chaos parts them, and the body's speed at the start (m/s)
+_FIRST, _START = 3, 0.3
 EXACT, IVP = "exact engine", "solve_ivp, DOP853 with events"
 
 
@@ -192,22 +194,30 @@ def _clock(scene: Scene, lengths: tuple[int, int]) -> float:
 
 
 def _ladder(folder: Path, effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
-    """The exact engine on models of the cluster with more and more modes, against the finest."""
-    finest = scenes.cluster(folder, effort.ladder[-1])
+    """The cluster from a start with an impact: reduced models by the exact engine, the whole mesh step by step.
+
+    Error: largest of the periods' peaks over the first periods, against the finest reduced model, relative.
+    """
+    finest = scenes.cluster(folder, effort.ladder[-1]).replace({"damper.0.velocity": _START})
     made = {count: finest.replace({"structure.modes": count}) for count in effort.ladder}
-    clocks: dict[str, Clock] = {str(count): partial(_clock, scene, (500, 3000)) for count, scene in made.items()}
+    clocks: dict[str, Clock] = {str(count): partial(_clock, scene, (500, 2000)) for count, scene in made.items()}
     times = in_turns(clocks, effort.rounds, rng)
-    responses = {count: _run(scene, effort.means, False) for count, scene in made.items()}
-    best = responses[effort.ladder[-1]]
+    peaks = {count: _run(scene, _FIRST, True).peak for count, scene in made.items()}
+    best = peaks[effort.ladder[-1]]
+    errors = [float(np.abs(peak / best - 1).max()) for peak in peaks.values()]
+    full = scenes.cluster_elements(folder, effort.ladder[-1], finest, _FIRST)
+    # the least number of modes from which on all models are good enough
+    enough = effort.ladder[max((i + 1 for i, error in enumerate(errors) if error > 0.02), default=0)]
+    medians = dict(zip(effort.ladder, (float(np.median(values)) for values in times.values()), strict=True))
+    per_period = full.seconds_per_step * full.steps
     return {
-        "modes": list(effort.ladder),
-        "time": [spread(values) for values in times.values()],
-        "error": [abs(response.amplitude_mean / best.amplitude_mean - 1) for response in responses.values()],
-        "floor": [
-            float(np.hypot(response.amplitude_mean_confidence or 0.0, best.amplitude_mean_confidence or 0.0))
-            / best.amplitude_mean
-            for response in responses.values()
-        ],
+        "modes": list(effort.ladder), "time": [spread(values) for values in times.values()], "error": errors,
+        "full": {
+            "free_dofs": full.size, "steps": full.steps, "time": per_period,
+            "error": float(np.abs(full.peak / best - 1).max()),
+            "curve_days": full.curve_seconds(1000, 61) / 86400,
+        },
+        "speed_up": {"modes": enough, "factor": per_period / medians[enough]},
     }  # fmt: skip
 
 
