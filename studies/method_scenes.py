@@ -69,11 +69,11 @@ def cluster(folder: Path, modes: int) -> Scene:
     data = {
         "structure": {"model": "rom", "file": str(file)},
         "excitation": {
-            "frequency": 0.99 * _first(file), "at": "shroud", "resonance_amplitude": bench_scenes.AMPLITUDE
+            "frequency": _first(file), "at": "shroud", "resonance_amplitude": bench_scenes.AMPLITUDE
         },
         "gravity": {"acceleration": 0.0},
         "contact": {"law": "compliant", "stiffness": 3e7},
-        "cavity": [{"name": "c1", "gap": 0.5 * bench_scenes.AMPLITUDE, "floor": "c1_floor"}],
+        "cavity": [{"name": "c1", "gap": 0.2 * bench_scenes.AMPLITUDE, "floor": "c1_floor"}],
         "damper": [{"cavity": "c1", "mass": 0.003, "restitution": 0.7}],
     }  # fmt: skip
     return validate(Scene, data, "scene")
