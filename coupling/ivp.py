@@ -99,6 +99,9 @@ class IvpRun:
         if not self.begun:
             self.begun = True
             self._record()
+            if len(self.records.samples):
+                q = self.y[: self.size]
+                self.records.samples[0] = [self._response(0.0, q), *(self.system.J[: len(self.rows.mass)] @ q)]
             if not self._decide(self.time, -1, ""):
                 return Status.UNDECIDED
         with np.errstate(all="ignore"):

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 import shutil
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coupling.inputs import validate
 from coupling.scene import Scene
 from studies import bench_scenes
+
+if TYPE_CHECKING:
+    from studies.full_elements import ExplicitRun
 
 #: methods by the name in charts: options of [solver] besides the number of steps
 STEPPING: dict[str, dict[str, Any]] = {
@@ -66,11 +69,11 @@ def cluster(folder: Path, modes: int) -> Scene:
     data = {
         "structure": {"model": "rom", "file": str(file)},
         "excitation": {
-            "frequency": 0.99 * _first(file), "at": "shroud", "resonance_amplitude": bench_scenes.AMPLITUDE
+            "frequency": _first(file), "at": "shroud", "resonance_amplitude": bench_scenes.AMPLITUDE
         },
         "gravity": {"acceleration": 0.0},
         "contact": {"law": "compliant", "stiffness": 3e7},
-        "cavity": [{"name": "c1", "gap": 0.5 * bench_scenes.AMPLITUDE, "floor": "c1_floor"}],
+        "cavity": [{"name": "c1", "gap": 0.2 * bench_scenes.AMPLITUDE, "floor": "c1_floor"}],
         "damper": [{"cavity": "c1", "mass": 0.003, "restitution": 0.7}],
     }  # fmt: skip
     return validate(Scene, data, "scene")
@@ -86,6 +89,18 @@ def _cluster_model(file: Path, modes: int) -> None:
     case = file.with_suffix(".toml")
     case.write_text(text.replace("degree = 2", "degree = 1"), encoding="utf-8")
     reduction(assemble(Case.load(case)), modes).save(file)
+
+
+def cluster_elements(folder: Path, modes: int, scene: Scene, periods: int) -> ExplicitRun:
+    """The scene of `cluster` on its mesh, without reduction."""
+    from studies.config import Case
+    from studies.full_elements import explicit_run
+    from studies.pipeline import assemble, interface
+
+    case = Case.load(folder / f"cluster_{modes}.toml")
+    matrices = assemble(case).matrices
+    first = 2 * math.pi * _first(folder / f"cluster_{modes}.h5")
+    return explicit_run(matrices, interface(case, matrices), scene, first, periods)
 
 
 def _first(file: Path) -> float:

@@ -51,7 +51,7 @@ def test_touches_shorter_than_a_step_are_missed_by_signs_alone():
 
 
 def test_work_precision_leaves_its_results(tmp_path, capsys):
-    effort = work_precision.Effort(1, (100, 1000), (1e-6,), 2, 60, 200, 2, 2000, None, ())
+    effort = work_precision.Effort(1, (100, 1000), (1e-6,), 2, 60, 200, 2, 1e5, 2000, None, ())
     result = work_precision.run_work_precision(tmp_path, effort)
     assert json.loads((tmp_path / "work_precision.json").read_text()) == json.loads(json.dumps(result))
     assert (tmp_path / "work_precision.png").read_bytes().startswith(b"\x89PNG")
