@@ -104,6 +104,9 @@ def modal_figure(result: Mapping[str, Any], path: Path) -> None:
             values = [f[part] / 1e9 if part == "peak_bytes" else f[part]["cpu_s"] for _, f in done]
             axes.loglog([dofs for dofs, _ in done], values, "o-", color=colours[name], label=label)
         axes.set_title(title)
+        dofs = [entry["assembly"]["dofs"] for entry in sizes]
+        axes.set_xticks(dofs, [f"{count:,}" for count in dofs])
+        axes.set_xticks([], minor=True)
         axes.set_xlabel("degrees of freedom")
         axes.set_ylabel("GB" if part == "peak_bytes" else "processor time, s")
         axes.grid(True, which="major", color="#e2e8f0")
