@@ -1,7 +1,8 @@
 """Speed and accuracy of the exact engine: against a hand-written loop, against solve_ivp, with modes, with bodies.
 
-Times are CPU times of one thread per excitation period, from runs of two lengths, so that set-up drops out. Whatever is
-divided by each other is measured in turns, in a new random order every round; ratios are medians over the rounds.
+Times are CPU times of one thread per excitation period, between two periods of a run that has met its subsystems, so
+that set-up drops out. Whatever is divided by each other is measured in turns, in a new random order every round; ratios
+are medians over the rounds.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from coupling.engine import simulate
 from coupling.scene import Scene
 from modal.store import replacing
 from studies import bench_scenes as scenes
-from studies.bench_inside import awake_modes, time_of_parts
+from studies.bench_inside import awake_modes, time_of_a_period, time_of_parts
 from studies.hand_loop import ImpactOscillator, complete_loop, lean_loop, plain_loop
 from studies.rivals import solve_with_events, truth
 from studies.terminal import progress
@@ -111,7 +112,7 @@ def _one_mode(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
     case = ImpactOscillator.of(scene)
     loops = {"plain loop": plain_loop, "lean loop": lean_loop, "complete loop": complete_loop}
     solvers = {f"solve_ivp {rtol:.0e}": partial(solve_with_events, rtol=rtol) for rtol in _TOLERANCES}
-    clocks: dict[str, Clock] = {"engine": partial(_engine_clock, scene, effort.engine)}
+    clocks: dict[str, Clock] = {"engine": partial(time_of_a_period, scene, effort.engine)}
     clocks |= {name: partial(_clock, loop, case, effort.loop) for name, loop in loops.items()}
     clocks |= {name: partial(_clock, solver, case, effort.solver) for name, solver in solvers.items()}
     times = in_turns(clocks, effort.rounds, rng)
@@ -143,7 +144,7 @@ def _modes(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
             made = [scenes.reduced(Path(folder), count, use) for count in effort.modes]
             lengths = effort.hard if use == _HARD else effort.calm
             clocks: dict[str, Clock] = {
-                str(count): partial(_engine_clock, scene, lengths)
+                str(count): partial(time_of_a_period, scene, lengths)
                 for count, scene in zip(effort.modes, made, strict=True)
             }
             times = in_turns(clocks, effort.rounds, rng)
@@ -168,7 +169,9 @@ def _bodies(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
     """Time against the number of bodies in cavities of their own."""
     made = {str(count): scenes.bodies(count) for count in _COUNTS}
     lengths = (effort.engine[0], sum(effort.engine) // 2)
-    times = in_turns({name: partial(_engine_clock, scene, lengths) for name, scene in made.items()}, effort.rounds, rng)
+    times = in_turns(
+        {name: partial(time_of_a_period, scene, lengths) for name, scene in made.items()}, effort.rounds, rng
+    )
     responses = [simulate(scene.replace({"time.periods": lengths[1]})) for scene in made.values()]
     return {
         "counts": list(_COUNTS),
@@ -190,7 +193,7 @@ def _costs(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
     differ in their numbers; timed: seconds a period of the engine's search and account, and what is left of it.
     """
     made = [scenes.one_mode(*factors) for factors in _VARIED]
-    clocks: dict[str, Clock] = {str(i): partial(_engine_clock, scene, effort.engine) for i, scene in enumerate(made)}
+    clocks: dict[str, Clock] = {str(i): partial(time_of_a_period, scene, effort.engine) for i, scene in enumerate(made)}
     times = np.array([np.median(values) for values in in_turns(clocks, effort.rounds, rng).values()])
     counts = np.array([_counts(scene, effort.engine) for scene in made])
     # relative errors count, so that the cheap scenes have their say
@@ -213,11 +216,6 @@ def _counts(scene: Scene, lengths: tuple[int, int]) -> tuple[float, float, float
     span = lengths[1] - lengths[0]
     evaluations = long.counters["evaluations"] - short.counters["evaluations"]
     return 1.0, (long.events - short.events) / span, evaluations / span
-
-
-def _engine_clock(scene: Scene, lengths: tuple[int, int]) -> float:
-    short, long = (seconds(simulate, scene.replace({"time.periods": periods})) for periods in lengths)
-    return (long - short) / (lengths[1] - lengths[0])
 
 
 def _clock(method: Callable[..., Any], case: ImpactOscillator, periods: int) -> float:

@@ -1,4 +1,4 @@
-"""What only the engine's inside can tell a benchmark: modes that are awake, time of its parts.
+"""What only the engine's inside can tell a benchmark: modes that are awake, time of a period and of its parts.
 
 The one file of `studies` that reaches behind `coupling.engine.simulate`.
 """
@@ -28,6 +28,14 @@ def awake_modes(scene: Scene, first: int, last: int) -> float:
         run.advance(period, scene.solver.max_events)
         total += int(run.state.counters[state.AWAKE]) - 1  # the first is the excitation
     return total / (last - first)
+
+
+def time_of_a_period(scene: Scene, lengths: tuple[int, int]) -> float:
+    """Mean seconds of the periods from the first to the second of two, in one run."""
+    first, last = lengths
+    run = _begun(scene, last)
+    run.advance(first, scene.solver.max_events)
+    return seconds(run.advance, last, scene.solver.max_events) / (last - first)
 
 
 def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
