@@ -138,7 +138,11 @@ def test_open_choice_of_the_response_is_refused(tmp_path):
         ("count = 10", "min_frequency = 1.0", "modes: min_frequency: expected a max_frequency above it"),
         ("count = 10", "min_frequency = 5.0\nmax_frequency = 5.0", "modes: min_frequency: expected a max_frequency"),
         ("count = 10", 'at = "shroud"', "modes.at: no interface 'shroud'; known: c1"),
-        ('"c1_floor"', '"c1_floor"\nkind = "mean"', "interface.c1.kind: should be 'average', 'rigid', 'node' or 'full'"),
+        (
+            '"c1_floor"',
+            '"c1_floor"\nkind = "mean"',
+            "interface.c1.kind: should be 'average', 'rigid', 'node' or 'full'",
+        ),
         ('facets = "c1_floor"\n', "", "interface.c1.facets: missing"),
         ('["clamp"]', '"clamp"', "support.clamped: expected a list of facet groups"),
         ('["clamp"]', '{clamp = "w"}', "support.clamped: clamp: expected components out of 'xyz', not 'w'"),
