@@ -201,8 +201,7 @@ def natural_ladder(
 
 def _least(model: ReducedModel) -> int:
     """The fewest natural modes of a model: one, or its rigid motions."""
-    natural = model.natural_frequencies_hz
-    return max(1, int(np.count_nonzero(natural < 1e-6 * natural[-1])))
+    return max(1, model.rigid_modes)
 
 
 def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:

@@ -164,6 +164,12 @@ class ReducedModel:
         return np.sqrt(np.maximum(self._eigenvalues, 0.0)) / (2.0 * np.pi)
 
     @property
+    def rigid_modes(self) -> int:
+        """How many natural frequencies vanish beside the highest."""
+        natural = self.natural_frequencies_hz
+        return int(np.count_nonzero(natural < 1e-6 * natural[-1]))
+
+    @property
     def static_stiffness(self) -> np.ndarray:
         """(k, k) N/m, forces at the interface for unit displacements of it, everything else free.
 

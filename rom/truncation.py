@@ -49,15 +49,10 @@ def basis_ladder(
     rich: ReducedModel, basis: str, frequencies_hz: np.ndarray, labels: Sequence[str] | None = None
 ) -> list[Rung]:
     """All models of a basis out of `rich_model`, each against that."""
-    least = 0 if basis == "craig-bampton" else max(_rigid_count(rich), int(basis != "rubin"))
+    least = 0 if basis == "craig-bampton" else max(rich.rigid_modes, int(basis != "rubin"))
     rungs = []
     for modes in range(least, rich.modes + 1):
         model = basis_model(rich, basis, modes)
         errors = frf_errors(model, rich, frequencies_hz, labels)
         rungs.append(Rung(modes, model.size, float(errors.max()), 0.0))
     return rungs
-
-
-def _rigid_count(model: ReducedModel) -> int:
-    natural = model.natural_frequencies_hz
-    return int(np.count_nonzero(natural < 1e-6 * natural[-1]))

@@ -286,7 +286,5 @@ def reduction(
 
 
 def _of_interest(model: ReducedModel, max_frequency: float | None) -> np.ndarray:
-    natural = model.natural_frequencies_hz
-    elastic = natural[natural > 1e-6 * natural[-1]]
-    top = max_frequency or 1.5 * float(elastic[0])
-    return grid(model, 0.0 if elastic.size == natural.size else 0.05 * top, top)
+    top = max_frequency or 1.5 * float(model.natural_frequencies_hz[model.rigid_modes])
+    return grid(model, 0.05 * top if model.rigid_modes else 0.0, top)
