@@ -16,7 +16,7 @@ import numpy as np
 
 from modal.correlation import MeasuredShapes
 from modal.frf import Frf, FrfError
-from modal.store import replacing
+from modal.store import replacing, write_csv
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".bunv")
 _PLACE = ("x", "y", "z", "dx", "dy", "dz")
@@ -51,11 +51,11 @@ def write_shapes(shapes: MeasuredShapes, path: str | os.PathLike[str]) -> None:
         _shapes_to_universal(shapes, target)
         return
     names = [f"mode {i + 1}" if np.isnan(f) else repr(float(f)) for i, f in enumerate(shapes.frequencies_hz)]
-    with replacing(target) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow([*_PLACE, *names])
-        for point, direction, values in zip(shapes.points, shapes.directions, shapes.shapes.T, strict=True):
-            writer.writerow([*point.tolist(), *direction.tolist(), *(str(v).strip("()") for v in values.tolist())])
+    rows = (
+        [*point.tolist(), *direction.tolist(), *(str(v).strip("()") for v in values.tolist())]
+        for point, direction, values in zip(shapes.points, shapes.directions, shapes.shapes.T, strict=True)
+    )
+    write_csv(target, [*_PLACE, *names], rows)
 
 
 def read_frf(path: str | os.PathLike[str], quantity: str = "receptance") -> Frf:
@@ -86,10 +86,7 @@ def write_frf(frf: Frf, path: str | os.PathLike[str]) -> None:
         return
     columns = [frf.frequencies_hz, *(part for response in frf.values for part in (response.real, response.imag))]
     names = ["frequency_hz", *(f"{part}_{i}" for i in range(len(frf.values)) for part in ("real", "imag"))]
-    with replacing(target) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(names)
-        writer.writerows(np.column_stack(columns).tolist())
+    write_csv(target, names, np.column_stack(columns).tolist())
 
 
 def _existing(path: str | os.PathLike[str]) -> Path:

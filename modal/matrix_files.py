@@ -15,7 +15,7 @@ import numpy as np
 from scipy import io, sparse
 
 from modal.matrices import MatricesError, Patch, SystemMatrices
-from modal.store import replacing
+from modal.store import replacing, write_csv
 
 _COMPONENTS = "xyz"
 
@@ -75,17 +75,17 @@ def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> No
         with replacing(home / f"{name}.mtx") as temporary:
             io.mmwrite(str(temporary), whole, symmetry="symmetric", precision=17)
     nodes = [[index, *xyz] for index, xyz in enumerate(matrices.coordinates.tolist(), 1)]
-    _write(home / "nodes.csv", ("node", "x", "y", "z"), nodes)
+    write_csv(home / "nodes.csv", ("node", "x", "y", "z"), nodes)
     entries = [
         [label, int(node) + 1, float(weight)]
         for label, patch in matrices.patches.items()
         for node, weight in zip(patch.nodes, patch.weights, strict=True)
     ]
-    _write(home / "sets.csv", ("set", "node", "weight"), entries)
+    write_csv(home / "sets.csv", ("set", "node", "weight"), entries)
     held: dict[int, str] = {}
     for dof in matrices.fixed.tolist():
         held[dof // 3 + 1] = held.get(dof // 3 + 1, "") + _COMPONENTS[dof % 3]
-    _write(home / "fixed.csv", ("node", "components"), [list(item) for item in held.items()])
+    write_csv(home / "fixed.csv", ("node", "components"), [list(item) for item in held.items()])
 
 
 def _system(
@@ -181,10 +181,3 @@ def _rows(path: Path, columns: tuple[str, ...]) -> list[list[str]]:
         if len(row) < len(columns):
             raise MatricesError(f"{path}: row {number} has {len(row)} columns; expected {', '.join(columns)}")
     return rows
-
-
-def _write(path: Path, header: tuple[str, ...], rows: list[list[object]]) -> None:
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(header)
-        writer.writerows(rows)

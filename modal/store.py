@@ -1,4 +1,4 @@
-"""Records on disk: one HDF5 layout for every result, readable by xarray and netCDF tools.
+"""Records on disk: one HDF5 layout for every result, readable by xarray and netCDF tools; tables and plain data.
 
 The ground floor of the project: it knows h5py and nothing else of ours, so that every stage may write its records the
 same way. A record is a set of named variables with dimensions and units, and flat attributes.
@@ -7,10 +7,12 @@ same way. A record is a set of named variables with dimensions and units, and fl
 from __future__ import annotations
 
 import contextlib
+import csv
 import json
+import math
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -53,6 +55,34 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
+    """Write a table: one line of names, then the rows."""
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(header)
+        writer.writerows(rows)
+
+
+def write_json(path: str | os.PathLike[str], data: Any) -> None:
+    """Write finite plain data as JSON."""
+    with replacing(path) as temporary:
+        temporary.write_text(json_text(data), encoding="utf-8")
+
+
+def json_text(data: Any) -> str:
+    """Finite plain data as JSON. Raises ValueError for nan and infinity, which it does not know."""
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def finite(data: Any) -> Any:
+    """Plain data with None for what is not finite."""
+    if isinstance(data, Mapping):
+        return {key: finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def save(

@@ -7,8 +7,6 @@ are medians over the rounds.
 
 from __future__ import annotations
 
-import csv
-import json
 import tempfile
 import time
 from collections.abc import Callable, Mapping
@@ -22,7 +20,7 @@ from scipy.optimize import nnls
 
 from coupling.engine import simulate
 from coupling.scene import Scene
-from modal.store import replacing
+from modal.store import write_csv, write_json
 from studies import bench_scenes as scenes
 from studies.bench_inside import awake_modes, time_of_a_period, time_of_parts
 from studies.hand_loop import ImpactOscillator, complete_loop, lean_loop, plain_loop
@@ -76,8 +74,7 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     from studies.bench_figures import one_mode_figure, scaling_figure
 
     folder.mkdir(parents=True, exist_ok=True)
-    with replacing(folder / "bench_engine.json") as temporary:
-        temporary.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_json(folder / "bench_engine.json", result)
     _write_csv(result, folder / "bench_engine.csv")
     one_mode_figure(result, folder / "bench_one_mode.png")
     scaling_figure(result, folder / "bench_scaling.png")
@@ -244,8 +241,6 @@ def _write_csv(result: Mapping[str, Any], path: Path) -> None:
     costs = result["costs"]
     lines += [("costs", name, "time of one", "s", {"median": part["cost"]}) for name, part in costs["counted"].items()]
     lines += [("costs", name, "time per period", "s", {"median": part}) for name, part in costs["timed"].items()]
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(("part", "case", "quantity", "unit", "median", "low", "high"))
-        for part, case, quantity, unit, values in lines:
-            writer.writerow((part, case, quantity, unit, *(values.get(key, "") for key in ("median", "low", "high"))))
+    spreads = ("median", "low", "high")
+    rows = ((*names, *(values.get(key, "") for key in spreads)) for *names, values in lines)
+    write_csv(path, ("part", "case", "quantity", "unit", *spreads), rows)

@@ -6,7 +6,6 @@ counts less in it than in time by the clock.
 
 from __future__ import annotations
 
-import csv
 import importlib.util
 import json
 import os
@@ -22,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from meshes.vane_cluster import VaneCluster, build
-from modal.store import replacing
+from modal.store import write_csv, write_json
 from studies.terminal import progress
 from studies.timing import machine
 
@@ -87,8 +86,7 @@ def _write(result: Mapping[str, Any], folder: Path) -> None:
     from studies.bench_figures import modal_figure
 
     folder.mkdir(parents=True, exist_ok=True)
-    with replacing(folder / "bench_modal.json") as temporary:
-        temporary.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_json(folder / "bench_modal.json", result)
     _write_csv(result, folder / "bench_modal.csv")
     modal_figure(result, folder / "bench_modal.png")
 
@@ -187,18 +185,19 @@ def _ahead(sizes: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _write_csv(result: Mapping[str, Any], path: Path) -> None:
     """One line a size and solver."""
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(
-            ("dofs", "solver", "status", "factorisation_cpu_s", "modes_cpu_s", "modes_wall_s", "peak_bytes")
-        )
-        for entry in result["sizes"]:
-            assembly = entry["assembly"]
-            dofs = assembly.get("dofs")
-            time_of = assembly.get("assembly", {})
-            writer.writerow((dofs, "assembly", assembly["status"], "", time_of.get("cpu_s"), time_of.get("wall_s"),
-                             assembly.get("peak_bytes")))  # fmt: skip
-            for name, found in entry["solvers"].items():
-                factor, modes = found.get("factorisation", {}), found.get("modes", {})
-                writer.writerow((dofs, NAMES[name], found["status"], factor.get("cpu_s"), modes.get("cpu_s"),
-                                 modes.get("wall_s"), found.get("peak_bytes")))  # fmt: skip
+    rows: list[tuple[Any, ...]] = []
+    for entry in result["sizes"]:
+        assembly = entry["assembly"]
+        dofs, times = assembly.get("dofs"), assembly.get("assembly", {})
+        rows.append(
+            (dofs, "assembly", assembly["status"], "", times.get("cpu_s"), times.get("wall_s"),
+             assembly.get("peak_bytes"))
+        )  # fmt: skip
+        for name, found in entry["solvers"].items():
+            factor, modes = found.get("factorisation", {}), found.get("modes", {})
+            rows.append(
+                (dofs, NAMES[name], found["status"], factor.get("cpu_s"), modes.get("cpu_s"), modes.get("wall_s"),
+                 found.get("peak_bytes"))
+            )  # fmt: skip
+    header = ("dofs", "solver", "status", "factorisation_cpu_s", "modes_cpu_s", "modes_wall_s", "peak_bytes")
+    write_csv(path, header, rows)

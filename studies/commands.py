@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import json
-import math
 import os
 import sys
 import time
@@ -15,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coupling.inputs import InputError
-from modal.store import replacing
+from modal.store import finite, json_text, write_json
 from studies.terminal import progress, tell_calibration, tell_modes, tell_sweep
 from studies.workers import workers
 
@@ -272,21 +270,10 @@ def _check_outputs(arguments: Namespace, **suffixes: tuple[str, ...]) -> None:
 def _write_json(target: str | None, data: Mapping[str, Any]) -> None:
     if target is None:
         return
-    text = json.dumps(_plain(data), indent=1, allow_nan=False) + "\n"
     if target == "-":
-        print(text, end="")
-        return
-    with replacing(target) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def _plain(data: Any) -> Any:
-    """JSON knows no nan: null."""
-    if isinstance(data, Mapping):
-        return {key: _plain(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_plain(value) for value in data]
-    return None if isinstance(data, float) and not math.isfinite(data) else data
+        print(json_text(finite(data)), end="")
+    else:
+        write_json(target, finite(data))
 
 
 def _shown(value: Any) -> str:

@@ -6,7 +6,6 @@ model: each law has a limit of its own, or none.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from coupling.engine import simulate
 from coupling.inputs import InputError, read_toml, validate
 from coupling.scene import Scene
 from coupling.sweep import warm_up
-from modal.store import replacing
+from modal.store import finite, write_json
 from rom.reduced import ReducedModel
 from studies.bounce import LAWS as BAR_LAWS
 from studies.bounce import bounce
@@ -66,8 +65,7 @@ def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
             "cluster": cluster_curves(file, effort, report),
             "versions": versions(),
         }
-    with replacing(folder / "ladder.json") as temporary:
-        temporary.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_json(folder / "ladder.json", finite(result))
     from studies.ladder_figures import bar_figure, cluster_figure
 
     bar_figure(result["bar"], folder / "ladder_bar.png")

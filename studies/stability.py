@@ -5,8 +5,6 @@ Each part takes scenes that differ in one number, runs the method, and finds by 
 
 from __future__ import annotations
 
-import csv
-import json
 import math
 import tempfile
 import time
@@ -25,7 +23,7 @@ from coupling.response import Status
 from coupling.rows import rows_of
 from coupling.scene import Scene
 from coupling.structure import linear_structure
-from modal.store import replacing
+from modal.store import write_csv, write_json
 from studies.terminal import progress
 from studies.timing import machine
 
@@ -67,14 +65,14 @@ def run_stability(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
             report(done, len(parts))
             result["parts"][name] = part(effort)
     result["wall_time_s"] = time.perf_counter() - started
-    with replacing(folder / "stability.json") as path:
-        path.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    with replacing(folder / "stability.csv") as path, path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(("part", "curve", "x", "y"))
-        for name, part in result["parts"].items():
-            for curve, values in part["curves"].items():
-                writer.writerows((name, curve, x, y) for x, y in zip(part["x"], values, strict=True))
+    write_json(folder / "stability.json", result)
+    points = (
+        (name, curve, x, y)
+        for name, part in result["parts"].items()
+        for curve, values in part["curves"].items()
+        for x, y in zip(part["x"], values, strict=True)
+    )
+    write_csv(folder / "stability.csv", ("part", "curve", "x", "y"), points)
     from studies.method_figures import stability_figure
 
     stability_figure(result, folder / "stability.png")

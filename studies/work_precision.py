@@ -8,8 +8,6 @@ runs of two lengths.
 
 from __future__ import annotations
 
-import csv
-import json
 import tempfile
 import time
 from collections.abc import Mapping
@@ -23,7 +21,7 @@ import numpy as np
 from coupling.engine import simulate
 from coupling.response import Response
 from coupling.scene import Scene
-from modal.store import replacing
+from modal.store import write_csv, write_json
 from studies import method_scenes as scenes
 from studies.terminal import progress
 from studies.timing import Clock, in_turns, machine, seconds, spread
@@ -78,8 +76,7 @@ def run_work_precision(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
         if effort.modes is not None:
             result["ladder"] = _ladder(Path(temporary), effort, rng)
     result["wall_time_s"] = time.perf_counter() - started
-    with replacing(folder / "work_precision.json") as path:
-        path.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_json(folder / "work_precision.json", result)
     _write_csv(result, folder / "work_precision.csv")
     from studies.method_figures import work_precision_figure
 
@@ -229,11 +226,10 @@ def _ladder(folder: Path, effort: Effort, rng: np.random.Generator) -> dict[str,
 def _write_csv(result: Mapping[str, Any], path: Path) -> None:
     """One line a point."""
     names = ("method", "setting", "status", "error", "interval", "floor", "energy_residual", "penetration")
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(("scene", *names, "time_s", "time_low_s", "time_high_s"))
-        for scene, chart in result["charts"].items():
-            for point in chart["points"]:
-                times = point["time"] or {}
-                row = [point[name] for name in names] + [times.get(key, "") for key in ("median", "low", "high")]
-                writer.writerow((scene, *("" if value is None else value for value in row)))
+    rows = []
+    for scene, chart in result["charts"].items():
+        for point in chart["points"]:
+            times = point["time"] or {}
+            row = [point[name] for name in names] + [times.get(key, "") for key in ("median", "low", "high")]
+            rows.append((scene, *("" if value is None else value for value in row)))
+    write_csv(path, ("scene", *names, "time_s", "time_low_s", "time_high_s"), rows)
