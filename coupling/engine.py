@@ -120,12 +120,6 @@ class _Run:
         code = auto.DONE if self.begun else self.begin(self.max_events)
         return _STATUS[self.advance(periods, self.max_events) if code == auto.DONE else code]
 
-    @property
-    def peaks(self) -> np.ndarray:
-        """Largest |x| of the periods done, m."""
-        peaks: np.ndarray = self.records.peak[: self.state.counters[st.PERIOD]]
-        return peaks
-
     def outcome(self) -> Outcome:
         """What the run leaves behind."""
         counters = self.state.counters
