@@ -52,6 +52,9 @@ class CvodeRun(IvpRun):
             found.t[1:last], states, who, float(found.t_events[-1]), found.y_events[-1], found.nfev, not found.success
         )
 
+    def _opens(self, row: int, y: np.ndarray) -> bool:
+        return bool(self.system.J[row] @ y[self.size : 2 * self.size] > 0)
+
     def _solve(self, grid: np.ndarray, watches: list[Watch]) -> CVODEResult:
         from sksundae.cvode import CVODE
 
@@ -61,6 +64,9 @@ class CvodeRun(IvpRun):
         def roots(t: float, y: np.ndarray, out: np.ndarray) -> None:
             for i, watch in enumerate(watches):
                 out[i] = watch.value(t, y)
+                # a gap that opens is no root: the first steps after an impact are of low order, and may dip below zero
+                if out[i] <= 0 and watch.kind == "gap" and watch.direction < 0 and self._opens(watch.row, y):
+                    out[i] = self.reach
 
         roots.terminal = [True] * len(watches)  # type: ignore[attr-defined]
         roots.direction = [watch.direction for watch in watches]  # type: ignore[attr-defined]

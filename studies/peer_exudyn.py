@@ -42,7 +42,7 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
         return PeerRun(Status.DIVERGED.value, np.zeros(0), np.zeros((0, 0)), 0.0, time.thread_time() - started)
     seconds = time.thread_time() - started
     del kept
-    stored = world.GetSensorStoredData(sensor)
+    stored = np.asarray(world.GetSensorStoredData(sensor))
     q = np.full((periods * round(setting) + 1, len(turn)), np.nan)
     q[np.rint(stored[:, 0] * round(setting)).astype(int)] = stored[:, 1:] @ turn.T * units.length
     q[0] = made.motion.q
@@ -65,7 +65,9 @@ def _coordinates(made: Coupled) -> np.ndarray:
     moved = system.J[:, :n][np.abs(system.J[:, :n]).max(axis=1, initial=0.0) > 0]
     if len(moved):
         floor = moved[0]
-        if any(min(np.abs(row - floor).max(), np.abs(row + floor).max()) > 1e-12 * np.abs(floor).max() for row in moved):
+        if any(
+            min(np.abs(row - floor).max(), np.abs(row + floor).max()) > 1e-12 * np.abs(floor).max() for row in moved
+        ):
             raise InputError("Exudyn: this set-up needs walls that move with one floor")
         back[int(np.abs(floor).argmax()), :n] = -floor  # slips are x - floor
     return np.linalg.inv(back)
@@ -173,7 +175,7 @@ def _settings(periods: int, steps: int) -> Any:
     """Equal steps, no files, one thread."""
     import exudyn
 
-    settings = exudyn.SimulationSettings()
+    settings: Any = exudyn.SimulationSettings()
     integration = settings.timeIntegration
     integration.numberOfSteps, integration.endTime = periods * steps, float(periods)
     integration.automaticStepSize = integration.adaptiveStep = False

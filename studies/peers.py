@@ -28,8 +28,8 @@ _DEEPEST = 0.1
 class PeerRun:
     """What a peer leaves behind.
 
-    status: words of coupling.response.Status; peak (periods,): largest |x|, m; samples (k, 1 + b): displacement and slips at
-    equidistant times, m; penetration relative to the free travel; seconds: CPU time of the steps, without set-up.
+    status: words of coupling.response.Status; peak (periods,): largest |x|, m; samples (k, 1 + b): displacement and
+    slips at equidistant times, m; penetration relative to the free travel; seconds: CPU time of the steps, no set-up.
     """
 
     status: str
