@@ -181,9 +181,9 @@ def _settings(periods: int, steps: int) -> Any:
     integration.automaticStepSize = integration.adaptiveStep = False
     integration.discontinuous.useRecommendedStepSize = False
     integration.verboseMode = 0
-    settings.solutionSettings.writeSolutionToFile = False
-    settings.solutionSettings.solverInformationFileName = ""
-    settings.solutionSettings.sensorsWritePeriod = 0.5 / steps
+    settings.solution.file.write = False
+    settings.solution.solverInformationFileName = ""
+    settings.solution.sensors.writePeriod = 0.5 / steps
     settings.linearSolver.solverType = exudyn.LinearSolverType.EXUdense
     settings.parallel.numberOfThreads = 1
     return settings

@@ -1,9 +1,9 @@
 """Speed against accuracy: every method on the same scenes, with the same machine, in turns.
 
 Periodic scenes: largest error of response and slips at ten times of every period, relative to their ranges, against
-the exact engine, whose own error is against 40 digits where structure and bodies have them. Scenes that never repeat:
-error of the mean amplitude, with the 95 % confidence intervals of both means. Times are CPU times per excitation period,
-without set-up. Other programs (studies.peers) take part where they are installed and can express the scene.
+the exact engine, whose own error is against 40 digits for one mode. Scenes that never repeat: error of the mean
+amplitude, with the 95 % confidence intervals of both means. Times are CPU times per excitation period, without set-up.
+Other programs (studies.peers) take part where they are installed and can express the scene.
 """
 
 from __future__ import annotations
