@@ -10,7 +10,7 @@ import pytest
 from studies import stability, work_precision
 from studies.cli import main
 from studies.failing import DAMPING
-from studies.failure_maps import MAPS, MapEffort
+from studies.failure_maps import CO_SIMULATIONS, MAPS, MapEffort
 from studies.macro_step import macro_step
 from studies.peers import PEERS
 
@@ -58,13 +58,10 @@ def test_touches_shorter_than_a_step_are_missed_by_signs_alone():
 SMALL_MAP = MapEffort(across=2, up=2, phases=40, modes=(0, 2, 5))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow) if name.startswith("co-simulation, Gauss") else name
-        for name in MAPS
-    ],
-)  # fmt: skip
+DEAR = {"missed impacts", *CO_SIMULATIONS}
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in DEAR else n for n in MAPS])
 def test_edges_of_the_maps_lie_on_the_analytic_limits(name):
     """2/omega, 2 v_reg m*/(mu N), spectral radii of macro-steps, durations of touches, the contact mass of a rod."""
     made = MAPS[name](SMALL_MAP)
