@@ -66,6 +66,14 @@ def coupled_pair(mass: float) -> tuple[dict[str, Any], float, float]:
     return tables, stiffness, float(rows.dashpot[-2])
 
 
+def restless(tables: Mapping[str, Any], solver: Mapping[str, Any], static: float, steps: int) -> bool:
+    """Whether a body on a wall with a dashpot does not come to rest at its static compression, or the run fails."""
+    response = simulate(scene(tables, dict(solver) | {"steps_per_period": steps}))
+    if response.status not in (Status.OK, Status.ENERGY):
+        return True
+    return bool(np.abs(response.slip[-10:, 0] + 500.0 + static).max() > 0.5 * static)
+
+
 def unsteady(mass: float, slow: float, steps: int) -> bool:
     """Whether a body on a floor with regularised friction does not come to rest; slow: its slip speed, m/s."""
     tables = data(

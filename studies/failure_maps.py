@@ -81,7 +81,7 @@ def cosimulation_map(effort: MapEffort, exchange: str, hold: int) -> dict[str, A
 
     def fails(mass: float, step: float) -> bool:
         tables, stiffness, _ = pairs[float(mass)]
-        return failing.bounces(tables, solver, mass / stiffness, math.floor(1 / step))
+        return failing.restless(tables, solver, mass / stiffness, math.floor(1 / step))
 
     made = _map(masses, limits, fails, effort)
     return made | {"x_label": "mass of the body / mass of the structure", "y_label": "macro-step, periods"}
