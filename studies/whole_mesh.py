@@ -40,8 +40,8 @@ class CurveEffort:
 
     size: float = 0.009
     modes: int = 20
-    periods: int = 300
-    dropped: int = 200
+    periods: int = 240
+    dropped: int = 160
     wide: float = 0.002
     points: int = 25
 
