@@ -46,15 +46,16 @@ class Section:
 
 def write_report(results: Results, path: str | Path) -> None:
     """Write the page. A picture that cannot be rendered is left out, and the page says so."""
+    names = results.names
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters |= {"shown": shown, "name": lambda file: Path(file).name, "anchor": _anchor}
+    environment.filters |= {"shown": shown, "name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
     template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
-    scenes = {Path(name).name: _flat(_without_sweep(sweep)) for name, sweep in results.sweeps.items()}
+    scenes = {names[file]: _flat(_without_sweep(sweep)) for file, sweep in results.sweeps.items()}
     scenes |= {
-        Path(name).name: _flat(history.scene.to_dict())
-        for name, history in results.histories.items()
+        names[file]: _flat(history.scene.to_dict())
+        for file, history in results.histories.items()
         if history.scene is not None
     }
     sections = list(_sections(results))
@@ -74,9 +75,9 @@ def write_report(results: Results, path: str | Path) -> None:
         temporary.write_text(html, encoding="utf-8")
 
 
-def _anchor(file: str) -> str:
+def _anchor(name: str) -> str:
     """Where the page tells the provenance of a file."""
-    return "from-" + re.sub(r"\W", "-", Path(file).name)
+    return "from-" + re.sub(r"\W", "-", name)
 
 
 def _sections(results: Results) -> Iterator[Section]:
@@ -92,25 +93,28 @@ def _sections(results: Results) -> Iterator[Section]:
 def _section(study: Study | None, results: Results, mine: Callable[[str], bool], numbers: Iterator[int]) -> Section:
     sweeps = {name: sweep for name, sweep in results.sweeps.items() if mine(name)}
     histories = {name: history for name, history in results.histories.items() if mine(name)}
+    names = results.names
+    named = {file: (names[file], sweep) for file, sweep in sweeps.items()}
     return Section(
         study,
-        groups=[_group(next(numbers), group) for group in _by_axis(_responses(sweeps, study))],
+        groups=[_group(next(numbers), group) for group in _by_axis(_responses(named, study))],
         maps=[_map(next(numbers), name, sweep) for name, sweep in sweeps.items() if map_axes(sweep)],
         histories=[_history(next(numbers), name, history) for name, history in histories.items()],
     )  # fmt: skip
 
 
-def _responses(sweeps: Mapping[str, Sweep], study: Study | None) -> list[ForcedResponse]:
-    """The curves of sweeps; those of a study are named by their files, others by their models."""
-    names = {file: model_name(sweep.scene) for file, sweep in sweeps.items()}
-    taken = list(names.values())
-    for file, name in names.items():
-        stem = Path(file).stem
+def _responses(sweeps: Mapping[str, tuple[str, Sweep]], study: Study | None) -> list[ForcedResponse]:
+    """The curves of named sweeps; those of a study are called by their files, others by their models."""
+    models = [model_name(sweep.scene) for _, sweep in sweeps.values()]
+    found = []
+    for model, (file, (name, sweep)) in zip(models, sweeps.items(), strict=True):
+        stem = name.removesuffix(".h5")
         if study is not None:
-            names[file] = stem.removeprefix(study.study).strip("_").replace("_", " ") or name
-        elif taken.count(name) > 1:
-            names[file] = f"{name} ({stem})"
-    return [response for file, sweep in sweeps.items() for response in _curves(file, sweep, names[file])]
+            called = stem.removeprefix(study.study).strip("_").replace("_", " ") or model
+        else:
+            called = model if models.count(model) == 1 else f"{model} ({stem})"
+        found += _curves(file, sweep, called)
+    return found
 
 
 def _curves(file: str, sweep: Sweep, name: str) -> list[ForcedResponse]:
@@ -164,7 +168,7 @@ def _history(number: int, name: str, history: History) -> dict[str, Any]:
         late = history.late()
         header = ("time", "displacement", *(f"body_{body + 1}" for body in range(late.bodies.shape[1])))
         drawn = chart(f"history-{number}", history_figure(late), header, late.rows(), [name])
-    return {"file": Path(name).name, "chart": drawn, "measures": history.measures}
+    return {"file": name, "chart": drawn, "measures": history.measures}
 
 
 def _key_figures(response: ForcedResponse) -> dict[str, Any]:
@@ -190,7 +194,7 @@ def _analysis(number: int, name: str, values: dict[str, Any], attributes: dict[s
     elif bending is not None:
         picture = mode_picture(name, bending)
     return {
-        "file": Path(name).name,
+        "file": name,
         "chart": turned,
         "picture": None if picture is None else base64.b64encode(picture).decode(),
         "first_bending": bending,
@@ -209,7 +213,7 @@ def _analysis(number: int, name: str, values: dict[str, Any], attributes: dict[s
 
 def _reduction(name: str, model: ReducedModel) -> dict[str, Any]:
     return {
-        "file": Path(name).name,
+        "file": name,
         "interface": [(label, model.contact_mass(label)) for label in model.interface],
         "modes": model.modes,
         "frequencies": model.natural_frequencies_hz,
@@ -218,18 +222,15 @@ def _reduction(name: str, model: ReducedModel) -> dict[str, Any]:
 
 
 def _provenance(results: Results) -> dict[str, dict[str, str]]:
-    tables = {"report": versions()}
-    for name, (_, attributes) in results.modes.items():
+    """What is known of every file, by its path; of the page itself under ""."""
+    tables = {"": versions()}
+    for file, (_, attributes) in results.modes.items():
         extra = json.loads(attributes.get("versions", "{}"))
-        tables[Path(name).name] = _flat({"matrices": json.loads(attributes["provenance"]), "versions": extra})
-    for name, model in results.reduced.items():
-        tables[Path(name).name] = _flat(model.provenance)
-    for name, sweep in results.sweeps.items():
-        tables[Path(name).name] = _flat(sweep.provenance)
-    for name, history in results.histories.items():
-        tables[Path(name).name] = _flat({key: v for key, v in history.provenance.items() if key != "scene"})
-    for name in (*results.modes, *results.reduced, *results.sweeps, *results.histories):
-        tables[Path(name).name]["sha256"] = hashlib.sha256(Path(name).read_bytes()).hexdigest()
+        tables[file] = _flat({"matrices": json.loads(attributes["provenance"]), "versions": extra})
+    for file, record in (results.reduced | results.sweeps | results.histories).items():
+        tables[file] = _flat({key: value for key, value in record.provenance.items() if key != "scene"})
+    for file in results.names:
+        tables[file]["sha256"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
     return tables
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,23 @@ class Results:
     sweeps: dict[str, Sweep] = field(default_factory=dict)
     histories: dict[str, History] = field(default_factory=dict)
     studies: dict[str, Study] = field(default_factory=dict)
+
+    @property
+    def names(self) -> dict[str, str]:
+        """What to call every file of a record."""
+        return short_names([*self.modes, *self.reduced, *self.sweeps, *self.histories])
+
+
+def short_names(paths: Iterable[str]) -> dict[str, str]:
+    """The shortest ends of paths that tell them apart: names of files, with folders where names are the same."""
+    parts = {path: Path(path).resolve().parts for path in paths}
+    names = {}
+    for path, mine in parts.items():
+        length = 1
+        while any(other[-length:] == mine[-length:] for key, other in parts.items() if other != mine):
+            length += 1
+        names[path] = "/".join(mine[-length:])
+    return names
 
 
 def collect(paths: Sequence[str | Path]) -> Results:

@@ -240,3 +240,14 @@ def test_a_sweep_that_failed_everywhere_still_makes_a_page(results, tmp_path, mo
     sweep(validate(Scene, DATA | {"sweep": {"excitation.frequency": FREQUENCIES}}, "x")).save(tmp_path / "bad.h5")
     write_report(collect([tmp_path]), tmp_path / "report.html")
     assert "7 of 7 points ended with a status other than" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_files_of_the_same_name_are_told_apart(results, tmp_path):
+    for folder in ("stiff", "soft"):
+        (tmp_path / folder).mkdir()
+        shutil.copy(results / "sweep_one.h5", tmp_path / folder / "sweep.h5")
+    write_report(collect([tmp_path / "stiff", tmp_path / "soft"]), tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    names = {trace["legendgroup"] for trace in charts(page)["response-0"]}
+    assert names == {"rigid model (stiff/sweep)", "rigid model (soft/sweep)"}
+    assert {'id="from-stiff-sweep-h5"', 'id="from-soft-sweep-h5"'} <= set(re.findall(r'id="[\w-]+"', page))
