@@ -8,7 +8,8 @@ from cases import BLOCK, changed
 
 from modal.eigen import Modes
 from studies.cli import BAD_INPUT, main
-from studies.report import collect, write_report
+from studies.report import write_report
+from studies.results import collect
 
 CASE = BLOCK.replace("count = 6", "count = 8")
 
