@@ -2,8 +2,8 @@
 
 Jean (1999); Acary and Brogliato (2008), chapter 10. The theta method for the smooth part, Newton's law and Coulomb's on
 velocities; a contact takes part in a step if its gap, half a step ahead, is closed. Second order where no row is
-active (theta = 1/2), first order over impacts. Springs of compliant contacts and Jenkins elements enter the same
-problem, implicitly.
+active (theta = 1/2), first order over impacts. An impact that others bring about within a step is a problem of its own,
+after theirs. Springs of compliant contacts and Jenkins elements enter the same problem, implicitly.
 """
 
 from __future__ import annotations
