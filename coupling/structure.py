@@ -28,7 +28,8 @@ class LinearStructure:
     floor, left, right: (cavities, n) functionals of the cavities' surfaces; casing: (friction dampers, n) functionals
     of what rubs on the casing; force: (n,) complex modal load and base_acceleration: complex acceleration of the base,
     both amplitudes of exp(i omega t); displacement and velocity: (n,) initial state; table: complex displacement
-    amplitude of the base that counts as response (prescribed motion).
+    amplitude of the base that counts as response (prescribed motion); physical: displacement per modal coordinate of a
+    rigid structure, whatever its mass; 1 for others.
     """
 
     omega: float
@@ -44,6 +45,7 @@ class LinearStructure:
     displacement: np.ndarray
     velocity: np.ndarray
     table: complex = 0.0
+    physical: float = 1.0
 
     @property
     def modes(self) -> int:
@@ -91,6 +93,7 @@ def linear_structure(scene: Scene) -> LinearStructure:
     return LinearStructure(
         omega, basis.stiffness, basis.damping, response, floor, left, right,
         np.reshape(casing, (len(casing), len(response))), force, base, displacement, velocity,
+        physical=float(response[0]) if isinstance(scene.structure, Rigid) else 1.0,
     )  # fmt: skip
 
 
