@@ -12,7 +12,7 @@ the engine runs. Left out are the boundary's motion under friction on the floor 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -29,6 +29,10 @@ from rom.reduced import ReducedModel
 _NEWTON = "; of the forced response alone: Newton's impacts have no limit as modes grow, compliant contacts have"
 
 
+#: the choice of a number of modes by file, `modes` and tolerance
+Choices = Mapping[tuple[Any, ...], Choice]
+
+
 class Settled(NamedTuple):
     """A scene without open choices, and the estimate of the model chosen (None if there was no choice)."""
 
@@ -43,13 +47,17 @@ def settle(scene: Scene) -> Settled:
 
 def settle_all(scenes: Sequence[Scene]) -> list[Settled]:
     """The same for the points of a sweep: those with one model and tolerance share the choice that suits them all."""
-    if not any(_open(scene) for scene in scenes):
-        return [Settled(scene, None) for scene in scenes]
+    choices = choices_of(scenes)
+    return [settled(scene, choices) for scene in scenes]
+
+
+def choices_of(scenes: Iterable[Scene]) -> Choices:
+    """The number of modes that suits all scenes with one model and tolerance, for each of these."""
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
-        groups.setdefault(_group(scene), []).append(scene)
-    choices = {key: _choice(members) for key, members in groups.items() if key and key[1] == "auto"}
-    return [_settled(scene, choices.get(_group(scene))) for scene in scenes]
+        if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+            groups.setdefault(_group(scene), []).append(scene)
+    return {key: _choice(members) for key, members in groups.items()}
 
 
 def kept(structure: Rom) -> int | None:
@@ -73,7 +81,8 @@ def restricted(file: str, _stamp: int, modes: int | None, natural: bool) -> Redu
     return model.massless(modes) if natural else model.truncated(modes)
 
 
-def _open(scene: Scene) -> bool:
+def is_open(scene: Scene) -> bool:
+    """Whether a scene leaves something to settle."""
     return isinstance(scene.structure, Rom) and (scene.structure.modes == "auto" or _wants_residual(scene))
 
 
@@ -86,9 +95,10 @@ def _group(scene: Scene) -> tuple[Any, ...]:
     return (structure.file, structure.modes, structure.tolerance) if isinstance(structure, Rom) else ()
 
 
-def _settled(scene: Scene, choice: Choice | None) -> Settled:
-    structure = scene.structure
-    if not isinstance(structure, Rom) or not _open(scene):
+def settled(scene: Scene, choices: Choices) -> Settled:
+    """The scene with the choice that was made for it."""
+    structure, choice = scene.structure, choices.get(_group(scene))
+    if not isinstance(structure, Rom) or not is_open(scene):
         return Settled(scene, None)
     if choice is not None:
         structure = replace(structure, modes=choice.chosen.modes, natural=True)

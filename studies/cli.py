@@ -159,6 +159,10 @@ def _parser() -> argparse.ArgumentParser:
 
     sweep = with_json(command("sweep", "a run at every point of the scene's [sweep] grid", "SCENE.toml", "SWEEP.h5"))
     sweep.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
+    sweep.add_argument(
+        "--resume", action="store_true",
+        help="go on where the sweep was killed, or fail; without it, it goes on if it can and begins if it must",
+    )  # fmt: skip
 
     report = command("report", "one HTML page of results", None, "REPORT.html", required=True)
     report.add_argument("inputs", nargs="+", metavar="DIR|FILE", help="results of modal, reduce and sweep (.h5)")

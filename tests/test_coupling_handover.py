@@ -90,13 +90,13 @@ def test_plain_data_is_exact():
 
 def test_another_size_is_refused():
     final = simulate(scene("row", 2)).final
-    with pytest.raises(InputError, match="2 bodies .* does not fit a scene of 1, 1 and 0"):
+    with pytest.raises(InputError, match=r"2 bodies .* does not fit a scene of 1, 1 and 0"):
         simulate(scene("newton", 2), start=final)
 
 
 def test_stepping_methods_are_refused():
     final = simulate(scene("newton", 2)).final
-    with pytest.raises(InputError, match="solver.method exact, not moreau"):
+    with pytest.raises(InputError, match=r"solver.method exact, not moreau"):
         simulate(scene("newton", 2, solver={"method": "moreau"}), start=final)
     assert simulate(scene("newton", 2, solver={"method": "moreau"})).final is None
 
