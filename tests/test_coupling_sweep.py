@@ -3,12 +3,7 @@
 import json
 import math
 import multiprocessing
-import os
-import signal
-import subprocess
-import sys
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 
 import numpy as np
 import pytest
