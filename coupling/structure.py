@@ -140,17 +140,25 @@ def _force_amplitude(scene: Scene, basis: _ModalBasis, response: np.ndarray) -> 
         raise InputError(
             "excitation.resonance_amplitude: an undamped resonance has no amplitude; give damping or force"
         )
-    peak = int(np.argmax(response**2 / (2 * zeta * basis.stiffness)))
-    resonance = np.sqrt(basis.stiffness[peak])
+    largest = _largest_receptance(basis.stiffness.tobytes(), basis.damping.tobytes(), response.tobytes())
+    return float(excitation.resonance_amplitude / largest)
+
+
+@lru_cache(maxsize=64)
+def _largest_receptance(stiffness_: bytes, damping_: bytes, response_: bytes) -> float:
+    """Largest displacement per newton near the highest resonance, m/N; the same for all frequencies of a sweep."""
+    stiffness, response = np.frombuffer(stiffness_), np.frombuffer(response_)
+    damping = np.frombuffer(damping_).reshape(len(stiffness), -1)
+    zeta = np.diag(damping) / (2 * np.sqrt(stiffness))
+    peak = int(np.argmax(response**2 / (2 * zeta * stiffness)))
+    resonance = np.sqrt(stiffness[peak])
 
     def negative(omega: float) -> float:
-        mass = np.eye(len(response))
-        return -float(abs(_receptance(basis.stiffness, basis.damping, mass, response, np.array([omega]))[0]))
+        return -float(abs(_receptance(stiffness, damping, np.eye(len(response)), response, np.array([omega]))[0]))
 
     width = min(3 * zeta[peak], 0.5)
     bounds = (resonance * (1 - width), resonance * (1 + width))
-    found = minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-9 * resonance})
-    return float(excitation.resonance_amplitude / -found.fun)
+    return -float(minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-9 * resonance}).fun)
 
 
 def _row(basis: _ModalBasis, label: str | None, key: str) -> np.ndarray:
