@@ -229,6 +229,7 @@ def demo(arguments: Namespace) -> None:
 _BENCHES = {
     "engine": ("bench_engine", "run_bench", "bench_engine"),
     "modal": ("bench_modal", "run_bench", "bench_modal"),
+    "sweep": ("bench_sweep", "run_bench", "bench_sweep"),
     "ladder": ("model_ladder", "run_ladder", "ladder"),
     "work-precision": ("work_precision", "run_work_precision", "work_precision"),
     "stability": ("stability", "run_stability", "stability"),

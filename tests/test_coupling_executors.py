@@ -69,9 +69,7 @@ def deadly(base, choices, values, task):
     return points.run_points(base, choices, values, task)
 
 
-@pytest.mark.parametrize(
-    "changes", [pytest.param({}, marks=pytest.mark.slow), LINKED], ids=["independent", "linked"]
-)
+@pytest.mark.parametrize("changes", [pytest.param({}, marks=pytest.mark.slow), LINKED], ids=["independent", "linked"])
 def test_a_point_that_kills_its_worker_is_one_point(changes, monkeypatch):
     """Such as one that needs more memory than there is: all others are what they are without it."""
     expected = sweep(scene(**changes))
