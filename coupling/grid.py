@@ -99,6 +99,22 @@ class Grid:
             yield Chain([int(point) for point in line[order]], direction != "independent")
 
 
+class PointList:
+    """Points in any places, to be run like those of a grid; `base` leaves no number of modes open."""
+
+    def __init__(self, base: Scene, points: Sequence[Mapping[str, Any]]) -> None:
+        self.base, self.size, self._points = base, len(points), points
+        self.choices: Choices = {}
+
+    def values(self, index: int) -> Mapping[str, Any]:
+        """What a point changes in the base."""
+        return self._points[index]
+
+    def chains(self) -> Iterator[Chain]:
+        """All points, in one go."""
+        yield Chain(range(self.size), False)
+
+
 def grid(scene: Scene) -> Grid:
     """The grid of a scene's [sweep] table. Raises InputError for a point that is no scene, before any run."""
     axes = {path: axis_values(values) for path, values in scene.sweep.items()}

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coupling.engine import simulate
-from coupling.grid import Grid, Points
+from coupling.grid import Grid, PointList, Points
 from coupling.handover import Handover
 from coupling.response import Response
 from coupling.scene import Scene
@@ -151,7 +151,7 @@ def _linear(scene: Scene) -> tuple[float, float]:
     return found[0], found[1]
 
 
-def tasks_of(grid: Grid, finished: Finished, most: int) -> Iterator[tuple[Task, Sequence[int]]]:
+def tasks_of(grid: Grid | PointList, finished: Finished, most: int) -> Iterator[tuple[Task, Sequence[int]]]:
     """Tasks of at most so many points that can run side by side, each with the rest of its chain.
 
     All tasks of chains that are not linked, and the first of those that are; of points that are not done.

@@ -302,7 +302,11 @@ class Scene:
     @classmethod
     def load(cls, path: str | Path) -> Scene:
         """The scene in a TOML file; a reduced model's file is taken relative to it. Raises InputError."""
-        data = read_toml(path)
+        return cls.of(read_toml(path), path)
+
+    @classmethod
+    def of(cls, data: dict[str, Any], path: str | Path) -> Scene:
+        """The scene in the tables of a TOML file that lies at `path`."""
         structure = data.get("structure")
         if isinstance(structure, dict) and isinstance(structure.get("file"), str):
             structure["file"] = str(Path(path).parent / structure["file"])

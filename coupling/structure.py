@@ -123,6 +123,18 @@ def excitation_force(scene: Scene) -> float:
     return _force_amplitude(scene, basis, _row(basis, at, "excitation.at"))
 
 
+def largest_resonance(scene: Scene) -> tuple[float, float]:
+    """Displacement of the response per newton, m/N, and modal mass there, kg, of the highest resonance without bodies.
+
+    Raises InputError for a structure without damping.
+    """
+    basis = _basis(scene)
+    at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
+    if np.any(np.diag(basis.damping) <= 0):
+        raise InputError("structure: a resonance without damping has no amplitude; give damping")
+    return _highest(basis, _row(basis, at, "excitation.at"))
+
+
 def _receptance(
     stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, response: np.ndarray, omega: np.ndarray
 ) -> np.ndarray:
@@ -135,18 +147,20 @@ def _force_amplitude(scene: Scene, basis: _ModalBasis, response: np.ndarray) -> 
     excitation = scene.excitation
     if excitation.resonance_amplitude is None:
         return excitation.force or 0.0
-    zeta = np.diag(basis.damping) / (2 * np.sqrt(basis.stiffness))
-    if np.any(zeta <= 0):
+    if np.any(np.diag(basis.damping) <= 0):
         raise InputError(
             "excitation.resonance_amplitude: an undamped resonance has no amplitude; give damping or force"
         )
-    largest = _largest_receptance(basis.stiffness.tobytes(), basis.damping.tobytes(), response.tobytes())
-    return float(excitation.resonance_amplitude / largest)
+    return float(excitation.resonance_amplitude / _highest(basis, response)[0])
+
+
+def _highest(basis: _ModalBasis, response: np.ndarray) -> tuple[float, float]:
+    return _resonance(basis.stiffness.tobytes(), basis.damping.tobytes(), response.tobytes())
 
 
 @lru_cache(maxsize=64)
-def _largest_receptance(stiffness_: bytes, damping_: bytes, response_: bytes) -> float:
-    """Largest displacement per newton near the highest resonance, m/N; the same for all frequencies of a sweep."""
+def _resonance(stiffness_: bytes, damping_: bytes, response_: bytes) -> tuple[float, float]:
+    """Largest displacement per newton and modal mass of the highest resonance: once for all frequencies of a sweep."""
     stiffness, response = np.frombuffer(stiffness_), np.frombuffer(response_)
     damping = np.frombuffer(damping_).reshape(len(stiffness), -1)
     zeta = np.diag(damping) / (2 * np.sqrt(stiffness))
@@ -158,7 +172,8 @@ def _largest_receptance(stiffness_: bytes, damping_: bytes, response_: bytes) ->
 
     width = min(3 * zeta[peak], 0.5)
     bounds = (resonance * (1 - width), resonance * (1 + width))
-    return -float(minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-9 * resonance}).fun)
+    found = minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-9 * resonance})
+    return -float(found.fun), float(1 / response[peak] ** 2)
 
 
 def _row(basis: _ModalBasis, label: str | None, key: str) -> np.ndarray:

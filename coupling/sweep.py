@@ -14,7 +14,7 @@ import numpy as np
 
 from coupling.checkpoint import Checkpoint
 from coupling.engine import simulate
-from coupling.grid import Grid
+from coupling.grid import Grid, PointList
 from coupling.grid import grid as grid_of
 from coupling.inputs import validate
 from coupling.points import COLUMNS, LOSSES, MEASURES, TEXTS, Block, Finished, Task, broken, run_points, tasks_of
@@ -149,6 +149,15 @@ def sweep(
     return _result(grid, finished, provenance)
 
 
+def run_list(base: Scene, points: Sequence[Mapping[str, Any]], executor: Executor | None = None) -> Finished:
+    """Runs of scenes that differ from `base` in some values, by their paths; all points name the same paths."""
+    listed = PointList(base, points)
+    finished = Finished(listed.size)
+    for task, rest, block in _run(listed, finished, executor):
+        finished.add(task, block, bool(rest))
+    return finished
+
+
 def _result(grid: Grid, finished: Finished, provenance: dict[str, Any]) -> Sweep:
     columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
     return Sweep(
@@ -184,7 +193,9 @@ def _dimension(path: str) -> str:
 _Entry = tuple[Task, Sequence[int]]
 
 
-def _run(grid: Grid, finished: Finished, executor: Executor | None) -> Iterator[tuple[Task, Sequence[int], Block]]:
+def _run(
+    grid: Grid | PointList, finished: Finished, executor: Executor | None
+) -> Iterator[tuple[Task, Sequence[int], Block]]:
     """Tasks as they are done, each with what is left of its chain, and what it leaves."""
     most = max(1, min(_MOST_PER_TASK, (grid.size - finished.count) // 32))
     source, ready = tasks_of(grid, finished, most), deque[_Entry]()
@@ -213,7 +224,7 @@ def _in_flight(executor: Executor) -> int:
     return 2 * known + 2 if isinstance(known, int) else _IN_FLIGHT
 
 
-def _submit(grid: Grid, task: Task, executor: Executor | None) -> Future[Block]:
+def _submit(grid: Grid | PointList, task: Task, executor: Executor | None) -> Future[Block]:
     points = [grid.values(point) for point in task.points]
     if executor is None:
         future: Future[Block] = Future()
@@ -226,7 +237,7 @@ def _submit(grid: Grid, task: Task, executor: Executor | None) -> Future[Block]:
 
 
 def _ended(
-    grid: Grid, running: dict[Future[Block], _Entry], executor: Executor | None
+    grid: Grid | PointList, running: dict[Future[Block], _Entry], executor: Executor | None
 ) -> Iterator[tuple[_Entry, Block]]:
     """Tasks that have ended, taken from those that run.
 
@@ -247,7 +258,7 @@ def _ended(
         yield (task, rest), _one_by_one(grid, task, future, executor)
 
 
-def _one_by_one(grid: Grid, task: Task, lost: Future[Block], executor: Executor | None) -> Block:
+def _one_by_one(grid: Grid | PointList, task: Task, lost: Future[Block], executor: Executor | None) -> Block:
     """The points of a task that was lost, each as a task of its own."""
     blocks, state = [], task.start
     for point in task.points:

@@ -1,4 +1,4 @@
-"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, import, run, sweep, report, demo, bench."""
+"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, import, run, sweep, optimise, report, demo ..."""
 
 from __future__ import annotations
 
@@ -163,6 +163,11 @@ def _parser() -> argparse.ArgumentParser:
         "--resume", action="store_true",
         help="go on where the sweep was killed, or fail; without it, it goes on if it can and begins if it must",
     )  # fmt: skip
+
+    optimise = with_json(
+        command("optimise", "mass, gap and number of bodies that reduce most", "STUDY.toml", "OPTIMUM.h5")
+    )
+    optimise.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
 
     report = command("report", "one HTML page of results", None, "REPORT.html", required=True)
     report.add_argument("inputs", nargs="+", metavar="DIR|FILE", help="results of modal, reduce and sweep (.h5)")

@@ -209,6 +209,25 @@ def sweep(arguments: Namespace) -> None:
         print(f"{points.size} points, {resumed} of them from the checkpoint, in {took:.1f} s")
 
 
+def optimise(arguments: Namespace) -> None:
+    """Mass, gap and number of bodies that reduce most, as designed and within tolerances."""
+    _check_outputs(arguments)
+    from studies.optimise import optimise as search
+    from studies.optimise_study import Study
+    from studies.provenance import versions
+
+    study = Study.load(arguments.input)
+    with workers(arguments.workers) as pool, progress("optimise") as report:
+        found = search(study, pool, report, {"versions": versions()})
+    if arguments.output:
+        found.save(arguments.output)
+    _write_json(arguments.json, found.to_json())
+    if arguments.json != "-":
+        print(found.sentence)
+        if found.trouble:
+            print(f"{found.trouble} of {found.scenes} scenes are not ok")
+
+
 def report(arguments: Namespace) -> None:
     """One HTML page of results."""
     _check_outputs(arguments, output=(".html", ".htm"))
