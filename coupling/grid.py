@@ -133,22 +133,18 @@ def grid(scene: Scene) -> Grid:
         _check_method(made)
     assert first is not None
     along = _along(scene, axes) if linked else None
-    choices = choices_of(points.raw(values) for values in _product(axes)) if leaves_open else {}
+    choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if leaves_open else {}
     start = settled(first, choices)
     linear_structure(start.scene)
     return Grid(scene, axes, base, choices, start.estimate, along)
-
-
-def _product(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
-    return (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
 
 
 def _telling(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
     """Points that tell whether all are scenes: a frequency is good or bad whatever the other values are."""
     first = {path: values[0] for path, values in axes.items()}
     others = {path: values for path, values in axes.items() if path != _FREQUENCY}
-    for point in _product(others):
-        yield first | point
+    for values in itertools.product(*others.values()):
+        yield first | dict(zip(others, values, strict=True))
     for frequency in axes.get(_FREQUENCY, ()):
         yield first | {_FREQUENCY: frequency}
 

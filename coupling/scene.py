@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -326,6 +326,12 @@ class Scene:
         for path, value in values.items():
             assign(data, path.split("."), value, path)
         return validate(Scene, data, "scene")
+
+    def sweep_points(self) -> tuple[dict[str, np.ndarray], Iterator[dict[str, Any]]]:
+        """The grid of the [sweep] table: (axes by path, the points of their product with the last axis fastest)."""
+        axes = {path: axis_values(values) for path, values in self.sweep.items()}
+        points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
+        return {path: np.asarray(values) for path, values in axes.items()}, points
 
 
 def axis_values(values: Range | Sequence[Any]) -> list[Any]:
