@@ -24,7 +24,8 @@ from modal.store import Variable, frozen, load, save
 _KIND = "sweep"
 #: measures of a run and their units, each an array over the grid
 MEASURES = {
-    "amplitude_max": "m", "amplitude_mean": "m", "amplitude_rms": "m", "amplitude_harmonic": "m",
+    "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m", "amplitude_rms": "m",
+    "amplitude_harmonic": "m",
     "amplitude_undamped": "m", "amplitude_fixed": "m", "impacts_per_period": "1", "attached_mass_fraction": "1",
     "energy_residual": "1", "wall_time_s": "s",
 }  # fmt: skip
@@ -46,7 +47,8 @@ class Sweep:
     scene                 the scene of the sweep, with its [sweep] table
     axes                  dotted path -> values
     amplitude_*           m, of the displacement at excitation.at; `undamped` and `fixed` are those of the linear
-                          structure without bodies and with every body glued to its cavity
+                          structure without bodies and with every body glued to its cavity; `mean_confidence` is the
+                          half width of the mean's 95 % confidence interval, nan where there are too few periods
     attached_mass_fraction  share of the bodies' mass that the structure feels; nan without bodies or motion
     energy_share          (*grid, 4) share of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another coupling.response.Status, or "error: ..." for a run that broke, without measures
@@ -57,6 +59,7 @@ class Sweep:
     axes: Mapping[str, np.ndarray]
     amplitude_max: np.ndarray
     amplitude_mean: np.ndarray
+    amplitude_mean_confidence: np.ndarray
     amplitude_rms: np.ndarray
     amplitude_harmonic: np.ndarray
     amplitude_undamped: np.ndarray
