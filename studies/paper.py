@@ -1,7 +1,7 @@
 """Every figure of the paper as a study on the shipped cluster: sweeps, pictures, and claims with a verdict each.
 
 A figure is a file in paper_scenes/ (studies.paper_figure), rules for its claims and a picture. What was computed before
-with the same scene, model and versions is taken over, so that an interrupted run goes on.
+with the same scene, model and versions can be taken over, so that an interrupted run goes on.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import textwrap
 import time
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from modal.store import StoreError, finite, load, write_json
 from rom.reduced import ReducedModel
 from studies import paper_claims, paper_plots, paper_reduced, systems
 from studies.paper_curve import Curve, curves
-from studies.paper_figure import FOLDER, Bar, PaperFigure, Structure, write_scene
+from studies.paper_figure import FOLDER, Bar, Effort, PaperFigure, Structure, write_scene
 from studies.provenance import versions
 from studies.results import CLAIMS, Claim, Study
 from studies.terminal import progress
@@ -34,10 +34,26 @@ from studies.workers import workers
 
 NAMES = ("fig9", "fig10", "fig12", "fig13", "fig14", "fig19", "mistuning", "systems")
 #: modes of the reduced model's file: what `modes = "auto"` chooses from
-_MODES = 12
+MODES = 12
 
 
-def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None) -> list[Study]:
+@dataclass(frozen=True)
+class Session:
+    """Where studies go and what computes them.
+
+    pool: of processes, None for this one; effort: less than the figures' files say; resume: take over what the folder
+    has of the same scene, model and versions; computed: sweeps of this session by the stem of their files.
+    """
+
+    structure: Structure
+    folder: Path
+    pool: Executor | None = None
+    effort: Effort | None = None
+    resume: bool = False
+    computed: dict[str, Sweep] = field(default_factory=dict)
+
+
+def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None, resume: bool = False) -> list[Study]:
     """Compute the named studies (default: all) into a folder, and tell their claims. Raises InputError."""
     for name in names:
         if name not in NAMES:
@@ -47,25 +63,24 @@ def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None)
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"--output {folder}: cannot be made ({error.strerror})") from error
-    structure = prepare(folder)
+    structure = prepare(folder, resume)
     studies = []
     with workers(count) as pool:
+        session = Session(structure, folder, pool, resume=resume)
         for name in names or NAMES:
             begun = time.perf_counter()
-            studies.append(study(name, structure, folder, pool))
+            studies.append(study(name, session))
             tell(studies[-1], time.perf_counter() - begun)
-    print(
-        f"{folder}: {time.perf_counter() - started:.0f} s; `vanedamp report {folder} -o report.html` makes a page of it"
-    )
+    print(f"\n{folder}: {time.perf_counter() - started:.0f} s; for a page: vanedamp report {folder} -o report.html")
     return studies
 
 
-def prepare(folder: Path, modes: int = _MODES) -> Structure:
-    """The shipped cluster's modes.h5 and rom.h5 in a folder, unless they are there for this case, mesh and software."""
+def prepare(folder: Path, resume: bool = False) -> Structure:
+    """The shipped cluster's modes.h5 and rom.h5 in a folder; resume: unless they are there, of this case and mesh."""
     case, mesh, source = folder / "case.toml", folder / "vane_cluster.msh", FOLDER / "case.toml"
     found, reduced = folder / "modes.h5", folder / "rom.h5"
     same = all(old.is_file() and old.read_bytes() == new.read_bytes() for old, new in ((case, source), (mesh, SHIPPED)))
-    if not (same and _made_by_us(found, reduced, modes)):
+    if not (resume and same and _made_by_us(found, reduced, MODES)):
         shutil.copyfile(SHIPPED, mesh)
         shutil.copyfile(source, case)
         from studies.config import Case
@@ -73,7 +88,7 @@ def prepare(folder: Path, modes: int = _MODES) -> Structure:
 
         structure = assemble(Case.load(case))
         modal_analysis(structure).save(found)
-        reduction(structure, modes).save(reduced)
+        reduction(structure, MODES).save(reduced)
     return Structure.load(found, reduced)
 
 
@@ -85,41 +100,41 @@ def _made_by_us(found: Path, reduced: Path, modes: int) -> bool:
         return False
 
 
-def study(name: str, structure: Structure, folder: Path, pool: Executor | None, points: int | None = None) -> Study:
-    """One study into a folder: scenes (.toml), sweeps (.h5), picture and, last, claims. points: frequencies a curve."""
+def study(name: str, session: Session) -> Study:
+    """One study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
     if name == "fig13":
-        return _history(structure, folder, pool)
-    figure = PaperFigure.load(name, structure, points)
-    found = {curve: _swept(figure, curve, folder, pool) for curve in figure.scenes}
+        return _history(session)
+    figure = PaperFigure.load(name, session.structure, session.effort)
+    found = {curve: _swept(figure, curve, session) for curve in figure.scenes}
     read = {curve: curves(sweep, curve.replace("_", " ") or name) for curve, sweep in found.items()}
     claims = _claims(figure, read)
-    _picture(figure, read, folder / f"{name}.png")
+    _picture(figure, read, session.folder / f"{name}.png")
     trouble = sum(int((sweep.status != "ok").sum()) for sweep in found.values())
     if trouble:
-        total = sum(sweep.status.size for sweep in found.values())
-        claims = [
-            replace(claim, why=f"{claim.why} ({trouble} of {total} points are not ok.)".strip()) for claim in claims
-        ]
-    return _told(Study(name, figure.title, [f"{figure.stem(curve)}.h5" for curve in found], claims), folder)
+        told = f" ({trouble} of {sum(sweep.status.size for sweep in found.values())} points are not ok.)"
+        claims = [replace(claim, why=(claim.why + told).strip()) for claim in claims]
+    return _written(Study(name, figure.title, [f"{figure.stem(curve)}.h5" for curve in found], claims), session.folder)
 
 
-def _swept(figure: PaperFigure, curve: str, folder: Path, pool: Executor | None) -> Sweep:
-    """The sweep of a curve: computed, or the one in the folder if it is of this scene, model and software."""
+def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
+    """The sweep of a curve: of this session, of the folder where it may be taken over, or computed."""
     scene, stem = figure.scenes[curve], figure.stem(curve)
-    path = folder / f"{stem}.h5"
+    path = session.folder / f"{stem}.h5"
+    checkpoint = Path(f"{path}.partial")
     provenance: dict[str, Any] = {"versions": versions()}
     if isinstance(scene.structure, Rom):
         provenance["model"] = hashlib.sha256(Path(scene.structure.file).read_bytes()).hexdigest()
-    old = _kept(path)
-    if old is not None and old.scene == scene and all(old.provenance.get(key) == provenance[key] for key in provenance):
-        return old
-    write_scene(scene, folder / f"{stem}.toml")
-    checkpoint = Path(f"{path}.partial")
-    with progress(stem) as report:
-        result = sweep(scene, pool, report, checkpoint, provenance)
-    result.save(path)
-    checkpoint.unlink(missing_ok=True)
-    return result
+    old = session.computed.get(stem) or (_kept(path) if session.resume else None)
+    if old is None or old.scene != scene or any(old.provenance.get(key) != provenance[key] for key in provenance):
+        if not session.resume:
+            checkpoint.unlink(missing_ok=True)
+        write_scene(scene, session.folder / f"{stem}.toml")
+        with progress(stem) as report:
+            old = sweep(scene, session.pool, report, checkpoint, provenance)
+        old.save(path)
+        checkpoint.unlink(missing_ok=True)
+    session.computed[stem] = old
+    return old
 
 
 def _kept(path: Path) -> Sweep | None:
@@ -186,27 +201,27 @@ def _half_gaps(scene: Scene, reference: float) -> list[float]:
     return (gaps / 2 / reference).tolist()
 
 
-def _history(structure: Structure, folder: Path, pool: Executor | None) -> Study:
+def _history(session: Session) -> Study:
     """Fig. 13: the run at the damped peak of Fig. 12, with samples and events."""
     data = read_toml(FOLDER / "fig13.toml")
-    figure = PaperFigure.load("fig12", structure)
+    figure = PaperFigure.load("fig12", session.structure, session.effort)
     runs = {}
     for curve, of in figure.scenes.items():
-        found = curves(_swept(figure, curve, folder, pool), curve)[0]
-        at = {"excitation.frequency": found.peak().frequency, "sweep": {}, "time": data["time"]}
-        scene = of.replace(at)
+        found = curves(_swept(figure, curve, session), curve)[0]
+        scene = of.replace({"excitation.frequency": found.peak().frequency, "sweep": {}, "time": data["time"]})
         aside = scene.replace({"damper.0.position": data["aside"] * scene.cavity[0].gap})
         runs[curve] = scene, simulate(scene, events=True, samples_per_period=data["samples"]), simulate(aside)
     scene, response, alike = runs["reduced"]
+    folder = session.folder
     write_scene(scene, folder / "fig13.toml")
     response.save(folder / "fig13_response.h5", {"versions": versions(), "scene": scene.to_dict()})
     title = f"{data['title']}, {response.frequency:.1f} Hz"
-    paper_plots.history_picture(response, structure.amplitude, title, folder / "fig13.png")
+    paper_plots.history_picture(response, session.structure.amplitude, title, folder / "fig13.png")
     claims = paper_reduced.fig13(response, runs["rigid"][1], alike)
-    return _told(Study("fig13", title, ["fig13_response.h5"], claims), folder)
+    return _written(Study("fig13", title, ["fig13_response.h5"], claims), folder)
 
 
-def _told(found: Study, folder: Path) -> Study:
+def _written(found: Study, folder: Path) -> Study:
     write_json(folder / f"{found.study}{CLAIMS}", finite(asdict(found)))
     return found
 

@@ -2,8 +2,8 @@
 
 The file has a `title`, a `[frequencies]` table (start, stop and number of points), the `[scene]` that all curves share,
 and a `[curve.<name>]` for each curve that differs from it, with the tables that it replaces; a figure of one curve has
-none. Quantities in quotes are multiples of what the structure is like: "0.5 amplitude". A cavity with a `count` stands
-for so many alike, a damper with a `count` for so many bodies in a row.
+none, and a curve may have `frequencies` of its own. Quantities in quotes are multiples of what the structure is like:
+"0.5 amplitude". A cavity with a `count` stands for so many alike, a damper with a `count` for so many bodies in a row.
 
 A `[bar]` (density in kg/m^3, section in m^2) is a body that fills its cavity but for the gap: a curve that is `longer`
 by a share of its tangential length is heavier by that share, and its gap is less by as much as the bar is longer.
@@ -96,6 +96,19 @@ class Bar:
 
 
 @dataclass(frozen=True)
+class Effort:
+    """Less than a figure's file says: frequencies a curve, periods of a run and its transient."""
+
+    points: int
+    periods: int
+    transient: int
+
+    def of(self, scene: Scene) -> Scene:
+        """The scene with so many periods."""
+        return scene.replace({"time.periods": self.periods, "time.transient": self.transient})
+
+
+@dataclass(frozen=True)
 class PaperFigure:
     """A figure: its title and its scenes by the names of their curves, each with its [sweep]."""
 
@@ -104,26 +117,23 @@ class PaperFigure:
     scenes: dict[str, Scene]
 
     @classmethod
-    def load(cls, name: str, structure: Structure, points: int | None = None) -> PaperFigure:
-        """The figure of that name, on a structure, with so many frequencies (default: as many as its file says).
-
-        Raises InputError, naming the file.
-        """
+    def load(cls, name: str, structure: Structure, effort: Effort | None = None) -> PaperFigure:
+        """The figure of that name, on a structure. Raises InputError, naming the file."""
         file = FOLDER / f"{name}.toml"
         data = read_toml(file)
         try:
-            return cls._made(name, _scaled(data, structure), structure, points)
+            return cls._made(name, _scaled(data, structure), structure, effort)
         except InputError as error:
             raise InputError(f"{file}: {error}") from error
 
     @classmethod
-    def _made(cls, name: str, data: dict[str, Any], structure: Structure, points: int | None) -> PaperFigure:
-        frequencies = validate(Frequencies, data["frequencies"], "frequencies")
+    def _made(cls, name: str, data: dict[str, Any], structure: Structure, effort: Effort | None) -> PaperFigure:
         bar = validate(Bar, data["bar"], "bar") if "bar" in data else None
         scenes = {}
         for curve, changes in data.get("curve", {"": {}}).items():
             changes = dict(changes)
             longer = changes.pop("longer", None)
+            chosen = validate(Frequencies, changes.pop("frequencies", data["frequencies"]), f"{curve}.frequencies")
             tables = _expanded(_merged(data["scene"], changes))
             if tables["structure"].get("model") == "rom":
                 tables["structure"]["file"] = str(structure.rom)
@@ -131,7 +141,8 @@ class PaperFigure:
             if longer is not None:
                 assert bar is not None
                 scene = with_length(scene, bar, longer)
-            scenes[curve] = with_frequencies(scene, frequencies, points or frequencies.points)
+            scene = scene if effort is None else effort.of(scene)
+            scenes[curve] = with_frequencies(scene, chosen, effort.points if effort else chosen.points)
         return cls(name, data["title"], scenes)
 
     def stem(self, curve: str) -> str:

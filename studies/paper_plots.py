@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from coupling.response import Response
 from modal.store import replacing
 from studies.charts import COLOURS
-from studies.paper_claims import attached_closed_form, regime
+from studies.paper_claims import MOST_THETA, attached_closed_form, regime
 from studies.paper_curve import Curve
 from studies.systems import FORCES, LOADS, NAMES
 
@@ -48,16 +48,19 @@ def panels_picture(panels: Mapping[str, Mapping[str, Curve]], title: str, path: 
 
 def orientations_picture(found: Mapping[str, Sequence[Curve]], angles: Sequence[float], title: str, path: Path) -> None:
     """Horizontal and vertical responses, and the tops over the angle."""
+    found = {label: of for label, of in found.items() if "starts" not in label}
     figure, (first, second, third) = plt.subplots(1, 3, figsize=(16, 5.2), layout="constrained")
     for axes, index, name in ((first, 0, "horizontal"), (second, -1, "vertical")):
         _linear(axes, found["single"][index])
         for (label, of), colour in zip(found.items(), COLOURS, strict=False):
-            axes.plot(of[index].frequency, 100 * of[index].smooth, color=colour, label=label)
+            style = "--" if "aside" in label else "-"  # they lie on the single one
+            axes.plot(of[index].frequency, 100 * of[index].smooth, style, color=colour, label=label)
         _finish(axes, f"{name}: smoothed means")
     for (label, of), colour in zip(found.items(), COLOURS, strict=False):
         tops = [100 * float(curve.smooth.max()) for curve in of]
         spread = [100 * curve.peak().confidence for curve in of]
-        third.errorbar(angles, tops, spread, color=colour, marker="o", capsize=3, label=label)
+        style = "--" if "aside" in label else "-"
+        third.errorbar(angles, tops, spread, color=colour, linestyle=style, marker="o", capsize=3, label=label)
     third.set_xticks(list(angles))
     third.set_xlabel("orientation from the horizontal, degrees")
     third.set_ylabel("top of the smoothed mean / undamped maximum, %")
@@ -132,8 +135,6 @@ def mistuning_picture(
         axes.plot(curve.mean[other] / half, curve.attached[other], "x", color=colour, markersize=5, alpha=0.6)
     amplitude = np.linspace(0.15, 1.1, 300)
     theta, attached = attached_closed_form(amplitude, 1.0, restitution)
-    from studies.paper_claims import MOST_THETA
-
     stable = theta < MOST_THETA
     axes.plot(amplitude[stable], attached[stable], color="#0f172a", label="closed form, symmetric 1:1 regime")
     axes.plot(amplitude[~stable], attached[~stable], ":", color="#0f172a", label="where it is not stable")
@@ -152,23 +153,27 @@ def systems_picture(found: Mapping[str, Sequence[Curve]], title: str, path: Path
     """The best of each system, and its tops."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(14.5, 5.6), width_ratios=[1.5, 1], layout="constrained")
     _linear(left, found["single_body"][0])
-    labels, tops, colours = [], [], []
+    labels, tops, means, colours = [], [], [], []
     numbers: dict[str, Sequence[Any]] = {"friction_damper": FORCES, "rotating": LOADS}
     for (name, of), colour in zip(found.items(), COLOURS, strict=False):
-        best = min(of, key=lambda curve: curve.peak().height)
-        left.plot(best.frequency, 100 * best.mean, color=colour, linewidth=1.6, label=NAMES[name])
+        best = min(of, key=lambda curve: float(curve.smooth.max()))
+        left.plot(best.frequency, 100 * best.mean, ".", color=colour, markersize=3, alpha=0.6)
+        left.plot(best.frequency, 100 * best.smooth, color=colour, linewidth=1.8, label=NAMES[name])
         for index, curve in enumerate(of):
             what = {"friction_damper": "normal force", "rotating": "load"}.get(name)
             labels.append(NAMES[name] if what is None else f"{NAMES[name]}, {what} {numbers[name][index]:g}")
-            tops.append(100 * curve.peak().height)
+            tops.append(100 * float(curve.smooth.max()))
+            means.append(100 * curve.peak().height)
             colours.append(colour)
     bars = right.barh(np.arange(len(tops)), tops, color=colours)
-    right.bar_label(bars, [f"{top:.0f}" for top in tops], padding=3, fontsize=9)
+    right.bar_label(bars, [f"{top:.0f}" for top in tops], label_type="center", color="white", fontsize=9)
+    right.plot(means, np.arange(len(means)), "|", color="#0f172a", markersize=12, label="highest mean")
+    right.legend(loc="lower right")
     right.set_yticks(np.arange(len(tops)), labels, fontsize=9)
     right.invert_yaxis()
     right.set_xlim(0, 112)
-    right.set_xlabel("highest mean / undamped maximum, %")
-    _finish(left, "means of the peaks; of several loads the best")
+    right.set_xlabel("top of the smoothed mean / undamped maximum, %")
+    _finish(left, "means (points) and smoothed means; of several loads the best")
     figure.suptitle(title)
     _save(figure, path)
 
