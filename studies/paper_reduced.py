@@ -61,8 +61,9 @@ def _drop(curve: Curve) -> Claim:
         f"at the undamped resonance {left:.3f} is left (fixed body: {fixed:.3f}); above the peak, wherever the body "
         f"is touched, the smoothed mean is {low:.2f} to {high:.2f} times the fixed curve, in the median {median:.2f}",
         verdict(0.9 < median < 1.1 and high < 1.2, median < 1.1),
-        "It drops through the fixed curve: the impacts not only attach mass, they take energy as well. Farther up "
-        "they end, and a body at rest in the middle leaves the undamped curve.",
+        "It drops through the fixed curve: the impacts not only attach mass, they take energy as well, the more the "
+        "wider the gap (reference/10 stays close to the fixed curve). Farther up they end, and a body at rest in "
+        "the middle leaves the undamped curve.",
         {"at_resonance": left, "ratio_low": low, "ratio_median": median, "ratio_high": high},
     )
 
