@@ -18,9 +18,9 @@ from coupling.structure import linear_structure
 
 #: measures of a run and their units, each an array over the grid
 MEASURES = {
-    "amplitude_max": "m", "amplitude_mean": "m", "amplitude_rms": "m", "amplitude_harmonic": "m",
-    "amplitude_undamped": "m", "amplitude_fixed": "m", "impacts_per_period": "1", "attached_mass_fraction": "1",
-    "energy_residual": "1",
+    "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m", "amplitude_rms": "m",
+    "amplitude_harmonic": "m", "amplitude_undamped": "m", "amplitude_fixed": "m",
+    "impacts_per_period": "1", "attached_mass_fraction": "1", "energy_residual": "1",
 }  # fmt: skip
 #: what takes the energy, the last axis of `energy_share`
 LOSSES = ("viscous", "friction", "impact", "contact")

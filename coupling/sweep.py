@@ -45,7 +45,8 @@ class Sweep:
     scene                 the scene of the sweep, with its [sweep] table
     axes                  dotted path -> values
     amplitude_*           m, of the displacement at excitation.at; `undamped` and `fixed` are those of the linear
-                          structure without bodies and with every body glued to its cavity
+                          structure without bodies and with every body glued to its cavity; `mean_confidence` is the
+                          half width of the mean's 95 % confidence interval, nan where there are too few periods
     attached_mass_fraction  share of the bodies' mass that the structure feels; nan without bodies or motion
     energy_share          (*grid, 4) share of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another coupling.response.Status, or "error: ..." for a run that broke, without measures
@@ -57,6 +58,7 @@ class Sweep:
     axes: Mapping[str, np.ndarray]
     amplitude_max: np.ndarray
     amplitude_mean: np.ndarray
+    amplitude_mean_confidence: np.ndarray
     amplitude_rms: np.ndarray
     amplitude_harmonic: np.ndarray
     amplitude_undamped: np.ndarray

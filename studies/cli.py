@@ -1,4 +1,4 @@
-"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, import, run, sweep, optimise, report, demo ..."""
+"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, import, run, sweep, optimise, paper, report ..."""
 
 from __future__ import annotations
 
@@ -176,6 +176,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR|FILE",
         help="results of modal, reduce, run and sweep (.h5), studies (.claims.json)",
     )
+
+    paper = command("paper", "the paper's figures as studies, each claim with a verdict", None, "DIR", required=True)
+    paper.add_argument("studies", nargs="*", metavar="STUDY", help="fig9 ... systems (default: all; docs/paper.md)")
+    paper.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
+    paper.add_argument("--resume", action="store_true", help="take over what the folder has of the same scenes")
 
     demo = command("demo", "the whole pipeline on the shipped mesh", None, "DIR")
     demo.set_defaults(output="out")

@@ -238,6 +238,13 @@ def report(arguments: Namespace) -> None:
     print(f"{arguments.output}: report")
 
 
+def paper(arguments: Namespace) -> None:
+    """The paper's figures as studies."""
+    from studies.paper import run_paper
+
+    run_paper(_folder(arguments), arguments.studies, arguments.workers, arguments.resume)
+
+
 def demo(arguments: Namespace) -> None:
     """The whole pipeline on the shipped mesh."""
     from studies.demo import run_demo
