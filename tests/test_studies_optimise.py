@@ -1,5 +1,6 @@
 """The optimisation finds the optimum that is known, and keeps what it found. No test asserts a time."""
 
+import html
 import json
 import tomllib
 
@@ -198,3 +199,13 @@ def test_bodies_are_spread_over_the_cavities(tmp_path):
     point = case.point(Design(0.02, 0.5, 3), dict.fromkeys(deviations(case)[0], 0.0), 2400.0)
     assert [point[f"damper.{i}.position"] for i in range(3)] == pytest.approx([-2.5e-6, 2.5e-6, 0.0])
     assert point["damper.mass"] == pytest.approx(0.02 * 0.148 / 3)
+
+
+def test_report_tells_the_optimum(found, tmp_path):
+    record = found[0]
+    record.save(tmp_path / "optimum.h5")
+    assert main(["report", str(tmp_path), "-o", str(tmp_path / "report.html")]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert record.sentence in html.unescape(page)
+    assert f"{100 * record.robust.reduction_tolerances:.1f}" in page
+    assert "Plotly.newPlot" in page and 'download="optimum-0.csv"' in page
