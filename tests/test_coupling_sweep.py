@@ -128,6 +128,21 @@ def test_workers_change_nothing(result):
         same(sweep(scene(), pool), result)
 
 
+def test_any_key_is_an_axis(tmp_path):
+    """Words, whole numbers, tables of lists by name and by index."""
+    cavities = [{"name": "c1", "gap": 5e-4}, {"name": "c2", "gap": 1e-4}]
+    axes = {
+        "damper.cavity": ["c1", "c2"], "time.periods": [30, 40], "cavity.c2.gap": [1e-4, 2e-4], "cavity.0.gap": [5e-4]
+    }  # fmt: skip
+    found = sweep(scene(cavity=cavities, sweep=axes))
+    for place in np.ndindex(found.shape):
+        values = {path: values[at] for (path, values), at in zip(axes.items(), place, strict=True)}
+        single = simulate(scene(cavity=cavities, sweep={}).replace(values))
+        assert found.amplitude_mean[place] == single.amplitude_mean
+    found.save(tmp_path / "sweep.h5")
+    assert list(Sweep.load(tmp_path / "sweep.h5").axes["damper.cavity"]) == ["c1", "c2"]
+
+
 def test_progress_counts_to_the_end():
     calls = []
     sweep(scene(), progress=lambda done, total: calls.append((done, total)))
