@@ -325,7 +325,7 @@ def test_bad_reduced_models(command, folder, rom, capfd):
         (["modal", "case.toml", "--vtk", "modes.stl"], "expected a file name ending in .vtu or .vtk"),
         (["mesh", "case.toml", "-o", "block.vtk"], "expected a file name ending in .msh"),
         (["report", "case.toml", "-o", "report.html"], "case.toml: not a readable HDF5 file"),
-        (["report", ".", "-o", "report.html"], "no results of modal, reduce or sweep"),
+        (["report", ".", "-o", "report.html"], "no results of modal, reduce, run, sweep or paper"),
         (["report", "nowhere", "-o", "report.html"], "nowhere: no such file or folder"),
         (["report", ".", "-o", "report.pdf"], "expected a file name ending in .html"),
     ],
