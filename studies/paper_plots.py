@@ -19,7 +19,7 @@ from modal.store import replacing
 from studies.charts import COLOURS
 from studies.paper_claims import MOST_THETA, attached_closed_form, regime
 from studies.paper_curve import Curve
-from studies.systems import FORCES, LOADS, NAMES
+from studies.systems import FORCES, LOADS, NAMES, top
 
 _GREY, _DARK = "#94a3b8", "#475569"
 
@@ -65,7 +65,7 @@ def orientations_picture(found: Mapping[str, Sequence[Curve]], angles: Sequence[
     third.set_xlabel("orientation from the horizontal, degrees")
     third.set_ylabel("top of the smoothed mean / undamped maximum, %")
     third.set_ylim(bottom=0)
-    third.set_title("tops, with 95 % confidence")
+    third.set_title("tops; bars: 95 % confidence of the highest mean")
     third.grid(True, color="#e2e8f0")
     third.legend(fontsize=8)
     figure.suptitle(title)
@@ -156,23 +156,27 @@ def systems_picture(found: Mapping[str, Sequence[Curve]], title: str, path: Path
     labels, tops, means, colours = [], [], [], []
     numbers: dict[str, Sequence[Any]] = {"friction_damper": FORCES, "rotating": LOADS}
     for (name, of), colour in zip(found.items(), COLOURS, strict=False):
-        best = min(of, key=lambda curve: float(curve.smooth.max()))
+        best = min(of, key=top)
         left.plot(best.frequency, 100 * best.mean, ".", color=colour, markersize=3, alpha=0.6)
-        left.plot(best.frequency, 100 * best.smooth, color=colour, linewidth=1.8, label=NAMES[name])
+        line = best.smooth if best.impacts.any() else best.mean
+        left.plot(best.frequency, 100 * line, color=colour, linewidth=1.8, label=NAMES[name])
         for index, curve in enumerate(of):
             what = {"friction_damper": "normal force", "rotating": "load"}.get(name)
             labels.append(NAMES[name] if what is None else f"{NAMES[name]}, {what} {numbers[name][index]:g}")
-            tops.append(100 * float(curve.smooth.max()))
+            tops.append(100 * top(curve))
             means.append(100 * curve.peak().height)
             colours.append(colour)
     bars = right.barh(np.arange(len(tops)), tops, color=colours)
     right.bar_label(bars, [f"{top:.0f}" for top in tops], label_type="center", color="white", fontsize=9)
     right.plot(means, np.arange(len(means)), "|", color="#0f172a", markersize=12, label="highest mean")
-    right.legend(loc="lower right")
+    right.legend(loc="upper right")
     right.set_yticks(np.arange(len(tops)), labels, fontsize=9)
     right.invert_yaxis()
     right.set_xlim(0, 112)
-    right.set_xlabel("top of the smoothed mean / undamped maximum, %")
+    right.set_xlabel("top / undamped maximum, %")
+    right.set_title(
+        "tops of the curves; forces in exciting forces,\nloads in shares of the one that sticks", fontsize=11
+    )
     _finish(left, "means (points) and smoothed means; of several loads the best")
     figure.suptitle(title)
     _save(figure, path)
