@@ -1,9 +1,9 @@
-"""What a scene leaves open about its reduced model, settled: how many modes it needs, and how stiff its contacts are.
+"""What a scene leaves open about its reduced model, settled: how many modes it needs.
 
 `modes = "auto"` takes the fewest natural modes whose estimated error stays within the tolerance (rom.ladder): of the
-receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus what a
-collision's energy and duration lose, in the measure in which the bodies can change the response at all. The whole model
-of the file is the measure.
+receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus that of the
+pulse of a collision, in the measure in which the bodies can change the response at all. The whole model of the file is
+the measure.
 
 A boundary without mass yields under its contact force by the flexibility G that the modes lack, u = Phi eta + G f,
 while it touches and not otherwise. For one contact at a time this is a spring 1/G between body and modes, which is what
@@ -23,9 +23,16 @@ import numpy as np
 from coupling.inputs import InputError
 from coupling.laws import Compliant, Massless, Newton
 from coupling.scene import Rom, Scene
-from rom.ladder import Choice, Collision, choose, grid, natural_ladder, rigid_errors
+from coupling.sensitivity import sensitivity
+from rom.collision import Collision, pulse
+from rom.ladder import Choice, choose, grid, natural_ladder, rigid_errors
 from rom.reduced import ReducedModel
+from rom.spectrum import spectrum
 
+#: bodies that hit twice a period act like up to 1.7 times their mass (docs/engine.md: attached mass), and damp besides
+_IMPACTS = 2.0
+#: what the sensitivity of the one-mode model is short of that of a richer one, at most, by experience
+_CAUTION = 5.0
 _NEWTON = "; of the forced response alone: Newton's impacts have no limit as modes grow, compliant contacts have"
 
 
@@ -37,7 +44,7 @@ class Settled(NamedTuple):
 
 
 def settle(scene: Scene) -> Settled:
-    """The scene with its number of modes and its contact stiffness. Raises InputError when there is no good choice."""
+    """The scene with its number of modes. Raises InputError when there is no good choice."""
     return settle_all([scene])[0]
 
 
@@ -74,11 +81,7 @@ def restricted(file: str, _stamp: int, modes: int | None, natural: bool) -> Redu
 
 
 def _open(scene: Scene) -> bool:
-    return isinstance(scene.structure, Rom) and (scene.structure.modes == "auto" or _wants_residual(scene))
-
-
-def _wants_residual(scene: Scene) -> bool:
-    return isinstance(scene.contact, Massless) or (isinstance(scene.contact, Compliant) and scene.contact.residual)
+    return isinstance(scene.structure, Rom) and scene.structure.modes == "auto"
 
 
 def _group(scene: Scene) -> tuple[Any, ...]:
@@ -88,16 +91,13 @@ def _group(scene: Scene) -> tuple[Any, ...]:
 
 def _settled(scene: Scene, choice: Choice | None) -> Settled:
     structure = scene.structure
-    if not isinstance(structure, Rom) or not _open(scene):
+    if choice is None or not isinstance(structure, Rom):
         return Settled(scene, None)
-    if choice is not None:
-        structure = replace(structure, modes=choice.chosen.modes, natural=True)
-    contact = scene.contact
-    if _wants_residual(scene):
-        model = restricted(structure.file, file_stamp(structure.file), kept(structure), structure.natural)
-        contact = Compliant(_series(scene, model))
-    estimate = None if choice is None else choice.to_json() | {"stiffness": getattr(contact, "stiffness", None)}
-    return Settled(replace(scene, structure=structure, contact=contact), estimate)
+    structure = replace(structure, modes=choice.chosen.modes, natural=True)
+    scene = replace(scene, structure=structure)
+    contacts = _collisions(scene, restricted(structure.file, file_stamp(structure.file), structure.modes, True))
+    stiffness = min((collision.stiffness for collision in contacts), default=None)
+    return Settled(scene, choice.to_json() | {"stiffness": stiffness})
 
 
 def _choice(scenes: Sequence[Scene]) -> Choice:
@@ -114,19 +114,15 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     frequencies = grid(model, min(driven), max(driven))
 
     def collisions(smaller: ReducedModel) -> list[Collision]:
-        made = {}
-        for scene in scenes:
-            if isinstance(scene.contact, Newton):
-                continue
-            stiffness = _series(scene, smaller)
-            for damper in scene.damper:
-                walls = tuple(_walls(scene, damper.cavity))
-                made[walls, damper.mass, stiffness] = Collision(walls, damper.mass, stiffness, damper.restitution)
-        return list(made.values())
+        if smaller.size == model.size and any(map(_needs_residual, scenes)) and not _yields(smaller):
+            return []  # the whole model has no boundary without mass
+        return list(dict.fromkeys(item for scene in scenes for item in _collisions(scene, smaller)))
 
-    rungs = natural_ladder(model, frequencies, labels, [at], collisions, any(map(_wants_residual, scenes)))
-    share = max(_influence(scene, model, frequencies) for scene in scenes)
-    rungs = [replace(rung, collision=min(share, 1.0) * rung.collision) for rung in rungs]
+    rungs = natural_ladder(model, frequencies, labels, [at], collisions)
+    share = min(1.0, _IMPACTS * max(_influence(scene, model, frequencies) for scene in scenes))
+    if any(rung.collision > 0.0 for rung in rungs):
+        share = min(share, _CAUTION * _sensitivity(scenes, model))
+    rungs = [replace(rung, collision=share * rung.collision) for rung in rungs]
     rigid = float(rigid_errors(model, frequencies, at, labels, [at]).max())
     choice = choose(rungs, structure.tolerance, rigid)
     if not choice.met:
@@ -148,27 +144,56 @@ def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> fl
     return float((np.abs(glued - loose) / np.maximum(np.abs(loose), np.abs(glued))).max())
 
 
-def _series(scene: Scene, model: ReducedModel) -> float:
-    """Stiffness of the walls' mean residual flexibility in series with the law's own spring, N/m."""
-    walls = list(dict.fromkeys(label for damper in scene.damper for label in _walls(scene, damper.cavity)))
-    residual = model.residual_flexibility
-    indices = [model.interface.index(label) for label in walls]
-    lost = 0.0
-    if residual is not None and walls and _wants_residual(scene):
-        lost = float(np.mean(np.diag(residual)[indices]))
-    own = scene.contact.stiffness if isinstance(scene.contact, Compliant) else None
-    flexibility = lost + (0.0 if own is None else 1.0 / own)
-    if flexibility <= 0.0:
-        raise InputError(
-            "contact: the reduced model lacks no flexibility at the walls; take structure.natural = true with modes, "
-            "or a model of basis macneal or massless"
-        )
-    return 1.0 / flexibility
+def _sensitivity(scenes: Sequence[Scene], model: ReducedModel) -> float:
+    """Of the first scene with collisions and those that differ in frequency alone; 1 where it cannot be told."""
+    squares, shapes = spectrum(model.mass, model.stiffness)
+    least = max(1, model.rigid_modes)
+    for scene in scenes:
+        smaller = model if not _needs_residual(scene) or _yields(model) else model.massless(model.size - 1)
+        undamped = _undamped(scene, model)
+        for collision in _collisions(scene, smaller)[:1]:
+            row = (model.row(collision.label) @ shapes)[: smaller.size]
+            felt = pulse(squares[: smaller.size], row, collision, scene.excitation.frequency)
+            alike = [item for item in scenes if replace(item, excitation=scene.excitation) == scene]
+            return sensitivity(alike, collision, float(row[0]), felt, least, undamped) if undamped > 0.0 else 1.0
+    return 1.0
 
 
-def _walls(scene: Scene, cavity: str) -> list[str]:
-    found = next(item for item in scene.cavity if item.name == cavity)
-    return [label for label in found.labels()[:2] if label is not None]
+def _undamped(scene: Scene, model: ReducedModel) -> float:
+    """Amplitude of the highest resonance without bodies, m; 0 where no force drives it."""
+    if scene.excitation.resonance_amplitude is not None:
+        return scene.excitation.resonance_amplitude
+    at = str(scene.excitation.at)
+    return float(np.abs(model.frf(model.natural_frequencies_hz, at, at)).max()) * (scene.excitation.force or 0.0)
+
+
+def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
+    """Contacts of bodies with walls as they are on a model; none for rigid contacts. Raises InputError."""
+    if isinstance(scene.contact, Newton):
+        return []
+    first = spectrum(model.mass, model.stiffness)[1][:, 0]
+    flexibility = model.residual_flexibility
+    own = np.zeros(len(model.interface)) if flexibility is None else np.diag(flexibility)
+    found = []
+    for damper in scene.damper:
+        cavity = next(item for item in scene.cavity if item.name == damper.cavity)
+        for label in dict.fromkeys(filter(None, cavity.labels()[:2])):
+            reduced = 1.0 / (1.0 / damper.mass + float(model.row(label) @ first) ** 2)
+            lost = float(own[model.interface.index(label)])
+            element = scene.contact.element(damper.restitution, reduced, lost)
+            found.append(Collision(label, damper.mass, element.stiffness, element.dashpot))
+    return found
+
+
+def _needs_residual(scene: Scene) -> bool:
+    """Whether a contact is nothing but the flexibility that modes lack."""
+    return isinstance(scene.contact, Massless) or (
+        isinstance(scene.contact, Compliant) and scene.contact.stiffness is None
+    )
+
+
+def _yields(model: ReducedModel) -> bool:
+    return model.residual_flexibility is not None and bool(np.diag(model.residual_flexibility).max() > 0.0)
 
 
 def _surfaces(scene: Scene) -> list[str]:

@@ -44,6 +44,7 @@ class LinearStructure:
     displacement: np.ndarray
     velocity: np.ndarray
     table: complex = 0.0
+    wall_flexibility: np.ndarray | None = None
 
     @property
     def modes(self) -> int:
@@ -53,12 +54,13 @@ class LinearStructure:
 
 @dataclass(frozen=True)
 class _ModalBasis:
-    """Modes of a structure without bodies: squared frequencies, damping, functionals and base loads by label."""
+    """Modes of a structure without bodies: squared frequencies, damping; by label functionals, base loads, residual."""
 
     stiffness: np.ndarray
     damping: np.ndarray
     rows: dict[str, np.ndarray]
     base: dict[str, np.ndarray]
+    flexibility: dict[str, float]
 
 
 def linear_structure(scene: Scene) -> LinearStructure:
@@ -91,6 +93,7 @@ def linear_structure(scene: Scene) -> LinearStructure:
     return LinearStructure(
         omega, basis.stiffness, basis.damping, response, floor, left, right,
         np.reshape(casing, (len(casing), len(response))), force, base, displacement, velocity,
+        wall_flexibility=_wall_flexibility(basis, scene),
     )  # fmt: skip
 
 
@@ -165,6 +168,13 @@ def _surfaces(basis: _ModalBasis, scene: Scene, index: int) -> tuple[np.ndarray,
     return _row(basis, left, f"{key}.left"), _row(basis, right, f"{key}.right"), _row(basis, floor, f"{key}.floor")
 
 
+def _wall_flexibility(basis: _ModalBasis, scene: Scene) -> np.ndarray:
+    if isinstance(scene.structure, Rigid):
+        return np.zeros((len(scene.cavity), 2))
+    walls = [basis.flexibility[str(label)] for cavity in scene.cavity for label in cavity.labels()[:2]]
+    return np.reshape(walls, (-1, 2))
+
+
 def _basis(scene: Scene) -> _ModalBasis:
     structure = scene.structure
     if isinstance(structure, Rigid):
@@ -172,7 +182,7 @@ def _basis(scene: Scene) -> _ModalBasis:
         row = frozen([1 / root])
         return _ModalBasis(
             frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
-            {"structure": row}, {"structure": frozen([root])},
+            {"structure": row}, {"structure": frozen([root])}, {},
         )  # fmt: skip
     settled = settle(scene).scene.structure
     assert isinstance(settled, Rom)
@@ -199,4 +209,7 @@ def modal_basis(model: ReducedModel) -> _ModalBasis:
         label: frozen(shapes.T @ model.base_load @ direction)
         for label, direction in zip(model.interface, model.directions, strict=True)
     }
-    return _ModalBasis(frozen(squares), frozen(damping), rows, base)
+    residual = model.residual_flexibility
+    own = np.zeros(len(model.interface)) if residual is None else np.diag(residual)
+    flexibility = dict(zip(model.interface, own.tolist(), strict=True))
+    return _ModalBasis(frozen(squares), frozen(damping), rows, base, flexibility)

@@ -213,35 +213,33 @@ def _quasi_static_blocks(
     They are not made orthogonal to the latter: a truncated model keeps them whole.
     """
     blocks: list[np.ndarray] = []
-    lag = constraint
+    lag, known, sizes = constraint, fixed, np.empty(0)
     for _ in range(count):
         lag = held.solve(mass @ lag)
-        known = np.hstack([fixed, *blocks])
-        if blocks:
-            known = _orthonormal(known, mass)
-            lag = (
-                lag
-                - (before := np.hstack(blocks))
-                @ np.linalg.lstsq(before.T @ (mass @ before), before.T @ (mass @ lag), rcond=None)[0]
-            )
+        for _ in range(2 if blocks else 0):
+            # beside the fixed-interface modes blocks are orthogonal, or shares of both that are small would multiply
+            lag = lag - np.hstack(blocks) @ (known[:, fixed.shape[1] :].T @ (mass @ lag) / sizes[:, None])
         values, vectors = np.linalg.eigh(lag.T @ (mass @ lag))
         kept = values > _OWN_SHARE * values[-1]
         lag = lag @ (vectors[:, kept] / np.sqrt(values[kept]))
-        rest = lag - known @ (known.T @ (mass @ lag))
+        rest = _without(lag, known, mass)
         shares, vectors = np.linalg.eigh(rest.T @ (mass @ rest))
-        lag = lag @ vectors[:, shares > _OWN_SHARE]
-        if lag.shape[1] == 0:
+        own = shares > _OWN_SHARE
+        if not np.any(own):
             break
-        lag = lag * mode_signs(lag)
-        blocks.append(lag)
+        signs = mode_signs(lag @ vectors[:, own])
+        blocks.append(lag @ vectors[:, own] * signs)
+        sizes = np.append(sizes, np.sqrt(shares[own]))
+        known = np.hstack([known, _without(rest @ vectors[:, own] * signs / np.sqrt(shares[own]), known, mass)])
+        lag = blocks[-1]
     return blocks
 
 
-def _orthonormal(fields: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
-    """M-orthonormal basis of independent fields (n, m)."""
-    gram = fields.T @ (mass @ fields)
-    values, vectors = np.linalg.eigh(gram)
-    return fields @ (vectors / np.sqrt(values))
+def _without(fields: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
+    """Fields (n, m) without what M-orthonormal ones have of them."""
+    for _ in range(2):  # twice is enough
+        fields = fields - known @ (known.T @ (mass @ fields))
+    return fields
 
 
 def mode_signs(shapes: np.ndarray) -> np.ndarray:

@@ -7,17 +7,14 @@ quasi-static modes (block Krylov, Craig and Hale 1988). So the error is estimate
 basis with two more such blocks, which is the difference of the two models' receptances. The blocks come from the
 factors at hand, for as many solutions as the interface has coordinates each.
 
-Contact. A collision of duration pi / omega_c is a half sine of force. It leaves mode j of the wall the energy
-(phi_j p S(omega_j))^2 / 2, p the impulse and S the pulse's spectrum, 1 at low frequency and falling with
-(omega_c / omega)^2 above the contact's frequency omega_c = sqrt(k_c (1/m_1 + 1/m_i)). What the modes above the cut
-would take, relative to the energy of the approach, is what the smaller model cannot know.
+Contact. Bodies act on the structure by pulses, so an error of the pulse at the excitation frequency (rom.collision) is
+one of the force that changes the response.
 
 Needs numpy and reduced models alone.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -25,7 +22,9 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from rom.collision import Collision, pulse, share_above
 from rom.reduced import ReducedModel
+from rom.spectrum import spectrum
 
 
 class LadderError(ValueError):
@@ -33,29 +32,17 @@ class LadderError(ValueError):
 
 
 @dataclass(frozen=True)
-class Collision:
-    """Contacts of a body with walls of the structure.
-
-    labels       interface coordinates of the walls
-    mass         kg, of the body
-    stiffness    N/m, of the contact
-    restitution  1
-    """
-
-    labels: tuple[str, ...]
-    mass: float
-    stiffness: float
-    restitution: float
-
-
-@dataclass(frozen=True)
 class Rung:
-    """A model of the ladder with its estimated errors: modes, coordinates, of the receptance, of the collisions."""
+    """A model of the ladder with its estimated errors, relative: of the receptance, of the pulses of collisions.
+
+    above: share of a collision's energy that modes beyond the model's would take, which need not be an error.
+    """
 
     modes: int
     size: int
     receptance: float
     collision: float
+    above: float = 0.0
 
     @property
     def error(self) -> float:
@@ -125,78 +112,36 @@ def rigid_errors(
     return frf_errors(rigid, richer, frequencies_hz, labels, forces)
 
 
-def contact_frequency(model: ReducedModel, label: str, stiffness: float, mass: float) -> float:
-    """Hz, of a body of that mass (kg) on a contact (N/m) with a wall that has the mass of the first natural mode."""
-    first = float((model.row(label) @ linalg.eigh(model.stiffness, model.mass, subset_by_index=[0, 0])[1])[0] ** 2)
-    return math.sqrt(stiffness * (first + 1.0 / mass)) / (2.0 * math.pi)
-
-
-def pulse_spectrum(ratio: np.ndarray | float) -> np.ndarray:
-    """|Fourier transform| of a half sine of unit impulse at ratio = omega / omega_c: cos(pi r / 2) / (1 - r^2)."""
-    r = np.asarray(ratio, dtype=float)
-    near = np.abs(r - 1.0) < 1e-6
-    safe = np.where(near, 0.0, r)
-    return np.where(near, math.pi / 4.0, np.abs(np.cos(math.pi * safe / 2.0) / (1.0 - safe**2)))
-
-
-def collision_share(model: ReducedModel, modes: int, collision: Collision) -> float:
-    """Share of a collision's energy that natural modes beyond the first `modes` would take; the worst wall.
-
-    The impulse is that of an isolated collision with restitution at the mass of the first natural mode; the energy,
-    that of its approach and of the modes above the first.
-    """
-    squares, shapes = linalg.eigh(model.stiffness, model.mass)
-    omegas = np.sqrt(np.maximum(squares, 0.0))
-    worst = 0.0
-    for label in collision.labels:
-        row = model.row(label) @ shapes
-        reduced = 1.0 / (row[0] ** 2 + 1.0 / collision.mass)
-        spectrum = pulse_spectrum(omegas / math.sqrt(collision.stiffness / reduced))
-        impulse = (1.0 + collision.restitution) * reduced  # of a unit speed of approach
-        energy = 0.5 * (row * impulse * spectrum) ** 2
-        worst = max(worst, float(energy[modes:].sum() / (0.5 * reduced + energy[1:].sum())))
-    return worst
-
-
-def compliance_error(model: ReducedModel, frequency_hz: float, collision: Collision) -> float:
-    """How much of a period a collision's duration is wrong by, when its wall lacks the residual flexibility of a model.
-
-    A flexibility G in series lengthens the contact's half period by G k_c / 2 of itself.
-    """
-    assert model.residual_flexibility is not None
-    worst = 0.0
-    for label in collision.labels:
-        index = model.interface.index(label)
-        lost = 0.5 * collision.stiffness * float(model.residual_flexibility[index, index])
-        duration = 0.5 / contact_frequency(model, label, collision.stiffness, collision.mass)
-        worst = max(worst, lost * duration * frequency_hz)
-    return worst
-
-
 def natural_ladder(
     richer: ReducedModel,
     frequencies_hz: np.ndarray,
     labels: Sequence[str] | None = None,
     forces: Sequence[str] | None = None,
     collisions: Callable[[ReducedModel], Sequence[Collision]] = lambda model: (),
-    residual: bool = False,
 ) -> list[Rung]:
     """Models of 1, 2, 3, ... natural modes of a model, with the errors of each against the whole.
 
-    collisions: the contacts, which may depend on the model with so many modes. residual: the contacts have the
-    flexibility that the modes lack (a massless boundary); otherwise it is lost.
+    collisions: the contacts, which may depend on the model with so many modes, always in the same order; where a model
+    has none but others do, contact has no meaning on it, and it is left out.
     """
-    rungs = []
+    squares, shapes = spectrum(richer.mass, richer.stiffness)
+    rungs, pulses = [], []
     for modes in range(_least(richer), richer.size + 1):
         model = richer.massless(modes)
         plain = replace(model, residual_flexibility=None, residual_recovery=None, output_residual=None)
         receptance = float(frf_errors(plain, richer, frequencies_hz, labels, forces).max())
-        share = 0.0
-        for collision in collisions(model):
-            lost = 0.0 if residual else compliance_error(model, float(frequencies_hz.max()), collision)
-            share = max(share, collision_share(richer, modes, collision) + lost)
-        rungs.append(Rung(modes, modes, receptance, share))
-    return rungs
+        met = [(collision, richer.row(collision.label) @ shapes) for collision in collisions(model)]
+        pulses.append([pulse(squares[:modes], row[:modes], item, frequencies_hz.max()).transform for item, row in met])
+        above = max((share_above(squares, row, modes, item) for item, row in met), default=0.0)
+        rungs.append(Rung(modes, modes, receptance, 0.0, above))
+    if not any(pulses):
+        return rungs
+    finest = np.array([transforms for transforms in pulses if transforms][-1])
+    return [
+        replace(rung, collision=float(np.abs(np.array(transforms) / finest - 1.0).max()))
+        for rung, transforms in zip(rungs, pulses, strict=True)
+        if transforms
+    ]
 
 
 def _least(model: ReducedModel) -> int:
