@@ -33,6 +33,8 @@ from rom.spectrum import spectrum
 _IMPACTS = 2.0
 #: what the sensitivity of the one-mode model is short of that of a richer one, at most, by experience
 _CAUTION = 5.0
+#: between a single collision and the response, in which collisions meet the waves of those before
+_SAFETY = 1.5
 _NEWTON = "; of the forced response alone: Newton's impacts have no limit as modes grow, compliant contacts have"
 
 
@@ -122,7 +124,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     share = min(1.0, _IMPACTS * max(_influence(scene, model, frequencies) for scene in scenes))
     if any(rung.collision > 0.0 for rung in rungs):
         share = min(share, _CAUTION * _sensitivity(scenes, model))
-    rungs = [replace(rung, collision=share * rung.collision) for rung in rungs]
+    rungs = [replace(rung, collision=_SAFETY * share * rung.collision) for rung in rungs]
     rigid = float(rigid_errors(model, frequencies, at, labels, [at]).max())
     choice = choose(rungs, structure.tolerance, rigid)
     if not choice.met:

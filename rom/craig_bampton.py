@@ -34,6 +34,8 @@ from rom.reduced import ReducedModel
 _ROUND_TRIP = 1e-2
 # share of a quasi-static mode's inertia that must be its own for the reduced mass to stay well conditioned
 _OWN_SHARE = 1e-10
+# lowest eigenvalue of the mass of fields of unit norm that a factorisation stands
+_SMALLEST = 1e-14
 
 
 class ReductionError(ValueError):
@@ -213,26 +215,38 @@ def _quasi_static_blocks(
     They are not made orthogonal to the latter: a truncated model keeps them whole.
     """
     blocks: list[np.ndarray] = []
-    lag, known, sizes = constraint, fixed, np.empty(0)
+    lag, known = constraint, fixed
+    unit = constraint / np.sqrt(np.einsum("ij,ij->j", constraint, mass @ constraint))
     for _ in range(count):
         lag = held.solve(mass @ lag)
-        for _ in range(2 if blocks else 0):
-            # beside the fixed-interface modes blocks are orthogonal, or shares of both that are small would multiply
-            lag = lag - np.hstack(blocks) @ (known[:, fixed.shape[1] :].T @ (mass @ lag) / sizes[:, None])
+        if blocks:
+            before = np.hstack(blocks)
+            lag = lag - before @ np.linalg.lstsq(before.T @ (mass @ before), before.T @ (mass @ lag), rcond=None)[0]
         values, vectors = np.linalg.eigh(lag.T @ (mass @ lag))
         kept = values > _OWN_SHARE * values[-1]
         lag = lag @ (vectors[:, kept] / np.sqrt(values[kept]))
         rest = _without(lag, known, mass)
         shares, vectors = np.linalg.eigh(rest.T @ (mass @ rest))
-        own = shares > _OWN_SHARE
-        if not np.any(own):
+        own = _independent(lag @ vectors, shares, np.hstack([unit, fixed, *blocks]), mass)
+        if own == 0:
             break
-        signs = mode_signs(lag @ vectors[:, own])
-        blocks.append(lag @ vectors[:, own] * signs)
-        sizes = np.append(sizes, np.sqrt(shares[own]))
-        known = np.hstack([known, _without(rest @ vectors[:, own] * signs / np.sqrt(shares[own]), known, mass)])
+        turns = vectors[:, -own:]
+        blocks.append(lag @ turns * mode_signs(lag @ turns))
+        known = np.hstack([known, _without(rest @ turns / np.sqrt(shares[-own:]), known, mass)])
         lag = blocks[-1]
     return blocks
+
+
+def _independent(fields: np.ndarray, shares: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> int:
+    """How many of the last fields (n, m), whose own shares ascend, leave the mass of all together well conditioned.
+
+    A share that is small beside known fields which are nearly dependent already multiplies with theirs.
+    """
+    for count in range(int(np.count_nonzero(shares > _OWN_SHARE)), 0, -1):
+        together = np.hstack([known, fields[:, -count:]])
+        if np.linalg.eigvalsh(together.T @ (mass @ together))[0] > _SMALLEST:
+            return count
+    return 0
 
 
 def _without(fields: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> np.ndarray:

@@ -26,7 +26,7 @@ from studies.timing import in_turns
 TOLERANCES = (0.1, 0.03, 0.01)
 _STARTS = (-0.3, 0.2)
 #: numbers of modes tried, besides those chosen and all of them
-_COUNTS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20, 25, 32)
+_COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 20, 25, 32)
 #: rounds of the clocks, and between which periods of a run they measure
 _ROUNDS, _LENGTHS = 3, (50, 150)
 

@@ -69,7 +69,9 @@ def cluster_figure(cluster: Mapping[str, Any], path: Path) -> None:
     right.set_ylabel("mean amplitude, of the undamped peak")
     for axis in (left, right):
         axis.grid(True, which="major", color="#e2e8f0")
-        axis.legend(fontsize=8)
+    right.legend(fontsize=8)
+    if noise > 0.0:
+        left.legend(*([item[-1]] for item in left.get_legend_handles_labels()), fontsize=8, loc="lower right")
     _save(figure, path)
 
 
