@@ -7,11 +7,14 @@ the measure.
 
 A boundary without mass yields under its contact force by the flexibility G that the modes lack, u = Phi eta + G f,
 while it touches and not otherwise. For one contact at a time this is a spring 1/G between body and modes, which is what
-the engine runs. Left out are the boundary's motion under friction on the floor and under forces at other coordinates.
+the engine runs, at every wall with its own G. Left out are the boundary's motion under friction on the floor and under
+forces at other coordinates; where walls that can be touched at once have much of G in common, the estimate tells.
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -31,6 +34,8 @@ from rom.spectrum import spectrum
 
 #: bodies that hit twice a period act like up to 1.7 times their mass (docs/engine.md: attached mass), and damp besides
 _IMPACTS = 2.0
+#: share of a flexibility in common that is told
+_SHARED = 0.1
 #: what the sensitivity of the one-mode model is short of that of a richer one, at most, by experience
 _CAUTION = 5.0
 #: between a single collision and the response, in which collisions meet the waves of those before
@@ -52,8 +57,6 @@ def settle(scene: Scene) -> Settled:
 
 def settle_all(scenes: Sequence[Scene]) -> list[Settled]:
     """The same for the points of a sweep: those with one model and tolerance share the choice that suits them all."""
-    if not any(_open(scene) for scene in scenes):
-        return [Settled(scene, None) for scene in scenes]
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
         groups.setdefault(_group(scene), []).append(scene)
@@ -93,13 +96,57 @@ def _group(scene: Scene) -> tuple[Any, ...]:
 
 def _settled(scene: Scene, choice: Choice | None) -> Settled:
     structure = scene.structure
-    if choice is None or not isinstance(structure, Rom):
+    if not isinstance(structure, Rom):
         return Settled(scene, None)
+    if choice is None:
+        return Settled(scene, _warning(_shared(scene, structure)))
     structure = replace(structure, modes=choice.chosen.modes, natural=True)
     scene = replace(scene, structure=structure)
     contacts = _collisions(scene, restricted(structure.file, file_stamp(structure.file), structure.modes, True))
     stiffness = min((collision.stiffness for collision in contacts), default=None)
-    return Settled(scene, choice.to_json() | {"stiffness": stiffness})
+    estimate = choice.to_json() | {"stiffness": stiffness}
+    warning = _warning(_shared(scene, structure))
+    if warning is not None:
+        estimate |= warning | {"sentence": f"{choice.sentence}; {warning['sentence']}"}
+    return Settled(scene, estimate)
+
+
+def _shared(scene: Scene, structure: Rom) -> float:
+    """Largest flexibility that two walls have in common which can be touched at once, relative to their own."""
+    law = scene.contact
+    if isinstance(law, Newton) or (isinstance(law, Compliant) and not law.residual):
+        return 0.0
+    model = restricted(structure.file, file_stamp(structure.file), kept(structure), structure.natural)
+    residual = model.residual_flexibility
+    if residual is None:
+        return 0.0
+    own = 0.0 if isinstance(law, Massless) or law.stiffness is None else 1.0 / law.stiffness
+    largest = 0.0
+    for (one, first), (other, second) in itertools.combinations(_touched(scene, model), 2):
+        if one != other:
+            size = math.sqrt((residual[first, first] + own) * (residual[second, second] + own))
+            largest = max(largest, abs(float(residual[first, second])) / size if size > 0.0 else 0.0)
+    return largest
+
+
+def _touched(scene: Scene, model: ReducedModel) -> list[tuple[int, int]]:
+    """(body, wall's place in the interface) of all contacts of bodies with walls."""
+    found = []
+    for cavity in scene.cavity:
+        bodies = [index for index, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
+        ends = zip(bodies[:1] + bodies[-1:], cavity.labels()[:2], strict=False)
+        found += [(body, model.interface.index(label)) for body, label in ends if label in model.interface]
+    return found
+
+
+def _warning(shared: float) -> dict[str, Any] | None:
+    if shared <= _SHARED:
+        return None
+    return {
+        "shared_flexibility": shared,
+        "sentence": f"walls have up to {100 * shared:.0f} % of their residual flexibility in common, which contacts "
+        "closed at the same time do not feel; more modes lessen it",
+    }
 
 
 def _choice(scenes: Sequence[Scene]) -> Choice:

@@ -69,6 +69,13 @@ def test_each_wall_yields_by_its_own_flexibility(tmp_path):
     squares, shapes = np.linalg.eigh(stiffness)
     lost = np.diag(np.linalg.inv(stiffness) - np.outer(shapes[:, 0], shapes[:, 0]) / squares[0])
     assert 1 / springs(made) == pytest.approx(lost[[0, 2]], rel=1e-9)
+    # one body cannot touch both walls at once, two can: what the walls have in common is told
+    assert settle(made).estimate is None
+    pair = made.replace({"damper": [{"cavity": "c", "mass": 0.05}] * 2})
+    common = -shapes[0, 0] * shapes[2, 0] / squares[0] + np.linalg.inv(stiffness)[0, 2]
+    told = settle(pair).estimate
+    assert told["shared_flexibility"] == pytest.approx(abs(common) / np.sqrt(lost[0] * lost[2]), rel=1e-9)
+    assert f"{100 * told['shared_flexibility']:.0f} % of their residual flexibility in common" in told["sentence"]
 
 
 def test_massless_wall_yields_by_what_the_modes_lack(file):
