@@ -64,24 +64,27 @@ def settle_all(scenes: Sequence[Scene]) -> list[Settled]:
     return [_settled(scene, choices.get(_group(scene))) for scene in scenes]
 
 
-def kept(structure: Rom) -> int | None:
-    """The number of modes of a structure that has been settled."""
-    assert structure.modes != "auto"
-    return structure.modes
-
-
 def file_stamp(file: str) -> int:
     """Tells a file from a later one of that name."""
     path = Path(file)
     return path.stat().st_mtime_ns if path.is_file() else 0
 
 
+def reduced_model(structure: Rom) -> ReducedModel:
+    """The reduced model of a structure that has been settled, with so many of its modes."""
+    assert structure.modes != "auto"
+    return _restricted(
+        structure.file, file_stamp(structure.file), structure.modes, structure.natural, structure.attached
+    )
+
+
 @lru_cache(maxsize=8)
-def restricted(file: str, _stamp: int, modes: int | None, natural: bool) -> ReducedModel:
-    """The reduced model of a file with so many of its modes."""
+def _restricted(file: str, _stamp: int, modes: int | None, natural: bool, attached: bool) -> ReducedModel:
     model = ReducedModel.load(file)
     if modes is None:
         return model
+    if attached:
+        return model.attached(modes)
     return model.massless(modes) if natural else model.truncated(modes)
 
 
@@ -100,9 +103,9 @@ def _settled(scene: Scene, choice: Choice | None) -> Settled:
         return Settled(scene, None)
     if choice is None:
         return Settled(scene, _warning(_shared(scene, structure)))
-    structure = replace(structure, modes=choice.chosen.modes, natural=True)
+    structure = replace(structure, modes=choice.chosen.modes, natural=True, attached=choice.chosen.attached)
     scene = replace(scene, structure=structure)
-    contacts = _collisions(scene, restricted(structure.file, file_stamp(structure.file), structure.modes, True))
+    contacts = _collisions(scene, reduced_model(structure))
     stiffness = min((collision.stiffness for collision in contacts), default=None)
     estimate = choice.to_json() | {"stiffness": stiffness}
     warning = _warning(_shared(scene, structure))
@@ -116,7 +119,7 @@ def _shared(scene: Scene, structure: Rom) -> float:
     law = scene.contact
     if isinstance(law, Newton) or (isinstance(law, Compliant) and not law.residual):
         return 0.0
-    model = restricted(structure.file, file_stamp(structure.file), kept(structure), structure.natural)
+    model = reduced_model(structure)
     residual = model.residual_flexibility
     if residual is None:
         return 0.0
@@ -154,7 +157,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     first = scenes[0]
     structure, at = first.structure, first.excitation.at
     assert isinstance(structure, Rom) and at is not None
-    model = restricted(structure.file, file_stamp(structure.file), None, False)
+    model = reduced_model(replace(structure, modes=None))
     labels = list(dict.fromkeys([at, *(label for scene in scenes for label in _surfaces(scene))]))
     for label in labels:
         if label not in model.interface:
@@ -163,17 +166,20 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     frequencies = grid(model, min(driven), max(driven))
 
     def collisions(smaller: ReducedModel) -> list[Collision]:
-        if smaller.size == model.size and any(map(_needs_residual, scenes)) and not _yields(smaller):
-            return []  # the whole model has no boundary without mass
+        if any(map(_needs_residual, scenes)) and not _yields(smaller):
+            return []  # it has no boundary without mass
         return list(dict.fromkeys(item for scene in scenes for item in _collisions(scene, smaller)))
 
-    rungs = natural_ladder(model, frequencies, labels, [at], collisions)
     share = min(1.0, _IMPACTS * max(_influence(scene, model, frequencies) for scene in scenes))
-    if any(rung.collision > 0.0 for rung in rungs):
-        share = min(share, _CAUTION * _sensitivity(scenes, model))
-    rungs = [replace(rung, collision=_SAFETY * share * rung.collision) for rung in rungs]
+    share = _SAFETY * min(share, _CAUTION * _sensitivity(scenes, model))
     rigid = float(rigid_errors(model, frequencies, at, labels, [at]).max())
-    choice = choose(rungs, structure.tolerance, rigid)
+    choices = []
+    for attached in (False, True):
+        rungs = natural_ladder(model, frequencies, labels, [at], collisions, attached)
+        rungs = [replace(rung, collision=share * rung.collision) for rung in rungs]
+        choices.append(choose(rungs, structure.tolerance, rigid))
+    # the first of equals: natural modes alone
+    choice = min(choices, key=lambda item: (not item.met, item.chosen.size))
     if not choice.met:
         raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
     if any(isinstance(scene.contact, Newton) for scene in scenes):

@@ -55,7 +55,7 @@ def _amplitude(scene: Scene, modes: int, restitution: float, spring: float) -> f
     assert isinstance(structure, Rom)
     simple = replace(
         scene,
-        structure=replace(structure, modes=modes, natural=True),
+        structure=replace(structure, modes=modes, natural=True, attached=False),
         contact=Compliant(spring),
         damper=tuple(replace(damper, restitution=restitution) for damper in scene.damper),
         time=Time(_PERIODS, _TRANSIENT),

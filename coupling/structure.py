@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
-from coupling.choice import file_stamp, kept, restricted, settle
+from coupling.choice import file_stamp, reduced_model, settle
 from coupling.inputs import InputError
 from coupling.scene import Prescribed, Rigid, Rom, Scene
 from modal.store import frozen
@@ -186,12 +186,12 @@ def _basis(scene: Scene) -> _ModalBasis:
         )  # fmt: skip
     settled = settle(scene).scene.structure
     assert isinstance(settled, Rom)
-    return _rom_basis(settled.file, file_stamp(settled.file), kept(settled), settled.natural)
+    return _rom_basis(settled, file_stamp(settled.file))
 
 
 @lru_cache(maxsize=8)
-def _rom_basis(file: str, _stamp: int, modes: int | None, natural: bool) -> _ModalBasis:
-    return modal_basis(restricted(file, _stamp, modes, natural))
+def _rom_basis(structure: Rom, _stamp: int) -> _ModalBasis:
+    return modal_basis(reduced_model(structure))
 
 
 def modal_basis(model: ReducedModel) -> _ModalBasis:

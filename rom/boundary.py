@@ -8,7 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from rom.fields import ReducedModelError
-from rom.spectrum import check_elastic, halved, spectrum
+from rom.spectrum import check_elastic, halved, krylov, spectrum
 
 if TYPE_CHECKING:
     from rom.reduced import ReducedModel
@@ -23,6 +23,19 @@ def massless(model: ReducedModel, modes: int) -> ReducedModel:
     static = shapes[:, modes:] / squares[modes:] @ (model.selection @ shapes[:, modes:]).T
     kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": ()}
     return model.projected(shapes[:, :modes], **kept, **residual_fields(model, static))
+
+
+def attached(model: ReducedModel, modes: int) -> ReducedModel:
+    """ReducedModel.attached."""
+    squares, shapes = spectrum(model.mass, model.stiffness)
+    if not 0 < modes < model.size:
+        raise ReducedModelError(f"modes: expected 1 to {model.size - 1} (fewer than all of this model), not {modes}")
+    check_elastic(squares[modes:], squares)
+    dropped = shapes[:, modes:]
+    static = (model.selection @ dropped).T / squares[modes:, None]
+    block = np.hstack(krylov(static, np.diag(squares[modes:]), np.eye(len(static)), 1))
+    kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (block.shape[1],)}
+    return model.projected(np.hstack([dropped @ block, shapes[:, :modes]]), **kept)
 
 
 def boundary_form(model: ReducedModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ Needs numpy and reduced models alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -26,6 +26,10 @@ from rom.collision import Collision, pulse, share_above
 from rom.reduced import ReducedModel
 from rom.spectrum import spectrum
 
+_WITHOUT_RESIDUAL: dict[str, Any] = {
+    "residual_flexibility": None, "residual_recovery": None, "output_residual": None,
+}  # fmt: skip
+
 
 class LadderError(ValueError):
     """No model meets the tolerance, or the question is not one; the message tells what would help."""
@@ -35,7 +39,8 @@ class LadderError(ValueError):
 class Rung:
     """A model of the ladder with its estimated errors, relative: of the receptance, of the pulses of collisions.
 
-    above: share of a collision's energy that modes beyond the model's would take, which need not be an error.
+    above: share of a collision's energy that modes beyond the model's would take, which need not be an error;
+    attached: whether the modes come with residual attachment modes (ReducedModel.attached).
     """
 
     modes: int
@@ -43,6 +48,7 @@ class Rung:
     receptance: float
     collision: float
     above: float = 0.0
+    attached: bool = False
 
     @property
     def error(self) -> float:
@@ -105,10 +111,7 @@ def rigid_errors(
         linalg.eigh(richer.stiffness, richer.mass, subset_by_index=[0, 0])[1],
         fixed_interface_modes=0, free_modes=1, blocks=(),
     )  # fmt: skip
-    rigid = replace(
-        first, selection=np.tile(first.row(at), (len(first.interface), 1)), residual_flexibility=None,
-        residual_recovery=None, output_residual=None,
-    )  # fmt: skip
+    rigid = replace(first, selection=np.tile(first.row(at), (len(first.interface), 1)), **_WITHOUT_RESIDUAL)
     return frf_errors(rigid, richer, frequencies_hz, labels, forces)
 
 
@@ -118,22 +121,23 @@ def natural_ladder(
     labels: Sequence[str] | None = None,
     forces: Sequence[str] | None = None,
     collisions: Callable[[ReducedModel], Sequence[Collision]] = lambda model: (),
+    attached: bool = False,
 ) -> list[Rung]:
-    """Models of 1, 2, 3, ... natural modes of a model, with the errors of each against the whole.
+    """Models of 1, 2, 3, ... natural modes of a model, with the errors of each against the whole, which is the last.
 
     collisions: the contacts, which may depend on the model with so many modes, always in the same order; where a model
-    has none but others do, contact has no meaning on it, and it is left out.
+    has none but others do, contact has no meaning on it, and it is left out. attached: with attachment modes.
     """
     squares, shapes = spectrum(richer.mass, richer.stiffness)
     rungs, pulses = [], []
-    for modes in range(_least(richer), richer.size + 1):
-        model = richer.massless(modes)
-        plain = replace(model, residual_flexibility=None, residual_recovery=None, output_residual=None)
+    for model in _natural_models(richer, attached):
+        modes = model.free_modes
+        plain = model if attached else replace(model, **_WITHOUT_RESIDUAL)
         receptance = float(frf_errors(plain, richer, frequencies_hz, labels, forces).max())
-        met = [(collision, richer.row(collision.label) @ shapes) for collision in collisions(model)]
-        pulses.append([pulse(squares[:modes], row[:modes], item, frequencies_hz.max()).transform for item, row in met])
-        above = max((share_above(squares, row, modes, item) for item, row in met), default=0.0)
-        rungs.append(Rung(modes, modes, receptance, 0.0, above))
+        met = collisions(model)
+        pulses.append(_pulses(model, met, float(frequencies_hz.max())))
+        above = [share_above(squares, richer.row(item.label) @ shapes, modes, item) for item in met]
+        rungs.append(Rung(modes, model.size, receptance, 0.0, max(above, default=0.0), attached and modes < model.size))
     if not any(pulses):
         return rungs
     finest = np.array([transforms for transforms in pulses if transforms][-1])
@@ -142,6 +146,19 @@ def natural_ladder(
         for rung, transforms in zip(rungs, pulses, strict=True)
         if transforms
     ]
+
+
+def _natural_models(richer: ReducedModel, attached: bool) -> Iterator[ReducedModel]:
+    for modes in range(_least(richer), richer.size):
+        model = richer.attached(modes) if attached else richer.massless(modes)
+        if model.size < richer.size:
+            yield model
+    yield richer.massless(richer.size)
+
+
+def _pulses(model: ReducedModel, collisions: Sequence[Collision], frequency_hz: float) -> list[complex]:
+    squares, shapes = spectrum(model.mass, model.stiffness)
+    return [pulse(squares, model.row(item.label) @ shapes, item, frequency_hz).transform for item in collisions]
 
 
 def _least(model: ReducedModel) -> int:
@@ -158,6 +175,8 @@ def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
     within = np.flatnonzero(late <= tolerance)
     chosen = ladder[int(within[0])] if within.size else ladder[int(np.argmin(errors))]
     what = "mode" if chosen.modes == 1 else "modes"
+    if chosen.attached:
+        what += f" and {chosen.size - chosen.modes} attachment modes"
     sentence = f"{chosen.modes} {what}: estimated error {_percent(chosen.error)}, rigid model {_percent(rigid)}"
     if not within.size:
         sentence += f"; none within the tolerance of {_percent(tolerance)}, keep more modes"

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import linalg
 
 from rom import record
-from rom.boundary import boundary_form, massless
+from rom.boundary import attached, boundary_form, massless
 from rom.cut import truncated
 from rom.fields import ReducedModelError, check_definite, check_interface, checked, shaped, symmetric
 from rom.spectrum import halved, modal_damping, spectrum
@@ -222,6 +222,14 @@ class ReducedModel:
         Raises ReducedModelError for fewer modes than the structure has rigid motions.
         """
         return massless(self, modes)
+
+    def attached(self, modes: int) -> ReducedModel:
+        """The model's own lowest `modes` natural modes after residual attachment modes, with their mass (Rubin 1975).
+
+        As many more coordinates as the interface has independent ones; its flexibility stays exact. Raises
+        ReducedModelError for all of the modes, or fewer than the structure has rigid motions.
+        """
+        return attached(self, modes)
 
     def boundary_form(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Mass (singular), damping and stiffness (k + n, k + n) in (u, eta) of a model with a massless boundary.

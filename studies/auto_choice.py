@@ -7,7 +7,7 @@ per period, within runs and in turns.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -24,8 +24,10 @@ from studies.bench_inside import time_of_a_period
 from studies.timing import in_turns
 
 TOLERANCES = (0.1, 0.03, 0.01)
+#: a model: number of natural modes, and whether attachment modes come with them
+Kind = tuple[int, bool]
 _STARTS = (-0.3, 0.2)
-#: numbers of modes tried, besides those chosen and all of them
+#: numbers of modes tried, alone and with attachment modes, besides those chosen and all of them
 _COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 20, 25, 32)
 #: rounds of the clocks, and between which periods of a run they measure
 _ROUNDS, _LENGTHS = 3, (50, 150)
@@ -35,17 +37,17 @@ _ROUNDS, _LENGTHS = 3, (50, 150)
 class Verdict:
     """One scene and tolerance: what was chosen, what it turned out to be, and the cheapest model within the tolerance.
 
-    Errors in units of the undamped peak; confidence: of the error, 95 %; costs in seconds per period.
+    Models by `shown`; errors in units of the undamped peak; confidence: of the error, 95 %; costs in s per period.
     """
 
     scene: str
     tolerance: float
-    modes: int
+    modes: str
     estimate: float
     error: float
     confidence: float
     cost: float
-    cheapest_modes: int
+    cheapest_modes: str
     cheapest_cost: float
 
     @property
@@ -82,57 +84,71 @@ def judge(trial: Trial, name: str, periods: int) -> list[Verdict]:
         settled = settle_all([scene.replace({"structure.tolerance": tolerance}) for scene in scenes])
         assert settled[0].estimate is not None
         chosen[tolerance] = settled[0].estimate
-    whole = max(rung["modes"] for rung in chosen[TOLERANCES[0]]["ladder"])
-    picked = {estimate["modes"] for estimate in chosen.values()}
-    counts = sorted({count for count in _COUNTS if count < whole} | picked | {whole})
-    deviations, confidences = errors(scenes, counts, trial.undamped, periods)
-    costs = _costs(scenes[len(scenes) // 2], counts)
+    kinds = _kinds(chosen.values())
+    deviations, confidences = errors(scenes, kinds, trial.undamped, periods)
+    costs = _costs(scenes[len(scenes) // 2], kinds)
     found = []
     for tolerance, estimate in chosen.items():
-        place = counts.index(estimate["modes"])
+        place = kinds.index((estimate["modes"], estimate["attached"]))
         within = [i for i, error in enumerate(deviations) if error <= tolerance]
         best = min(within, key=lambda i: costs[i])
         found.append(
             Verdict(
-                name, tolerance, estimate["modes"], float(estimate["error"]), float(deviations[place]),
-                float(confidences[place]), float(costs[place]), counts[best], float(costs[best]),
+                name, tolerance, shown(kinds[place]), float(estimate["error"]), float(deviations[place]),
+                float(confidences[place]), float(costs[place]), shown(kinds[best]), float(costs[best]),
             )
         )  # fmt: skip
     return found
 
 
+def shown(kind: Kind) -> str:
+    """A model for people: "3", or "3+" with attachment modes."""
+    return f"{kind[0]}{'+' * kind[1]}"
+
+
+def _kinds(chosen: Collection[Mapping[str, Any]]) -> list[Kind]:
+    """Models to try, the whole one last."""
+    rungs = {(rung["modes"], rung["attached"]) for estimate in chosen for rung in estimate["ladder"]}
+    whole = max(rungs)[0]
+    # attachment modes make a model larger, so that many modes with them are the whole
+    tried = {(count, attached) for count in _COUNTS for attached in (False, True) if count < whole - attached * 4}
+    picked = {(estimate["modes"], estimate["attached"]) for estimate in chosen}
+    return [*sorted((tried | picked) - {(whole, False)}), (whole, False)]
+
+
 def errors(
-    scenes: Sequence[Scene], counts: Sequence[int], undamped: float, periods: int
+    scenes: Sequence[Scene], kinds: Sequence[Kind], undamped: float, periods: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Errors (counts,) of models with so many modes, which are ascending, against the last; 95 % confidence of each.
+    """Errors (kinds,) of models against the last, and the 95 % confidence of each.
 
     undamped: m; the scenes differ in frequency.
     """
-    means, widths = np.zeros((2, len(counts), len(scenes)))
-    for i, modes in enumerate(counts):
+    means, widths = np.zeros((2, len(kinds), len(scenes)))
+    for i, kind in enumerate(kinds):
         for j, scene in enumerate(scenes):
-            runs = [simulate(_fixed(scene, modes, periods, start)) for start in _STARTS]
+            runs = [simulate(_fixed(scene, kind, periods, start)) for start in _STARTS]
             means[i, j] = np.mean([run.amplitude_mean for run in runs]) / undamped
             parts = [run.amplitude_mean_confidence or 0.0 for run in runs]
             widths[i, j] = np.linalg.norm(parts) / len(parts) / undamped
     deviations = np.abs(means - means[-1])
-    worst = (np.arange(len(counts)), deviations.argmax(axis=1))
+    worst = (np.arange(len(kinds)), deviations.argmax(axis=1))
     return deviations[worst], np.hypot(widths, widths[-1])[worst]
 
 
-def _costs(scene: Scene, counts: Sequence[int]) -> np.ndarray:
-    """Seconds per period (counts,), medians over the rounds."""
+def _costs(scene: Scene, kinds: Sequence[Kind]) -> np.ndarray:
+    """Seconds per period (kinds,), medians over the rounds."""
     clocks = {
-        str(modes): partial(time_of_a_period, _fixed(scene, modes, _LENGTHS[1], _STARTS[0]), _LENGTHS)
-        for modes in counts
+        shown(kind): partial(time_of_a_period, _fixed(scene, kind, _LENGTHS[1], _STARTS[0]), _LENGTHS) for kind in kinds
     }
     times = in_turns(clocks, _ROUNDS, np.random.default_rng(0))
-    return np.array([np.median(times[str(modes)]) for modes in counts])
+    return np.array([np.median(times[shown(kind)]) for kind in kinds])
 
 
-def _fixed(scene: Scene, modes: int, periods: int, start: float) -> Scene:
+def _fixed(scene: Scene, kind: Kind, periods: int, start: float) -> Scene:
+    modes, attached = kind
+    structure = scene.to_dict()["structure"] | {"modes": modes, "natural": True, "attached": attached}
     return scene.replace({
-        "structure.modes": modes, "structure.natural": True, "time.periods": periods, "time.transient": periods // 8,
+        "structure": structure, "time.periods": periods, "time.transient": periods // 8,
         "damper.0.position": start * scene.cavity[0].gap,
     })  # fmt: skip
 
@@ -154,8 +170,8 @@ def tell_trial(result: dict[str, Any]) -> None:
     print("automatic choice: scene, tolerance, modes, estimated and true error (95 %), cost, cheapest model, ratio")
     for row in result["verdicts"]:
         print(
-            f"  {row['scene']:11} {row['tolerance']:5}  {row['modes']:3}  {row['estimate']:.4f}  {row['error']:.4f} "
-            f"({row['confidence']:.4f})  {1e6 * row['cost']:6.1f} us  {row['cheapest_modes']:3}  {row['ratio']:.2f}"
+            f"  {row['scene']:11} {row['tolerance']:5}  {row['modes']:>3}  {row['estimate']:.4f}  {row['error']:.4f} "
+            f"({row['confidence']:.4f})  {1e6 * row['cost']:6.1f} us  {row['cheapest_modes']:>3}  {row['ratio']:.2f}"
             + ("" if row["kept"] else "  MISSED")
         )
     print(

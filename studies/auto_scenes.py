@@ -18,7 +18,7 @@ from coupling.scene import Scene
 from rom.reduced import ReducedModel
 
 #: the scenes of the trial; nothing was settled on them, and other seeds give other scenes for that
-SEED = 2027
+SEED = 2028
 _AMPLITUDE = 3e-5
 _ROD_MODES, _BEAM_ELEMENTS, _CLUSTER_MODES = 40, 8, 12
 # ranges of what is drawn: share of the first modal mass, of the undamped peak, of the first frequency

@@ -171,7 +171,7 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument(
         "study", choices=("engine", "modal", "ladder", "work-precision", "stability"),
         help="engine: the exact engine against a hand-written loop and solve_ivp; modal: time and memory of ten modes "
-        "beside scipy's solvers; ladder: contact laws and numbers of modes of reduced models, the choice of their number; "
+        "beside scipy's solvers; ladder: contact laws and numbers of modes of reduced models, and their choice; "
         "work-precision: speed against accuracy of all methods; stability: where methods fail",
     )  # fmt: skip
     bench.add_argument("--quick", action="store_true", help="seconds instead of minutes, and rougher figures")

@@ -21,25 +21,24 @@ def test_models_of_rod_and_beam():
 
 
 def kept(trial, tolerance, periods):
-    """(estimated, true error, its confidence, modes) of the choice for a tolerance."""
+    """(estimated, true error, its confidence, coordinates) of the choice for a tolerance."""
     scenes = [
         trial.scene.replace({"excitation.frequency": frequency, "structure.tolerance": tolerance})
         for frequency in trial.frequencies
     ]
     estimate = settle_all(scenes)[0].estimate
-    whole = estimate["ladder"][-1]["modes"]
-    counts = sorted({estimate["modes"], whole})
-    deviations, confidences = auto_choice.errors(scenes, counts, trial.undamped, periods)
-    return estimate["error"], deviations[0], confidences[0], estimate["modes"]
+    kinds = [(estimate["modes"], estimate["attached"]), (estimate["ladder"][-1]["modes"], False)]
+    deviations, confidences = auto_choice.errors(scenes, kinds, trial.undamped, periods)
+    return estimate["error"], deviations[0], confidences[0], estimate["size"]
 
 
 @pytest.mark.parametrize(("structure", "index"), [pytest.param("rod", 0, marks=pytest.mark.slow), ("beam", 1)])
 def test_tolerance_is_kept(tmp_path, structure, index):
     trial = trials(tmp_path, SEED + 1, {structure: index + 1})[index]
-    estimate, error, confidence, modes = kept(trial, 0.03, 600)
+    estimate, error, confidence, size = kept(trial, 0.03, 600)
     assert estimate <= 0.03
     assert error <= 0.03 + confidence
-    assert modes < 10
+    assert size < 10
 
 
 @pytest.mark.slow
