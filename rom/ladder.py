@@ -176,7 +176,8 @@ def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
     chosen = ladder[int(within[0])] if within.size else ladder[int(np.argmin(errors))]
     what = "mode" if chosen.modes == 1 else "modes"
     if chosen.attached:
-        what += f" and {chosen.size - chosen.modes} attachment modes"
+        extra = chosen.size - chosen.modes
+        what += f" and {extra} attachment mode{'s' * (extra > 1)}"
     sentence = f"{chosen.modes} {what}: estimated error {_percent(chosen.error)}, rigid model {_percent(rigid)}"
     if not within.size:
         sentence += f"; none within the tolerance of {_percent(tolerance)}, keep more modes"
