@@ -2,6 +2,8 @@
 # interpreter instead: make test PYTHON=python
 
 PYTHON = .venv/bin/python
+# one worker a core, each with one thread
+TESTS = OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-all test-versions check bench
@@ -18,10 +20,10 @@ demo: setup ## the whole pipeline on the shipped mesh; the report is out/report.
 	$(PYTHON) -m studies demo -o out
 
 test: setup ## the tests, fast tier
-	$(PYTHON) -m pytest -q
+	$(TESTS)
 
 test-all: setup ## the tests with the slow verification tier
-	$(PYTHON) -m pytest -q -m "slow or not slow"
+	$(TESTS) -m "slow or not slow"
 
 test-versions: ## the finite element tests on Debian 13 and unstable, in root folders of their own (root, debootstrap)
 	scripts/test_versions.sh

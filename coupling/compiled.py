@@ -8,6 +8,7 @@ arrays that it is given (coupling.state.Scratch).
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -19,8 +20,8 @@ from numba import config, njit
 #: start of a counter: a literal 0 has a type of its own, for which numba would compile all that it is handed to again
 ZERO = np.int64(0)
 
-
-_MARKS = (b"@entry", b"@kernel", b"@inlined")
+# what a file of compiled functions holds
+_MARKS = ("@entry", "@kernel", "@inlined")
 
 
 def entry(function: Callable[..., Any]) -> Any:
@@ -49,19 +50,27 @@ def _compile(function: Callable[..., Any], **options: bool) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
         return compiled
     # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls
-    compiled._cache._cache_file._source_stamp = _sources()
+    compiled._cache._cache_file._source_stamp = _sources(Path(function.__code__.co_filename))
     return compiled
 
 
 @cache
-def _sources() -> str:
-    """Digest of the files that hold compiled functions or the constants in them."""
+def _sources(file: Path) -> str:
+    """Digest of a file of compiled functions and of those that it imports, through files with such functions alone.
+
+    What the others import (scenes, rows) is data: it does not enter the code.
+    """
+    texts: dict[Path, str] = {}
+    waiting = [file]
+    while waiting:
+        path = waiting.pop()
+        if path in texts:
+            continue
+        texts[path] = path.read_text(encoding="utf-8")
+        if any(mark in texts[path] for mark in _MARKS):
+            names = re.findall(r"^from coupling\.(\w+)", texts[path], re.MULTILINE)
+            waiting += [path.with_name(f"{name}.py") for name in names]
     digest = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
-        text = file.read_bytes()
-        if any(mark in text for mark in _MARKS) or file.name in (
-            "compiled.py",
-            "state.py",
-        ):
-            digest.update(text)
+    for path in sorted(texts):
+        digest.update(texts[path].encode())
     return digest.hexdigest()

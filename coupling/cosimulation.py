@@ -14,8 +14,9 @@ import math
 import numpy as np
 from scipy.linalg import expm
 
+from coupling.compiled import entry, kernel
 from coupling.newmark import first_forces, net_load, row_force
-from coupling.system import DONE, PERIOD, STEPS, System, compiled
+from coupling.system import DONE, PERIOD, STEPS, System
 from coupling.tally import copy, end_period, follow_contacts, record_start, row_speed, sample, tally
 
 
@@ -35,7 +36,7 @@ def cosimulation_matrices(system: System) -> np.ndarray:
     return np.ascontiguousarray(exact)
 
 
-@compiled
+@entry
 def march_cosimulation(
     system, motion, records, log, matrix, memory, slow, gauss_seidel, hold, substeps, periods, budget, deepest
 ):
@@ -90,7 +91,7 @@ def march_cosimulation(
     return DONE
 
 
-@compiled
+@kernel
 def _structure(system, motion, matrix, known, force, older, hold, k, q, v):
     """The structure's macro-step under the forces that it was given."""
     n, h = system.modes, system.step
@@ -112,7 +113,7 @@ def _structure(system, motion, matrix, known, force, older, hold, k, q, v):
         motion.q[i], motion.v[i] = p, rate
 
 
-@compiled
+@kernel
 def _bodies(system, motion, slow, substeps, k, place, rate, bend, mean):
     """The bodies' macro-step on walls that move as they were told; adds up the mean forces of the rows."""
     n, size, rows = system.modes, len(motion.q), len(system.J)

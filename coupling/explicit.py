@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from coupling.compiled import entry
 from coupling.newmark import first_forces, net_load, row_force
-from coupling.system import DONE, PERIOD, System, compiled
+from coupling.system import DONE, PERIOD, System
 from coupling.tally import (
     copy,
     damped,
@@ -31,7 +32,7 @@ def explicit_matrix(system: System) -> np.ndarray:
     return inverse
 
 
-@compiled
+@entry
 def march_explicit(system, motion, records, log, inverse, slow, periods, budget, deepest):
     """Step to the end of `periods`. slow: (friction rows,) speed below which friction is viscous, m/s."""
     size, rows, h, steps = len(motion.q), len(system.J), system.step, len(system.phase) - 1

@@ -12,15 +12,9 @@ import math
 
 import numpy as np
 
+from coupling.compiled import entry, kernel
 from coupling.complementarity import solve_box
-from coupling.system import (
-    DONE,
-    PERIOD,
-    SOLVES,
-    UNDECIDED,
-    System,
-    compiled,
-)
+from coupling.system import DONE, PERIOD, SOLVES, UNDECIDED, System
 from coupling.tally import (
     copy,
     damped,
@@ -44,7 +38,7 @@ def moreau_matrices(system: System, theta: float) -> tuple[np.ndarray, np.ndarra
     return inverse, turned, system.J @ turned
 
 
-@compiled
+@entry
 def march_moreau(system, motion, records, log, problem, inverse, turned, mobility, theta, periods, budget, deepest):
     """Step to the end of `periods`. Returns one of the codes of coupling.system."""
     size, rows, h, steps = len(motion.q), len(system.J), system.step, len(system.phase) - 1
@@ -92,7 +86,7 @@ def march_moreau(system, motion, records, log, problem, inverse, turned, mobilit
     return DONE
 
 
-@compiled
+@kernel
 def _list_rows(system, motion, problem, listed, mobility, free, speed, theta):
     """Set up the problem of the rows that take part in a step. Returns how many they are."""
     h, count = system.step, 0
@@ -128,7 +122,7 @@ def _list_rows(system, motion, problem, listed, mobility, free, speed, theta):
     return count
 
 
-@compiled
+@kernel
 def _solve(problem, count):
     """Solve the problem; one row alone in closed form."""
     if count > 1:

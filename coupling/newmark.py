@@ -12,16 +12,9 @@ import math
 
 import numpy as np
 
+from coupling.compiled import entry, inlined, kernel
 from coupling.complementarity import solve_box
-from coupling.system import (
-    DONE,
-    PERIOD,
-    SOLVES,
-    UNDECIDED,
-    System,
-    compiled,
-    inserted,
-)
+from coupling.system import DONE, PERIOD, SOLVES, UNDECIDED, System
 from coupling.tally import (
     copy,
     damped,
@@ -45,7 +38,7 @@ def newmark_matrices(system: System, alpha: float) -> tuple[np.ndarray, np.ndarr
     return np.array([alpha, beta, gamma]), inverse, turned, system.J @ turned
 
 
-@compiled
+@entry
 def march_newmark(
     system, motion, records, log, problem, parameters, inverse, turned, mobility, slow, periods, budget, deepest
 ):
@@ -114,14 +107,14 @@ def march_newmark(
     return DONE
 
 
-@compiled
+@kernel
 def first_forces(system, motion, slow):
     """Forces of the rows by their laws (penalty contacts, regularised friction) at motion.q, motion.v."""
     for r in range(len(system.J)):
         row_force(system, motion, r, row_speed(system, r, motion.q), row_speed(system, r, motion.v), slow, 0.0)
 
 
-@inserted
+@inlined
 def row_force(system, motion, r, displacement, speed, slow, moved):
     """Set the force of row r by its law. moved: displacement of a Jenkins element since its last force."""
     if r >= system.friction_rows:
@@ -140,7 +133,7 @@ def row_force(system, motion, r, displacement, speed, slow, moved):
         motion.force[r] = -system.limit[r] * np.sign(speed)
 
 
-@inserted
+@inlined
 def net_load(system, motion, q, v, k, i):
     """Sum of the forces on coordinate i at step k of the period."""
     force = load_at(system, k, i) - damped(system, v, i) - system.stiffness[i] * q[i]
@@ -150,7 +143,7 @@ def net_load(system, motion, q, v, k, i):
     return force
 
 
-@compiled
+@kernel
 def _list_rows(system, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma):
     """Set up the problem of the rows that may carry force. Returns how many they are."""
     h, count = system.step, 0

@@ -6,54 +6,18 @@ their gaps and slips are g = J q + offset. All motion is relative to the base.
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable
-from functools import cache
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import config, njit
 
 from coupling.laws import damping_ratio
 from coupling.rows import Rows
 from coupling.scene import Scene
 
-_KERNELS = ("system", "tally", "moreau", "newmark", "explicit", "cosimulation", "complementarity", "state", "compiled")
-
 # counters of a run
 PERIOD, STEPS, IMPACTS, SOLVES, LOGGED = range(5)
 # what stepping kernels return
 DONE, DIVERGED, UNDECIDED, PENETRATION, EVENT_BUDGET = range(5)
-
-
-def compiled(function: Callable[..., Any]) -> Any:
-    """Compile a function of a stepping method: cached on disk, anew when one of the kernels' files has changed.
-
-    Without reference counting, which would cost more than the arithmetic: nothing in it may allocate.
-    """
-    return _compile(function)
-
-
-def inserted(function: Callable[..., Any]) -> Any:
-    """Compile a function of a stepping method into its callers."""
-    return _compile(function, forceinline=True)
-
-
-def _compile(function: Callable[..., Any], **options: bool) -> Any:
-    made = njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)  # type: ignore[call-overload]
-    if not config.DISABLE_JIT:  # type: ignore[attr-defined]
-        # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls
-        made._cache._cache_file._source_stamp = _sources()
-    return made
-
-
-@cache
-def _sources() -> str:
-    digest = hashlib.sha256()
-    for name in _KERNELS:
-        digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
-    return digest.hexdigest()
 
 
 class System(NamedTuple):

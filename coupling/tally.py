@@ -4,25 +4,15 @@ from __future__ import annotations
 
 import math
 
+from coupling.compiled import inlined, kernel
 from coupling.state import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, STORED, VISCOUS
-from coupling.system import (
-    DIVERGED,
-    DONE,
-    EVENT_BUDGET,
-    IMPACTS,
-    LOGGED,
-    PENETRATION,
-    PERIOD,
-    STEPS,
-    compiled,
-    inserted,
-)
+from coupling.system import DIVERGED, DONE, EVENT_BUDGET, IMPACTS, LOGGED, PENETRATION, PERIOD, STEPS
 
 #: a motion above this, in m or m/s, has no physical meaning
 _BOUND = 1e30
 
 
-@inserted
+@inlined
 def response_of(system, q, cosine, sine):
     """Displacement at the response."""
     x = system.table[0] * cosine - system.table[1] * sine
@@ -31,7 +21,7 @@ def response_of(system, q, cosine, sine):
     return x
 
 
-@inserted
+@inlined
 def rate_of(system, v, cosine, sine):
     """Velocity at the response."""
     rate = -system.omega * (system.table[0] * sine + system.table[1] * cosine)
@@ -40,7 +30,7 @@ def rate_of(system, v, cosine, sine):
     return rate
 
 
-@inserted
+@inlined
 def row_speed(system, r, v):
     """Velocity of row r."""
     speed = 0.0
@@ -49,7 +39,7 @@ def row_speed(system, r, v):
     return speed
 
 
-@compiled
+@kernel
 def record_start(system, motion, records):
     """Section and ledger at the start of a period."""
     n, b, p = system.modes, len(system.mass) - system.modes, motion.counters[PERIOD]
@@ -73,7 +63,7 @@ def record_start(system, motion, records):
         records.ledger[p, i] = motion.losses[i]
 
 
-@inserted
+@inlined
 def tally(system, motion, records, k, q, v, impulse, before, deepest):
     """Account for step k of the period, from q, v to motion.q, motion.v, with the impulses (r,) of the rows.
 
@@ -125,7 +115,7 @@ def tally(system, motion, records, k, q, v, impulse, before, deepest):
     return PENETRATION if deep > deepest else DONE
 
 
-@inserted
+@inlined
 def _waves(system, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after):
     """Peak, mean square, harmonic and momentum of a step."""
     largest = abs(x1)
@@ -144,7 +134,7 @@ def _waves(system, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after
     records.momentum[p] += h / 2.0 * complex(m0 * c0 + m1 * c1, -m0 * s0 - m1 * s1)
 
 
-@inserted
+@inlined
 def follow_contacts(system, motion, records, log, k, speed, impulse):
     """Count and log impacts: contacts that have begun to carry force, with the speeds (r,) at the step's start.
 
@@ -168,7 +158,7 @@ def follow_contacts(system, motion, records, log, k, speed, impulse):
         motion.active[r] = 1 if pushed else 0
 
 
-@inserted
+@inlined
 def sample(system, motion, records, k, q):
     """Keep a sample if step k of the period begins at one."""
     steps, b = len(system.phase) - 1, len(system.mass) - system.modes
@@ -183,7 +173,7 @@ def sample(system, motion, records, k, q):
             entry[1 + i] = row_speed(system, i, q)
 
 
-@inserted
+@inlined
 def solve_inverse(inverse, diagonal, vector, result):
     """result = inverse vector; a diagonal inverse is used as such."""
     for i in range(len(vector)):
@@ -195,7 +185,7 @@ def solve_inverse(inverse, diagonal, vector, result):
                 result[i] += inverse[i, j] * vector[j]
 
 
-@inserted
+@inlined
 def damped(system, v, i):
     """Viscous force on coordinate i."""
     if i >= system.modes:
@@ -206,20 +196,20 @@ def damped(system, v, i):
     return force
 
 
-@inserted
+@inlined
 def load_at(system, k, i):
     """Load on coordinate i at step k of the period, weight included, N."""
     return system.load[i, 0] * system.phase[k, 0] - system.load[i, 1] * system.phase[k, 1] + system.weight[i]
 
 
-@inserted
+@inlined
 def copy(source, target):
     """Copy (N,) numbers."""
     for i in range(len(target)):
         target[i] = source[i]
 
 
-@inserted
+@inlined
 def end_period(system, motion, records, budget):
     """Close a period. Returns DONE, DIVERGED or EVENT_BUDGET."""
     total = 0.0

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import io
 import json
 import math
 import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TextIO
 
 import h5py
 import numpy as np
@@ -60,9 +61,20 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
     """Write a table: one line of names, then the rows."""
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(header)
-        writer.writerows(rows)
+        _write_rows(stream, header, rows)
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """The same table as text."""
+    stream = io.StringIO(newline="")
+    _write_rows(stream, header, rows)
+    return stream.getvalue()
+
+
+def _write_rows(stream: TextIO, header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
+    writer = csv.writer(stream)
+    writer.writerow(header)
+    writer.writerows(rows)
 
 
 def write_json(path: str | os.PathLike[str], data: Any) -> None:

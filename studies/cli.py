@@ -161,7 +161,12 @@ def _parser() -> argparse.ArgumentParser:
     sweep.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
 
     report = command("report", "one HTML page of results", None, "REPORT.html", required=True)
-    report.add_argument("inputs", nargs="+", metavar="DIR|FILE", help="results of modal, reduce and sweep (.h5)")
+    report.add_argument(
+        "inputs",
+        nargs="+",
+        metavar="DIR|FILE",
+        help="results of modal, reduce, run and sweep (.h5), studies (.claims.json)",
+    )
 
     demo = command("demo", "the whole pipeline on the shipped mesh", None, "DIR")
     demo.set_defaults(output="out")

@@ -198,7 +198,8 @@ def sweep(arguments: Namespace) -> None:
 def report(arguments: Namespace) -> None:
     """One HTML page of results."""
     _check_outputs(arguments, output=(".html", ".htm"))
-    from studies.report import collect, write_report
+    from studies.report import write_report
+    from studies.results import collect
 
     write_report(collect(arguments.inputs), arguments.output)
     print(f"{arguments.output}: report")

@@ -57,7 +57,8 @@ def run_demo(folder: Path, workers: int | None = None) -> Path:
             results.append(folder / f"sweep_{model}.h5")
             result.save(results[-1])
             tell_sweep(result)
-    from studies.report import collect, write_report
+    from studies.report import write_report
+    from studies.results import collect
 
     with _stage("report"):
         write_report(collect(results), folder / "report.html")

@@ -10,13 +10,11 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from coupling.sweep import LOSSES
-from studies.forced_response import FREQUENCY, ForcedResponse
+from studies.charts import COLOURS, axis_title, dressed
+from studies.forced_response import ForcedResponse
 
-_COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#7e22ce", "#0e7490", "#a16207", "#be185d", "#475569")
 _LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626", "contact": "#2563eb"}
 _PANELS = 3  # energy panels side by side
-_FONT = "system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif"
-_AXIS: dict[str, Any] = {"showline": True, "linecolor": "#334155", "ticks": "outside", "gridcolor": "#e2e8f0"}
 
 
 def responses_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
@@ -81,35 +79,20 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
                 row=number // columns + 1, col=number % columns + 1,
             )  # fmt: skip
     figure.update_yaxes(range=[0, 100])
+    figure.update_annotations(font_size=12)
     figure.update_yaxes(title_text="share of the energy lost, %", col=1)
-    return _finish(figure, responses, height=400 * rows)
-
-
-def to_html(figure: go.Figure, identifier: str) -> str:
-    """The chart as a piece of HTML for a page that already holds plotly's script."""
-    buttons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]]  # no button that would send data anywhere
-    configuration = {"displaylogo": False, "responsive": True, "modeBarButtons": buttons}
-    html: str = figure.to_html(full_html=False, include_plotlyjs=False, div_id=identifier, config=configuration)
-    return html
+    _finish(figure, responses, height=400 * rows)
+    return figure.update_xaxes(title_font_size=11) if columns == _PANELS else figure
 
 
 def _cycle(responses: Sequence[ForcedResponse]) -> list[str]:
-    return [_COLOURS[index % len(_COLOURS)] for index in range(len(responses))]
+    return [COLOURS[index % len(COLOURS)] for index in range(len(responses))]
 
 
 def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int) -> go.Figure:
-    first = responses[0]
-    title = (
-        "excitation frequency, Hz" if first.axis == FREQUENCY else f"{first.axis}, {first.units}".removesuffix(", 1")
-    )
-    figure.update_xaxes(hoverformat=".6g", **_AXIS)
-    figure.update_yaxes(**_AXIS)
+    figure.update_xaxes(hoverformat=".6g")
     for axis in figure.select_xaxes():
         if axis.showticklabels is not False:  # of panels above each other, the lowest carries the title
-            axis.update(title_text=title)
-    figure.update_layout(
-        height=height, autosize=True, template="plotly_white", hovermode="x unified",
-        font={"family": _FONT, "size": 14}, margin={"l": 70, "r": 20, "t": 40, "b": 60},
-        legend={"groupclick": "toggleitem"},
-    )  # fmt: skip
-    return figure
+            axis.update(title_text=axis_title(responses[0].axis, responses[0].units))
+    figure.update_layout(hovermode="x unified")
+    return dressed(figure, height)

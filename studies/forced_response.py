@@ -14,6 +14,7 @@ from coupling.sweep import Sweep
 from modal.store import frozen
 
 FREQUENCY = "excitation.frequency"
+_LEVEL = "excitation.resonance_amplitude"
 #: a damped response within this share of the undamped one has not been touched by the bodies
 _UNTOUCHED = 0.01
 
@@ -26,6 +27,7 @@ class ForcedResponse:
     damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks
     energy_share       (n, 4) of viscous, friction, impact and contact loss
     trouble            number of points whose status is not ok
+    source             the file it comes from
     """
 
     name: str
@@ -41,6 +43,7 @@ class ForcedResponse:
     impacts_per_period: np.ndarray
     energy_share: np.ndarray
     trouble: int
+    source: str = ""
 
     def peak(self, curve: str) -> tuple[Any, float]:
         """Position on the axis and height, relative to the reference, of the top of a curve; nan if all failed."""
@@ -93,16 +96,24 @@ def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> For
         "impacts_per_period": sweep.impacts_per_period, "energy_share": sweep.energy_share,
     }  # fmt: skip
     cut = {key: frozen(values[point]) for key, values in curves.items()}
-    resonance = sweep.scene.excitation.resonance_amplitude
     return ForcedResponse(
         name=name,
         axis=axis,
         units=sweep.units()[axis],
         x=sweep.axes[axis][point[list(sweep.axes).index(axis)]],
-        reference=resonance or float(cut["undamped"].max()) or math.nan,  # without excitation nothing to relate to
+        reference=reference_amplitude(sweep, point),
         trouble=int(np.count_nonzero(sweep.status[point] != "ok")),
+        source="",
         **cut,
     )
+
+
+def reference_amplitude(sweep: Sweep, point: tuple[Any, ...] = ()) -> float:
+    """The undamped maximum that amplitudes of a sweep or a part of it are related to, m; nan without excitation."""
+    resonance = sweep.scene.excitation.resonance_amplitude
+    if resonance is None or _LEVEL in sweep.axes:
+        resonance = float(np.nan_to_num(sweep.amplitude_undamped[point]).max())
+    return resonance or math.nan
 
 
 def shown(value: Any) -> str:

@@ -1,81 +1,72 @@
-"""The report: result files in, one HTML page out that needs no network."""
+"""The report: results in, one HTML page out that needs no network."""
 
 from __future__ import annotations
 
 import base64
+import hashlib
+import itertools
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import h5py
 import jinja2
 import numpy as np
 import plotly.offline
 
-from coupling.inputs import InputError
-from coupling.sweep import Sweep
-from modal.store import StoreError, load, replacing
+from coupling.sweep import LOSSES, Sweep
+from modal.store import replacing
 from rom.reduced import ReducedModel
 from studies import figures
+from studies.charts import Chart, chart
 from studies.forced_response import ForcedResponse, forced_responses, model_name, shown
+from studies.history import History, history_figure
+from studies.mode_figure import is_small, mode_figure, mode_rows
 from studies.pictures import mode_picture
 from studies.provenance import versions
+from studies.response_map import map_axes, map_figure, map_rows
+from studies.results import Results, Study
 
 _TEMPLATE = Path(__file__).with_name("report.html")
-_KINDS = ("modes", "reduced-model", "sweep")
+#: curves of one sweep in a chart; of more, evenly chosen ones, if a map shows them all
+_MOST_CURVES = 5
 
 
 @dataclass(frozen=True)
-class Results:
-    """What a report is made of: records by the name of their file."""
+class Section:
+    """Charts and tables of results that belong together."""
 
-    modes: dict[str, tuple[dict[str, Any], dict[str, Any]]] = field(default_factory=dict)
-    reduced: dict[str, ReducedModel] = field(default_factory=dict)
-    sweeps: dict[str, Sweep] = field(default_factory=dict)
-
-
-def collect(paths: Sequence[str | Path]) -> Results:
-    """The results of modal, reduce and sweep in files, and in all .h5 files of folders (others there are passed over).
-
-    Raises InputError for a file that is none, and when there is nothing to report.
-    """
-    results = Results()
-    for path in map(Path, paths):
-        if not path.exists():
-            raise InputError(f"{path}: no such file or folder")
-        for file in sorted(path.glob("*.h5")) if path.is_dir() else [path]:
-            kind = _kind(file)
-            if kind not in _KINDS:
-                if path.is_dir():
-                    continue
-                raise InputError(f"{file}: holds no result of modal, reduce or sweep")
-            if kind == "modes":
-                results.modes[str(file)] = load(file, "modes")
-            elif kind == "reduced-model":
-                results.reduced[str(file)] = ReducedModel.load(file)
-            else:
-                results.sweeps[str(file)] = Sweep.load(file)
-    if not (results.modes or results.reduced or results.sweeps):
-        raise InputError(f"{', '.join(map(str, paths))}: no results of modal, reduce or sweep (.h5)")
-    return results
+    study: Study | None
+    groups: list[dict[str, Any]]
+    maps: list[Chart]
+    histories: list[dict[str, Any]]
 
 
 def write_report(results: Results, path: str | Path) -> None:
     """Write the page. A picture that cannot be rendered is left out, and the page says so."""
+    names = results.names
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters["shown"] = shown
+    environment.filters |= {"shown": shown, "name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
     template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
-    responses = _responses(results.sweeps)
-    scenes = {Path(name).name: _flat(_without_sweep(sweep)) for name, sweep in results.sweeps.items()}
+    scenes = {names[file]: _flat(_without_sweep(sweep)) for file, sweep in results.sweeps.items()}
+    scenes |= {
+        names[file]: _flat(history.scene.to_dict())
+        for file, history in results.histories.items()
+        if history.scene is not None
+    }
+    sections = list(_sections(results))
+    analyses = [_analysis(number, name, *record) for number, (name, record) in enumerate(results.modes.items())]
     html = template.render(
         plotly=plotly.offline.get_plotlyjs(),
-        analyses=[_analysis(name, *record) for name, record in results.modes.items()],
+        charted=any(section.groups or section.maps or section.histories for section in sections)
+        or any(analysis["chart"] for analysis in analyses),
+        sections=sections,
+        analyses=analyses,
         reductions=[_reduction(name, model) for name, model in results.reduced.items()],
-        groups=[_group(number, group) for number, group in enumerate(_by_axis(responses))],
         provenance=_provenance(results),
         scenes=scenes,
         keys=list(dict.fromkeys(key for scene in scenes.values() for key in scene)),
@@ -84,24 +75,53 @@ def write_report(results: Results, path: str | Path) -> None:
         temporary.write_text(html, encoding="utf-8")
 
 
-def _kind(path: Path) -> str | None:
-    try:
-        with h5py.File(path, "r") as file:
-            return str(file.attrs.get("kind"))
-    except OSError as error:
-        raise StoreError(f"{path}: not a readable HDF5 file ({error})") from error
+def _anchor(name: str) -> str:
+    """Where the page tells the provenance of a file."""
+    return "from-" + re.sub(r"\W", "-", name)
 
 
-def _responses(sweeps: Mapping[str, Sweep]) -> list[ForcedResponse]:
-    names = {file: model_name(sweep.scene) for file, sweep in sweeps.items()}
-    taken = list(names.values())
-    return [
-        response
-        for file, sweep in sweeps.items()
-        for response in forced_responses(
-            sweep, names[file] if taken.count(names[file]) == 1 else f"{names[file]} ({Path(file).stem})"
-        )
-    ]
+def _sections(results: Results) -> Iterator[Section]:
+    """What no study names, then every study with its own results."""
+    claimed = {str(Path(name).with_name(source)) for name, study in results.studies.items() for source in study.sources}
+    numbers = itertools.count()
+    yield _section(None, results, lambda name: name not in claimed, numbers)
+    for file, study in results.studies.items():
+        mine = {str(Path(file).with_name(source)) for source in study.sources}
+        yield _section(study, results, mine.__contains__, numbers)
+
+
+def _section(study: Study | None, results: Results, mine: Callable[[str], bool], numbers: Iterator[int]) -> Section:
+    sweeps = {name: sweep for name, sweep in results.sweeps.items() if mine(name)}
+    histories = {name: history for name, history in results.histories.items() if mine(name)}
+    names = results.names
+    named = {file: (names[file], sweep) for file, sweep in sweeps.items()}
+    return Section(
+        study,
+        groups=[_group(next(numbers), group) for group in _by_axis(_responses(named, study))],
+        maps=[_map(next(numbers), name, sweep) for name, sweep in sweeps.items() if map_axes(sweep)],
+        histories=[_history(next(numbers), name, history) for name, history in histories.items()],
+    )  # fmt: skip
+
+
+def _responses(sweeps: Mapping[str, tuple[str, Sweep]], study: Study | None) -> list[ForcedResponse]:
+    """The curves of named sweeps; those of a study are called by their files, others by their models."""
+    models = [model_name(sweep.scene) for _, sweep in sweeps.values()]
+    found = []
+    for model, (file, (name, sweep)) in zip(models, sweeps.items(), strict=True):
+        stem = name.removesuffix(".h5")
+        if study is not None:
+            called = stem.removeprefix(study.study).strip("_").replace("_", " ") or model
+        else:
+            called = model if models.count(model) == 1 else f"{model} ({stem})"
+        found += _curves(file, sweep, called)
+    return found
+
+
+def _curves(file: str, sweep: Sweep, name: str) -> list[ForcedResponse]:
+    found = [replace(response, source=file) for response in forced_responses(sweep, name)]
+    if len(found) <= _MOST_CURVES or map_axes(sweep) is None:
+        return found
+    return [found[index] for index in np.linspace(0, len(found) - 1, _MOST_CURVES).round().astype(int)]
 
 
 def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
@@ -111,13 +131,44 @@ def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
 
 
 def _group(number: int, responses: Sequence[ForcedResponse]) -> dict[str, Any]:
-    charts = {
-        "response": figures.responses_figure(responses),
-        "mistuning": figures.mistuning_figure(responses),
-        "energy": figures.energy_figure(responses),
+    made = {
+        "response": (figures.responses_figure, ("undamped", "fixed", "damped_max", "damped_mean")),
+        "mistuning": (figures.mistuning_figure, ("attached_mass_fraction", "impacts_per_period")),
+        "energy": (figures.energy_figure, LOSSES),
     }
-    html = {name: figures.to_html(figure, f"{name}-{number}") for name, figure in charts.items()}
-    return html | {"axis": responses[0].axis, "units": responses[0].units, "rows": [_key_figures(r) for r in responses]}
+    charts = {
+        kind: chart(
+            f"{kind}-{number}", figure(responses), ("response", responses[0].axis, *columns),
+            _table(responses, columns), [response.source for response in responses],
+        )
+        for kind, (figure, columns) in made.items()
+    }  # fmt: skip
+    return charts | {
+        "axis": responses[0].axis, "units": responses[0].units, "rows": [_key_figures(r) for r in responses]
+    }  # fmt: skip
+
+
+def _table(responses: Sequence[ForcedResponse], columns: Sequence[str]) -> Iterator[list[Any]]:
+    """A line a point: name, place on the axis, and the columns in SI units."""
+    for response in responses:
+        shares = dict(zip(LOSSES, response.energy_share.T, strict=True))
+        values = [shares[name] if name in shares else getattr(response, name) for name in columns]
+        yield from ([response.name, *line] for line in np.column_stack([response.x, *values]).tolist())
+
+
+def _map(number: int, name: str, sweep: Sweep) -> Chart:
+    header = ("panel", *(map_axes(sweep) or ()), "relative_amplitude")
+    return chart(f"map-{number}", map_figure(sweep), header, map_rows(sweep), [name])
+
+
+def _history(number: int, name: str, history: History) -> dict[str, Any]:
+    """A run: its time history, if it was sampled, and its figures."""
+    drawn = None
+    if len(history.time):
+        late = history.late()
+        header = ("time", "displacement", *(f"body_{body + 1}" for body in range(late.bodies.shape[1])))
+        drawn = chart(f"history-{number}", history_figure(late), header, late.rows(), [name])
+    return {"file": name, "chart": drawn, "measures": history.measures}
 
 
 def _key_figures(response: ForcedResponse) -> dict[str, Any]:
@@ -133,11 +184,18 @@ def _key_figures(response: ForcedResponse) -> dict[str, Any]:
     }
 
 
-def _analysis(name: str, values: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
+def _analysis(number: int, name: str, values: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
     bending = int(attributes["first_bending"]) if "first_bending" in attributes else None
-    picture = None if bending is None else mode_picture(name, bending)
+    turned, picture = None, None
+    if is_small(values):
+        first = bending or 0
+        header = ("x", "y", "z", "dx", "dy", "dz")
+        turned = chart(f"mode-{number}", mode_figure(values, first), header, mode_rows(values, first), [name])
+    elif bending is not None:
+        picture = mode_picture(name, bending)
     return {
-        "file": Path(name).name,
+        "file": name,
+        "chart": turned,
         "picture": None if picture is None else base64.b64encode(picture).decode(),
         "first_bending": bending,
         "modes": [
@@ -155,7 +213,7 @@ def _analysis(name: str, values: dict[str, Any], attributes: dict[str, Any]) -> 
 
 def _reduction(name: str, model: ReducedModel) -> dict[str, Any]:
     return {
-        "file": Path(name).name,
+        "file": name,
         "interface": [(label, model.contact_mass(label)) for label in model.interface],
         "modes": model.modes,
         "frequencies": model.natural_frequencies_hz,
@@ -164,14 +222,15 @@ def _reduction(name: str, model: ReducedModel) -> dict[str, Any]:
 
 
 def _provenance(results: Results) -> dict[str, dict[str, str]]:
-    tables = {"report": versions()}
-    for name, (_, attributes) in results.modes.items():
+    """What is known of every file, by its path; of the page itself under ""."""
+    tables = {"": versions()}
+    for file, (_, attributes) in results.modes.items():
         extra = json.loads(attributes.get("versions", "{}"))
-        tables[Path(name).name] = _flat({"matrices": json.loads(attributes["provenance"]), "versions": extra})
-    for name, model in results.reduced.items():
-        tables[Path(name).name] = _flat(model.provenance)
-    for name, sweep in results.sweeps.items():
-        tables[Path(name).name] = _flat(sweep.provenance)
+        tables[file] = _flat({"matrices": json.loads(attributes["provenance"]), "versions": extra})
+    for file, record in (results.reduced | results.sweeps | results.histories).items():
+        tables[file] = _flat({key: value for key, value in record.provenance.items() if key != "scene"})
+    for file in results.names:
+        tables[file]["sha256"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
     return tables
 
 

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
+from cases import DAMPED_BLOCK
 from structures import rod
-from test_studies_cli import CASE
 
 from coupling.choice import settle
 from coupling.engine import simulate
@@ -171,7 +171,7 @@ def test_what_does_not_fit(file):
 
 def test_command_chooses_modes_and_bases(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "case.toml").write_text(CASE)
+    (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
     counts = {}
     for basis in ("craig-bampton", "rubin", "macneal", "truncated"):
         tolerance = "0.3" if basis == "truncated" else "1e-3"

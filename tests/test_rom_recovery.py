@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from cases import DAMPED_BLOCK
 from scipy import linalg
 from structures import truss
-from test_studies_cli import CASE
 
 from coupling.inputs import InputError, validate
 from coupling.recovery import histories
@@ -25,7 +25,7 @@ def block(tmp_path_factory):
     from studies.pipeline import assemble, reduction, with_hot_spots
 
     path = tmp_path_factory.mktemp("block") / "case.toml"
-    path.write_text(CASE)
+    path.write_text(DAMPED_BLOCK)
     structure = assemble(Case.load(path))
     model = with_hot_spots(structure, reduction(structure, 20, keep_recovery=True))
     return structure, solve_modes(structure.matrices, 60), model

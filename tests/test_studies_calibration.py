@@ -6,6 +6,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from cases import BLOCK, changed
 
 from modal.correlation import MeasuredShapes, observed_shapes
 from modal.eigen import solve_modes
@@ -16,28 +17,12 @@ from studies.config import Case
 from studies.pipeline import assemble
 
 YOUNG, SPRINGS, RATIO = 1.9e11, 3e13, 0.004
-CASE = """
-[mesh]
-generator = "block"
-length = 0.1
-width = 0.02
-thickness = 0.01
-divisions = [6, 2, 1]
-[material.default]
-young = {young}
-poisson = 0.3
-density = 8000.0
-damping_ratio = 0.01
-fatigue_strength = 4e8
-[support.elastic.root]
-stiffness = {springs}
-[modes]
-count = 6
-direction = [0, 0, 1]
-[interface.tip]
-facets = "tip"
-direction = [0, 0, 1]
-"""
+CASE = changed(
+    BLOCK,
+    ("young = 2e11", "young = {young}"),
+    ("density = 8000.0", "density = 8000.0\ndamping_ratio = 0.01\nfatigue_strength = 4e8"),
+    ('[support]\nclamped = ["root"]', "[support.elastic.root]\nstiffness = {springs}"),
+)
 TABLE = """
 [calibration]
 share = 0.5

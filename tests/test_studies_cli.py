@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray
+from cases import DAMPED_BLOCK
 
 from coupling.scene import Scene
 from coupling.sweep import Sweep
@@ -21,32 +22,6 @@ from studies import commands
 from studies.cli import BAD_INPUT, _parser, main
 
 ROOT = Path(__file__).resolve().parent.parent
-CASE = """
-[mesh]
-generator = "block"
-length = 0.1
-width = 0.02
-thickness = 0.01
-divisions = [6, 2, 1]
-[material.default]
-young = 2e11
-poisson = 0.3
-density = 8000.0
-damping_ratio = 0.01
-fatigue_strength = 4e8
-[support]
-clamped = ["root"]
-[modes]
-count = 4
-direction = [0, 0, 1]
-at = "tip"
-[interface.tip]
-facets = "tip"
-direction = [0, 0, 1]
-[interface.top]
-facets = "top"
-direction = [0, 0, 1]
-"""
 SCENE = """
 [structure]
 model = "rigid"
@@ -75,7 +50,7 @@ transient = 10
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A working directory with a case and a scene."""
-    (tmp_path / "case.toml").write_text(CASE)
+    (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
     (tmp_path / "scene.toml").write_text(SCENE)
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -119,7 +94,7 @@ def test_matrices_for_other_codes(folder, capsys):
 def analysed(tmp_path_factory):
     """A case after modal, with all its outputs."""
     folder = tmp_path_factory.mktemp("modal")
-    (folder / "case.toml").write_text(CASE)
+    (folder / "case.toml").write_text(DAMPED_BLOCK)
     outputs = ["-o", str(folder / "modes.h5"), "--json", str(folder / "modes.json"), "--vtk", str(folder / "modes.vtu")]
     assert main(["modal", str(folder / "case.toml"), *outputs]) == 0
     return folder
@@ -166,7 +141,7 @@ def test_modal_files(analysed):
 
 
 def test_modal_without_interface_has_no_rigid_model(folder, capsys):
-    (folder / "case.toml").write_text(CASE.split("[interface")[0].replace('at = "tip"', ""))
+    (folder / "case.toml").write_text(DAMPED_BLOCK.split("[interface")[0].replace('at = "tip"', ""))
     assert main(["modal", "case.toml", "--json", "-"]) == 0
     assert json.loads(capsys.readouterr().out)["rigid"] is None
 
@@ -350,7 +325,7 @@ def test_bad_reduced_models(command, folder, rom, capfd):
         (["modal", "case.toml", "--vtk", "modes.stl"], "expected a file name ending in .vtu or .vtk"),
         (["mesh", "case.toml", "-o", "block.vtk"], "expected a file name ending in .msh"),
         (["report", "case.toml", "-o", "report.html"], "case.toml: not a readable HDF5 file"),
-        (["report", ".", "-o", "report.html"], "no results of modal, reduce or sweep"),
+        (["report", ".", "-o", "report.html"], "no results of modal, reduce, run, sweep or paper"),
         (["report", "nowhere", "-o", "report.html"], "nowhere: no such file or folder"),
         (["report", ".", "-o", "report.pdf"], "expected a file name ending in .html"),
     ],

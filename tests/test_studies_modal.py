@@ -4,40 +4,19 @@ import json
 
 import numpy as np
 import pytest
+from cases import BLOCK, changed
 
 from modal.eigen import Modes
 from studies.cli import BAD_INPUT, main
-from studies.report import collect, write_report
+from studies.report import write_report
+from studies.results import collect
 
-CASE = """
-[mesh]
-generator = "block"
-length = 0.1
-width = 0.02
-thickness = 0.01
-divisions = [6, 2, 1]
-[material.default]
-young = 2e11
-poisson = 0.3
-density = 8000.0
-[support]
-clamped = ["root"]
-[modes]
-count = 8
-direction = [0, 0, 1]
-[interface.tip]
-facets = "tip"
-direction = [0, 0, 1]
-"""
+CASE = BLOCK.replace("count = 6", "count = 8")
 
 
 def modal(folder, capfd, *changes):
     """The result of a changed case as data, and what was written to standard error."""
-    text = CASE
-    for old, new in changes:
-        assert text.count(old) == 1
-        text = text.replace(old, new)
-    (folder / "case.toml").write_text(text)
+    (folder / "case.toml").write_text(changed(CASE, *changes))
     arguments = ["modal", str(folder / "case.toml"), "-o", str(folder / "modes.h5"), "--json", "-"]
     status = main(arguments)
     captured = capfd.readouterr()

@@ -9,31 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import BLOCK
 
 from modal.eigen import Modes
 from studies.cli import BAD_INPUT, main
 
 ROOT = Path(__file__).resolve().parent.parent
-CASE = """
-[mesh]
-generator = "block"
-length = 0.1
-width = 0.02
-thickness = 0.01
-divisions = [6, 2, 1]
-[material.default]
-young = 2e11
-poisson = 0.3
-density = 8000.0
-[support]
-clamped = ["root"]
-[modes]
-count = 6
-direction = [0, 0, 1]
-[interface.tip]
-facets = "tip"
-direction = [0, 0, 1]
-"""
 # Open MPI 4 and 5: more ranks than cores, as root in a container
 ENVIRONMENT = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -59,7 +40,7 @@ def on_two_ranks(*arguments, cwd, program=("-m", "studies")):
 )
 def test_two_ranks_find_what_one_finds(modes, tmp_path):
     """The lowest modes by one shift, and some seventy by spectrum slicing."""
-    (tmp_path / "case.toml").write_text(CASE.replace("count = 6", modes))
+    (tmp_path / "case.toml").write_text(BLOCK.replace("count = 6", modes))
     outputs = ["-o", str(tmp_path / "one.h5"), "--json", str(tmp_path / "one.json")]
     assert main(["modal", str(tmp_path / "case.toml"), *outputs]) == 0
     alone = json.loads((tmp_path / "one.json").read_text())
@@ -78,7 +59,7 @@ def test_two_ranks_find_what_one_finds(modes, tmp_path):
 
 
 def test_bad_input_is_told_once(tmp_path):
-    (tmp_path / "case.toml").write_text(CASE.replace('["root"]', '["rot"]'))
+    (tmp_path / "case.toml").write_text(BLOCK.replace('["root"]', '["rot"]'))
     finished = on_two_ranks("modal", "case.toml", "-o", "modes.h5", cwd=tmp_path)
     assert finished.returncode == BAD_INPUT
     assert finished.stderr.count("no facet group 'rot'") == 1

@@ -1,20 +1,28 @@
 """The report: its numbers and curves are those of the files, and it fetches nothing."""
 
 import base64
+import csv
+import hashlib
+import io
 import json
 import re
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
 
+from coupling.engine import simulate
 from coupling.inputs import InputError, validate
 from coupling.scene import Scene
 from coupling.sweep import Sweep, sweep
-from modal.store import Variable, save
+from modal.store import Variable, load, save, write_json
 from rom.reduced import ReducedModel
 from studies import report as module
 from studies.cli import main
-from studies.report import collect, write_report
+from studies.mode_figure import sharp_edges, surface
+from studies.report import write_report
+from studies.results import collect
 
 RESONANCE = 100.0 / (2 * np.pi)
 DATA = {
@@ -43,7 +51,17 @@ def results(tmp_path_factory):
     sweep(validate(Scene, DATA | {"sweep": along}, "x")).save(folder / "sweep_one.h5")
     two = {"cavity.c1.gap": [2e-4, 4e-4], "excitation.frequency": FREQUENCIES}
     sweep(validate(Scene, DATA | {"sweep": two}, "x")).save(folder / "sweep_two.h5")
-    save(folder / "other.h5", "response", {"peak": Variable(np.zeros(3), ("period",))})
+    scene = validate(Scene, DATA, "x")
+    simulate(scene, events=True, samples_per_period=20).save(folder / "run.h5", {"scene": scene.to_dict()})
+    map_ = {"cavity.c1.gap": [4e-4, 2e-4, 3e-4], "excitation.frequency": FREQUENCIES}
+    sweep(validate(Scene, DATA | {"sweep": map_}, "x")).save(folder / "fig9_gaps.h5")
+    claims = [
+        {"claim": "Half is < enough", "ours": "0.5", "verdict": "shown"},
+        {"claim": "Half is too much", "ours": "0.5", "verdict": "not shown", "why": "no air", "figures": {"peak": 0.5}},
+    ]
+    study = {"study": "fig9", "title": "Three gaps", "sources": ["fig9_gaps.h5"], "claims": claims}
+    write_json(folder / "fig9.claims.json", study)
+    save(folder / "other.h5", "something", {"peak": Variable(np.zeros(3), ("period",))})
     return folder
 
 
@@ -70,7 +88,9 @@ def decoded(value):
 
 def test_curves_are_in_the_page(page, results):
     found = charts(page)
-    assert set(found) == {"response-0", "mistuning-0", "energy-0"}
+    kinds = ("response", "mistuning", "energy")
+    expected = {f"{kind}-{group}" for kind in kinds for group in (0, 2)} | {"history-1", "map-3", "mode-0"}
+    assert set(found) == expected
     one, two = (Sweep.load(results / f"sweep_{name}.h5") for name in ("one", "two"))
     expected = {
         "rigid model (sweep_one)": (one, ()),
@@ -94,6 +114,79 @@ def test_curves_are_in_the_page(page, results):
     np.testing.assert_allclose(np.sum([t["y"] for t in shares], axis=0), 100.0)
 
 
+def test_time_history_is_that_of_the_run(page, results):
+    values, _ = load(results / "run.h5", "response")
+    structure, impacts, body = charts(page)["history-1"]
+    np.testing.assert_allclose(structure["x"], 1e3 * values["time"])
+    np.testing.assert_allclose(structure["y"], 1e6 * values["displacement"])
+    np.testing.assert_allclose(body["y"], 1e6 * values["body_displacement"][:, 0])
+    np.testing.assert_allclose(impacts["x"], 1e3 * values["event_time"][values["event_kind"] == "impact"])
+    assert len(impacts["x"]) > 5
+    # the body is at a wall when it hits
+    at = np.interp(impacts["x"], body["x"], np.abs(body["y"]))
+    assert np.median(at) > 0.9 * 1e6 * 1e-4
+
+
+def test_map_is_in_order_of_its_axes(page, results):
+    record = Sweep.load(results / "fig9_gaps.h5")
+    (trace,) = charts(page)["map-3"]
+    np.testing.assert_allclose(trace["y"], [2e-4, 3e-4, 4e-4])
+    values = np.reshape(trace["z"], (3, len(FREQUENCIES))) if np.ndim(trace["z"]) == 1 else trace["z"]
+    np.testing.assert_allclose(values, record.amplitude_mean[[1, 2, 0]] / 1e-3)
+
+
+def test_study_has_its_claims_and_its_sweeps(page):
+    assert "<h2>Three gaps</h2>" in page
+    assert "Half is &lt; enough" in page
+    for verdict in ("shown", "not shown"):
+        assert re.search(rf'class="verdict \w+">{verdict}<', page)
+    names = {trace["legendgroup"] for trace in charts(page)["response-2"]}
+    assert names == {f"gaps, c1.gap = {gap} m" for gap in ("0.0002", "0.0003", "0.0004")}
+
+
+def test_every_chart_has_its_data_and_their_provenance(page, results):
+    links = dict(re.findall(r'download="([\w-]+)\.csv" href="data:text/csv;charset=utf-8;base64,([^"]+)"', page))
+    assert set(links) == set(charts(page))
+    table = list(csv.DictReader(io.StringIO(base64.b64decode(links["response-0"]).decode())))
+    record = Sweep.load(results / "sweep_one.h5")
+    mine = [row for row in table if row["response"] == "rigid model (sweep_one)"]
+    np.testing.assert_array_equal([float(row["damped_mean"]) for row in mine], record.amplitude_mean)
+    np.testing.assert_array_equal([float(row["excitation.frequency"]) for row in mine], FREQUENCIES)
+    for anchor in re.findall(r'href="#([\w-]+)"', page):
+        assert f'id="{anchor}"' in page
+    assert hashlib.sha256((results / "sweep_one.h5").read_bytes()).hexdigest() in page
+
+
+def test_surface_of_blocks_is_closed_and_outside():
+    """Twelve tetrahedra or two hexahedra fill a bar: area and volume by the divergence theorem."""
+    points = np.array([[x, y, z] for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    hexahedra = np.array([[0, 4, 6, 2, 1, 5, 7, 3], [4, 8, 10, 6, 5, 9, 11, 7]])
+    split = [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]]
+    for cells in (hexahedra, hexahedra[:, split].reshape(-1, 4)):
+        triangles = surface(cells)
+        a, b, c = points[triangles].transpose(1, 0, 2)
+        normals = np.cross(b - a, c - a) / 2
+        assert np.linalg.norm(normals, axis=1).sum() == pytest.approx(10.0)
+        assert np.einsum("ij,ij->", normals, (a + b + c) / 9) == pytest.approx(2.0)
+        lengths = np.linalg.norm(np.diff(points[sharp_edges(points, triangles)], axis=1), axis=-1)
+        assert lengths.sum() == pytest.approx(16.0)  # no edge across a flat side
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
+def test_browser_shows_the_page_without_a_complaint(page, results):
+    """Requests to hosts would fail, and be told: no name is resolved."""
+    command = [
+        "chromium", "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader", "--enable-logging=stderr", "--host-resolver-rules=MAP * ~NOTFOUND",
+        "--timeout=60000", "--dump-dom", f"file://{results / 'report.html'}",
+    ]  # fmt: skip
+    finished = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    assert finished.stdout.count("main-svg") >= 2 * len(charts(page))
+    told = [line for line in finished.stderr.splitlines() if "CONSOLE" in line and "willReadFrequently" not in line]
+    assert told == []
+
+
 def test_page_fetches_nothing(page):
     markup = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
     assert not re.search(r"""(?:src|href|url)\s*[=(]\s*["']?(?:https?:)?//""", markup)
@@ -102,7 +195,6 @@ def test_page_fetches_nothing(page):
 
 
 def test_tables_hold_the_results(page, results):
-    assert 'src="data:image/png;base64,' in page or "No picture" in page
     for frequency in ReducedModel.load(results / "rom.h5").natural_frequencies_hz:
         assert f"{frequency:.2f}" in page
     for text in ("effective masses", "rigid model", "mesh_sha256", "damper[0].restitution"):
@@ -110,7 +202,7 @@ def test_tables_hold_the_results(page, results):
 
 
 def test_files_of_other_kinds_are_passed_over_in_folders_only(results):
-    assert len(collect([results]).sweeps) == 2
+    assert len(collect([results]).sweeps) == 3
     with pytest.raises(InputError, match=r"other.h5: holds no result"):
         collect([results / "other.h5"])
 
@@ -124,6 +216,7 @@ def test_sweeps_alone_make_a_page(results, tmp_path):
 
 def test_page_without_a_picture_says_so(results, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "mode_picture", lambda *_: None)
+    monkeypatch.setattr(module, "is_small", lambda _: False)
     write_report(collect([results / "modes.h5"]), tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "No picture: this machine cannot render one" in text
@@ -147,3 +240,14 @@ def test_a_sweep_that_failed_everywhere_still_makes_a_page(results, tmp_path, mo
     sweep(validate(Scene, DATA | {"sweep": {"excitation.frequency": FREQUENCIES}}, "x")).save(tmp_path / "bad.h5")
     write_report(collect([tmp_path]), tmp_path / "report.html")
     assert "7 of 7 points ended with a status other than" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_files_of_the_same_name_are_told_apart(results, tmp_path):
+    for folder in ("stiff", "soft"):
+        (tmp_path / folder).mkdir()
+        shutil.copy(results / "sweep_one.h5", tmp_path / folder / "sweep.h5")
+    write_report(collect([tmp_path / "stiff", tmp_path / "soft"]), tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    names = {trace["legendgroup"] for trace in charts(page)["response-0"]}
+    assert names == {"rigid model (stiff/sweep)", "rigid model (soft/sweep)"}
+    assert {'id="from-stiff-sweep-h5"', 'id="from-soft-sweep-h5"'} <= set(re.findall(r'id="[\w-]+"', page))

@@ -1,0 +1,74 @@
+"""Maps: a sweep along two axes at once, as colours."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from coupling.sweep import Sweep
+from studies.charts import axis_title, dressed
+from studies.forced_response import FREQUENCY, reference_amplitude, shown
+
+_FEWEST = 3  # values of the second axis that make a map
+_MOST_PANELS = 6
+
+
+def map_axes(sweep: Sweep) -> tuple[str, str] | None:
+    """The two axes of a sweep's map: the frequency, or else the longest, and the longest other; None without."""
+    numeric = [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and len(values) >= _FEWEST]
+    numeric.sort(key=lambda path: (path != FREQUENCY, -len(sweep.axes[path])))
+    return (numeric[0], numeric[1]) if len(numeric) > 1 else None
+
+
+def map_figure(sweep: Sweep) -> go.Figure:
+    """Mean amplitude relative to the undamped maximum over two axes; a panel for every value of the others."""
+    panels = list(_panels(sweep))[:_MOST_PANELS]
+    columns = min(len(panels), 2)
+    figure = make_subplots(
+        rows=-(-len(panels) // columns), cols=columns, subplot_titles=[name for name, _, _, _ in panels],
+        shared_xaxes=True, shared_yaxes=True, horizontal_spacing=0.05,
+    )  # fmt: skip
+    across, up = map_axes(sweep) or ("", "")
+    units = sweep.units()
+    for number, (_, x, y, values) in enumerate(panels):
+        figure.add_heatmap(
+            x=x, y=y, z=values, coloraxis="coloraxis", row=number // columns + 1, col=number % columns + 1,
+            hovertemplate="%{x:.6g}, %{y:.4g}: %{z:.3f}<extra></extra>",
+        )  # fmt: skip
+    figure.update_xaxes(title_text=axis_title(across, units[across]))
+    figure.update_yaxes(title_text=axis_title(up, units[up]), col=1)
+    bar = {"title": {"text": "mean amplitude /<br>undamped maximum"}}
+    figure.update_layout(coloraxis={"colorscale": "Viridis", "cmin": 0, "colorbar": bar})
+    return dressed(figure, height=440 * -(-len(panels) // columns))
+
+
+def map_rows(sweep: Sweep) -> Iterator[list[object]]:
+    """Panel, the two axes' values and the relative amplitude of every point."""
+    for name, x, y, values in _panels(sweep):
+        for row, upper in enumerate(y.tolist()):
+            yield from ([name, across, upper, values[row, i]] for i, across in enumerate(x.tolist()))
+
+
+def _panels(sweep: Sweep) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+    """Name, values of the two axes and relative amplitudes (up, across), for every combination of the others."""
+    axes = map_axes(sweep)
+    assert axes is not None
+    paths, reference = list(sweep.axes), reference_amplitude(sweep)
+    across, up = (paths.index(path) for path in axes)
+    order = [np.argsort(sweep.axes[path], kind="stable") for path in axes]
+    others = [index for index in range(len(paths)) if index not in (across, up)]
+    for combination in itertools.product(*(range(sweep.shape[index]) for index in others)):
+        point: list[int | slice] = [slice(None)] * len(paths)
+        for index, value in zip(others, combination, strict=True):
+            point[index] = value
+        values = sweep.amplitude_mean[tuple(point)] / reference
+        values = (values if up < across else values.T)[np.ix_(order[1], order[0])]
+        name = ", ".join(
+            f"{paths[i].split('.', 1)[-1]} = {shown(sweep.axes[paths[i]][j])}"
+            for i, j in zip(others, combination, strict=True)
+        )
+        yield name, sweep.axes[axes[0]][order[0]], sweep.axes[axes[1]][order[1]], values

@@ -1,0 +1,40 @@
+"""Compiled functions are compiled anew when the code that they hold has changed, and only then."""
+
+import pytest
+
+from coupling.compiled import _sources
+
+
+@pytest.fixture
+def digest(tmp_path):
+    """Digest of a file of compiled functions in a chain caller -> callee -> records -> scenes."""
+    texts = {
+        "caller": "from coupling.callee import rise\n@entry\ndef climb(x): return rise(x)\n",
+        "callee": "from coupling.records import STEP\n@kernel\ndef rise(x): return x + STEP\n",
+        "records": "from coupling.scenes import Scene\nSTEP = 1.0\n",
+        "scenes": "class Scene: pass\n",
+    }
+    for name, text in texts.items():
+        (tmp_path / f"{name}.py").write_text(text)
+
+    def after(edited=None, file="caller"):
+        for name, text in texts.items():
+            (tmp_path / f"{name}.py").write_text(text + ("\n# edited\n" if name == edited else ""))
+        _sources.cache_clear()
+        return _sources(tmp_path / f"{file}.py")
+
+    yield after
+    _sources.cache_clear()
+
+
+@pytest.mark.parametrize("name", ["caller", "callee", "records"])
+def test_code_that_a_function_holds_dates_it(digest, name):
+    assert digest(name) != digest()
+
+
+def test_data_behind_records_does_not_date_it(digest):
+    assert digest("scenes") == digest()
+
+
+def test_a_caller_does_not_date_its_callee(digest):
+    assert digest("caller", "callee") == digest(None, "callee")
