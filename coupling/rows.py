@@ -136,9 +136,17 @@ def _contacts(scene: Scene, structure: LinearStructure) -> tuple[list[_Contact],
             restitution = float(np.prod([damper.restitution for damper in pair]) ** (1 / len(pair)))
             # the wall's mass is that of the structure's first mode, the same for every number of modes
             mobility = float(sum(1 / damper.mass for damper in pair) + (wall[:1] ** 2).sum())
-            element = scene.contact.element(restitution, 1 / mobility)
+            element = scene.contact.element(restitution, 1 / mobility, _yielding(structure, index, before, after))
             contacts.append(_Contact(before, after, wall, cavity.gap, element))
     return contacts, owner
+
+
+def _yielding(structure: LinearStructure, cavity: int, before: int, after: int) -> float:
+    """What the wall of a contact yields besides its modes, m/N; between two bodies the mean of the cavity's walls."""
+    if structure.wall_flexibility is None:
+        return 0.0
+    left, right = structure.wall_flexibility[cavity]
+    return float(left if before < 0 else right if after < 0 else 0.5 * (left + right))
 
 
 def _initial_rows(scene: Scene, structure: LinearStructure, rows: Rows) -> tuple[np.ndarray, np.ndarray]:

@@ -63,15 +63,21 @@ class Rigid:
 class Rom:
     """A reduced model from a file (`vanedamp reduce`), with the first `modes` of its modes (default: all).
 
-    natural: take the model's own lowest natural modes instead of those of its basis. modes = "auto": as many natural
-    modes as keep the estimated error within `tolerance`.
+    natural: take the model's own lowest natural modes instead of those of its basis; attached: with residual attachment
+    modes, which keep its flexibility. modes = "auto": as many natural modes as keep the estimated error within
+    `tolerance`, attached where that is smaller.
     """
 
     model: Literal["rom"]
     file: str
     modes: Annotated[Whole, Field(ge=0)] | Literal["auto"] | None = None
     natural: bool = False
+    attached: bool = False
     tolerance: Annotated[Real, Field(gt=0, lt=1)] = 0.01
+
+    def __post_init__(self) -> None:
+        if self.attached and not (self.natural and isinstance(self.modes, int)):
+            raise ValueError("attached: attachment modes go with natural = true and a number of modes")
 
 
 Structure = Annotated[Prescribed | Rigid | Rom, Field(discriminator="model")]

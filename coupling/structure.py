@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
-from coupling.choice import file_stamp, kept, restricted, settle
+from coupling.choice import file_stamp, reduced_model, settle
 from coupling.inputs import InputError
 from coupling.scene import Prescribed, Rigid, Rom, Scene
 from modal.store import frozen
@@ -46,6 +46,7 @@ class LinearStructure:
     velocity: np.ndarray
     table: complex = 0.0
     physical: float = 1.0
+    wall_flexibility: np.ndarray | None = None
 
     @property
     def modes(self) -> int:
@@ -55,12 +56,13 @@ class LinearStructure:
 
 @dataclass(frozen=True)
 class _ModalBasis:
-    """Modes of a structure without bodies: squared frequencies, damping, functionals and base loads by label."""
+    """Modes of a structure without bodies: squared frequencies, damping; by label functionals, base loads, residual."""
 
     stiffness: np.ndarray
     damping: np.ndarray
     rows: dict[str, np.ndarray]
     base: dict[str, np.ndarray]
+    flexibility: dict[str, float]
 
 
 def linear_structure(scene: Scene) -> LinearStructure:
@@ -94,6 +96,7 @@ def linear_structure(scene: Scene) -> LinearStructure:
         omega, basis.stiffness, basis.damping, response, floor, left, right,
         np.reshape(casing, (len(casing), len(response))), force, base, displacement, velocity,
         physical=float(response[0]) if isinstance(scene.structure, Rigid) else 1.0,
+        wall_flexibility=_wall_flexibility(basis, scene),
     )  # fmt: skip
 
 
@@ -191,6 +194,13 @@ def _surfaces(basis: _ModalBasis, scene: Scene, index: int) -> tuple[np.ndarray,
     return _row(basis, left, f"{key}.left"), _row(basis, right, f"{key}.right"), _row(basis, floor, f"{key}.floor")
 
 
+def _wall_flexibility(basis: _ModalBasis, scene: Scene) -> np.ndarray:
+    if isinstance(scene.structure, Rigid):
+        return np.zeros((len(scene.cavity), 2))
+    walls = [basis.flexibility[str(label)] for cavity in scene.cavity for label in cavity.labels()[:2]]
+    return np.reshape(walls, (-1, 2))
+
+
 def _basis(scene: Scene) -> _ModalBasis:
     structure = scene.structure
     if isinstance(structure, Rigid):
@@ -198,16 +208,16 @@ def _basis(scene: Scene) -> _ModalBasis:
         row = frozen([1 / root])
         return _ModalBasis(
             frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
-            {"structure": row}, {"structure": frozen([root])},
+            {"structure": row}, {"structure": frozen([root])}, {},
         )  # fmt: skip
     settled = settle(scene).scene.structure
     assert isinstance(settled, Rom)
-    return _rom_basis(settled.file, file_stamp(settled.file), kept(settled), settled.natural)
+    return _rom_basis(settled, file_stamp(settled.file))
 
 
 @lru_cache(maxsize=8)
-def _rom_basis(file: str, _stamp: int, modes: int | None, natural: bool) -> _ModalBasis:
-    return modal_basis(restricted(file, _stamp, modes, natural))
+def _rom_basis(structure: Rom, _stamp: int) -> _ModalBasis:
+    return modal_basis(reduced_model(structure))
 
 
 def modal_basis(model: ReducedModel) -> _ModalBasis:
@@ -225,4 +235,7 @@ def modal_basis(model: ReducedModel) -> _ModalBasis:
         label: frozen(shapes.T @ model.base_load @ direction)
         for label, direction in zip(model.interface, model.directions, strict=True)
     }
-    return _ModalBasis(frozen(squares), frozen(damping), rows, base)
+    residual = model.residual_flexibility
+    own = np.zeros(len(model.interface)) if residual is None else np.diag(residual)
+    flexibility = dict(zip(model.interface, own.tolist(), strict=True))
+    return _ModalBasis(frozen(squares), frozen(damping), rows, base, flexibility)

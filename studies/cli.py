@@ -191,7 +191,7 @@ def _parser() -> argparse.ArgumentParser:
         "study", choices=("engine", "modal", "sweep", "ladder", "work-precision", "stability"),
         help="engine: the exact engine against a hand-written loop and solve_ivp; modal: time and memory of ten modes "
         "beside scipy's solvers; sweep: time and memory of sweeps of up to 100 000 scenes; ladder: contact laws and "
-        "numbers of modes, error against cost; work-precision: speed against accuracy of all methods; "
+        "numbers of modes of reduced models, and their choice; work-precision: speed against accuracy of all methods; "
         "stability: where methods fail",
     )  # fmt: skip
     bench.add_argument("--quick", action="store_true", help="seconds instead of minutes, and rougher figures")

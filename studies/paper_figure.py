@@ -15,7 +15,7 @@ import json
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,10 +25,11 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
 from scipy.linalg import eigh
 
-from coupling.choice import file_stamp, restricted
+from coupling.choice import reduced_model
 from coupling.inputs import STRICT, InputError, Positive, Whole, read_toml, validate
 from coupling.scene import Rom, Scene
 from modal.store import load, replacing
+from rom.reduced import ReducedModel
 from studies.forced_response import FREQUENCY, resonance_grid
 
 FOLDER = Path(__file__).with_name("paper_scenes")
@@ -180,7 +181,7 @@ def linear_peaks(scene: Scene) -> list[float]:
     structure = scene.structure
     floors = {cavity.name: cavity.labels()[2] for cavity in scene.cavity}
     if isinstance(structure, Rom):
-        model = restricted(structure.file, file_stamp(structure.file), None, False)
+        model = _whole(structure)
         mass, stiffness = np.array(model.mass), model.stiffness
         rows = {name: model.row(str(label)) for name, label in floors.items()}
     else:
@@ -200,10 +201,14 @@ def write_scene(scene: Scene, path: Path) -> None:
         temporary.write_text(tomli_w.dumps(data), encoding="utf-8")
 
 
+def _whole(structure: Rom) -> ReducedModel:
+    """The reduced model with all that its file holds."""
+    return reduced_model(replace(structure, modes=None))
+
+
 def _damping_ratio(scene: Scene) -> float:
     if isinstance(scene.structure, Rom):
-        file = scene.structure.file
-        return float(np.max(restricted(file, file_stamp(file), None, False).damping_ratio or 0.0)) or 1e-3
+        return float(np.max(_whole(scene.structure).damping_ratio or 0.0)) or 1e-3
     return getattr(scene.structure, "damping_ratio", None) or 1e-3
 
 
