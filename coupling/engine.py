@@ -59,7 +59,7 @@ def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: 
     return evaluate(scene, run.outcome(), status, transient, started)
 
 
-def _run_of(scene: Scene, events: bool, samples_per_period: int, start: Handover | None) -> Run:
+def _run_of(scene: Scene, events: bool, samples_per_period: int, start: Handover | None = None) -> Run:
     if scene.solver.method == "exact":
         return _Run(scene, events, samples_per_period, start=start)
     if start is not None:
@@ -148,12 +148,6 @@ class _Run:
         y = (self.flows.shape[s][:, awake] @ state.amplitude[awake]).real
         y[: len(state.constant)] += state.constant
         return taken(self.structure, self.rows, state.displacement, state.velocity, y)
-
-    @property
-    def peaks(self) -> np.ndarray:
-        """Largest |x| of the periods done, m."""
-        peaks: np.ndarray = self.records.peak[: self.state.counters[st.PERIOD]]
-        return peaks
 
     def outcome(self) -> Outcome:
         """What the run leaves behind."""
