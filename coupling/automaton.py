@@ -13,7 +13,7 @@ import math
 from coupling.compiled import entry, inlined, kernel
 from coupling.contact import add_force, constant_loads, keep_released, settle, stop_riders
 from coupling.events import POSITION, VELOCITY, exp_minus_line, exp_minus_one
-from coupling.gaps import SIMULTANEOUS, close, join, join_speeds, measure_gaps, only, rigid, shift_slip
+from coupling.gaps import SIMULTANEOUS, align_gaps, close, join, join_speeds, measure_gaps, only, rigid, shift_slip
 from coupling.impacts import all_move, bounce, collide
 from coupling.ledger import account
 from coupling.springs import begin_push, change_push, spring_energy, spring_force
@@ -84,6 +84,7 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
             _phase(rows, st)
             _wake(flows, st)
             record_section(rows, flows, st, rec, work)
+            align_gaps(rows, st, work.coordinates)
             continue
         st.counters[EVENTS] += 1
         st.time[0] += tau
