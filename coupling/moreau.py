@@ -66,7 +66,7 @@ def march_moreau(system, motion, records, log, problem, inverse, turned, mobilit
     return DONE
 
 
-@kernel
+@inlined
 def _impulses(system, motion, problem, mobility, turned, free, speed, impulse, theta):
     """Set the impulses (r,) of a step; `free` (N,) becomes the velocity at its end. Returns False if undecided.
 
