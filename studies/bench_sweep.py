@@ -74,6 +74,7 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
         name: spread(np.array([pair["efficiency"][name] for pair in result["pairs"]]))
         for name in ("clock", "processor")
     }
+    result["overhead"] = spread(np.array([_overhead(entry) for entry in result["sizes"]]))
     result["wall_time_s"] = time.perf_counter() - started
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "bench_sweep.json", result)
@@ -98,6 +99,7 @@ def tell(result: Mapping[str, Any]) -> None:
         )
     for name, values in result["efficiency"].items():
         print(f"parallel efficiency by the {name:9} {shown(values)}  target {result['target']}")
+    print(f"share of the main process in the processors' time {shown(result['overhead'])}")
     print(f"load of the machine at the beginning: {result['machine']['load']:.1f}")
 
 
@@ -108,6 +110,12 @@ def _efficiency(one: Mapping[str, Any], many: Mapping[str, Any]) -> dict[str, fl
         "clock": one["wall_s"] / (count * many["wall_s"]),
         "processor": one["main_cpu_s"] / (count * max(everybody, *many["worker_cpu_s"])),
     }
+
+
+def _overhead(many: Mapping[str, Any]) -> float:
+    """What handing out, collecting and writing takes of all processor time."""
+    own: float = many["main_cpu_s"]
+    return own / (own + sum(many["worker_cpu_s"]))
 
 
 def _process(points: int, workers: int) -> dict[str, Any]:

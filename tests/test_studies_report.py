@@ -233,7 +233,7 @@ def test_names_are_escaped(results, tmp_path):
 def test_a_sweep_that_failed_everywhere_still_makes_a_page(results, tmp_path, monkeypatch):
     import coupling.points
 
-    def broken(_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("everywhere")
 
     monkeypatch.setattr(coupling.points, "simulate", broken)
