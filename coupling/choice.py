@@ -1,18 +1,21 @@
-"""What a scene leaves open about its reduced model, settled: how many modes it needs, and how stiff its contacts are.
+"""What a scene leaves open about its reduced model, settled: how many modes it needs.
 
 `modes = "auto"` takes the fewest natural modes whose estimated error stays within the tolerance (rom.ladder): of the
-receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus what a
-collision's energy and duration lose, in the measure in which the bodies can change the response at all. The whole model
-of the file is the measure.
+receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus that of the
+pulse of a collision, in the measure in which the bodies can change the response at all. The whole model of the file is
+the measure.
 
 A boundary without mass yields under its contact force by the flexibility G that the modes lack, u = Phi eta + G f,
 while it touches and not otherwise. For one contact at a time this is a spring 1/G between body and modes, which is what
-the engine runs. Left out are the boundary's motion under friction on the floor and under forces at other coordinates.
+the engine runs, at every wall with its own G. Left out are the boundary's motion under friction on the floor and under
+forces at other coordinates; where walls that can be touched at once have much of G in common, the estimate tells.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -23,10 +26,25 @@ import numpy as np
 from coupling.inputs import InputError
 from coupling.laws import Compliant, Massless, Newton
 from coupling.scene import Rom, Scene
-from rom.ladder import Choice, Collision, choose, grid, natural_ladder, rigid_errors
+from coupling.sensitivity import sensitivity
+from rom.collision import Collision, pulse
+from rom.ladder import Choice, choose, grid, natural_ladder, rigid_errors
 from rom.reduced import ReducedModel
+from rom.spectrum import spectrum
 
+#: bodies that hit twice a period act like up to 1.7 times their mass (docs/engine.md: attached mass), and damp besides
+_IMPACTS = 2.0
+#: share of a flexibility in common that is told
+_SHARED = 0.1
+#: what the sensitivity of the one-mode model is short of that of a richer one, at most, by experience
+_CAUTION = 5.0
+#: between a single collision and the response, in which collisions meet the waves of those before
+_SAFETY = 1.5
 _NEWTON = "; of the forced response alone: Newton's impacts have no limit as modes grow, compliant contacts have"
+
+
+#: the choice of a number of modes by file, `modes` and tolerance
+Choices = Mapping[tuple[Any, ...], Choice]
 
 
 class Settled(NamedTuple):
@@ -37,25 +55,23 @@ class Settled(NamedTuple):
 
 
 def settle(scene: Scene) -> Settled:
-    """The scene with its number of modes and its contact stiffness. Raises InputError when there is no good choice."""
+    """The scene with its number of modes. Raises InputError when there is no good choice."""
     return settle_all([scene])[0]
 
 
 def settle_all(scenes: Sequence[Scene]) -> list[Settled]:
     """The same for the points of a sweep: those with one model and tolerance share the choice that suits them all."""
-    if not any(_open(scene) for scene in scenes):
-        return [Settled(scene, None) for scene in scenes]
+    choices = choices_of(scenes)
+    return [settled(scene, choices) for scene in scenes]
+
+
+def choices_of(scenes: Iterable[Scene]) -> Choices:
+    """The number of modes that suits all scenes with one model and tolerance, for each of these."""
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
-        groups.setdefault(_group(scene), []).append(scene)
-    choices = {key: _choice(members) for key, members in groups.items() if key and key[1] == "auto"}
-    return [_settled(scene, choices.get(_group(scene))) for scene in scenes]
-
-
-def kept(structure: Rom) -> int | None:
-    """The number of modes of a structure that has been settled."""
-    assert structure.modes != "auto"
-    return structure.modes
+        if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+            groups.setdefault(_group(scene), []).append(scene)
+    return {key: _choice(members) for key, members in groups.items()}
 
 
 def file_stamp(file: str) -> int:
@@ -64,21 +80,27 @@ def file_stamp(file: str) -> int:
     return path.stat().st_mtime_ns if path.is_file() else 0
 
 
+def reduced_model(structure: Rom) -> ReducedModel:
+    """The reduced model of a structure that has been settled, with so many of its modes."""
+    assert structure.modes != "auto"
+    return _restricted(
+        structure.file, file_stamp(structure.file), structure.modes, structure.natural, structure.attached
+    )
+
+
 @lru_cache(maxsize=8)
-def restricted(file: str, _stamp: int, modes: int | None, natural: bool) -> ReducedModel:
-    """The reduced model of a file with so many of its modes."""
+def _restricted(file: str, _stamp: int, modes: int | None, natural: bool, attached: bool) -> ReducedModel:
     model = ReducedModel.load(file)
     if modes is None:
         return model
+    if attached:
+        return model.attached(modes)
     return model.massless(modes) if natural else model.truncated(modes)
 
 
-def _open(scene: Scene) -> bool:
-    return isinstance(scene.structure, Rom) and (scene.structure.modes == "auto" or _wants_residual(scene))
-
-
-def _wants_residual(scene: Scene) -> bool:
-    return isinstance(scene.contact, Massless) or (isinstance(scene.contact, Compliant) and scene.contact.residual)
+def is_open(scene: Scene) -> bool:
+    """Whether a scene leaves something to settle."""
+    return isinstance(scene.structure, Rom) and scene.structure.modes == "auto"
 
 
 def _group(scene: Scene) -> tuple[Any, ...]:
@@ -86,18 +108,60 @@ def _group(scene: Scene) -> tuple[Any, ...]:
     return (structure.file, structure.modes, structure.tolerance) if isinstance(structure, Rom) else ()
 
 
-def _settled(scene: Scene, choice: Choice | None) -> Settled:
-    structure = scene.structure
-    if not isinstance(structure, Rom) or not _open(scene):
+def settled(scene: Scene, choices: Choices) -> Settled:
+    """The scene with the choice that was made for it."""
+    structure, choice = scene.structure, choices.get(_group(scene))
+    if not isinstance(structure, Rom):
         return Settled(scene, None)
-    if choice is not None:
-        structure = replace(structure, modes=choice.chosen.modes, natural=True)
-    contact = scene.contact
-    if _wants_residual(scene):
-        model = restricted(structure.file, file_stamp(structure.file), kept(structure), structure.natural)
-        contact = Compliant(_series(scene, model))
-    estimate = None if choice is None else choice.to_json() | {"stiffness": getattr(contact, "stiffness", None)}
-    return Settled(replace(scene, structure=structure, contact=contact), estimate)
+    if choice is None:
+        return Settled(scene, _warning(_shared(scene, structure)))
+    structure = replace(structure, modes=choice.chosen.modes, natural=True, attached=choice.chosen.attached)
+    scene = replace(scene, structure=structure)
+    contacts = _collisions(scene, reduced_model(structure))
+    stiffness = min((collision.stiffness for collision in contacts), default=None)
+    estimate = choice.to_json() | {"stiffness": stiffness}
+    warning = _warning(_shared(scene, structure))
+    if warning is not None:
+        estimate |= warning | {"sentence": f"{choice.sentence}; {warning['sentence']}"}
+    return Settled(scene, estimate)
+
+
+def _shared(scene: Scene, structure: Rom) -> float:
+    """Largest flexibility that two walls have in common which can be touched at once, relative to their own."""
+    law = scene.contact
+    if isinstance(law, Newton) or (isinstance(law, Compliant) and not law.residual):
+        return 0.0
+    model = reduced_model(structure)
+    residual = model.residual_flexibility
+    if residual is None:
+        return 0.0
+    own = 0.0 if isinstance(law, Massless) or law.stiffness is None else 1.0 / law.stiffness
+    largest = 0.0
+    for (one, first), (other, second) in itertools.combinations(_touched(scene, model), 2):
+        if one != other:
+            size = math.sqrt((residual[first, first] + own) * (residual[second, second] + own))
+            largest = max(largest, abs(float(residual[first, second])) / size if size > 0.0 else 0.0)
+    return largest
+
+
+def _touched(scene: Scene, model: ReducedModel) -> list[tuple[int, int]]:
+    """(body, wall's place in the interface) of all contacts of bodies with walls."""
+    found = []
+    for cavity in scene.cavity:
+        bodies = [index for index, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
+        ends = zip(bodies[:1] + bodies[-1:], cavity.labels()[:2], strict=False)
+        found += [(body, model.interface.index(label)) for body, label in ends if label in model.interface]
+    return found
+
+
+def _warning(shared: float) -> dict[str, Any] | None:
+    if shared <= _SHARED:
+        return None
+    return {
+        "shared_flexibility": shared,
+        "sentence": f"walls have up to {100 * shared:.0f} % of their residual flexibility in common, which contacts "
+        "closed at the same time do not feel; more modes lessen it",
+    }
 
 
 def _choice(scenes: Sequence[Scene]) -> Choice:
@@ -105,7 +169,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     first = scenes[0]
     structure, at = first.structure, first.excitation.at
     assert isinstance(structure, Rom) and at is not None
-    model = restricted(structure.file, file_stamp(structure.file), None, False)
+    model = reduced_model(replace(structure, modes=None))
     labels = list(dict.fromkeys([at, *(label for scene in scenes for label in _surfaces(scene))]))
     for label in labels:
         if label not in model.interface:
@@ -114,21 +178,20 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     frequencies = grid(model, min(driven), max(driven))
 
     def collisions(smaller: ReducedModel) -> list[Collision]:
-        made = {}
-        for scene in scenes:
-            if isinstance(scene.contact, Newton):
-                continue
-            stiffness = _series(scene, smaller)
-            for damper in scene.damper:
-                walls = tuple(_walls(scene, damper.cavity))
-                made[walls, damper.mass, stiffness] = Collision(walls, damper.mass, stiffness, damper.restitution)
-        return list(made.values())
+        if any(map(_needs_residual, scenes)) and not _yields(smaller):
+            return []  # it has no boundary without mass
+        return list(dict.fromkeys(item for scene in scenes for item in _collisions(scene, smaller)))
 
-    rungs = natural_ladder(model, frequencies, labels, [at], collisions, any(map(_wants_residual, scenes)))
-    share = max(_influence(scene, model, frequencies) for scene in scenes)
-    rungs = [replace(rung, collision=min(share, 1.0) * rung.collision) for rung in rungs]
+    share = min(1.0, _IMPACTS * max(_influence(scene, model, frequencies) for scene in scenes))
+    share = _SAFETY * min(share, _CAUTION * _sensitivity(scenes, model))
     rigid = float(rigid_errors(model, frequencies, at, labels, [at]).max())
-    choice = choose(rungs, structure.tolerance, rigid)
+    choices = []
+    for attached in (False, True):
+        rungs = natural_ladder(model, frequencies, labels, [at], collisions, attached)
+        rungs = [replace(rung, collision=share * rung.collision) for rung in rungs]
+        choices.append(choose(rungs, structure.tolerance, rigid))
+    # the first of equals: natural modes alone
+    choice = min(choices, key=lambda item: (not item.met, item.chosen.size))
     if not choice.met:
         raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
     if any(isinstance(scene.contact, Newton) for scene in scenes):
@@ -148,27 +211,56 @@ def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> fl
     return float((np.abs(glued - loose) / np.maximum(np.abs(loose), np.abs(glued))).max())
 
 
-def _series(scene: Scene, model: ReducedModel) -> float:
-    """Stiffness of the walls' mean residual flexibility in series with the law's own spring, N/m."""
-    walls = list(dict.fromkeys(label for damper in scene.damper for label in _walls(scene, damper.cavity)))
-    residual = model.residual_flexibility
-    indices = [model.interface.index(label) for label in walls]
-    lost = 0.0
-    if residual is not None and walls and _wants_residual(scene):
-        lost = float(np.mean(np.diag(residual)[indices]))
-    own = scene.contact.stiffness if isinstance(scene.contact, Compliant) else None
-    flexibility = lost + (0.0 if own is None else 1.0 / own)
-    if flexibility <= 0.0:
-        raise InputError(
-            "contact: the reduced model lacks no flexibility at the walls; take structure.natural = true with modes, "
-            "or a model of basis macneal or massless"
-        )
-    return 1.0 / flexibility
+def _sensitivity(scenes: Sequence[Scene], model: ReducedModel) -> float:
+    """Of the first scene with collisions and those that differ in frequency alone; 1 where it cannot be told."""
+    squares, shapes = spectrum(model.mass, model.stiffness)
+    least = max(1, model.rigid_modes)
+    for scene in scenes:
+        smaller = model if not _needs_residual(scene) or _yields(model) else model.massless(model.size - 1)
+        undamped = _undamped(scene, model)
+        for collision in _collisions(scene, smaller)[:1]:
+            row = (model.row(collision.label) @ shapes)[: smaller.size]
+            felt = pulse(squares[: smaller.size], row, collision, scene.excitation.frequency)
+            alike = [item for item in scenes if replace(item, excitation=scene.excitation) == scene]
+            return sensitivity(alike, collision, float(row[0]), felt, least, undamped) if undamped > 0.0 else 1.0
+    return 1.0
 
 
-def _walls(scene: Scene, cavity: str) -> list[str]:
-    found = next(item for item in scene.cavity if item.name == cavity)
-    return [label for label in found.labels()[:2] if label is not None]
+def _undamped(scene: Scene, model: ReducedModel) -> float:
+    """Amplitude of the highest resonance without bodies, m; 0 where no force drives it."""
+    if scene.excitation.resonance_amplitude is not None:
+        return scene.excitation.resonance_amplitude
+    at = str(scene.excitation.at)
+    return float(np.abs(model.frf(model.natural_frequencies_hz, at, at)).max()) * (scene.excitation.force or 0.0)
+
+
+def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
+    """Contacts of bodies with walls as they are on a model; none for rigid contacts. Raises InputError."""
+    if isinstance(scene.contact, Newton):
+        return []
+    first = spectrum(model.mass, model.stiffness)[1][:, 0]
+    flexibility = model.residual_flexibility
+    own = np.zeros(len(model.interface)) if flexibility is None else np.diag(flexibility)
+    found = []
+    for damper in scene.damper:
+        cavity = next(item for item in scene.cavity if item.name == damper.cavity)
+        for label in dict.fromkeys(filter(None, cavity.labels()[:2])):
+            reduced = 1.0 / (1.0 / damper.mass + float(model.row(label) @ first) ** 2)
+            lost = float(own[model.interface.index(label)])
+            element = scene.contact.element(damper.restitution, reduced, lost)
+            found.append(Collision(label, damper.mass, element.stiffness, element.dashpot))
+    return found
+
+
+def _needs_residual(scene: Scene) -> bool:
+    """Whether a contact is nothing but the flexibility that modes lack."""
+    return isinstance(scene.contact, Massless) or (
+        isinstance(scene.contact, Compliant) and scene.contact.stiffness is None
+    )
+
+
+def _yields(model: ReducedModel) -> bool:
+    return model.residual_flexibility is not None and bool(np.diag(model.residual_flexibility).max() > 0.0)
 
 
 def _surfaces(scene: Scene) -> list[str]:

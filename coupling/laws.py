@@ -32,7 +32,7 @@ class Newton:
 
     law: Literal["newton"] = "newton"
 
-    def element(self, restitution: float, mass: float) -> Element:
+    def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
         """The element of a pair with a coefficient of restitution and a reduced mass (kg)."""
         return Element(restitution)
 
@@ -42,8 +42,8 @@ class Compliant:
     """Spring (`stiffness`, N/m) and dashpot while the gap is closed; the contact ends when its force vanishes.
 
     The dashpot gives an isolated collision of the pair's reduced mass the restitution asked for. With `residual` the
-    spring is in series with what a reduced model's modes lack of its walls' static flexibility; without a `stiffness`
-    it is that alone (coupling.choice).
+    spring is in series with what a reduced model's modes lack of its wall's static flexibility; without a `stiffness`
+    it is that alone.
     """
 
     stiffness: Positive | None = None
@@ -54,9 +54,13 @@ class Compliant:
         if self.stiffness is None and not self.residual:
             raise ValueError("give stiffness (N/m), or residual = true on a reduced model, or both")
 
-    def element(self, restitution: float, mass: float) -> Element:
-        """The element of a pair with a coefficient of restitution and a reduced mass (kg). Raises InputError at 0."""
-        stiffness = 1.0 if self.stiffness is None else self.stiffness  # until coupling.choice knows better
+    def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
+        """The element of a pair with a coefficient of restitution, a reduced mass (kg) and what the wall yields.
+
+        flexibility: m/N that the modes lack of the wall; None: not known yet. Raises InputError at restitution 0.
+        """
+        own = 0.0 if self.stiffness is None else 1.0 / self.stiffness
+        stiffness = _series(own, flexibility) if self.residual else 1.0 / own
         dashpot = 2 * damping_ratio(restitution) * math.sqrt(stiffness * mass)
         return Element(restitution, stiffness, dashpot)
 
@@ -71,16 +75,31 @@ class Massless:
 
     law: Literal["massless"] = "massless"
 
-    def element(self, restitution: float, mass: float) -> Element:
-        """Refuses a restitution. Raises InputError."""
+    def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
+        """The wall as a spring; flexibility: m/N that the modes lack of it, None: not known yet.
+
+        Raises InputError for a restitution.
+        """
         if restitution != 1.0:
             raise InputError(
                 f"restitution: a massless contact loses nothing and has no impact law; drop it (got {restitution:g})"
             )
-        return Element(1.0, 1.0, 0.0)  # until coupling.choice knows the spring
+        return Element(1.0, _series(0.0, flexibility), 0.0)
 
 
 Contact = Annotated[Newton | Compliant | Massless, Field(discriminator="law")]
+
+
+def _series(own: float, flexibility: float | None) -> float:
+    """Stiffness of a spring (flexibility `own`) on a wall that yields; any where the wall is not known yet."""
+    if flexibility is None:
+        return 1.0
+    if own + flexibility <= 0.0:
+        raise InputError(
+            "contact: the reduced model lacks no flexibility at the walls; take structure.natural = true with modes, "
+            "or a model of basis macneal or massless"
+        )
+    return 1.0 / (own + flexibility)
 
 
 def damping_ratio(restitution: float) -> float:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import eigh
 
-from coupling.choice import file_stamp, kept, restricted, settle
+from coupling.choice import reduced_model, settle
 from coupling.engine import run_with_response
 from coupling.inputs import InputError
 from coupling.response import Status
@@ -39,7 +39,7 @@ def histories(scene: Scene, outputs: Sequence[str], samples_per_period: int = 10
     structure = scene.structure
     if not isinstance(structure, Rom):
         raise InputError('structure.model: outputs are those of a reduced model; take model = "rom"')
-    model = restricted(structure.file, file_stamp(structure.file), kept(structure), structure.natural)
+    model = reduced_model(structure)
     unknown = [name for name in outputs if name not in model.outputs]
     if unknown or model.output_rows is None:
         known = ", ".join(model.outputs) or "none"

@@ -34,6 +34,8 @@ from rom.reduced import ReducedModel
 _ROUND_TRIP = 1e-2
 # share of a quasi-static mode's inertia that must be its own for the reduced mass to stay well conditioned
 _OWN_SHARE = 1e-10
+# lowest eigenvalue of the mass of fields of unit norm that a factorisation stands
+_SMALLEST = 1e-14
 
 
 class ReductionError(ValueError):
@@ -213,35 +215,45 @@ def _quasi_static_blocks(
     They are not made orthogonal to the latter: a truncated model keeps them whole.
     """
     blocks: list[np.ndarray] = []
-    lag = constraint
+    lag, known = constraint, fixed
+    unit = constraint / np.sqrt(np.einsum("ij,ij->j", constraint, mass @ constraint))
     for _ in range(count):
         lag = held.solve(mass @ lag)
-        known = np.hstack([fixed, *blocks])
         if blocks:
-            known = _orthonormal(known, mass)
-            lag = (
-                lag
-                - (before := np.hstack(blocks))
-                @ np.linalg.lstsq(before.T @ (mass @ before), before.T @ (mass @ lag), rcond=None)[0]
-            )
+            before = np.hstack(blocks)
+            lag = lag - before @ np.linalg.lstsq(before.T @ (mass @ before), before.T @ (mass @ lag), rcond=None)[0]
         values, vectors = np.linalg.eigh(lag.T @ (mass @ lag))
         kept = values > _OWN_SHARE * values[-1]
         lag = lag @ (vectors[:, kept] / np.sqrt(values[kept]))
-        rest = lag - known @ (known.T @ (mass @ lag))
+        rest = _without(lag, known, mass)
         shares, vectors = np.linalg.eigh(rest.T @ (mass @ rest))
-        lag = lag @ vectors[:, shares > _OWN_SHARE]
-        if lag.shape[1] == 0:
+        own = _independent(lag @ vectors, shares, np.hstack([unit, fixed, *blocks]), mass)
+        if own == 0:
             break
-        lag = lag * mode_signs(lag)
-        blocks.append(lag)
+        turns = vectors[:, -own:]
+        blocks.append(lag @ turns * mode_signs(lag @ turns))
+        known = np.hstack([known, _without(rest @ turns / np.sqrt(shares[-own:]), known, mass)])
+        lag = blocks[-1]
     return blocks
 
 
-def _orthonormal(fields: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
-    """M-orthonormal basis of independent fields (n, m)."""
-    gram = fields.T @ (mass @ fields)
-    values, vectors = np.linalg.eigh(gram)
-    return fields @ (vectors / np.sqrt(values))
+def _independent(fields: np.ndarray, shares: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> int:
+    """How many of the last fields (n, m), whose own shares ascend, leave the mass of all together well conditioned.
+
+    A share that is small beside known fields which are nearly dependent already multiplies with theirs.
+    """
+    for count in range(int(np.count_nonzero(shares > _OWN_SHARE)), 0, -1):
+        together = np.hstack([known, fields[:, -count:]])
+        if np.linalg.eigvalsh(together.T @ (mass @ together))[0] > _SMALLEST:
+            return count
+    return 0
+
+
+def _without(fields: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
+    """Fields (n, m) without what M-orthonormal ones have of them."""
+    for _ in range(2):  # twice is enough
+        fields = fields - known @ (known.T @ (mass @ fields))
+    return fields
 
 
 def mode_signs(shapes: np.ndarray) -> np.ndarray:

@@ -88,8 +88,7 @@ def external_model(
             raise ExternalError(f"{name}: shape {matrix.shape}; expected square matrices of one size")
         if not np.all(np.isfinite(matrix)) or not np.any(matrix):
             raise ExternalError(f"{name}: zero, or holds entries that are not finite")
-    asymmetry = max(checks.asymmetry(matrix) for matrix in matrices.values())
-    worst = max(matrices, key=lambda name: checks.asymmetry(matrices[name]))
+    asymmetry, worst = max((checks.asymmetry(matrix), name) for name, matrix in matrices.items())
     if asymmetry > _ASYMMETRY:
         raise ExternalError(f"{worst}: not symmetric ({asymmetry:.1e}); if only one triangle is stored, mirror it")
     matrices = {name: 0.5 * (matrix + matrix.T) for name, matrix in matrices.items()}

@@ -7,25 +7,28 @@ quasi-static modes (block Krylov, Craig and Hale 1988). So the error is estimate
 basis with two more such blocks, which is the difference of the two models' receptances. The blocks come from the
 factors at hand, for as many solutions as the interface has coordinates each.
 
-Contact. A collision of duration pi / omega_c is a half sine of force. It leaves mode j of the wall the energy
-(phi_j p S(omega_j))^2 / 2, p the impulse and S the pulse's spectrum, 1 at low frequency and falling with
-(omega_c / omega)^2 above the contact's frequency omega_c = sqrt(k_c (1/m_1 + 1/m_i)). What the modes above the cut
-would take, relative to the energy of the approach, is what the smaller model cannot know.
+Contact. Bodies act on the structure by pulses, so an error of the pulse at the excitation frequency (rom.collision) is
+one of the force that changes the response.
 
 Needs numpy and reduced models alone.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy import linalg
 
+from rom.collision import Collision, pulse, share_above
 from rom.reduced import ReducedModel
+from rom.spectrum import spectrum
+
+_WITHOUT_RESIDUAL: dict[str, Any] = {
+    "residual_flexibility": None, "residual_recovery": None, "output_residual": None,
+}  # fmt: skip
 
 
 class LadderError(ValueError):
@@ -33,29 +36,19 @@ class LadderError(ValueError):
 
 
 @dataclass(frozen=True)
-class Collision:
-    """Contacts of a body with walls of the structure.
-
-    labels       interface coordinates of the walls
-    mass         kg, of the body
-    stiffness    N/m, of the contact
-    restitution  1
-    """
-
-    labels: tuple[str, ...]
-    mass: float
-    stiffness: float
-    restitution: float
-
-
-@dataclass(frozen=True)
 class Rung:
-    """A model of the ladder with its estimated errors: modes, coordinates, of the receptance, of the collisions."""
+    """A model of the ladder with its estimated errors, relative: of the receptance, of the pulses of collisions.
+
+    above: share of a collision's energy that modes beyond the model's would take, which need not be an error;
+    attached: whether the modes come with residual attachment modes (ReducedModel.attached).
+    """
 
     modes: int
     size: int
     receptance: float
     collision: float
+    above: float = 0.0
+    attached: bool = False
 
     @property
     def error(self) -> float:
@@ -118,59 +111,8 @@ def rigid_errors(
         linalg.eigh(richer.stiffness, richer.mass, subset_by_index=[0, 0])[1],
         fixed_interface_modes=0, free_modes=1, blocks=(),
     )  # fmt: skip
-    rigid = replace(
-        first, selection=np.tile(first.row(at), (len(first.interface), 1)), residual_flexibility=None,
-        residual_recovery=None, output_residual=None,
-    )  # fmt: skip
+    rigid = replace(first, selection=np.tile(first.row(at), (len(first.interface), 1)), **_WITHOUT_RESIDUAL)
     return frf_errors(rigid, richer, frequencies_hz, labels, forces)
-
-
-def contact_frequency(model: ReducedModel, label: str, stiffness: float, mass: float) -> float:
-    """Hz, of a body of that mass (kg) on a contact (N/m) with a wall that has the mass of the first natural mode."""
-    first = float((model.row(label) @ linalg.eigh(model.stiffness, model.mass, subset_by_index=[0, 0])[1])[0] ** 2)
-    return math.sqrt(stiffness * (first + 1.0 / mass)) / (2.0 * math.pi)
-
-
-def pulse_spectrum(ratio: np.ndarray | float) -> np.ndarray:
-    """|Fourier transform| of a half sine of unit impulse at ratio = omega / omega_c: cos(pi r / 2) / (1 - r^2)."""
-    r = np.asarray(ratio, dtype=float)
-    near = np.abs(r - 1.0) < 1e-6
-    safe = np.where(near, 0.0, r)
-    return np.where(near, math.pi / 4.0, np.abs(np.cos(math.pi * safe / 2.0) / (1.0 - safe**2)))
-
-
-def collision_share(model: ReducedModel, modes: int, collision: Collision) -> float:
-    """Share of a collision's energy that natural modes beyond the first `modes` would take; the worst wall.
-
-    The impulse is that of an isolated collision with restitution at the mass of the first natural mode; the energy,
-    that of its approach and of the modes above the first.
-    """
-    squares, shapes = linalg.eigh(model.stiffness, model.mass)
-    omegas = np.sqrt(np.maximum(squares, 0.0))
-    worst = 0.0
-    for label in collision.labels:
-        row = model.row(label) @ shapes
-        reduced = 1.0 / (row[0] ** 2 + 1.0 / collision.mass)
-        spectrum = pulse_spectrum(omegas / math.sqrt(collision.stiffness / reduced))
-        impulse = (1.0 + collision.restitution) * reduced  # of a unit speed of approach
-        energy = 0.5 * (row * impulse * spectrum) ** 2
-        worst = max(worst, float(energy[modes:].sum() / (0.5 * reduced + energy[1:].sum())))
-    return worst
-
-
-def compliance_error(model: ReducedModel, frequency_hz: float, collision: Collision) -> float:
-    """How much of a period a collision's duration is wrong by, when its wall lacks the residual flexibility of a model.
-
-    A flexibility G in series lengthens the contact's half period by G k_c / 2 of itself.
-    """
-    assert model.residual_flexibility is not None
-    worst = 0.0
-    for label in collision.labels:
-        index = model.interface.index(label)
-        lost = 0.5 * collision.stiffness * float(model.residual_flexibility[index, index])
-        duration = 0.5 / contact_frequency(model, label, collision.stiffness, collision.mass)
-        worst = max(worst, lost * duration * frequency_hz)
-    return worst
 
 
 def natural_ladder(
@@ -179,24 +121,44 @@ def natural_ladder(
     labels: Sequence[str] | None = None,
     forces: Sequence[str] | None = None,
     collisions: Callable[[ReducedModel], Sequence[Collision]] = lambda model: (),
-    residual: bool = False,
+    attached: bool = False,
 ) -> list[Rung]:
-    """Models of 1, 2, 3, ... natural modes of a model, with the errors of each against the whole.
+    """Models of 1, 2, 3, ... natural modes of a model, with the errors of each against the whole, which is the last.
 
-    collisions: the contacts, which may depend on the model with so many modes. residual: the contacts have the
-    flexibility that the modes lack (a massless boundary); otherwise it is lost.
+    collisions: the contacts, which may depend on the model with so many modes, always in the same order; where a model
+    has none but others do, contact has no meaning on it, and it is left out. attached: with attachment modes.
     """
-    rungs = []
-    for modes in range(_least(richer), richer.size + 1):
-        model = richer.massless(modes)
-        plain = replace(model, residual_flexibility=None, residual_recovery=None, output_residual=None)
+    squares, shapes = spectrum(richer.mass, richer.stiffness)
+    rungs, pulses = [], []
+    for model in _natural_models(richer, attached):
+        modes = model.free_modes
+        plain = model if attached else replace(model, **_WITHOUT_RESIDUAL)
         receptance = float(frf_errors(plain, richer, frequencies_hz, labels, forces).max())
-        share = 0.0
-        for collision in collisions(model):
-            lost = 0.0 if residual else compliance_error(model, float(frequencies_hz.max()), collision)
-            share = max(share, collision_share(richer, modes, collision) + lost)
-        rungs.append(Rung(modes, modes, receptance, share))
-    return rungs
+        met = collisions(model)
+        pulses.append(_pulses(model, met, float(frequencies_hz.max())))
+        above = [share_above(squares, richer.row(item.label) @ shapes, modes, item) for item in met]
+        rungs.append(Rung(modes, model.size, receptance, 0.0, max(above, default=0.0), attached and modes < model.size))
+    if not any(pulses):
+        return rungs
+    finest = np.array([transforms for transforms in pulses if transforms][-1])
+    return [
+        replace(rung, collision=float(np.abs(np.array(transforms) / finest - 1.0).max()))
+        for rung, transforms in zip(rungs, pulses, strict=True)
+        if transforms
+    ]
+
+
+def _natural_models(richer: ReducedModel, attached: bool) -> Iterator[ReducedModel]:
+    for modes in range(_least(richer), richer.size):
+        model = richer.attached(modes) if attached else richer.massless(modes)
+        if model.size < richer.size:
+            yield model
+    yield richer.massless(richer.size)
+
+
+def _pulses(model: ReducedModel, collisions: Sequence[Collision], frequency_hz: float) -> list[complex]:
+    squares, shapes = spectrum(model.mass, model.stiffness)
+    return [pulse(squares, model.row(item.label) @ shapes, item, frequency_hz).transform for item in collisions]
 
 
 def _least(model: ReducedModel) -> int:
@@ -213,6 +175,9 @@ def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
     within = np.flatnonzero(late <= tolerance)
     chosen = ladder[int(within[0])] if within.size else ladder[int(np.argmin(errors))]
     what = "mode" if chosen.modes == 1 else "modes"
+    if chosen.attached:
+        extra = chosen.size - chosen.modes
+        what += f" and {extra} attachment mode{'s' * (extra > 1)}"
     sentence = f"{chosen.modes} {what}: estimated error {_percent(chosen.error)}, rigid model {_percent(rigid)}"
     if not within.size:
         sentence += f"; none within the tolerance of {_percent(tolerance)}, keep more modes"

@@ -82,7 +82,7 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
         point: tuple[Any, ...] = (*combination[:along], order, *combination[along:])
         units = sweep.units()
         values = [
-            f"{path.split('.', 1)[-1]} = {shown(axis[index])} {units[path]}".removesuffix(" 1")
+            f"{path.split('.', 1)[-1]} = {quantity(axis[index], units[path])}"
             for path, axis, index in zip(labels, others, combination, strict=True)
         ]
         responses.append(_response(sweep, point, paths[along], ", ".join([name or model_name(sweep.scene), *values])))
@@ -119,6 +119,13 @@ def reference_amplitude(sweep: Sweep, point: tuple[Any, ...] = ()) -> float:
 def shown(value: Any) -> str:
     """A value of an axis in a few digits; text as it is."""
     return str(value) if isinstance(value, str) else f"{value:.6g}"
+
+
+def quantity(value: Any, units: str) -> str:
+    """A value with its unit, lengths in micrometres."""
+    if units == "m" and not isinstance(value, str):
+        return f"{value * 1e6:.4g} µm"
+    return f"{shown(value)} {units}".removesuffix(" 1")
 
 
 def resonance_grid(start: float, stop: float, peaks: list[float], width: float, num: int) -> np.ndarray:

@@ -19,9 +19,10 @@ _COLOURS = {
     "newton": "#c2410c",
     "compliant": "#1d4f91",
     "compliant and residual": "#15803d",
+    "residual alone": "#6d28d9",
     "massless": "#a16207",
 }
-_MARKERS = dict(zip(_COLOURS, "osD^", strict=True))
+_MARKERS = dict(zip(_COLOURS, "osDv^", strict=True))
 
 
 def bar_figure(bar: Mapping[str, Any], path: Path) -> None:
@@ -43,32 +44,59 @@ def bar_figure(bar: Mapping[str, Any], path: Path) -> None:
 
 
 def cluster_figure(cluster: Mapping[str, Any], path: Path) -> None:
-    """Error of the damped response against its cost, and the responses of the finest models."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.8), layout="constrained")
-    noise = 0.0
+    """Error of the damped response against its cost, all laws against one model, and the responses with most modes."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12.5, 5.0), layout="constrained")
+    reference = cluster["reference"]
+    noise = np.linalg.norm(cluster["laws"][reference["law"]]["confidence"][-1]) / cluster["undamped"]
+    noise /= np.sqrt(len(cluster["frequencies_hz"]))
     for law, entry in cluster["laws"].items():
-        cost = 1e6 * np.array(entry["seconds_per_period"])
-        errors = np.array(entry["error"])
-        left.loglog(cost[:-1], errors[:-1], "-", color=_COLOURS[law], marker=_MARKERS[law], label=law)
-        for modes, x, y in zip(cluster["modes"][:-1], cost, errors, strict=False):
+        style = {"color": _COLOURS[law], "marker": _MARKERS[law]}
+        shown = slice(0, -1 if law == reference["law"] else None)
+        cost, errors = 1e6 * np.array(entry["seconds_per_period"])[shown], np.array(entry["error"])[shown]
+        left.loglog(cost, errors, "-", label=law, **style)
+        for modes, x, y in zip(cluster["modes"], cost, errors, strict=False):
             left.annotate(str(modes), (x, y), (4, 4), textcoords="offset points", fontsize=8, color=_COLOURS[law])
-        noise = max(noise, float(np.sqrt(np.mean(np.square(entry["confidence"][-1])))) / cluster["undamped"])
         right.plot(
-            cluster["frequencies_hz"],
-            np.array(entry["amplitude"][-1]) / cluster["undamped"],
-            "-",
-            color=_COLOURS[law],
-            marker=_MARKERS[law],
-            label=f"{law}, {cluster['modes'][-1]} modes",
-        )
+            cluster["frequencies_hz"], np.array(entry["amplitude"][-1]) / cluster["undamped"], "-",
+            label=f"{law}, {cluster['modes'][-1]} modes", **style,
+        )  # fmt: skip
     if noise > 0.0:
-        left.axhline(noise, ls=":", color="#7a7f87", label="95 % confidence of a mean")
-    left.set_xlabel("wall time per excitation period, µs")
+        left.axhline(noise, ls=":", color="#7a7f87", label="95 % confidence of the reference")
+    left.set_xlabel("CPU time per excitation period, µs")
     left.set_ylabel("rms error of the mean amplitude, of the undamped peak")
-    left.set_title("against the same law with the most modes; figures: modes")
+    left.set_title(f"against one model: {reference['law']}, {reference['modes']} modes; figures: modes", fontsize=10)
     right.set_xlabel("excitation frequency, Hz")
     right.set_ylabel("mean amplitude, of the undamped peak")
     for axis in (left, right):
+        axis.grid(True, which="major", color="#e2e8f0")
+    right.legend(fontsize=8)
+    if noise > 0.0:
+        left.legend(*([item[-1]] for item in left.get_legend_handles_labels()), fontsize=8, loc="lower right")
+    _save(figure, path)
+
+
+def auto_figure(auto: Mapping[str, Any], path: Path) -> None:
+    """The automatic choice: true error against the tolerance, and cost against that of the cheapest model."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.5, 4.8), layout="constrained")
+    kinds = list(dict.fromkeys(row["scene"].split()[0] for row in auto["verdicts"]))
+    for kind, colour, marker in zip(kinds, _COLOURS.values(), "osD", strict=False):
+        rows = [row for row in auto["verdicts"] if row["scene"].startswith(kind)]
+        # apart from each other, so that scenes of one tolerance can be told
+        apart = np.array([1.0 + 0.05 * (int(row["scene"].split()[1]) - 5) for row in rows])
+        tolerances = np.array([row["tolerance"] for row in rows])
+        places = apart * tolerances
+        errors, bars = (np.array([row[what] for row in rows]) / tolerances for what in ("error", "confidence"))
+        left.errorbar(places, errors, bars, fmt=marker, color=colour, label=kind, elinewidth=0.8, ms=5)
+        right.semilogx(places, [row["ratio"] for row in rows], marker, color=colour, label=kind, ms=5)
+    left.axhline(1.0, ls="--", color="#7a7f87", label="tolerance")
+    left.set_xscale("log")
+    left.set_ylim(bottom=0.0)
+    left.set_ylabel("true error over tolerance (bars: 95 %)")
+    right.axhline(2.0, ls="--", color="#7a7f87", label="twice the cheapest")
+    right.set_ylim(bottom=0.0)
+    right.set_ylabel("cost over that of the cheapest model within the tolerance")
+    for axis in (left, right):
+        axis.set_xlabel("tolerance, of the undamped peak (scenes side by side)")
         axis.grid(True, which="major", color="#e2e8f0")
         axis.legend(fontsize=8)
     _save(figure, path)

@@ -1,13 +1,18 @@
 """The ladder of models, charted: contact laws against the number of modes, error against cost.
 
-A bar on a wall, which has an exact solution, and the shipped cluster with a loose body, measured against its own finest
-model: each law has a limit of its own, or none.
+A bar on a wall, which has an exact solution; the shipped cluster with a loose body, all laws against one finest model;
+and the automatic choice of a model on trial.
+
+The finest model of the cluster is the one with the most modes and a contact that yields by its own spring and by what
+these modes lack of the wall's flexibility. Its contact has a limit as modes are added, and a loss that is given;
+Newton's law has no limit, and a massless boundary without loss is another contact.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +24,31 @@ from coupling.scene import Scene
 from coupling.sweep import warm_up
 from modal.store import finite, write_json
 from rom.reduced import ReducedModel
+from studies.auto_choice import run_trial, summary, tell_trial
+from studies.auto_scenes import SEED
+from studies.bench_inside import time_of_a_period
 from studies.bounce import LAWS as BAR_LAWS
 from studies.bounce import bounce
-from studies.provenance import versions
 from studies.terminal import progress
+from studies.timing import Clock, in_turns, machine
 
 #: contact tables of the cluster's scenes; stiffness: shorter contacts than the first 25 modes can follow
 LAWS: dict[str, dict[str, Any]] = {
     "newton": {"law": "newton"},
     "compliant": {"law": "compliant", "stiffness": 1e8},
     "compliant and residual": {"law": "compliant", "stiffness": 1e8, "residual": True},
+    "residual alone": {"law": "compliant", "residual": True},
     "massless": {"law": "massless"},
 }
+#: the law of the finest model, against which all are measured
+REFERENCE = "compliant and residual"
 # share of the structure's mass in the body, of the undamped maximum in the gap, and restitution where a law has one
 _BODY, _GAP, _RESTITUTION = 0.02, 0.5, 0.7
 _AMPLITUDE = 3e-5
+# where a body starts, of its gap: several steady states can exist
+_STARTS = (0.0, 0.3)
+# rounds of the clocks, and between which periods of a run they measure
+_ROUNDS, _LENGTHS = 3, (50, 150)
 
 
 @dataclass(frozen=True)
@@ -45,10 +60,15 @@ class Effort:
     frequencies: int
     periods: int
     bar_modes: tuple[int, ...]
+    trials: dict[str, int]
+    trial_periods: int
 
 
-FULL = Effort(2, (1, 2, 3, 6, 12, 25, 60), 9, 1500, (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30))
-QUICK = Effort(1, (1, 2, 3, 6, 12), 3, 150, (1, 2, 4, 8))
+FULL = Effort(
+    2, (1, 2, 3, 6, 12, 25, 60), 9, 1500, (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30),
+    {"cluster": 4, "rod": 3, "beam": 3}, 2000,
+)  # fmt: skip
+QUICK = Effort(1, (1, 2, 3, 6, 12), 3, 150, (1, 2, 4, 8), {"cluster": 1, "beam": 1}, 200)
 
 
 def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
@@ -58,18 +78,18 @@ def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
     except OSError as error:
         raise InputError(f"--output {folder}: cannot be made ({error.strerror})") from error
     file = folder / "ladder_rom.h5"
-    cluster_model(effort).save(file)
-    with progress("ladder") as report:
-        result = {
-            "bar": bar_errors(effort.bar_modes),
-            "cluster": cluster_curves(file, effort, report),
-            "versions": versions(),
-        }
+    cluster_model(effort.degree, max(effort.modes)).save(file)
+    result: dict[str, Any] = {"machine": machine(), "bar": bar_errors(effort.bar_modes)}
+    with progress("laws") as report:
+        result["cluster"] = cluster_curves(file, effort, report)
+    with progress("automatic choice") as report:
+        result["auto"] = summary(run_trial(folder, SEED, effort.trials, effort.trial_periods, report))
     write_json(folder / "ladder.json", finite(result))
-    from studies.ladder_figures import bar_figure, cluster_figure
+    from studies.ladder_figures import auto_figure, bar_figure, cluster_figure
 
     bar_figure(result["bar"], folder / "ladder_bar.png")
     cluster_figure(result["cluster"], folder / "ladder_cluster.png")
+    auto_figure(result["auto"], folder / "ladder_auto.png")
     return result
 
 
@@ -84,51 +104,57 @@ def bar_errors(counts: tuple[int, ...]) -> dict[str, Any]:
     }
 
 
-def cluster_model(effort: Effort) -> ReducedModel:
-    """The shipped cluster as the finest model of the study."""
+def cluster_model(degree: int, modes: int) -> ReducedModel:
+    """The shipped cluster with so many fixed-interface modes."""
     from meshes.vane_cluster import SHIPPED
     from studies.config import Case
     from studies.pipeline import assemble, reduction
 
     data = read_toml(Path(__file__).with_name("demo_case.toml"))
-    data["mesh"] = {"file": str(SHIPPED), "degree": effort.degree}
-    return reduction(assemble(validate(Case, data, "demo_case.toml")), max(effort.modes))
+    data["mesh"] = {"file": str(SHIPPED), "degree": degree}
+    return reduction(assemble(validate(Case, data, "demo_case.toml")), modes)
 
 
 def cluster_curves(file: Path, effort: Effort, report: Callable[[int, int], None]) -> dict[str, Any]:
-    """Mean amplitudes over the frequencies, and the cost, of each law and number of natural modes."""
+    """Mean amplitudes over the frequencies, their error and the cost, of each law and number of natural modes."""
     model = ReducedModel.load(file)
     first = float(model.natural_frequencies_hz[0])
     mass = 1.0 / float((model.massless(1).row("shroud") ** 2)[0])
     frequencies = first * np.linspace(0.975, 1.005, effort.frequencies)
     curves: dict[str, Any] = {}
+    clocks: dict[str, Clock] = {}
     warm_up()
     done, total = 0, len(LAWS) * len(effort.modes)
     for law, contact in LAWS.items():
-        curves[law] = {"amplitude": [], "confidence": [], "seconds_per_period": [], "status": []}
+        entry = curves[law] = {"amplitude": [], "confidence": [], "status": []}
         for modes in effort.modes:
-            runs = [simulate(_scene(file, modes, contact, mass, frequency, effort)) for frequency in frequencies]
-            entry = curves[law]
-            entry["amplitude"].append([run.amplitude_mean for run in runs])
-            entry["confidence"].append([run.amplitude_mean_confidence or 0.0 for run in runs])
-            entry["seconds_per_period"].append(
-                float(np.median([run.wall_time_s / max(run.periods, 1) for run in runs]))
-            )
-            entry["status"].append([run.status.value for run in runs])
+            scenes = [_scene(file, modes, contact, mass, frequency, effort) for frequency in frequencies]
+            runs = [[simulate(_from(scene, start)) for start in _STARTS] for scene in scenes]
+            entry["amplitude"].append([float(np.mean([run.amplitude_mean for run in pair])) for pair in runs])
+            entry["confidence"].append([
+                float(np.linalg.norm([run.amplitude_mean_confidence or 0.0 for run in pair])) / len(pair)
+                for pair in runs
+            ])  # fmt: skip
+            entry["status"].append([run.status.value for pair in runs for run in pair])
+            middle = scenes[len(scenes) // 2].replace({"time.periods": _LENGTHS[1], "time.transient": 0})
+            clocks[f"{law}/{modes}"] = partial(time_of_a_period, middle, _LENGTHS)
             done += 1
             report(done, total)
-    for entry in curves.values():
-        entry["error"] = _errors(entry)
+    times = in_turns(clocks, _ROUNDS, np.random.default_rng(0))
+    finest = np.array(curves[REFERENCE]["amplitude"][-1])
+    for law, entry in curves.items():
+        entry["seconds_per_period"] = [float(np.median(times[f"{law}/{modes}"])) for modes in effort.modes]
+        deviations = (np.array(entry["amplitude"]) - finest) / _AMPLITUDE
+        entry["error"] = np.sqrt(np.mean(deviations**2, axis=1)).tolist()
+        entry["peak_error"] = (np.max(entry["amplitude"], axis=1) / _AMPLITUDE - finest.max() / _AMPLITUDE).tolist()
     return {
         "modes": list(effort.modes), "frequencies_hz": frequencies.tolist(), "undamped": _AMPLITUDE, "laws": curves,
-        "periods": effort.periods,
+        "periods": effort.periods, "reference": {"law": REFERENCE, "modes": effort.modes[-1]},
     }  # fmt: skip
 
 
-def _errors(entry: Mapping[str, Any]) -> list[float]:
-    """Root mean square over the frequencies against the same law with the most modes, relative to the undamped peak."""
-    finest = np.array(entry["amplitude"][-1])
-    return [float(np.sqrt(np.mean((np.array(curve) - finest) ** 2)) / _AMPLITUDE) for curve in entry["amplitude"]]
+def _from(scene: Scene, start: float) -> Scene:
+    return scene.replace({"damper.0.position": start * scene.cavity[0].gap})
 
 
 def _scene(file: Path, modes: int, contact: Mapping[str, Any], mass: float, frequency: float, effort: Effort) -> Scene:
@@ -152,6 +178,8 @@ def tell(result: Mapping[str, Any]) -> None:
     print("bar on a wall, error of the second apex's time, by modes " + ", ".join(map(str, bar["modes"])))
     for law, errors in bar["time"].items():
         print(f"  {law:10} " + "  ".join(f"{error:.1e}" for error in errors))
-    print("cluster, error of the mean amplitude against the finest, by modes " + ", ".join(map(str, cluster["modes"])))
+    finest = f"{cluster['reference']['law']}, {cluster['reference']['modes']} modes"
+    print(f"cluster, error of the mean amplitude against {finest}, by modes " + ", ".join(map(str, cluster["modes"])))
     for law, entry in cluster["laws"].items():
         print(f"  {law:22} " + "  ".join(f"{error:.1e}" for error in entry["error"]))
+    tell_trial(result["auto"])

@@ -11,9 +11,9 @@ from plotly.subplots import make_subplots
 
 from coupling.sweep import Sweep
 from studies.charts import axis_title, dressed
-from studies.forced_response import FREQUENCY, reference_amplitude, shown
+from studies.forced_response import FREQUENCY, quantity, reference_amplitude
 
-_FEWEST = 3  # values of the second axis that make a map
+_FEWEST = 4  # values of the second axis that make a map
 _MOST_PANELS = 6
 
 
@@ -34,16 +34,22 @@ def map_figure(sweep: Sweep) -> go.Figure:
     )  # fmt: skip
     across, up = map_axes(sweep) or ("", "")
     units = sweep.units()
+    scales = [1e6 if units[path] == "m" else 1.0 for path in (across, up)]
     for number, (_, x, y, values) in enumerate(panels):
         figure.add_heatmap(
-            x=x, y=y, z=values, coloraxis="coloraxis", row=number // columns + 1, col=number % columns + 1,
+            x=scales[0] * x, y=scales[1] * y, z=values, coloraxis="coloraxis",
+            row=number // columns + 1, col=number % columns + 1,
             hovertemplate="%{x:.6g}, %{y:.4g}: %{z:.3f}<extra></extra>",
         )  # fmt: skip
-    figure.update_xaxes(title_text=axis_title(across, units[across]))
-    figure.update_yaxes(title_text=axis_title(up, units[up]), col=1)
+    figure.update_xaxes(title_text=axis_title(across, _larger(units[across])))
+    figure.update_yaxes(title_text=axis_title(up, _larger(units[up])), col=1)
     bar = {"title": {"text": "mean amplitude /<br>undamped maximum"}}
     figure.update_layout(coloraxis={"colorscale": "Viridis", "cmin": 0, "colorbar": bar})
     return dressed(figure, height=440 * -(-len(panels) // columns))
+
+
+def _larger(units: str) -> str:
+    return "µm" if units == "m" else units
 
 
 def map_rows(sweep: Sweep) -> Iterator[list[object]]:
@@ -57,7 +63,7 @@ def _panels(sweep: Sweep) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndar
     """Name, values of the two axes and relative amplitudes (up, across), for every combination of the others."""
     axes = map_axes(sweep)
     assert axes is not None
-    paths, reference = list(sweep.axes), reference_amplitude(sweep)
+    paths, units, reference = list(sweep.axes), sweep.units(), reference_amplitude(sweep)
     across, up = (paths.index(path) for path in axes)
     order = [np.argsort(sweep.axes[path], kind="stable") for path in axes]
     others = [index for index in range(len(paths)) if index not in (across, up)]
@@ -68,7 +74,7 @@ def _panels(sweep: Sweep) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndar
         values = sweep.amplitude_mean[tuple(point)] / reference
         values = (values if up < across else values.T)[np.ix_(order[1], order[0])]
         name = ", ".join(
-            f"{paths[i].split('.', 1)[-1]} = {shown(sweep.axes[paths[i]][j])}"
+            f"{paths[i].split('.', 1)[-1]} = {quantity(sweep.axes[paths[i]][j], units[paths[i]])}"
             for i, j in zip(others, combination, strict=True)
         )
         yield name, sweep.axes[axes[0]][order[0]], sweep.axes[axes[1]][order[1]], values

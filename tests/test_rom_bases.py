@@ -152,6 +152,20 @@ def test_massless_boundary_form():
         rod_model("rubin").boundary_form()
 
 
+def test_attachments_of_a_model_are_those_of_rubin():
+    """Of a Craig-Bampton model that has all the structure's coordinates: the same space, so the same receptance."""
+    matrices = truss()
+    interface = Interface.on_patches(matrices, ENDS)
+    whole = reduce(matrices, interface, modes=interface.motions.shape[1] - len(interface.labels))
+    rubin, own = reduce(matrices, interface, "rubin", 4), whole.attached(4)
+    assert own.blocks == rubin.blocks == (len(interface.labels),)
+    assert own.natural_frequencies_hz == pytest.approx(rubin.natural_frequencies_hz, rel=1e-8)
+    assert own.receptance([0.07]) == pytest.approx(rubin.receptance([0.07]), rel=1e-7)
+    assert own.truncated(2).blocks == own.blocks
+    with pytest.raises(ReducedModelError, match="modes: expected 1 to"):
+        whole.attached(whole.size)
+
+
 @pytest.mark.parametrize("basis", ["rubin", "macneal", "massless", "truncated"])
 def test_reconstruction(basis):
     matrices = truss()

@@ -154,6 +154,20 @@ def test_quasi_static_modes_give_way_to_the_modes(structure, interface):
     assert reduce(structure, interface, 26, quasi_static=True).size == 30
 
 
+@pytest.mark.parametrize(("nodes", "modes"), [(14, 0), (20, 10), (30, 30)])
+def test_many_quasi_static_blocks_stay_well_conditioned(nodes, modes):
+    """Three patches in three directions each and four blocks: more than round-off can tell from the modes."""
+    matrices = truss(nodes=nodes)
+    labels = [
+        InterfaceCoordinate(f"{patch}{axis}", patch, tuple(np.eye(3)[axis])) for patch in "abc" for axis in range(3)
+    ]
+    held = Interface.on_patches(matrices, labels)
+    model = reduce(matrices, held, modes, quasi_static=4)
+    assert model.blocks[0] == 9
+    reference = linalg.eigh(held.restrict(matrices)[0].toarray(), held.restrict(matrices)[1].toarray())[0]
+    assert model.natural_frequencies_hz[:9] == pytest.approx(np.sqrt(reference[:9]) / (2 * np.pi), rel=1e-6)
+
+
 def test_truncation_is_a_smaller_reduction(structure, interface):
     large, small = (reduce(structure, interface, modes, keep_recovery=True) for modes in (9, 4))
     cut = large.truncated(4)

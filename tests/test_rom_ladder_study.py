@@ -44,7 +44,14 @@ def test_command(tmp_path, capsys):
     assert "cluster, error of the mean amplitude" in capsys.readouterr().out
     result = json.loads((tmp_path / "ladder.json").read_text())
     assert result["bar"]["energy"] < 1e-11
-    for entry in result["cluster"]["laws"].values():
-        assert entry["error"][-1] == 0.0
+    laws = result["cluster"]["laws"]
+    assert laws[result["cluster"]["reference"]["law"]]["error"][-1] == 0.0
+    assert laws["newton"]["error"][-1] > 0.0
+    for entry in laws.values():
         assert set(np.ravel(entry["status"])) == {"ok"}
-    assert {path.name for path in tmp_path.glob("*.png")} == {"ladder_bar.png", "ladder_cluster.png"}
+    assert result["auto"]["number"] == 6
+    assert result["auto"]["kept"] >= 5
+    assert all(row["cheapest_cost"] > 0.0 for row in result["auto"]["verdicts"])
+    assert (tmp_path / "auto.csv").read_text().startswith("scene,tolerance,modes,estimate,error")
+    figures = {"ladder_bar.png", "ladder_cluster.png", "ladder_auto.png"}
+    assert {path.name for path in tmp_path.glob("*.png")} == figures

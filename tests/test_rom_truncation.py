@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import integrate, linalg
+from scipy import linalg
 from structures import rod, truss
 
 from rom import checks, ladder
 from rom.interface import Interface, InterfaceCoordinate
-from rom.reduced import ReducedModel
 from rom.reduction import BASES, reduce
 from rom.truncation import basis_ladder, basis_model, rich_model
 
@@ -92,30 +91,6 @@ def test_choice_keeps_its_promise():
         assert choice.met
         true = checks.receptance_errors(rich.truncated(chosen, 1), frequencies, every.receptance(frequencies))
         assert true.max() < 1.01 * tolerance
-
-
-def test_pulse_spectrum():
-    for ratio in (0.3, 1.0, 2.5):
-        # half sine of duration pi and unit impulse: sin(t) / 2
-        parts = [
-            integrate.quad(lambda t, f=f, r=ratio: 0.5 * np.sin(t) * f(r * t), 0, np.pi)[0] for f in (np.cos, np.sin)
-        ]
-        assert ladder.pulse_spectrum(ratio) == pytest.approx(np.hypot(*parts), rel=1e-9)
-
-
-def test_collision_share_of_two_modes():
-    # a wall of two modes; the second is far below the contact's frequency and takes its part of a blow at once
-    omegas = np.array([1.0, 5.0])
-    model = ReducedModel.from_matrices(np.eye(2), np.diag(omegas**2), {"wall": [1.0, 0.5]}, damping_ratio=0.0)
-    collision = ladder.Collision(("wall",), mass=0.5, stiffness=1e8, restitution=1.0)
-    # reduced mass 1/(1 + 2), impulse 2/3: energy (0.5 * 2/3)^2 / 2 besides an approach with 1/6
-    assert ladder.collision_share(model, 1, collision) == pytest.approx((1 / 18) / (1 / 6 + 1 / 18), rel=1e-4)
-    assert ladder.collision_share(model, 2, collision) == 0.0
-    expected = np.sqrt(1e8 * 3) / (2 * np.pi)
-    assert ladder.contact_frequency(model, "wall", 1e8, 0.5) == pytest.approx(expected, rel=1e-12)
-    # and one far above hardly moves
-    stiff = ReducedModel.from_matrices(np.eye(2), np.diag([1.0, 1e12]), {"wall": [1.0, 0.5]}, damping_ratio=0.0)
-    assert ladder.collision_share(stiff, 1, replace(collision, stiffness=1e4)) < 1e-12
 
 
 def test_natural_ladder_ends_at_the_whole_model():

@@ -60,10 +60,10 @@ def test_one_response_for_every_combination_of_the_other_axes():
     curve = np.arange(12.0).reshape(2, 3, 2)
     responses = forced_responses(made(axes, amplitude_max=curve))
     assert [response.name for response in responses] == [
-        "rigid model, c1.gap = 1e-05 m, mass = 0.1 kg",
-        "rigid model, c1.gap = 1e-05 m, mass = 0.2 kg",
-        "rigid model, c1.gap = 2e-05 m, mass = 0.1 kg",
-        "rigid model, c1.gap = 2e-05 m, mass = 0.2 kg",
+        "rigid model, c1.gap = 10 µm, mass = 0.1 kg",
+        "rigid model, c1.gap = 10 µm, mass = 0.2 kg",
+        "rigid model, c1.gap = 20 µm, mass = 0.1 kg",
+        "rigid model, c1.gap = 20 µm, mass = 0.2 kg",
     ]
     np.testing.assert_array_equal(responses[2].damped_max, curve[1, :, 0])
     assert responses[2].energy_share.shape == (3, 4)

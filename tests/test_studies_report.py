@@ -53,13 +53,13 @@ def results(tmp_path_factory):
     sweep(validate(Scene, DATA | {"sweep": two}, "x")).save(folder / "sweep_two.h5")
     scene = validate(Scene, DATA, "x")
     simulate(scene, events=True, samples_per_period=20).save(folder / "run.h5", {"scene": scene.to_dict()})
-    map_ = {"cavity.c1.gap": [4e-4, 2e-4, 3e-4], "excitation.frequency": FREQUENCIES}
+    map_ = {"cavity.c1.gap": [4e-4, 2e-4, 3e-4, 1e-4], "excitation.frequency": FREQUENCIES}
     sweep(validate(Scene, DATA | {"sweep": map_}, "x")).save(folder / "fig9_gaps.h5")
     claims = [
         {"claim": "Half is < enough", "ours": "0.5", "verdict": "shown"},
         {"claim": "Half is too much", "ours": "0.5", "verdict": "not shown", "why": "no air", "figures": {"peak": 0.5}},
     ]
-    study = {"study": "fig9", "title": "Three gaps", "sources": ["fig9_gaps.h5"], "claims": claims}
+    study = {"study": "fig9", "title": "Four gaps", "sources": ["fig9_gaps.h5"], "claims": claims}
     write_json(folder / "fig9.claims.json", study)
     save(folder / "other.h5", "something", {"peak": Variable(np.zeros(3), ("period",))})
     return folder
@@ -94,8 +94,8 @@ def test_curves_are_in_the_page(page, results):
     one, two = (Sweep.load(results / f"sweep_{name}.h5") for name in ("one", "two"))
     expected = {
         "rigid model (sweep_one)": (one, ()),
-        "rigid model (sweep_two), c1.gap = 0.0002 m": (two, (0,)),
-        "rigid model (sweep_two), c1.gap = 0.0004 m": (two, (1,)),
+        "rigid model (sweep_two), c1.gap = 200 µm": (two, (0,)),
+        "rigid model (sweep_two), c1.gap = 400 µm": (two, (1,)),
     }
     traces = found["response-0"]
     assert {trace["legendgroup"] for trace in traces} == set(expected)
@@ -130,18 +130,18 @@ def test_time_history_is_that_of_the_run(page, results):
 def test_map_is_in_order_of_its_axes(page, results):
     record = Sweep.load(results / "fig9_gaps.h5")
     (trace,) = charts(page)["map-3"]
-    np.testing.assert_allclose(trace["y"], [2e-4, 3e-4, 4e-4])
-    values = np.reshape(trace["z"], (3, len(FREQUENCIES))) if np.ndim(trace["z"]) == 1 else trace["z"]
-    np.testing.assert_allclose(values, record.amplitude_mean[[1, 2, 0]] / 1e-3)
+    np.testing.assert_allclose(trace["y"], [100, 200, 300, 400])
+    values = np.reshape(trace["z"], (4, len(FREQUENCIES))) if np.ndim(trace["z"]) == 1 else trace["z"]
+    np.testing.assert_allclose(values, record.amplitude_mean[[3, 1, 2, 0]] / 1e-3)
 
 
 def test_study_has_its_claims_and_its_sweeps(page):
-    assert "<h2>Three gaps</h2>" in page
+    assert "<h2>Four gaps</h2>" in page
     assert "Half is &lt; enough" in page
     for verdict in ("shown", "not shown"):
         assert re.search(rf'class="verdict \w+">{verdict}<', page)
     names = {trace["legendgroup"] for trace in charts(page)["response-2"]}
-    assert names == {f"gaps, c1.gap = {gap} m" for gap in ("0.0002", "0.0003", "0.0004")}
+    assert names == {f"gaps, c1.gap = {gap} µm" for gap in (100, 200, 300, 400)}
 
 
 def test_every_chart_has_its_data_and_their_provenance(page, results):
@@ -231,12 +231,12 @@ def test_names_are_escaped(results, tmp_path):
 
 
 def test_a_sweep_that_failed_everywhere_still_makes_a_page(results, tmp_path, monkeypatch):
-    import coupling.sweep
+    import coupling.points
 
-    def broken(_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("everywhere")
 
-    monkeypatch.setattr(coupling.sweep, "simulate", broken)
+    monkeypatch.setattr(coupling.points, "simulate", broken)
     sweep(validate(Scene, DATA | {"sweep": {"excitation.frequency": FREQUENCIES}}, "x")).save(tmp_path / "bad.h5")
     write_report(collect([tmp_path]), tmp_path / "report.html")
     assert "7 of 7 points ended with a status other than" in (tmp_path / "report.html").read_text(encoding="utf-8")

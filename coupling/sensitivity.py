@@ -1,0 +1,65 @@
+"""How much a response depends on its collisions: short runs of the one-mode model with other pulses.
+
+A body in a narrow cavity goes with its walls whatever its collisions are like; one that rattles does not. The runs tell
+which, at the price of some hundred periods of the cheapest model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from coupling.laws import Compliant
+from coupling.scene import Rom, Scene, Time
+from coupling.solver import Solver
+from rom.collision import Collision, Pulse
+
+# of the impulse and of the duration; a softer spring takes its square root longer
+_LESS, _LONGER = 0.8, 2.0
+_PERIODS, _TRANSIENT, _FREQUENCIES = 450, 150, 3
+_PLASTIC = 0.05
+
+
+def sensitivity(
+    scenes: Sequence[Scene], collision: Collision, wall: float, pulse: Pulse, modes: int, undamped: float
+) -> float:
+    """Change of the mean amplitude, in units of the undamped peak (m), for a relative change of a collision's pulse.
+
+    The largest of up to three of the scenes, which differ in frequency, with `modes` natural modes, as few as there can
+    be. wall: the first mode's entry of the wall's functional; pulse: that of the collision on the whole model.
+    """
+    reduced = 1.0 / (wall**2 + 1.0 / collision.mass)
+    growth = min(max(abs(pulse.transform) / reduced, 1.0 + _PLASTIC), 2.0)  # 1 + restitution
+    spring = reduced * (math.pi / pulse.duration) ** 2
+    weaker = max(_LESS * growth, 1.0 + _PLASTIC / 2)
+    ordered = sorted(scenes, key=lambda scene: scene.excitation.frequency)
+    places = np.unique(np.linspace(0, len(ordered) - 1, _FREQUENCIES).astype(int))
+    worst = 0.0
+    for scene in (ordered[place] for place in places):
+        as_it_is = _amplitude(scene, modes, growth - 1.0, spring)
+        less = abs(_amplitude(scene, modes, weaker - 1.0, spring) - as_it_is) / (1.0 - weaker / growth)
+        # a pulse acts in its middle, so that twice the duration is half of it late
+        late = math.pi * scene.excitation.frequency * pulse.duration * (_LONGER - 1.0)
+        later = abs(_amplitude(scene, modes, growth - 1.0, spring / _LONGER**2) - as_it_is) / late
+        worst = max(worst, less, later) if math.isfinite(less + later) else math.inf
+    return worst / undamped
+
+
+def _amplitude(scene: Scene, modes: int, restitution: float, spring: float) -> float:
+    from coupling.engine import simulate  # which settles its scenes by this
+
+    structure = scene.structure
+    assert isinstance(structure, Rom)
+    simple = replace(
+        scene,
+        structure=replace(structure, modes=modes, natural=True, attached=False),
+        contact=Compliant(spring),
+        damper=tuple(replace(damper, restitution=restitution) for damper in scene.damper),
+        time=Time(_PERIODS, _TRANSIENT),
+        solver=Solver(),
+        sweep={},
+    )
+    return simulate(simple).amplitude_mean

@@ -1,0 +1,126 @@
+"""Scenes on which the automatic choice of a model is tried: three structures, and bodies drawn at random.
+
+A rod and a beam with closed or small matrices have what a vane cluster has not: many modes of alike impedance below the
+contact's frequency, which soft contacts feel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coupling.inputs import validate
+from coupling.scene import Scene
+from rom.reduced import ReducedModel
+
+#: the scenes of the trial; nothing was settled on them, and other seeds give other scenes for that
+SEED = 2028
+_AMPLITUDE = 3e-5
+_ROD_MODES, _BEAM_ELEMENTS, _CLUSTER_MODES = 40, 8, 12
+# ranges of what is drawn: share of the first modal mass, of the undamped peak, of the first frequency
+_MASS, _GAP, _CONTACT, _RESTITUTION, _FRICTION = (0.005, 0.05), (0.2, 1.0), (3.0, 30.0), (0.5, 0.95), (0.1, 0.5)
+#: gravity in the unit of the undamped peak's acceleration: 9.81 m/s^2 on the cluster
+_GRAVITY = 1e-3
+#: places between the resonance with loose (0) and with fixed bodies (1), where the damped peak lies
+PLACES = (0.2, 0.5, 0.8)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A scene without its frequency: structure's name, scene, its frequencies (Hz), contact over first frequency."""
+
+    structure: str
+    scene: Scene
+    frequencies: tuple[float, ...]
+    contact_ratio: float
+
+    @property
+    def undamped(self) -> float:
+        """Undamped peak, m."""
+        peak = self.scene.excitation.resonance_amplitude
+        assert peak is not None
+        return peak
+
+
+def trials(folder: Path, seed: int, counts: dict[str, int]) -> list[Trial]:
+    """So many scenes of each structure ("cluster", "rod", "beam"); its reduced model is left in the folder."""
+    generator = np.random.default_rng(seed)
+    found = []
+    for name, count in counts.items():
+        file = folder / f"auto_{name}.h5"
+        if not file.exists():
+            _MODELS[name]().save(file)
+        found += [_trial(name, file, generator) for _ in range(count)]
+    return found
+
+
+def rod_model() -> ReducedModel:
+    """Clamped unit rod in Craig-Bampton form: constraint mode x, fixed-interface modes sqrt(2) sin(j pi x)."""
+    order = np.arange(1, _ROD_MODES + 1)
+    mass, stiffness = np.eye(_ROD_MODES + 1), np.diag(np.append(1.0, (order * np.pi) ** 2))
+    mass[0, 0] = 1.0 / 3.0
+    mass[0, 1:] = mass[1:, 0] = -math.sqrt(2.0) * (-1.0) ** order / (order * np.pi)
+    row = np.eye(_ROD_MODES + 1)[0]
+    return ReducedModel.from_matrices(
+        mass, stiffness, {"tip": row}, damping_ratio=0.01, fixed_interface_modes=_ROD_MODES
+    )
+
+
+def beam_model() -> ReducedModel:
+    """Clamped unit beam in bending, of cubic elements (Euler and Bernoulli)."""
+    h = 1.0 / _BEAM_ELEMENTS
+    stiffness = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]) / h**3
+    mass = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) * h / 420.0
+    size = 2 * _BEAM_ELEMENTS + 2
+    whole = np.zeros((2, size, size))
+    turn = np.array([1.0, h, 1.0, h])
+    for element in range(_BEAM_ELEMENTS):
+        place = slice(2 * element, 2 * element + 4)
+        whole[:, place, place] += np.array([mass, stiffness]) * np.outer(turn, turn)
+    row = np.eye(size - 2)[size - 4]
+    return ReducedModel.from_matrices(whole[0, 2:, 2:], whole[1, 2:, 2:], {"tip": row}, damping_ratio=0.005)
+
+
+def _cluster() -> ReducedModel:
+    from studies.model_ladder import cluster_model
+
+    return cluster_model(1, _CLUSTER_MODES)
+
+
+_MODELS = {"cluster": _cluster, "rod": rod_model, "beam": beam_model}
+_LABELS = {"cluster": ("shroud", "c1_floor"), "rod": ("tip", "tip"), "beam": ("tip", "tip")}
+
+
+def _trial(name: str, file: Path, generator: np.random.Generator) -> Trial:
+    model = ReducedModel.load(file)
+    at, floor = _LABELS[name]
+    first, rigid = float(model.natural_frequencies_hz[0]), model.massless(1)
+    modal, wall = (1.0 / float(rigid.row(label)[0] ** 2) for label in (at, floor))
+    mass = modal * _spread(generator, _MASS)
+    ratio = _spread(generator, _CONTACT)
+    stiffness = (2.0 * math.pi * first * ratio) ** 2 / (1.0 / mass + 1.0 / wall)
+    gap = _AMPLITUDE * _spread(generator, _GAP)
+    body = {
+        "cavity": "c1", "mass": mass, "friction": generator.uniform(*_FRICTION),
+        "restitution": generator.uniform(*_RESTITUTION),
+    }  # fmt: skip
+    data: dict[str, Any] = {
+        "structure": {"model": "rom", "file": str(file), "modes": "auto"},
+        "excitation": {"frequency": first, "resonance_amplitude": _AMPLITUDE, "at": at},
+        "gravity": {"acceleration": _GRAVITY * _AMPLITUDE * (2.0 * math.pi * first) ** 2},
+        "cavity": [{"name": "c1", "gap": gap, "floor": floor}],
+        "damper": [body],
+        "contact": {"law": "compliant", "stiffness": stiffness, "residual": bool(generator.random() < 0.5)},
+    }
+    fixed = first / math.sqrt(1.0 + mass / wall)
+    frequencies = tuple(first + place * (fixed - first) for place in PLACES)
+    return Trial(name, validate(Scene, data, "scene"), frequencies, ratio)
+
+
+def _spread(generator: np.random.Generator, limits: tuple[float, float]) -> float:
+    """Uniform in the logarithm."""
+    return float(np.exp(generator.uniform(*np.log(limits))))

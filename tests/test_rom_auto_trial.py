@@ -1,0 +1,53 @@
+"""The automatic choice on scenes that nothing was settled on: is the error it promises kept?
+
+The truth is the response of the whole model, over periods and starts (studies.auto_choice); `vanedamp bench ladder`
+adds what the models cost.
+"""
+
+import numpy as np
+import pytest
+
+from coupling.choice import settle_all
+from studies import auto_choice
+from studies.auto_scenes import SEED, beam_model, rod_model, trials
+
+
+def test_models_of_rod_and_beam():
+    """Closed forms: (j - 1/2) pi of the unit rod; cos(x) cosh(x) = -1 of the beam."""
+    rod = 2 * np.pi * rod_model().natural_frequencies_hz[:3]
+    assert rod == pytest.approx([np.pi / 2, 3 * np.pi / 2, 5 * np.pi / 2], rel=1e-4)
+    beam = 2 * np.pi * beam_model().natural_frequencies_hz[:3]
+    assert beam == pytest.approx(np.array([1.87510407, 4.69409113, 7.85475744]) ** 2, rel=2e-3)
+
+
+def kept(trial, tolerance, periods):
+    """(estimated, true error, its confidence, coordinates) of the choice for a tolerance."""
+    scenes = [
+        trial.scene.replace({"excitation.frequency": frequency, "structure.tolerance": tolerance})
+        for frequency in trial.frequencies
+    ]
+    estimate = settle_all(scenes)[0].estimate
+    kinds = [(estimate["modes"], estimate["attached"]), (estimate["ladder"][-1]["modes"], False)]
+    deviations, confidences = auto_choice.errors(scenes, kinds, trial.undamped, periods)
+    return estimate["error"], deviations[0], confidences[0], estimate["size"]
+
+
+@pytest.mark.parametrize(("structure", "index"), [pytest.param("rod", 0, marks=pytest.mark.slow), ("beam", 1)])
+def test_tolerance_is_kept(tmp_path, structure, index):
+    trial = trials(tmp_path, SEED + 1, {structure: index + 1})[index]
+    estimate, error, confidence, size = kept(trial, 0.03, 600)
+    assert estimate <= 0.03
+    assert error <= 0.03 + confidence
+    assert size < 10
+
+
+@pytest.mark.slow
+def test_tolerances_of_the_trial(tmp_path):
+    """Ten scenes, three tolerances each."""
+    drawn = trials(tmp_path, SEED, {"cluster": 4, "rod": 3, "beam": 3})
+    found = [kept(trial, tolerance, 1500) for trial in drawn for tolerance in auto_choice.TOLERANCES]
+    missed = sum(
+        error > tolerance + confidence
+        for (_, error, confidence, _), tolerance in zip(found, auto_choice.TOLERANCES * 10, strict=True)
+    )
+    assert missed <= 1
