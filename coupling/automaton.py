@@ -13,7 +13,7 @@ import math
 from coupling.compiled import entry, inlined, kernel
 from coupling.contact import add_force, constant_loads, keep_released, settle, stop_riders
 from coupling.events import POSITION, VELOCITY, exp_minus_line, exp_minus_one
-from coupling.gaps import SIMULTANEOUS, close, join, join_speeds, measure_gaps, only, rigid, shift_slip
+from coupling.gaps import SIMULTANEOUS, align_gaps, close, join, join_speeds, measure_gaps, only, rigid, shift_slip
 from coupling.impacts import all_move, bounce, collide
 from coupling.ledger import account
 from coupling.springs import begin_push, change_push, spring_energy, spring_force
@@ -31,6 +31,8 @@ from coupling.state import (
     PERIOD,
     RECLOSES,
     SEARCHING,
+    SLIP_LEFT,
+    SLIP_RIGHT,
     SPRUNG,
     STICK,
     STORED,
@@ -82,6 +84,7 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
             _phase(rows, st)
             _wake(flows, st)
             record_section(rows, flows, st, rec, work)
+            align_gaps(rows, st, work.coordinates)
             continue
         st.counters[EVENTS] += 1
         st.time[0] += tau
@@ -98,10 +101,14 @@ def begin(rows, st, rec, work):
     n, hit = len(st.constant), False
     for r in range(rows.friction_rows):
         if not rigid(rows, r) and rows.limit[r] > 0.0:
-            st.state[r] = SPRUNG
+            st.state[r] = _stretched(rows, st, r)
     for r in range(len(st.state)):
         work.forced[r] = 0
         if r >= rows.friction_rows and st.displacement[r] <= SIMULTANEOUS * rows.gap[r - rows.friction_rows]:
+            if not rigid(rows, r) and st.displacement[r] < -SIMULTANEOUS * rows.gap[r - rows.friction_rows]:
+                # pressed already: its impact belongs to the run before
+                st.state[r] = SPRUNG if spring_force(rows, st, r) > 0.0 else LEAVING
+                continue
             _touch(rows, st, work, r)
             if st.velocity[r] < 0.0 and rigid(rows, r):
                 hit = True
@@ -114,6 +121,15 @@ def begin(rows, st, rec, work):
         for i in range(n):
             st.coordinates[n + i] += work.jump[i]
     return settle(rows, st, rec, work)
+
+
+@inlined
+def _stretched(rows, st, r):
+    """State of a Jenkins element with a given elongation: its spring holds, or it slides on at its bound."""
+    at_bound = abs(rows.spring[r] * st.displacement[r]) >= (1.0 - SIMULTANEOUS) * rows.limit[r]
+    if at_bound and st.displacement[r] * st.velocity[r] > 0.0:
+        return SLIP_RIGHT if st.velocity[r] > 0.0 else SLIP_LEFT
+    return SPRUNG
 
 
 @inlined

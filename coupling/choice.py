@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -43,6 +43,10 @@ _SAFETY = 1.5
 _NEWTON = "; of the forced response alone: Newton's impacts have no limit as modes grow, compliant contacts have"
 
 
+#: the choice of a number of modes by file, `modes` and tolerance
+Choices = Mapping[tuple[Any, ...], Choice]
+
+
 class Settled(NamedTuple):
     """A scene without open choices, and the estimate of the model chosen (None if there was no choice)."""
 
@@ -57,11 +61,17 @@ def settle(scene: Scene) -> Settled:
 
 def settle_all(scenes: Sequence[Scene]) -> list[Settled]:
     """The same for the points of a sweep: those with one model and tolerance share the choice that suits them all."""
+    choices = choices_of(scenes)
+    return [settled(scene, choices) for scene in scenes]
+
+
+def choices_of(scenes: Iterable[Scene]) -> Choices:
+    """The number of modes that suits all scenes with one model and tolerance, for each of these."""
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
-        groups.setdefault(_group(scene), []).append(scene)
-    choices = {key: _choice(members) for key, members in groups.items() if key and key[1] == "auto"}
-    return [_settled(scene, choices.get(_group(scene))) for scene in scenes]
+        if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+            groups.setdefault(_group(scene), []).append(scene)
+    return {key: _choice(members) for key, members in groups.items()}
 
 
 def file_stamp(file: str) -> int:
@@ -88,7 +98,8 @@ def _restricted(file: str, _stamp: int, modes: int | None, natural: bool, attach
     return model.massless(modes) if natural else model.truncated(modes)
 
 
-def _open(scene: Scene) -> bool:
+def is_open(scene: Scene) -> bool:
+    """Whether a scene leaves something to settle."""
     return isinstance(scene.structure, Rom) and scene.structure.modes == "auto"
 
 
@@ -97,8 +108,9 @@ def _group(scene: Scene) -> tuple[Any, ...]:
     return (structure.file, structure.modes, structure.tolerance) if isinstance(structure, Rom) else ()
 
 
-def _settled(scene: Scene, choice: Choice | None) -> Settled:
-    structure = scene.structure
+def settled(scene: Scene, choices: Choices) -> Settled:
+    """The scene with the choice that was made for it."""
+    structure, choice = scene.structure, choices.get(_group(scene))
     if not isinstance(structure, Rom):
         return Settled(scene, None)
     if choice is None:

@@ -17,7 +17,7 @@ from scipy.linalg import expm
 from coupling.compiled import entry, kernel
 from coupling.newmark import first_forces, net_load, row_force
 from coupling.system import DONE, PERIOD, STEPS, System
-from coupling.tally import copy, end_period, follow_contacts, record_start, row_speed, sample, tally
+from coupling.tally import close_step, copy, end_period, open_step, record_start, row_speed
 
 
 def cosimulation_matrices(system: System) -> np.ndarray:
@@ -58,10 +58,7 @@ def march_cosimulation(
         copy(motion.force, older_force)
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
-            copy(motion.q, q)
-            copy(motion.v, v)
-            copy(motion.elongation, before)
-            sample(system, motion, records, k, q)
+            open_step(system, motion, records, k, q, v, before)
             _structure(system, motion, matrix, known, last_force, older_force, hold, k, q, v)
             for r in range(rows):
                 place[r], rate[r], bend[r] = 0.0, 0.0, 0.0
@@ -81,8 +78,7 @@ def march_cosimulation(
             copy(mean, last_force)
             for r in range(rows):
                 impulse[r] = h * mean[r]
-            follow_contacts(system, motion, records, log, k, speed, impulse)
-            code = tally(system, motion, records, k, q, v, impulse, before, deepest)
+            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
             if code != DONE:
                 return code
         code = end_period(system, motion, records, budget)

@@ -15,6 +15,8 @@ from coupling import state as st
 from coupling.choice import settle
 from coupling.evaluation import Outcome, Run, evaluate, run_scene
 from coupling.flow import add_flow, empty_flows
+from coupling.handover import Handover, given, taken
+from coupling.inputs import InputError
 from coupling.response import Response, Status
 from coupling.rows import rows_of
 from coupling.scene import Scene
@@ -28,18 +30,22 @@ _STATUS = {
 }
 
 
-def simulate(scene: Scene, events: bool = False, samples_per_period: int = 0) -> Response:
+def simulate(
+    scene: Scene, events: bool = False, samples_per_period: int = 0, start: Handover | None = None
+) -> Response:
     """Run a scene from time zero over `scene.time.periods` excitation periods.
 
-    events: keep the list of events; samples_per_period: keep that many equidistant samples of each period.
+    events: keep the list of events; samples_per_period: keep that many equidistant samples of each period; start: the
+    state that another run has left (`Response.final`), in place of the scene's initial one; for the exact engine.
     Raises InputError for a scene that the model does not allow; numerical trouble is a status of the response.
     """
     started = time.perf_counter()
     settled = settle(scene)
     scene = settled.scene
-    run = _run_of(scene, events, samples_per_period)
+    run = _run_of(scene, events, samples_per_period, start)
     status, transient = run_scene(run, scene)
-    return replace(evaluate(scene, run.outcome(), status, transient, started), estimate=settled.estimate)
+    final = run.final() if isinstance(run, _Run) else None
+    return replace(evaluate(scene, run.outcome(), status, transient, started), estimate=settled.estimate, final=final)
 
 
 def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:
@@ -53,9 +59,11 @@ def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: 
     return evaluate(scene, run.outcome(), status, transient, started)
 
 
-def _run_of(scene: Scene, events: bool, samples_per_period: int) -> Run:
+def _run_of(scene: Scene, events: bool, samples_per_period: int, start: Handover | None = None) -> Run:
     if scene.solver.method == "exact":
-        return _Run(scene, events, samples_per_period)
+        return _Run(scene, events, samples_per_period, start=start)
+    if start is not None:
+        raise InputError(f"continuation: is for solver.method exact, not {scene.solver.method}")
     from coupling.stepping import begin_run  # its kernels are loaded when they are wanted
 
     return begin_run(scene, events, samples_per_period)
@@ -77,18 +85,27 @@ class _Run:
     """The mutable state of one run and the subsystems it has met."""
 
     def __init__(
-        self, scene: Scene, events: bool, samples_per_period: int, functional: np.ndarray | None = None
+        self,
+        scene: Scene,
+        events: bool,
+        samples_per_period: int,
+        functional: np.ndarray | None = None,
+        start: Handover | None = None,
     ) -> None:
         structure = linear_structure(scene)
         if functional is not None:
             structure = replace(structure, response=functional)
-        self.max_events, self.begun = scene.solver.max_events, False
+        self.max_events, self.begun, self.ended = scene.solver.max_events, False, False
+        self.structure = structure
         self.rows, displacement, velocity = rows_of(scene, structure)
+        coordinates = np.r_[structure.displacement, structure.velocity]
+        if start is not None:
+            coordinates, displacement, velocity = given(structure, self.rows, start)
         self.flows = empty_flows(self.rows)
         self.log = _Log(events, [])
         modes = self.flows.eigenvalue.shape[1]
         self.state = st.new_state(self.rows, modes, displacement, velocity)
-        self.state.coordinates[:] = np.r_[structure.displacement, structure.velocity]
+        self.state.coordinates[:] = coordinates
         self.channels = st.new_channels(self.rows, modes)
         self.records = st.new_records(self.rows, scene.time.periods, samples_per_period)
         self.scratch = st.new_scratch(self.rows, modes)
@@ -118,13 +135,19 @@ class _Run:
     def advance_to(self, periods: int) -> Status:
         """Advance to the end of `periods`, from the decision of the initial state. Returns how that ended."""
         code = auto.DONE if self.begun else self.begin(self.max_events)
-        return _STATUS[self.advance(periods, self.max_events) if code == auto.DONE else code]
+        code = self.advance(periods, self.max_events) if code == auto.DONE else code
+        self.ended = code != auto.DONE
+        return _STATUS[code]
 
-    @property
-    def peaks(self) -> np.ndarray:
-        """Largest |x| of the periods done, m."""
-        peaks: np.ndarray = self.records.peak[: self.state.counters[st.PERIOD]]
-        return peaks
+    def final(self) -> Handover | None:
+        """The state at the end of the periods done; None for a run that ended within one."""
+        if self.ended:
+            return None
+        state, s = self.state, int(self.state.counters[st.FLOW])
+        awake = state.awake[: state.counters[st.AWAKE]]
+        y = (self.flows.shape[s][:, awake] @ state.amplitude[awake]).real
+        y[: len(state.constant)] += state.constant
+        return taken(self.structure, self.rows, state.displacement, state.velocity, y)
 
     def outcome(self) -> Outcome:
         """What the run leaves behind."""

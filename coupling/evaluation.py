@@ -26,10 +26,6 @@ _CHUNK = 100
 class Run(Protocol):
     """A run of any method that can be continued."""
 
-    @property
-    def peaks(self) -> np.ndarray:
-        """Largest |x| of the periods done, m."""
-
     def advance_to(self, periods: int) -> Status:
         """Continue to the end of so many periods, or to what ends the run."""
 
@@ -63,7 +59,8 @@ def run_scene(run: Run, scene: Scene) -> tuple[Status, int]:
         ended = run.advance_to(min(periods, scene.time.periods))
         if ended is not Status.OK:
             return ended, dropped
-        peaks = run.peaks
+        outcome = run.outcome()
+        peaks = outcome.records.peak[: outcome.periods]
         transient = transient_length(peaks)
         if transient is None:
             status, dropped = Status.NOT_STEADY, scene.time.dropped

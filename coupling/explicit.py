@@ -13,16 +13,15 @@ from coupling.compiled import entry
 from coupling.newmark import first_forces, net_load, row_force
 from coupling.system import DONE, PERIOD, System
 from coupling.tally import (
+    close_step,
     copy,
     damped,
     end_period,
-    follow_contacts,
     load_at,
+    open_step,
     record_start,
     row_speed,
-    sample,
     solve_inverse,
-    tally,
 )
 
 
@@ -45,11 +44,8 @@ def march_explicit(system, motion, records, log, inverse, slow, periods, budget,
             motion.half[i] = motion.v[i] + 0.5 * h * net_load(system, motion, motion.q, motion.v, 0, i) / system.mass[i]
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
-            copy(motion.q, q)
-            copy(motion.v, v)
+            open_step(system, motion, records, k, q, v, before)
             copy(motion.force, old)
-            copy(motion.elongation, before)
-            sample(system, motion, records, k, q)
             for i in range(size):
                 motion.q[i] += h * motion.half[i]
             for r in range(rows):
@@ -67,8 +63,7 @@ def march_explicit(system, motion, records, log, inverse, slow, periods, budget,
             for i in range(size):
                 motion.v[i] = motion.half[i] + 0.5 * h * change[i]
                 motion.half[i] += h * change[i]
-            follow_contacts(system, motion, records, log, k, speed, impulse)
-            code = tally(system, motion, records, k, q, v, impulse, before, deepest)
+            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
             if code != DONE:
                 return code
         code = end_period(system, motion, records, budget)

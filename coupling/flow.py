@@ -281,12 +281,18 @@ def _attachment(rows: Rows, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray,
             known[unknown[0]] = True
         elif np.linalg.norm(functional) > 1e-12 * np.linalg.norm(rows.structure[r]):
             inner.append(functional)
-    links = [np.flatnonzero(rows.bodies[r]) for r in remaining]
-    graph = coo_matrix((np.ones(len(links)), np.array(links).reshape(-1, 2).T), (b, b))
-    _, cluster = connected_components(graph, directed=False)
+    cluster = _connected([np.flatnonzero(rows.bodies[r]) for r in remaining], b)
     numbers = np.unique(cluster[~known])
     cluster = np.where(known, -1, np.searchsorted(numbers, cluster))
     return carrier, cluster, np.array(inner)
+
+
+def _connected(links: list[np.ndarray], count: int) -> np.ndarray:
+    """Number of the connected part of each of `count` nodes."""
+    if not links:  # the usual case, and the library takes its time
+        return np.arange(count)
+    graph = coo_matrix((np.ones(len(links)), np.array(links, int).T), (count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _decided(rows: Rows, r: int, known: np.ndarray) -> bool:
@@ -316,12 +322,13 @@ class _SprungBodies(NamedTuple):
 def _sprung_bodies(rows: Rows, cluster: np.ndarray, sprung: np.ndarray) -> _SprungBodies:
     """Bodies that springs tie to the structure move with it; others vibrate about their common centre of mass."""
     b, groups = len(cluster), cluster.max(initial=-1) + 1
+    if not len(sprung):
+        return _SprungBodies(np.zeros((b, 0)), np.zeros((0, b)), np.zeros(b, bool), cluster)
     member = (cluster == np.arange(groups)[:, None]).astype(float)
     links = rows.bodies[sprung] @ member.T
     # the last node is the structure
     ends = [np.r_[np.flatnonzero(link), groups][:2] for link in links if link.any()]
-    graph = coo_matrix((np.ones(len(ends)), np.array(ends, int).reshape(-1, 2).T), (groups + 1,) * 2)
-    _, part = connected_components(graph, directed=False)
+    part = _connected(ends, groups + 1)
     columns, rests = [np.zeros((b, 0))], [np.zeros((0, b))]
     first = np.array([member[g] * (np.arange(b) == np.argmax(member[g])) for g in range(groups)]).reshape(groups, b)
     for c in np.unique(part[:groups]):

@@ -8,11 +8,14 @@ from __future__ import annotations
 import math
 
 from coupling.compiled import inlined, kernel
+from coupling.state import OPEN
 
 #: gaps closed to this share of the free travel are closed at the same instant
 SIMULTANEOUS = 1e-12
 #: speeds below this share of the largest are round-off
 ROUND_OFF = 1e-13
+#: share of the free travel below which a gap is about to close
+_NEAR = 1e-6
 
 
 @inlined
@@ -29,6 +32,26 @@ def measure_gaps(rows, st):
             if before >= 0:
                 left, near, slower = st.displacement[before], st.low[before], st.velocity[before]
             st.displacement[r], st.velocity[r] = (right - left) + (far - near), faster - slower
+
+
+@inlined
+def align_gaps(rows, st, y):
+    """Take open gaps to walls that move apart from the floor anew from slips and structure: round-off would add up.
+
+    y: (2n,) p and p' of the structure. A gap about to close is left alone: it must not change sides.
+    """
+    n = len(st.constant)
+    for r in range(rows.friction_rows, len(st.state)):
+        scale = rows.gap[r - rows.friction_rows]
+        if rows.rides[r] or st.state[r] != OPEN or st.displacement[r] < _NEAR * scale:
+            continue
+        k, sign = (rows.before[r], -1.0) if rows.before[r] >= 0 else (rows.after[r], 1.0)
+        place, speed = sign * (st.displacement[k] + st.low[k]), sign * st.velocity[k]
+        for i in range(n):
+            apart = rows.structure[r, i] + sign * rows.floor[k, i]
+            place += apart * y[i]
+            speed += apart * y[n + i]
+        st.displacement[r], st.velocity[r] = 0.5 * scale + place, speed
 
 
 @inlined

@@ -26,6 +26,8 @@ from coupling.structure import linear_structure
 _OPEN, _CLOSED, _SLIDING, _STICKING, _FREE = range(5)
 #: gaps below this share of the free travel are closed, speeds below this share of the fastest are rest
 _TOUCH = 1e-9
+#: a gap or a slip of this share is on its side of zero, and no more
+_ROUND_OFF = 1e-13
 #: rebounds below this share of gap times angular frequency are the end of a chatter
 _SETTLED = 1e-6
 #: events without time between them before the run is given up
@@ -45,18 +47,26 @@ class Watch(NamedTuple):
     value: Function
 
 
+class Arc(NamedTuple):
+    """Motion between two events: states (size, k) at k times, and the watch whose event has ended it, if any."""
+
+    t: np.ndarray
+    y: np.ndarray
+    event: int | None
+    event_time: float
+    event_state: np.ndarray
+    evaluations: int
+    failed: bool
+
+
 class IvpRun:
     """A run by solve_ivp: state y = (q, v, integrals), contact states of the rows."""
 
     def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
-        """Raises InputError for Jenkins elements, and where samples do not fall on the evaluation grid."""
+        """Raises InputError for Jenkins elements."""
         if any(damper.stiffness is not None for damper in scene.friction_damper):
             raise InputError("friction_damper.stiffness: solve_ivp knows no springs before sliders; leave it out")
         self.solver, self.steps = scene.solver, scene.solver.steps
-        if samples_per_period and self.steps % samples_per_period:
-            raise InputError(
-                f"solver.steps_per_period: {self.steps} is no multiple of {samples_per_period} samples a period"
-            )
         structure = linear_structure(scene)
         self.rows, displacement, velocity = rows_of(scene, structure)
         rows = self.rows
@@ -113,12 +123,6 @@ class IvpRun:
                     return status
         return Status.OK
 
-    @property
-    def peaks(self) -> np.ndarray:
-        """Largest |x| of the periods done, m."""
-        peaks: np.ndarray = self.records.peak[: self.period]
-        return peaks
-
     def outcome(self) -> Outcome:
         """What the run leaves behind."""
         numbers = {"impacts": self.impacts, "evaluations": self.evaluations}
@@ -132,7 +136,6 @@ class IvpRun:
     def _segment(self, end: float) -> Status:
         """Integrate to the next event or to the end of the run; record the periods that this completes."""
         period, watches = self.rows.period, self._watches()
-        functions = [_event(watch) for watch in watches]
         step = period / self.steps
         first = int(np.floor(self.time / step * (1 + 1e-14) + 1e-9)) + 1
         grid = np.arange(first, round(end / step) + 1) * step
@@ -140,31 +143,38 @@ class IvpRun:
         grid = grid[grid > self.time]
         if not len(grid):
             grid = np.array([self.time + step])
-        tolerance = self.solver.rtol or 1e-9
-        atol = self._tolerance(tolerance)
-        found = solve_ivp(
-            self._rate, (self.time, grid[-1]), self.y, "DOP853", t_eval=grid, events=functions, rtol=tolerance,
-            atol=atol, max_step=step,
-        )  # fmt: skip
-        self.evaluations += int(found.nfev)
-        if found.status < 0 or not all(np.isfinite(part).all() for part in (found.y if len(found.t) else ())):
+        found = self._integrate(grid, watches)
+        self.evaluations += found.evaluations
+        if found.failed or not np.isfinite(found.y).all():
             return Status.DIVERGED
         if len(found.t):
-            self._grid(found.t, np.reshape(found.y, (len(self.y), -1)))
+            self._grid(found.t, found.y)
             if self.deep > self.solver.deepest:
                 return Status.PENETRATION
-        if found.status == 0:
+        if found.event is None:
             self.time, self.y = float(grid[-1]), found.y[:, -1].copy()
             return Status.OK
-        who = next(i for i, times in enumerate(found.t_events) if len(times))
-        before, self.time = self.time, float(found.t_events[who][-1])
-        self.y = found.y_events[who][-1].copy()
+        before, self.time = self.time, found.event_time
+        self.y = found.event_state.copy()
+        who = found.event
         self.events += 1
         self.standing = self.standing + 1 if self.time - before < 1e-13 * period else 0
         if self.standing > _STANDING:
             return Status.UNDECIDED
         decided = self._decide(self.time, watches[who].row, watches[who].kind)
         return Status.OK if decided else Status.UNDECIDED
+
+    def _integrate(self, grid: np.ndarray, watches: list[Watch]) -> Arc:
+        """The motion from now to the first event, or to the end of the grid."""
+        tolerance = self.solver.rtol or 1e-9
+        found = solve_ivp(
+            self._rate, (self.time, grid[-1]), self.y, "DOP853", t_eval=grid, events=[_event(w) for w in watches],
+            rtol=tolerance, atol=self._tolerance(tolerance), max_step=self.rows.period / self.steps,
+        )  # fmt: skip
+        states = np.reshape(found.y, (len(self.y), -1)) if len(found.t) else np.zeros((len(self.y), 0))
+        who = next((i for i, times in enumerate(found.t_events) if len(times)), None) if found.status == 1 else None
+        event = (0.0, self.y) if who is None else (float(found.t_events[who][-1]), found.y_events[who][-1])
+        return Arc(found.t, states, who, *event, int(found.nfev), found.status < 0)
 
     def _tolerance(self, relative: float) -> np.ndarray:
         size, omega = self.size, self.rows.omega
@@ -279,7 +289,7 @@ class IvpRun:
         gaps, speeds = system.J @ q + system.offset, system.J @ v
         rest = _TOUCH * self.rows.omega * self.reach
         if kind == "slip":
-            self._stop(row, v)
+            self._hasten(row, 0.0)
             speeds = system.J @ v
         if kind == "gap" and np.isfinite(system.spring[row]):
             self.pressed[row] = not self.pressed[row]
@@ -297,15 +307,16 @@ class IvpRun:
         still = touching & (np.abs(speeds) <= rest)
         for r in np.flatnonzero(touching):
             # on the open side of the gap, or the next sign change could not be seen
-            self._shift(r, q, 1e-13 * self.reach - (system.J[r] @ q + system.offset[r]))
+            self._shift(r, q, _ROUND_OFF * self.reach - (system.J[r] @ q + system.offset[r]))
         return self._settle(t, still, speeds, rest, row, kind)
 
-    def _stop(self, r: int, v: np.ndarray) -> None:
-        """Make the speed of row r exactly zero; what moves is the body, if there is one."""
+    def _hasten(self, r: int, speed: float) -> None:
+        """Set the speed of row r; what moves is the body, if there is one."""
+        v = self.y[self.size : 2 * self.size]
         bodies = np.flatnonzero(self.system.J[r, self.system.modes :])
         if len(bodies):
             i = self.system.modes + bodies[0]
-            v[i] -= (self.system.J[r] @ v) / self.system.J[r, i]
+            v[i] += (speed - self.system.J[r] @ v) / self.system.J[r, i]
 
     def _shift(self, r: int, q: np.ndarray, by: float) -> None:
         i = self.system.modes + np.flatnonzero(self.system.J[r, self.system.modes :])[0]
@@ -375,6 +386,8 @@ class IvpRun:
                 state[r] = _OPEN if bound else _CLOSED
             elif bound:
                 state[r], self.sign[r] = _SLIDING, 1.0 if problem.state[a] == AT_LOW else -1.0
+                # on its way, or a step that ends beyond the next turn would find the turn at its own start, for ever
+                self._hasten(r, self.sign[r] * _ROUND_OFF * self.rows.omega * self.reach)
             else:
                 state[r] = _STICKING
         return True

@@ -12,21 +12,13 @@ import math
 
 import numpy as np
 
-from coupling.compiled import entry, kernel
-from coupling.complementarity import solve_box
+from coupling.compiled import entry, inlined, kernel
+from coupling.row_problem import list_row, solve_rows
 from coupling.system import DONE, PERIOD, SOLVES, UNDECIDED, System
-from coupling.tally import (
-    copy,
-    damped,
-    end_period,
-    follow_contacts,
-    load_at,
-    record_start,
-    row_speed,
-    sample,
-    solve_inverse,
-    tally,
-)
+from coupling.tally import close_step, damped, end_period, load_at, open_step, record_start, row_speed, solve_inverse
+
+#: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
+_TURNS, _ROUND_OFF = 20, 1e-12
 
 
 def moreau_matrices(system: System, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -44,15 +36,11 @@ def march_moreau(system, motion, records, log, problem, inverse, turned, mobilit
     size, rows, h, steps = len(motion.q), len(system.J), system.step, len(system.phase) - 1
     q, v, rhs, free = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
     impulse, speed, before = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows]
-    listed = motion.listed
     if motion.counters[PERIOD] == 0:
         record_start(system, motion, records)
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
-            copy(motion.q, q)
-            copy(motion.v, v)
-            copy(motion.elongation, before)
-            sample(system, motion, records, k, q)
+            open_step(system, motion, records, k, q, v, before)
             for i in range(size):
                 load = theta * load_at(system, k + 1, i) + (1.0 - theta) * load_at(system, k, i)
                 rhs[i] = h * (load - damped(system, v, i) - system.stiffness[i] * (q[i] + h * theta * v[i]))
@@ -61,23 +49,15 @@ def march_moreau(system, motion, records, log, problem, inverse, turned, mobilit
                 free[i] += v[i]
             for r in range(rows):
                 speed[r], impulse[r] = row_speed(system, r, v), 0.0
-            count = _list_rows(system, motion, problem, listed, mobility, free, speed, theta)
-            if count > 0:
-                motion.counters[SOLVES] += 1
-                if not _solve(problem, count):
-                    return UNDECIDED
-            for a in range(count):
-                impulse[listed[a]] = problem.force[a]
+            if not _impulses(system, motion, problem, mobility, turned, free, speed, impulse, theta):
+                return UNDECIDED
             for i in range(size):
-                for a in range(count):
-                    free[i] += turned[i, listed[a]] * problem.force[a]
                 motion.v[i] = free[i]
                 motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
             for r in range(system.friction_rows):
                 if system.spring[r] != math.inf and system.limit[r] > 0.0:
                     motion.elongation[r] = -impulse[r] / (h * system.spring[r])
-            follow_contacts(system, motion, records, log, k, speed, impulse)
-            code = tally(system, motion, records, k, q, v, impulse, before, deepest)
+            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
             if code != DONE:
                 return code
         code = end_period(system, motion, records, budget)
@@ -86,12 +66,53 @@ def march_moreau(system, motion, records, log, problem, inverse, turned, mobilit
     return DONE
 
 
+@inlined
+def _impulses(system, motion, problem, mobility, turned, free, speed, impulse, theta):
+    """Set the impulses (r,) of a step; `free` (N,) becomes the velocity at its end. Returns False if undecided.
+
+    A contact that parts as the step begins waits. Where impulses of others drive it together, it meets a second impact
+    after theirs, at its new speed: in one problem with them it would end without rebound, and since nothing opens an
+    overlap without speed, bodies in a row would fly as one ever after.
+    """
+    slowest = 0.0
+    for r in range(system.friction_rows, len(system.J)):
+        slowest = max(slowest, _ROUND_OFF * abs(speed[r]))
+    for turn in range(_TURNS):
+        last = turn == _TURNS - 1
+        count = _list_rows(system, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last)
+        if count == 0:
+            return True
+        motion.counters[SOLVES] += 1
+        if not solve_rows(problem, count):
+            return False
+        for a in range(count):
+            r = motion.listed[a]
+            impulse[r] += problem.force[a]
+            for i in range(len(free)):
+                free[i] += turned[i, r] * problem.force[a]
+        if not _approaching(system, motion, free, slowest):
+            return True
+    return True
+
+
+@inlined
+def _approaching(system, motion, free, slowest):
+    """Whether a closed rigid contact still approaches."""
+    for r in range(system.friction_rows, len(system.J)):
+        if motion.rows[4, r] > 0.0 and row_speed(system, r, free) < -slowest:
+            return True
+    return False
+
+
 @kernel
-def _list_rows(system, motion, problem, listed, mobility, free, speed, theta):
-    """Set up the problem of the rows that take part in a step. Returns how many they are."""
-    h, count = system.step, 0
+def _list_rows(system, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last):
+    """Set up the problem of the rows that take part in a turn. Returns how many they are."""
+    h, count, closed = system.step, 0, motion.rows[4]
     for r in range(len(system.J)):
         low, high, shift, soft = 0.0, np.inf, 0.0, 0.0
+        now = row_speed(system, r, free)
+        if turn == 0:
+            closed[r] = 0.0
         if r < system.friction_rows:
             if system.limit[r] == 0.0:
                 continue
@@ -103,7 +124,11 @@ def _list_rows(system, motion, problem, listed, mobility, free, speed, theta):
             if system.spring[r] == math.inf:
                 if gap + 0.5 * h * speed[r] > 0.0:
                     continue
-                shift = system.restitution[r] * min(speed[r], 0.0)
+                closed[r] = 1.0
+                before = speed[r] if turn == 0 else now
+                if not last and before > slowest and now > -slowest:
+                    continue
+                shift = system.restitution[r] * min(before, 0.0)
             else:
                 if gap + h * min(speed[r], row_speed(system, r, free)) > 0.0:
                     continue
@@ -111,21 +136,8 @@ def _list_rows(system, motion, problem, listed, mobility, free, speed, theta):
                 stiff = theta * (k * h * theta + c)
                 shift = (k * (gap + h * theta * (1.0 - theta) * speed[r]) + c * (1.0 - theta) * speed[r]) / stiff
                 soft = 1.0 / (h * stiff)
-        listed[count] = r
-        problem.b[count] = row_speed(system, r, free) + shift
-        problem.low[count], problem.high[count], problem.forced[count] = low, high, 0
-        for a in range(count + 1):
-            problem.matrix[count, a] = mobility[r, listed[a]]
-            problem.matrix[a, count] = problem.matrix[count, a]
-        problem.matrix[count, count] += soft
+        if system.spring[r] != math.inf or r < system.friction_rows:
+            low, high, shift = low - impulse[r], high - impulse[r], shift + soft * impulse[r]
+        list_row(problem, motion.listed, mobility, count, r, now + shift, low, high, soft)
         count += 1
     return count
-
-
-@kernel
-def _solve(problem, count):
-    """Solve the problem; one row alone in closed form."""
-    if count > 1:
-        return solve_box(problem, count, 0.0)
-    problem.force[0] = min(max(-problem.b[0] / problem.matrix[0, 0], problem.low[0]), problem.high[0])
-    return True

@@ -13,19 +13,18 @@ import math
 import numpy as np
 
 from coupling.compiled import entry, inlined, kernel
-from coupling.complementarity import solve_box
+from coupling.row_problem import list_row, solve_rows
 from coupling.system import DONE, PERIOD, SOLVES, UNDECIDED, System
 from coupling.tally import (
+    close_step,
     copy,
     damped,
     end_period,
-    follow_contacts,
     load_at,
+    open_step,
     record_start,
     row_speed,
-    sample,
     solve_inverse,
-    tally,
 )
 
 
@@ -55,11 +54,8 @@ def march_newmark(
             motion.half[i] = net_load(system, motion, motion.q, motion.v, 0, i) / system.mass[i]
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
-            copy(motion.q, q)
-            copy(motion.v, v)
+            open_step(system, motion, records, k, q, v, before)
             copy(motion.force, old)
-            copy(motion.elongation, before)
-            sample(system, motion, records, k, q)
             for i in range(size):
                 a = motion.half[i]
                 ahead[i] = q[i] + h * v[i] + h * h * (0.5 - beta) * a
@@ -76,10 +72,7 @@ def march_newmark(
             count = _list_rows(system, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma)
             if count > 0:
                 motion.counters[SOLVES] += 1
-                if count == 1:
-                    only = -problem.b[0] / problem.matrix[0, 0]
-                    problem.force[0] = min(max(only, problem.low[0]), problem.high[0])
-                elif not solve_box(problem, count, 0.0):
+                if not solve_rows(problem, count):
                     return UNDECIDED
             for r in range(rows):
                 motion.force[r] = 0.0
@@ -97,8 +90,7 @@ def march_newmark(
                 impulse[r] = 0.5 * h * (old[r] + motion.force[r])
                 if r < system.friction_rows and system.spring[r] != math.inf and system.limit[r] > 0.0:
                     motion.elongation[r] = -motion.force[r] / system.spring[r]
-            follow_contacts(system, motion, records, log, k, speed, impulse)
-            code = tally(system, motion, records, k, q, v, impulse, before, deepest)
+            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
             if code != DONE:
                 return code
         code = end_period(system, motion, records, budget)
@@ -166,12 +158,6 @@ def _list_rows(system, motion, problem, listed, mobility, ahead, fast, q, slow, 
             stiff = system.spring[r] * beta * h * h + system.dashpot[r] * gamma * h
             shift = (system.spring[r] * gap + system.dashpot[r] * speed) / stiff
             soft = 1.0 / stiff
-        listed[count] = r
-        problem.b[count] = shift
-        problem.low[count], problem.high[count], problem.forced[count] = low, high, 0
-        for a in range(count + 1):
-            problem.matrix[count, a] = mobility[r, listed[a]]
-            problem.matrix[a, count] = problem.matrix[count, a]
-        problem.matrix[count, count] += soft
+        list_row(problem, listed, mobility, count, r, shift, low, high, soft)
         count += 1
     return count

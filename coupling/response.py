@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from coupling.handover import Handover
 from modal.store import Variable, save
 
 
@@ -61,7 +62,8 @@ class Response:
     period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
     time, displacement, body_displacement: samples, empty if none were asked for; penetration: deepest overlap of bodies
     and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model
-    whose number of modes was chosen automatically (coupling.choice), None otherwise.
+    whose number of modes was chosen automatically (coupling.choice), None otherwise; final: the state at its end, with
+    which another run can begin, None for one that ended within a period or by another method than the exact one.
     """
 
     status: Status
@@ -92,6 +94,7 @@ class Response:
     body_displacement: np.ndarray
     penetration: float = 0.0
     estimate: dict[str, Any] | None = None
+    final: Handover | None = None
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """The result as plain data, with the list of events if wanted."""

@@ -152,17 +152,29 @@ def _yielding(structure: LinearStructure, cavity: int, before: int, after: int) 
 def _initial_rows(scene: Scene, structure: LinearStructure, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
     position = np.array([damper.position for damper in scene.damper])
     velocity = np.array([damper.velocity for damper in scene.damper])
-    # positions are relative to the floor; walls on other functionals start at their rest distance
-    displacement = rows.bodies @ position
+    unloaded = np.zeros(rows.friction_rows - len(rows.mass))
+    return row_motion(rows, position, velocity, structure.displacement, structure.velocity, unloaded)
+
+
+def row_motion(
+    rows: Rows, slip: np.ndarray, slip_velocity: np.ndarray, p: np.ndarray, rate: np.ndarray, elongation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and velocity (r,) of every row, from slips (b,), modal coordinates (n,) and their rates.
+
+    elongation: (friction dampers,) of the springs before the sliders, m.
+    """
+    # slips are relative to the floor; walls on other functionals start at their rest distance
+    displacement = rows.bodies @ slip
     ends = np.count_nonzero(rows.bodies[rows.friction_rows :], axis=1) == 1
     displacement[rows.friction_rows :][ends] += rows.gap[ends] / 2
-    absolute = velocity + rows.floor @ structure.velocity
-    speed = rows.structure @ structure.velocity + rows.bodies @ absolute
-    moved = rows.structure @ structure.displacement + rows.bodies @ (rows.floor @ structure.displacement)
-    speed[: len(velocity)] = velocity  # exact, so that a body at relative rest is known to be so
-    moved[: len(velocity)] = 0.0
+    absolute = slip_velocity + rows.floor @ rate
+    speed = rows.structure @ rate + rows.bodies @ absolute
+    moved = rows.structure @ p + rows.bodies @ (rows.floor @ p)
+    speed[: len(slip)] = slip_velocity  # exact, so that a body at relative rest is known to be so
+    moved[: len(slip)] = 0.0
     displacement += moved
-    displacement[: rows.friction_rows][np.isfinite(rows.spring[: rows.friction_rows])] = 0.0  # springs start unloaded
+    springs = np.isfinite(rows.spring[: rows.friction_rows])
+    displacement[: rows.friction_rows][springs] = np.r_[np.zeros(len(slip)), elongation][springs]
     return displacement, speed
 
 

@@ -208,6 +208,18 @@ class Range:
 
 
 @dataclass(frozen=True, config=STRICT)
+class Continuation:
+    """How the runs of a sweep begin: each from its own initial state ("independent"), or from its neighbour's last one.
+
+    The neighbour is the next lower ("up") or higher ("down") value of the axis `along`, by default the excitation
+    frequency or the only axis. The phase of the excitation goes on.
+    """
+
+    direction: Literal["independent", "up", "down"] = "independent"
+    along: str | None = None
+
+
+@dataclass(frozen=True, config=STRICT)
 class Scene:
     """Everything one run needs. Change a scene by making another: `scene.replace({"cavity.c1.gap": 1e-5})`."""
 
@@ -221,6 +233,7 @@ class Scene:
     contact: Contact = field(default_factory=Newton)
     time: Time = field(default_factory=Time)
     solver: Solver = field(default_factory=Solver)
+    continuation: Continuation = field(default_factory=Continuation)
     sweep: dict[str, Range | Annotated[tuple[Real | Whole | str, ...], Field(min_length=1)]] = field(
         default_factory=dict
     )
@@ -295,7 +308,11 @@ class Scene:
     @classmethod
     def load(cls, path: str | Path) -> Scene:
         """The scene in a TOML file; a reduced model's file is taken relative to it. Raises InputError."""
-        data = read_toml(path)
+        return cls.of(read_toml(path), path)
+
+    @classmethod
+    def of(cls, data: dict[str, Any], path: str | Path) -> Scene:
+        """The scene in the tables of a TOML file that lies at `path`."""
         structure = data.get("structure")
         if isinstance(structure, dict) and isinstance(structure.get("file"), str):
             structure["file"] = str(Path(path).parent / structure["file"])
@@ -313,32 +330,34 @@ class Scene:
         """
         data = self.to_dict()
         for path, value in values.items():
-            _assign(data, path.split("."), value, path)
+            assign(data, path.split("."), value, path)
         return validate(Scene, data, "scene")
 
     def sweep_points(self) -> tuple[dict[str, np.ndarray], Iterator[dict[str, Any]]]:
         """The grid of the [sweep] table: (axes by path, the points of their product with the last axis fastest)."""
-        axes = {path: _axis_values(values) for path, values in self.sweep.items()}
-        points = (dict(zip(axes, combination, strict=True)) for combination in itertools.product(*axes.values()))
+        axes = {path: axis_values(values) for path, values in self.sweep.items()}
+        points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
         return {path: np.asarray(values) for path, values in axes.items()}, points
 
 
-def _axis_values(values: Range | Sequence[Any]) -> list[Any]:
+def axis_values(values: Range | Sequence[Any]) -> list[Any]:
+    """The values of one axis of the [sweep] table."""
     if isinstance(values, Range):
         return [float(value) for value in np.linspace(values.start, values.stop, values.num)]
     return list(values)
 
 
-def _assign(node: Any, steps: list[str], value: Any, path: str) -> None:
+def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
+    """Change plain scene data at the end of `steps`, which stand in `path`. Raises InputError for an unknown place."""
     head, rest = steps[0], steps[1:]
     if isinstance(node, list):
         entries, rest = _entries(node, head, steps, path)
         for entry in entries:
-            _assign(entry, rest, value, path)
+            assign(entry, rest, value, path)
     elif rest:
         if head not in node:
             raise InputError(f"scene: {path}: no table '{head}'; {nearest(head, list(node))}")
-        _assign(node[head], rest, value, path)
+        assign(node[head], rest, value, path)
     else:
         node[head] = value
 

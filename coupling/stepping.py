@@ -44,12 +44,6 @@ class SteppedRun:
     """A run of a stepping method: matrices, motion and records."""
 
     def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
-        """Raises InputError where samples do not fall on steps."""
-        steps = scene.solver.steps
-        if samples_per_period and steps % samples_per_period:
-            raise InputError(
-                f"solver.steps_per_period: {steps} is no multiple of {samples_per_period} samples a period"
-            )
         structure = linear_structure(scene)
         self.rows, displacement, velocity = rows_of(scene, structure)
         system = sy.system_of(scene, self.rows)
@@ -81,12 +75,6 @@ class SteppedRun:
     def _body_energy(self) -> float:
         return float(self.rows.mass.sum() * self.motion.extremes[1] ** 2 / 2)
 
-    @property
-    def peaks(self) -> np.ndarray:
-        """Largest |x| of the periods done, m."""
-        peaks: np.ndarray = self.records.peak[: self.motion.counters[sy.PERIOD]]
-        return peaks
-
     def outcome(self) -> Outcome:
         """What the run leaves behind."""
         counters = self.motion.counters
@@ -100,7 +88,14 @@ class SteppedRun:
 
 
 def begin_run(scene: Scene, events: bool, samples_per_period: int) -> Run:
-    """A run of the scene's method, at time zero. Raises InputError for what the method cannot do."""
+    """A run of the scene's method, at time zero.
+
+    Raises InputError for what the method cannot do, and where samples do not fall on steps.
+    """
+    if samples_per_period and scene.solver.steps % samples_per_period:
+        raise InputError(
+            f"solver.steps_per_period: {scene.solver.steps} is no multiple of {samples_per_period} samples a period"
+        )
     if scene.solver.method == "solve_ivp":
         from coupling.ivp import IvpRun
 

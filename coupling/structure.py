@@ -28,7 +28,8 @@ class LinearStructure:
     floor, left, right: (cavities, n) functionals of the cavities' surfaces; casing: (friction dampers, n) functionals
     of what rubs on the casing; force: (n,) complex modal load and base_acceleration: complex acceleration of the base,
     both amplitudes of exp(i omega t); displacement and velocity: (n,) initial state; table: complex displacement
-    amplitude of the base that counts as response (prescribed motion).
+    amplitude of the base that counts as response (prescribed motion); physical: displacement per modal coordinate of a
+    rigid structure, whatever its mass; 1 for others.
     """
 
     omega: float
@@ -44,6 +45,7 @@ class LinearStructure:
     displacement: np.ndarray
     velocity: np.ndarray
     table: complex = 0.0
+    physical: float = 1.0
     wall_flexibility: np.ndarray | None = None
 
     @property
@@ -93,6 +95,7 @@ def linear_structure(scene: Scene) -> LinearStructure:
     return LinearStructure(
         omega, basis.stiffness, basis.damping, response, floor, left, right,
         np.reshape(casing, (len(casing), len(response))), force, base, displacement, velocity,
+        physical=float(response[0]) if isinstance(scene.structure, Rigid) else 1.0,
         wall_flexibility=_wall_flexibility(basis, scene),
     )  # fmt: skip
 
@@ -123,6 +126,18 @@ def excitation_force(scene: Scene) -> float:
     return _force_amplitude(scene, basis, _row(basis, at, "excitation.at"))
 
 
+def largest_resonance(scene: Scene) -> tuple[float, float]:
+    """Displacement of the response per newton, m/N, and modal mass there, kg, of the highest resonance without bodies.
+
+    Raises InputError for a structure without damping.
+    """
+    basis = _basis(scene)
+    at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
+    if np.any(np.diag(basis.damping) <= 0):
+        raise InputError("structure: a resonance without damping has no amplitude; give damping")
+    return _highest(basis, _row(basis, at, "excitation.at"))
+
+
 def _receptance(
     stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, response: np.ndarray, omega: np.ndarray
 ) -> np.ndarray:
@@ -135,22 +150,33 @@ def _force_amplitude(scene: Scene, basis: _ModalBasis, response: np.ndarray) -> 
     excitation = scene.excitation
     if excitation.resonance_amplitude is None:
         return excitation.force or 0.0
-    zeta = np.diag(basis.damping) / (2 * np.sqrt(basis.stiffness))
-    if np.any(zeta <= 0):
+    if np.any(np.diag(basis.damping) <= 0):
         raise InputError(
             "excitation.resonance_amplitude: an undamped resonance has no amplitude; give damping or force"
         )
-    peak = int(np.argmax(response**2 / (2 * zeta * basis.stiffness)))
-    resonance = np.sqrt(basis.stiffness[peak])
+    return float(excitation.resonance_amplitude / _highest(basis, response)[0])
+
+
+def _highest(basis: _ModalBasis, response: np.ndarray) -> tuple[float, float]:
+    return _resonance(basis.stiffness.tobytes(), basis.damping.tobytes(), response.tobytes())
+
+
+@lru_cache(maxsize=64)
+def _resonance(stiffness_: bytes, damping_: bytes, response_: bytes) -> tuple[float, float]:
+    """Largest displacement per newton and modal mass of the highest resonance: once for all frequencies of a sweep."""
+    stiffness, response = np.frombuffer(stiffness_), np.frombuffer(response_)
+    damping = np.frombuffer(damping_).reshape(len(stiffness), -1)
+    zeta = np.diag(damping) / (2 * np.sqrt(stiffness))
+    peak = int(np.argmax(response**2 / (2 * zeta * stiffness)))
+    resonance = np.sqrt(stiffness[peak])
 
     def negative(omega: float) -> float:
-        mass = np.eye(len(response))
-        return -float(abs(_receptance(basis.stiffness, basis.damping, mass, response, np.array([omega]))[0]))
+        return -float(abs(_receptance(stiffness, damping, np.eye(len(response)), response, np.array([omega]))[0]))
 
     width = min(3 * zeta[peak], 0.5)
     bounds = (resonance * (1 - width), resonance * (1 + width))
     found = minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-9 * resonance})
-    return float(excitation.resonance_amplitude / -found.fun)
+    return -float(found.fun), float(1 / response[peak] ** 2)
 
 
 def _row(basis: _ModalBasis, label: str | None, key: str) -> np.ndarray:

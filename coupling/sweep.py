@@ -2,41 +2,40 @@
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
 import json
-import math
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
-from coupling.choice import settle_all
+from coupling.checkpoint import Checkpoint
 from coupling.engine import simulate
-from coupling.inputs import InputError, validate
-from coupling.scene import Rom, Scene
-from coupling.structure import linear_structure
+from coupling.grid import Grid, PointList
+from coupling.grid import grid as grid_of
+from coupling.inputs import validate
+from coupling.points import COLUMNS, LOSSES, MEASURES, TEXTS, Block, Finished, Task, broken, run_points, tasks_of
+from coupling.scene import Scene
 from modal.store import Variable, frozen, load, save
 
 _KIND = "sweep"
-#: measures of a run and their units, each an array over the grid
-MEASURES = {
-    "amplitude_max": "m", "amplitude_mean": "m", "amplitude_rms": "m", "amplitude_harmonic": "m",
-    "amplitude_undamped": "m", "amplitude_fixed": "m", "impacts_per_period": "1", "attached_mass_fraction": "1",
-    "energy_residual": "1", "wall_time_s": "s",
-}  # fmt: skip
-#: what takes the energy, the last axis of `energy_share`
-LOSSES = ("viscous", "friction", "impact", "contact")
 _UNITS = {
     "frequency": "Hz", "gap": "m", "mass": "kg", "stiffness": "N/m", "damping": "N s/m", "force": "N",
     "base_acceleration": "m/s^2", "acceleration": "m/s^2", "resonance_amplitude": "m", "displacement_amplitude": "m",
-    "position": "m", "displacement": "m", "velocity": "m/s", "normal_load": "N", "orientation_deg": "degree",
+    "position": "m", "displacement": "m", "velocity": "m/s", "normal_load": "N", "normal_force": "N",
+    "orientation_deg": "degree",
 }  # fmt: skip
 # few enough points that workers end together, and that a killed sweep loses little
 _MOST_PER_TASK = 16
+#: tasks that are with an executor of unknown size at a time: enough for some hundred workers
+_IN_FLIGHT = 512
+
+
+class SweepError(ValueError):
+    """A sweep that cannot go on: its workers are gone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +45,12 @@ class Sweep:
     scene                 the scene of the sweep, with its [sweep] table
     axes                  dotted path -> values
     amplitude_*           m, of the displacement at excitation.at; `undamped` and `fixed` are those of the linear
-                          structure without bodies and with every body glued to its cavity
+                          structure without bodies and with every body glued to its cavity; `mean_confidence` is the
+                          half width of the mean's 95 % confidence interval, nan where there are too few periods
     attached_mass_fraction  share of the bodies' mass that the structure feels; nan without bodies or motion
     energy_share          (*grid, 4) share of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another coupling.response.Status, or "error: ..." for a run that broke, without measures
+    A point of the grid is the same whoever ran it, and whenever: no time is taken.
     provenance            versions and whatever else the caller knows (JSON-able)
     """
 
@@ -57,6 +58,7 @@ class Sweep:
     axes: Mapping[str, np.ndarray]
     amplitude_max: np.ndarray
     amplitude_mean: np.ndarray
+    amplitude_mean_confidence: np.ndarray
     amplitude_rms: np.ndarray
     amplitude_harmonic: np.ndarray
     amplitude_undamped: np.ndarray
@@ -67,7 +69,6 @@ class Sweep:
     energy_residual: np.ndarray
     status: np.ndarray
     classification: np.ndarray
-    wall_time_s: np.ndarray
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -122,7 +123,7 @@ class Sweep:
 
 
 def sweep(
-    scene: Scene,
+    scene: Scene | Grid,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
     checkpoint: str | Path | None = None,
@@ -130,53 +131,45 @@ def sweep(
 ) -> Sweep:
     """Run every point of the scene's [sweep] table, in this process or on an executor.
 
-    progress: called with the number of points done and their total; checkpoint: a file to which finished points are
-    written and from which a sweep that was killed goes on; the caller removes it once the result is safe.
-    Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks
-    is a point with the status "error: ...".
+    scene: with its grid, if the caller has made it; progress: called with the number of points done and their total, at
+    the beginning, too; checkpoint: a file to which finished points are written and from which a sweep that was killed
+    goes on; the caller removes it once the result is safe (coupling.checkpoint.clear).
+    Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks, or
+    takes its worker with it, is a point with the status "error: ...". Raises StoreError when the checkpoint cannot be
+    written, SweepError when the executor has lost its workers for good.
     """
-    axes, scenes = grid(scene)
-    estimate = estimate_of(scene)
-    shape = tuple(len(values) for values in axes.values())
-    with _Checkpoint(checkpoint, scene) as done:
-        missing = [index for index in range(len(scenes)) if index not in done.records]
-        size = max(1, min(_MOST_PER_TASK, len(missing) // 32))
-        chunks = [missing[start : start + size] for start in range(0, len(missing), size)]
-        for chunk, records in _results(chunks, scenes, executor):
-            done.add(chunk, records)
+    grid = scene if isinstance(scene, Grid) else grid_of(scene)
+    provenance = dict(provenance or {})
+    with Checkpoint(checkpoint, grid.scene, grid.size, provenance) as kept:
+        finished = kept.finished
+        if progress is not None:
+            progress(finished.count, grid.size)
+        for task, rest, block in _run(grid, finished, executor):
+            kept.add(task, block, bool(rest))
             if progress is not None:
-                progress(len(done.records), len(scenes))
-        records = [done.records[index] for index in range(len(scenes))]
-    arrays = {name: frozen([record[name] for record in records]).reshape(shape) for name in MEASURES}
-    texts = {name: [record[name] for record in records] for name in ("status", "classification")}
+                progress(finished.count, grid.size)
+    return _result(grid, finished, provenance)
+
+
+def run_list(base: Scene, points: Sequence[Mapping[str, Any]], executor: Executor | None = None) -> Finished:
+    """Runs of scenes that differ from `base` in some values, by their paths; all points name the same paths."""
+    listed = PointList(base, points)
+    finished = Finished(listed.size)
+    for task, rest, block in _run(listed, finished, executor):
+        finished.add(task, block, bool(rest))
+    return finished
+
+
+def _result(grid: Grid, finished: Finished, provenance: dict[str, Any]) -> Sweep:
+    columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
     return Sweep(
-        scene=scene,
-        axes={path: frozen(values, values.dtype) for path, values in axes.items()},
-        energy_share=frozen([record["energy_share"] for record in records]).reshape(*shape, len(LOSSES)),
-        **arrays,
-        **{name: frozen(values, object).reshape(shape) for name, values in texts.items()},
-        provenance=dict(provenance or {}) | ({} if estimate is None else {"estimate": estimate}),
+        scene=grid.scene,
+        axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
+        energy_share=frozen(np.stack([columns[name] for name in LOSSES], axis=-1)),
+        **{name: frozen(columns[name]) for name in MEASURES},
+        **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
+        provenance=provenance | ({} if grid.estimate is None else {"estimate": grid.estimate}),
     )
-
-
-def estimate_of(scene: Scene) -> dict[str, Any] | None:
-    """The estimate of the model that a sweep chooses by itself; None where it has no choice."""
-    points = [_at(dataclasses.replace(scene, sweep={}), values) for values in scene.sweep_points()[1]]
-    return settle_all(points)[0].estimate if points else None
-
-
-def grid(scene: Scene) -> tuple[dict[str, np.ndarray], list[Scene]]:
-    """Axes by path and the scenes of all points, the last axis fastest. Raises InputError for a point that is none."""
-    axes, combinations = scene.sweep_points()
-    if not axes:
-        raise InputError(
-            'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
-        )
-    base = dataclasses.replace(scene, sweep={})
-    scenes = [_at(base, values) for values in combinations]
-    scenes = [settled.scene for settled in settle_all(scenes)]
-    linear_structure(scenes[0])
-    return axes, scenes
 
 
 def warm_up() -> None:
@@ -198,109 +191,85 @@ def _dimension(path: str) -> str:
     return path.replace(".", "_")
 
 
-def _at(base: Scene, values: Mapping[str, Any]) -> Scene:
-    try:
-        return base.replace(values)
-    except InputError as error:
-        point = ", ".join(f"{path} = {value!r}" for path, value in values.items())
-        raise InputError(f"sweep: at {point}: {str(error).removeprefix('scene: ')}") from None
+#: a task and what is left of its chain
+_Entry = tuple[Task, Sequence[int]]
 
 
-def _results(
-    chunks: list[list[int]], scenes: list[Scene], executor: Executor | None
-) -> Iterator[tuple[list[int], list[dict[str, Any]]]]:
-    if executor is None:
-        for chunk in chunks:
-            yield chunk, _run([scenes[index] for index in chunk])
-        return
-    futures = {executor.submit(_run, [scenes[index] for index in chunk]): chunk for chunk in chunks}
+def _run(
+    grid: Grid | PointList, finished: Finished, executor: Executor | None
+) -> Iterator[tuple[Task, Sequence[int], Block]]:
+    """Tasks as they are done, each with what is left of its chain, and what it leaves."""
+    most = max(1, min(_MOST_PER_TASK, (grid.size - finished.count) // 32))
+    source, ready = tasks_of(grid, finished, most), deque[_Entry]()
+    running: dict[Future[Block], _Entry] = {}
     try:
-        for future in as_completed(futures):
-            yield futures[future], future.result()
+        while True:
+            while len(running) < (1 if executor is None else _in_flight(executor)):
+                entry = ready.popleft() if ready else next(source, None)
+                if entry is None:
+                    break
+                running[_submit(grid, entry[0], executor)] = entry
+            if not running:
+                return
+            for (task, rest), block in _ended(grid, running, executor):
+                if rest and task.linked:
+                    ready.append((Task(rest[:most], True, block.final, task.chain), rest[most:]))
+                yield task, rest, block
     finally:
-        for future in futures:
+        for future in running:
             future.cancel()
 
 
-def _run(scenes: Sequence[Scene]) -> list[dict[str, Any]]:
-    """The task of a worker: one flat record a scene."""
-    return [_record(scene) for scene in scenes]
+def _in_flight(executor: Executor) -> int:
+    """Tasks to keep an executor busy; few, since all of them are in doubt when a worker dies."""
+    known = getattr(executor, "_max_workers", None) or getattr(executor, "num_workers", None)
+    return 2 * known + 2 if isinstance(known, int) else _IN_FLIGHT
 
 
-def _record(scene: Scene) -> dict[str, Any]:
-    record: dict[str, Any] = dict.fromkeys(MEASURES, math.nan)
-    record |= {"energy_share": [math.nan] * len(LOSSES), "classification": ""}
+def _submit(grid: Grid | PointList, task: Task, executor: Executor | None) -> Future[Block]:
+    points = [grid.values(point) for point in task.points]
+    if executor is None:
+        future: Future[Block] = Future()
+        future.set_result(run_points(grid.base, grid.choices, points, task))
+        return future
     try:
-        record |= {"amplitude_undamped": _linear(scene, fixed=False), "amplitude_fixed": _linear(scene, fixed=True)}
-        response = simulate(scene)
-    except InputError:
-        raise
-    except Exception as error:  # one broken point must not cost the others
-        return record | {"status": f"error: {type(error).__name__}: {error}"}
-    data = response.to_json()
-    losses = np.array([response.energy[name] for name in LOSSES])
-    if losses.sum() > 0:
-        record["energy_share"] = (losses / losses.sum()).tolist()
-    record |= {name: data[name] for name in MEASURES if data.get(name) is not None}
-    return record | {"status": data["status"], "classification": data["classification"]}
+        return executor.submit(run_points, grid.base, grid.choices, points, task)
+    except (BrokenExecutor, RuntimeError) as error:
+        raise SweepError(f"the workers are gone ({error}); run the same again to go on from the checkpoint") from error
 
 
-def _linear(scene: Scene, fixed: bool) -> float:
-    """Amplitude of the response without bodies or with every body glued to its cavity's floor, m."""
-    structure = linear_structure(scene)
-    mass, load = np.eye(structure.modes), structure.force.copy()
-    names = [cavity.name for cavity in scene.cavity]
-    for damper in scene.damper if fixed else ():
-        floor = structure.floor[names.index(damper.cavity)]
-        mass += damper.mass * np.outer(floor, floor)
-        load -= damper.mass * floor * structure.base_acceleration
-    dynamic = np.diag(structure.stiffness) + 1j * structure.omega * structure.damping - structure.omega**2 * mass
-    return float(abs(structure.response @ np.linalg.solve(dynamic, load) + structure.table))
+def _ended(
+    grid: Grid | PointList, running: dict[Future[Block], _Entry], executor: Executor | None
+) -> Iterator[tuple[_Entry, Block]]:
+    """Tasks that have ended, taken from those that run.
+
+    A process pool that loses a worker gives up all of its tasks: their points run again, one by one, to find the point
+    that breaks it.
+    """
+    done = wait(running, return_when=FIRST_COMPLETED).done
+    if any(isinstance(future.exception(), BrokenExecutor) for future in done if not future.cancelled()):
+        done = wait(running).done
+    lost = []
+    for future in done:
+        entry = running.pop(future)
+        if future.cancelled() or future.exception() is not None:
+            lost.append((entry, future))
+        else:
+            yield entry, future.result()
+    for (task, rest), future in lost:
+        yield (task, rest), _one_by_one(grid, task, future, executor)
 
 
-class _Checkpoint:
-    """Finished points in a file of JSON lines, headed by what they belong to; without a file, in memory alone."""
-
-    def __init__(self, path: str | Path | None, scene: Scene) -> None:
-        self.records: dict[int, dict[str, Any]] = {}
-        self._path = None if path is None else Path(path)
-        self._head = _fingerprint(scene)
-        self._file: TextIO | None = None
-
-    def __enter__(self) -> _Checkpoint:
-        if self._path is None:
-            return self
-        lines = self._path.read_text(encoding="utf-8").splitlines() if self._path.is_file() else []
-        if lines[:1] == [self._head]:
-            for line in lines[1:]:
-                try:
-                    index, record = json.loads(line)
-                except ValueError:  # the line at which the sweep was killed
-                    break
-                self.records[index] = record
-        self._file = self._path.open("w", encoding="utf-8")
-        self._file.write(self._head + "\n")
-        self._write(self.records)
-        return self
-
-    def add(self, indices: Sequence[int], records: Sequence[dict[str, Any]]) -> None:
-        new = dict(zip(indices, records, strict=True))
-        self.records |= new
-        self._write(new)
-
-    def _write(self, records: Mapping[int, dict[str, Any]]) -> None:
-        if self._file is not None:
-            self._file.writelines(json.dumps(item) + "\n" for item in records.items())
-            self._file.flush()
-
-    def __exit__(self, *_: object) -> None:
-        if self._file is not None:
-            self._file.close()
-
-
-def _fingerprint(scene: Scene) -> str:
-    """Hash of the scene and of the reduced model it names: points of another scene are not taken over."""
-    digest = hashlib.sha256(json.dumps(scene.to_dict(), sort_keys=True).encode())
-    if isinstance(scene.structure, Rom) and Path(scene.structure.file).is_file():
-        digest.update(Path(scene.structure.file).read_bytes())
-    return digest.hexdigest()
+def _one_by_one(grid: Grid | PointList, task: Task, lost: Future[Block], executor: Executor | None) -> Block:
+    """The points of a task that was lost, each as a task of its own."""
+    blocks, state = [], task.start
+    for point in task.points:
+        alone = Task([point], task.linked, state, task.chain)
+        # a lone point need not be tried again, unless others may have broken the pool
+        known = len(task.points) == 1 and not lost.cancelled() and not isinstance(lost.exception(), BrokenExecutor)
+        future = lost if known else _submit(grid, alone, executor)
+        error = future.exception()
+        blocks.append(future.result() if error is None else broken(error))
+        state = state if blocks[-1].final is None else blocks[-1].final
+    texts = [text for block in blocks for text in block.texts]
+    return Block(np.concatenate([block.values for block in blocks]), texts, state if task.linked else None)

@@ -64,6 +64,25 @@ def record_start(system, motion, records):
 
 
 @inlined
+def open_step(system, motion, records, k, q, v, before):
+    """Keep the state that step k of the period begins with in q, v (N,) and before (friction rows,); take a sample."""
+    copy(motion.q, q)
+    copy(motion.v, v)
+    copy(motion.elongation, before)
+    sample(system, motion, records, k, q)
+
+
+@inlined
+def close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest):
+    """Follow contacts and account for step k from what `open_step` kept; speed (r,) of the rows at its start.
+
+    Returns DONE, DIVERGED or PENETRATION.
+    """
+    follow_contacts(system, motion, records, log, k, speed, impulse)
+    return tally(system, motion, records, k, q, v, impulse, before, deepest)
+
+
+@inlined
 def tally(system, motion, records, k, q, v, impulse, before, deepest):
     """Account for step k of the period, from q, v to motion.q, motion.v, with the impulses (r,) of the rows.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import glob
 import io
 import json
 import math
@@ -105,9 +106,12 @@ def save(
 ) -> None:
     """Write a record of the given kind. A variable named like a dimension is that dimension's coordinate.
 
-    Strings and lists of strings become UTF-8 text; dictionaries among the attributes become JSON text.
+    Strings and lists of strings become UTF-8 text; dictionaries among the attributes become JSON text. Equal records
+    become equal files, byte by byte. Raises StoreError when the file cannot be written: a full disk, no permission.
     """
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+    # in memory first: a write that fails within HDF5 ends the whole process, sooner or later
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
         file.attrs["kind"] = kind
         file.attrs["schema_version"] = SCHEMA_VERSION
         for name, value in (attributes or {}).items():
@@ -127,6 +131,20 @@ def save(
             for axis, dimension in enumerate(variable.dims):
                 if name != dimension:
                     file[name].dims[axis].attach_scale(file[dimension])
+    try:
+        with replacing(path) as temporary, temporary.open("wb") as stream:
+            stream.write(image.getbuffer())
+            stream.flush()
+            os.fsync(stream.fileno())  # the new name must not reach the disk before the content
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be written ({error.strerror})") from error
+
+
+def clear_leftovers(path: str | os.PathLike[str]) -> None:
+    """Remove the temporary files that killed writers of `path` have left beside it."""
+    target = Path(path)
+    for file in target.parent.glob(f".{glob.escape(target.stem)}-{'?' * 8}{glob.escape(target.suffix)}"):
+        file.unlink(missing_ok=True)
 
 
 def load(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -137,6 +155,13 @@ def load(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, Any], dict[
         file = h5py.File(path, "r")
     except OSError as error:
         raise StoreError(f"{path}: not a readable HDF5 file ({error})") from error
+    try:
+        return _record(path, kind, file)
+    except (OSError, RuntimeError) as error:  # opened, and yet damaged
+        raise StoreError(f"{path}: not a readable HDF5 file ({error})") from error
+
+
+def _record(path: str | os.PathLike[str], kind: str, file: h5py.File) -> tuple[dict[str, Any], dict[str, Any]]:
     with file:
         found = file.attrs.get("kind")
         if found != kind:

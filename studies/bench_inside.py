@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from coupling import automaton, state
+from coupling import automaton, engine, state
 from coupling.engine import _Run
 from coupling.ledger import account
 from coupling.scene import Scene
@@ -31,11 +31,11 @@ def awake_modes(scene: Scene, first: int, last: int) -> float:
 
 
 def time_of_a_period(scene: Scene, lengths: tuple[int, int]) -> float:
-    """Mean seconds of the periods from the first to the second of two, in one run."""
+    """Mean seconds of the periods from the first to the second of two, in one run of the scene's method."""
     first, last = lengths
-    run = _begun(scene, last)
-    run.advance(first, scene.solver.max_events)
-    return seconds(run.advance, last, scene.solver.max_events) / (last - first)
+    run = engine._run_of(scene.replace({"time.periods": last, "time.transient": 0}), False, 0)
+    run.advance_to(first)
+    return seconds(run.advance_to, last) / (last - first)
 
 
 def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:

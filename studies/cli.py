@@ -1,4 +1,4 @@
-"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, import, run, sweep, report, demo, bench."""
+"""The command `vanedamp`: mesh, modal, calibrate, matrices, reduce, import, run, sweep, optimise, paper, report ..."""
 
 from __future__ import annotations
 
@@ -159,6 +159,15 @@ def _parser() -> argparse.ArgumentParser:
 
     sweep = with_json(command("sweep", "a run at every point of the scene's [sweep] grid", "SCENE.toml", "SWEEP.h5"))
     sweep.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
+    sweep.add_argument(
+        "--resume", action="store_true",
+        help="go on where the sweep was killed, or fail; without it, it goes on if it can and begins if it must",
+    )  # fmt: skip
+
+    optimise = with_json(
+        command("optimise", "mass, gap and number of bodies that reduce most", "STUDY.toml", "OPTIMUM.h5")
+    )
+    optimise.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
 
     report = command("report", "one HTML page of results", None, "REPORT.html", required=True)
     report.add_argument(
@@ -168,16 +177,22 @@ def _parser() -> argparse.ArgumentParser:
         help="results of modal, reduce, run and sweep (.h5), studies (.claims.json)",
     )
 
+    paper = command("paper", "the paper's figures as studies, each claim with a verdict", None, "DIR", required=True)
+    paper.add_argument("studies", nargs="*", metavar="STUDY", help="fig9 ... systems (default: all; docs/paper.md)")
+    paper.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
+    paper.add_argument("--resume", action="store_true", help="take over what the folder has of the same scenes")
+
     demo = command("demo", "the whole pipeline on the shipped mesh", None, "DIR")
     demo.set_defaults(output="out")
     demo.add_argument("--workers", type=_some, metavar="N", help="processes (default: one for every core)")
 
     bench = command("bench", "how fast and how exact the methods are, measured here", None, "DIR", required=True)
     bench.add_argument(
-        "study", choices=("engine", "modal", "ladder", "work-precision", "stability"),
+        "study", choices=("engine", "modal", "sweep", "ladder", "work-precision", "stability"),
         help="engine: the exact engine against a hand-written loop and solve_ivp; modal: time and memory of ten modes "
-        "beside scipy's solvers; ladder: contact laws and numbers of modes of reduced models, and their choice; "
-        "work-precision: speed against accuracy of all methods; stability: where methods fail",
+        "beside scipy's solvers; sweep: time and memory of sweeps of up to 100 000 scenes; ladder: contact laws and "
+        "numbers of modes of reduced models, and their choice; work-precision: speed against accuracy of all methods; "
+        "stability: where methods fail",
     )  # fmt: skip
     bench.add_argument("--quick", action="store_true", help="seconds instead of minutes, and rougher figures")
     return parser

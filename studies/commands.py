@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coupling.inputs import InputError
-from modal.store import finite, json_text, write_json
+from modal.store import clear_leftovers, finite, json_text, write_json
 from studies.terminal import progress, tell_calibration, tell_modes, tell_sweep
 from studies.workers import workers
 
@@ -175,24 +175,57 @@ def run(arguments: Namespace) -> None:
 def sweep(arguments: Namespace) -> None:
     """A grid of runs; finished points are kept beside the result and taken up again after a kill."""
     _check_outputs(arguments)
+    checkpoint = None if arguments.output is None else Path(f"{arguments.output}.partial")
+    if arguments.resume and (checkpoint is None or not checkpoint.exists()):
+        raise InputError(
+            "--resume: name the result with -o, its checkpoint lies beside it"
+            if checkpoint is None
+            else f"--resume: nothing to resume, there is no checkpoint {checkpoint}; leave --resume out to begin"
+        )
     scene = _load_scene(arguments.input)
-    from coupling.sweep import estimate_of, grid
+    from coupling.checkpoint import Checkpoint, clear
+    from coupling.grid import grid
     from coupling.sweep import sweep as run_sweep
     from studies.provenance import versions
 
-    grid(scene)  # processes are slow to start: a bad grid is told before
-    _tell_choice(arguments.input, estimate_of(scene))
-
-    checkpoint = None if arguments.output is None else Path(f"{arguments.output}.partial")
+    # processes are slow to start: a bad grid or the checkpoint of another sweep is told before
+    points, provenance = grid(scene), {"versions": versions()}
+    resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
+    _tell_choice(arguments.input, points.estimate)
     with workers(arguments.workers) as pool, progress("sweep") as report:
-        result = run_sweep(scene, pool, report, checkpoint, {"versions": versions()})
+        started = time.perf_counter()
+        result = run_sweep(points, pool, report, checkpoint, provenance)
     if arguments.output:
         result.save(arguments.output)
-    _write_json(arguments.json, result.to_json())
+    took = time.perf_counter() - started
+    # times are told, and not kept in the result, which is the same however it came about
+    told = {"points_resumed": resumed, "wall_time_s": took, "points_per_second": (points.size - resumed) / took}
+    _write_json(arguments.json, result.to_json() | told)
     if checkpoint is not None:
-        checkpoint.unlink(missing_ok=True)
+        clear(checkpoint)
+        clear_leftovers(arguments.output)
     if arguments.json != "-":
         tell_sweep(result)
+        print(f"{points.size} points, {resumed} of them from the checkpoint, in {took:.1f} s")
+
+
+def optimise(arguments: Namespace) -> None:
+    """Mass, gap and number of bodies that reduce most, as designed and within tolerances."""
+    _check_outputs(arguments)
+    from studies.optimise import optimise as search
+    from studies.optimise_study import Study
+    from studies.provenance import versions
+
+    study = Study.load(arguments.input)
+    with workers(arguments.workers) as pool, progress("optimise") as report:
+        found = search(study, pool, report, {"versions": versions()})
+    if arguments.output:
+        found.save(arguments.output)
+    _write_json(arguments.json, found.to_json())
+    if arguments.json != "-":
+        print(found.sentence)
+        if found.trouble:
+            print(f"{found.trouble} of {found.scenes} scenes are not ok")
 
 
 def report(arguments: Namespace) -> None:
@@ -203,6 +236,13 @@ def report(arguments: Namespace) -> None:
 
     write_report(collect(arguments.inputs), arguments.output)
     print(f"{arguments.output}: report")
+
+
+def paper(arguments: Namespace) -> None:
+    """The paper's figures as studies."""
+    from studies.paper import run_paper
+
+    run_paper(_folder(arguments), arguments.studies, arguments.workers, arguments.resume)
 
 
 def demo(arguments: Namespace) -> None:
@@ -216,6 +256,7 @@ def demo(arguments: Namespace) -> None:
 _BENCHES = {
     "engine": ("bench_engine", "run_bench", "bench_engine"),
     "modal": ("bench_modal", "run_bench", "bench_modal"),
+    "sweep": ("bench_sweep", "run_bench", "bench_sweep"),
     "ladder": ("model_ladder", "run_ladder", "ladder"),
     "work-precision": ("work_precision", "run_work_precision", "work_precision"),
     "stability": ("stability", "run_stability", "stability"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,8 @@ from coupling.scene import Scene
 from studies import bench_scenes
 
 if TYPE_CHECKING:
-    from studies.full_elements import ExplicitRun
+    from modal.matrices import SystemMatrices
+    from rom.interface import Interface
 
 #: methods by the name in charts: options of [solver] besides the number of steps
 STEPPING: dict[str, dict[str, Any]] = {
@@ -61,46 +63,65 @@ def double() -> Scene:
     return validate(Scene, data, "scene")
 
 
-def cluster(folder: Path, modes: int) -> Scene:
-    """The shipped cluster, of linear elements, as a reduced model (made in the folder once), with soft walls."""
-    file = folder / f"cluster_{modes}.h5"
-    if not file.is_file():
-        _cluster_model(file, modes)
-    data = {
-        "structure": {"model": "rom", "file": str(file)},
-        "excitation": {
-            "frequency": _first(file), "at": "shroud", "resonance_amplitude": bench_scenes.AMPLITUDE
-        },
-        "gravity": {"acceleration": 0.0},
-        "contact": {"law": "compliant", "stiffness": 3e7},
-        "cavity": [{"name": "c1", "gap": 0.2 * bench_scenes.AMPLITUDE, "floor": "c1_floor"}],
-        "damper": [{"cavity": "c1", "mass": 0.003, "restitution": 0.7}],
-    }  # fmt: skip
-    return validate(Scene, data, "scene")
+@dataclass(frozen=True)
+class Cluster:
+    """A cluster of linear elements in a folder: its mesh, and reduced models of it with a body on soft walls.
 
+    size: of the elements, m (None: the shipped mesh); lumped: reduce the mesh with the row sums of its mass.
+    """
 
-def _cluster_model(file: Path, modes: int) -> None:
-    from meshes.vane_cluster import SHIPPED
-    from studies.config import Case
-    from studies.pipeline import assemble, reduction
+    folder: Path
+    size: float | None = None
+    lumped: bool = False
 
-    shutil.copy(SHIPPED, file.parent / "vane_cluster.msh")
-    text = Path(__file__).with_name("demo_case.toml").read_text(encoding="utf-8")
-    case = file.with_suffix(".toml")
-    case.write_text(text.replace("degree = 2", "degree = 1"), encoding="utf-8")
-    reduction(assemble(Case.load(case)), modes).save(file)
+    def scene(self, modes: int) -> Scene:
+        """One body at the first natural frequency of the model with so many fixed-interface modes."""
+        file = self.folder / f"cluster_{modes}.h5"
+        if not file.is_file():
+            self._reduce(file, modes)
+        data = {
+            "structure": {"model": "rom", "file": str(file)},
+            "excitation": {
+                "frequency": _first(file), "at": "shroud", "resonance_amplitude": bench_scenes.AMPLITUDE
+            },
+            "gravity": {"acceleration": 0.0},
+            "contact": {"law": "compliant", "stiffness": 3e7},
+            "cavity": [{"name": "c1", "gap": 0.2 * bench_scenes.AMPLITUDE, "floor": "c1_floor"}],
+            "damper": [{"cavity": "c1", "mass": 0.003, "restitution": 0.7}],
+        }  # fmt: skip
+        return validate(Scene, data, "scene")
 
+    def elements(self) -> tuple[SystemMatrices, Interface]:
+        """The mesh without reduction: its matrices, as they are, and the interface."""
+        from studies.config import Case
+        from studies.pipeline import assemble, interface
 
-def cluster_elements(folder: Path, modes: int, scene: Scene, periods: int) -> ExplicitRun:
-    """The scene of `cluster` on its mesh, without reduction."""
-    from studies.config import Case
-    from studies.full_elements import explicit_run
-    from studies.pipeline import assemble, interface
+        case = Case.load(self._case())
+        matrices = assemble(case).matrices
+        return matrices, interface(case, matrices)
 
-    case = Case.load(folder / f"cluster_{modes}.toml")
-    matrices = assemble(case).matrices
-    first = 2 * math.pi * _first(folder / f"cluster_{modes}.h5")
-    return explicit_run(matrices, interface(case, matrices), scene, first, periods)
+    def _case(self) -> Path:
+        """The case file, written with its mesh on the first call."""
+        case = self.folder / "cluster.toml"
+        if not case.is_file():
+            from meshes.vane_cluster import SHIPPED, VaneCluster, build
+
+            self.folder.mkdir(parents=True, exist_ok=True)
+            mesh = self.folder / "vane_cluster.msh"
+            if self.size is None:
+                shutil.copy(SHIPPED, mesh)
+            else:
+                build(VaneCluster(element_size=self.size), mesh)
+            text = Path(__file__).with_name("demo_case.toml").read_text(encoding="utf-8")
+            case.write_text(text.replace("degree = 2", "degree = 1"), encoding="utf-8")
+        return case
+
+    def _reduce(self, file: Path, modes: int) -> None:
+        from rom.craig_bampton import reduce
+        from studies.full_elements import lumped
+
+        matrices, interface = self.elements()
+        reduce(lumped(matrices) if self.lumped else matrices, interface, modes).save(file)
 
 
 def _first(file: Path) -> float:

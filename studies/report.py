@@ -20,10 +20,12 @@ from coupling.sweep import LOSSES, Sweep
 from modal.store import replacing
 from rom.reduced import ReducedModel
 from studies import figures
-from studies.charts import Chart, chart
+from studies.charts import Chart, chart, dressed
 from studies.forced_response import ForcedResponse, forced_responses, model_name, shown
 from studies.history import History, history_figure
 from studies.mode_figure import is_small, mode_figure, mode_rows
+from studies.optimisation import Optimisation
+from studies.optimise_figures import optimisation_figure
 from studies.pictures import mode_picture
 from studies.provenance import versions
 from studies.response_map import map_axes, map_figure, map_rows
@@ -63,10 +65,14 @@ def write_report(results: Results, path: str | Path) -> None:
     html = template.render(
         plotly=plotly.offline.get_plotlyjs(),
         charted=any(section.groups or section.maps or section.histories for section in sections)
+        or bool(results.optimisations)
         or any(analysis["chart"] for analysis in analyses),
         sections=sections,
         analyses=analyses,
         reductions=[_reduction(name, model) for name, model in results.reduced.items()],
+        optimisations=[
+            _optimisation(number, file, found) for number, (file, found) in enumerate(results.optimisations.items())
+        ],
         provenance=_provenance(results),
         scenes=scenes,
         keys=list(dict.fromkeys(key for scene in scenes.values() for key in scene)),
@@ -171,6 +177,19 @@ def _history(number: int, name: str, history: History) -> dict[str, Any]:
     return {"file": name, "chart": drawn, "measures": history.measures}
 
 
+def _optimisation(number: int, file: str, found: Optimisation) -> dict[str, Any]:
+    """The optima, and the map of the reduction that they stand in."""
+    figure = dressed(optimisation_figure(found), height=560)
+    header = ("mass_ratio", "gap_ratio", "relative_amplitude")
+    rows = (
+        (mass, gap, found.map_amplitude[i, j])
+        for i, mass in enumerate(found.map_mass_ratio.tolist())
+        for j, gap in enumerate(found.map_gap_ratio.tolist())
+    )
+    optima = {"as designed": found.nominal, "within the tolerances": found.robust}
+    return {"record": found, "optima": optima, "chart": chart(f"optimum-{number}", figure, header, rows, [file])}
+
+
 def _key_figures(response: ForcedResponse) -> dict[str, Any]:
     curves = ("undamped", "fixed", "damped_max", "damped_mean")
     peaks = {curve: response.peak(curve) for curve in curves}
@@ -227,7 +246,7 @@ def _provenance(results: Results) -> dict[str, dict[str, str]]:
     for file, (_, attributes) in results.modes.items():
         extra = json.loads(attributes.get("versions", "{}"))
         tables[file] = _flat({"matrices": json.loads(attributes["provenance"]), "versions": extra})
-    for file, record in (results.reduced | results.sweeps | results.histories).items():
+    for file, record in (results.reduced | results.sweeps | results.histories | results.optimisations).items():
         tables[file] = _flat({key: value for key, value in record.provenance.items() if key != "scene"})
     for file in results.names:
         tables[file]["sha256"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()

@@ -15,6 +15,7 @@ from coupling.sweep import Sweep
 from modal.store import StoreError, load
 from rom.reduced import ReducedModel
 from studies.history import History
+from studies.optimisation import Optimisation
 
 CLAIMS = ".claims.json"
 
@@ -48,12 +49,13 @@ class Results:
     reduced: dict[str, ReducedModel] = field(default_factory=dict)
     sweeps: dict[str, Sweep] = field(default_factory=dict)
     histories: dict[str, History] = field(default_factory=dict)
+    optimisations: dict[str, Optimisation] = field(default_factory=dict)
     studies: dict[str, Study] = field(default_factory=dict)
 
     @property
     def names(self) -> dict[str, str]:
         """What to call every file of a record."""
-        return short_names([*self.modes, *self.reduced, *self.sweeps, *self.histories])
+        return short_names([*self.modes, *self.reduced, *self.sweeps, *self.histories, *self.optimisations])
 
 
 def short_names(paths: Iterable[str]) -> dict[str, str]:
@@ -79,9 +81,9 @@ def collect(paths: Sequence[str | Path]) -> Results:
             raise InputError(f"{path}: no such file or folder")
         for file in [*sorted(path.glob("*.h5")), *sorted(path.glob(f"*{CLAIMS}"))] if path.is_dir() else [path]:
             if not _read(file, results) and not path.is_dir():
-                raise InputError(f"{file}: holds no result of modal, reduce, run, sweep or paper")
+                raise InputError(f"{file}: holds no result of modal, reduce, run, sweep, optimise or paper")
     if not any(vars(results).values()):
-        raise InputError(f"{', '.join(map(str, paths))}: no results of modal, reduce, run, sweep or paper")
+        raise InputError(f"{', '.join(map(str, paths))}: no results of modal, reduce, run, sweep, optimise or paper")
     return results
 
 
@@ -100,6 +102,8 @@ def _read(file: Path, results: Results) -> bool:
             results.sweeps[name] = Sweep.load(file)
         case "response":
             results.histories[name] = History.load(file)
+        case "optimisation":
+            results.optimisations[name] = Optimisation.load(file)
         case _:
             return False
     return True

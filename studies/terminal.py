@@ -9,12 +9,14 @@ from typing import Any
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on standard error, on a terminal only."""
+    """A progress bar on standard error with rate and time left, on a terminal only."""
     from tqdm import tqdm
 
     with tqdm(desc=title, disable=None, leave=False) as bar:
 
         def show(done: int, total: int) -> None:
+            if bar.total is None:
+                bar.initial = bar.n = done  # what was done before tells nothing of the rate
             bar.total = total
             bar.update(done - bar.n)
 

@@ -4,13 +4,53 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from typing import Any
+
+
+class WorkerPool(Executor):
+    """A process pool that starts anew after the death of a worker, which breaks a pool of the standard library."""
+
+    def __init__(self, count: int) -> None:
+        self._max_workers = count
+        self._pool = self._new()
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
+        """Run a call in a worker. What a broken pool has lost is not run again."""
+        try:
+            return self._pool.submit(function, *arguments, **options)
+        except BrokenExecutor:
+            self._pool.shutdown(wait=False)
+            self._pool = self._new()
+            return self._pool.submit(function, *arguments, **options)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the workers."""
+        self._pool.shutdown(wait, cancel_futures=cancel_futures)
+
+    def _new(self) -> ProcessPoolExecutor:
+        # fresh processes: a fork of one that holds MPI or threads is not safe
+        context = multiprocessing.get_context("spawn")
+        return ProcessPoolExecutor(self._max_workers, mp_context=context, initializer=_end_with_parent)
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent was killed would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager
-def workers(count: int | None) -> Iterator[ProcessPoolExecutor | None]:
+def workers(count: int | None) -> Iterator[Executor | None]:
     """Worker processes with the engine compiled, one for every core unless told; None for a single one."""
     count = count or available_cores()
     if count == 1:
@@ -32,6 +72,6 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def new_pool(count: int) -> ProcessPoolExecutor:
-    """Fresh processes: a fork of one that holds MPI or threads is not safe."""
-    return ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
+def new_pool(count: int) -> WorkerPool:
+    """A pool of so many processes."""
+    return WorkerPool(count)

@@ -4,6 +4,7 @@ import copy
 
 import pytest
 
+from coupling.grid import grid
 from coupling.inputs import InputError, validate
 from coupling.scene import Scene
 
@@ -81,12 +82,11 @@ def test_replace_by_dotted_path():
 
 
 def test_sweep_is_the_product_of_its_axes():
-    axes, points = validate(Scene, GOOD, "scene.toml").sweep_points()
-    points = list(points)
-    assert list(axes) == ["excitation.frequency", "cavity.c1.gap"]
-    assert points[0] == {"excitation.frequency": 2350.0, "cavity.c1.gap": 2e-5}
-    assert points[-1] == {"excitation.frequency": 2450.0, "cavity.c1.gap": 1e-5}
-    assert len(points) == 6
+    points = grid(validate(Scene, GOOD, "scene.toml"))
+    assert list(points.axes) == ["excitation.frequency", "cavity.c1.gap"]
+    assert points.values(0) == {"excitation.frequency": 2350.0, "cavity.c1.gap": 2e-5}
+    assert points.values(5) == {"excitation.frequency": 2450.0, "cavity.c1.gap": 1e-5}
+    assert points.size == 6
 
 
 def test_broken_files(tmp_path):

@@ -13,6 +13,7 @@ from coupling.engine import simulate
 from coupling.inputs import InputError, validate
 from coupling.response import Status
 from coupling.scene import Scene
+from studies.method_scenes import double
 
 METHODS = {
     "moreau": {"method": "moreau"},
@@ -178,6 +179,29 @@ def test_bodies_in_one_cavity_share_their_losses(periodic, name):
     response = simulate(by(scene, **METHODS[name], steps_per_period=2000))
     assert response.status is Status.OK and response.energy_residual < 1e-3
     assert response.amplitude_mean == pytest.approx(exact.amplitude_mean, rel=0.08)
+
+
+def test_bodies_in_a_row_part_after_impacts_within_one_step():
+    """Wall, body and neighbour collide within a step: with one impact law for all three, the two would fly as one.
+
+    Such a pair keeps to 1.39 times the mean amplitude, in the exact engine too if it starts as one, but 1e-9 of the gap
+    between the bodies parts it there.
+    """
+    scene = double().replace({"time.periods": 900, "time.transient": 300})
+    exact = simulate(scene)
+    response = simulate(by(scene, method="moreau", steps_per_period=300))
+    assert response.status is Status.OK
+    assert response.amplitude_mean == pytest.approx(exact.amplitude_mean, rel=0.04)
+    assert response.impacts_per_period == pytest.approx(exact.impacts_per_period, rel=0.06)
+    left, right = (0.9 * scene.damper[0].position,) * 2
+    pair = simulate(scene.replace({"damper.0.position": left, "damper.1.position": right}))
+    assert pair.amplitude_mean == pytest.approx(1.39 * exact.amplitude_mean, rel=0.02)
+
+
+def test_a_slip_that_turns_twice_in_a_step_does_not_stand_still():
+    """The second turn, in the step in which the first slip has begun from rest, is not taken for the first again."""
+    scene = double().replace({"time.periods": 30, "time.transient": 0})
+    assert simulate(by(scene, method="solve_ivp", rtol=1e-4, steps_per_period=10)).status is Status.OK
 
 
 def test_impacts_are_logged(periodic):

@@ -17,6 +17,7 @@ from coupling.scene import Scene
 from coupling.sweep import Sweep
 from modal.eigen import Modes
 from modal.matrix_files import read_folder
+from modal.store import load
 from rom.reduced import ReducedModel
 from studies import commands
 from studies.cli import BAD_INPUT, _parser, main
@@ -204,6 +205,22 @@ def test_sweep(folder, capsys):
     result = json.loads((folder / "sweep.json").read_text())
     assert result["amplitude_max"] == found.amplitude_max.tolist()
     assert not (folder / "sweep.h5.partial").exists()
+    assert result["points_resumed"] == 0 and result["wall_time_s"] > 0
+
+
+def test_foreign_checkpoints_are_told_and_kept(folder, capfd):
+    partial = folder / "sweep.h5.partial"
+    for arguments, told in (
+        (["--resume"], "scene.toml: --resume: nothing to resume, there is no checkpoint sweep.h5.partial"),
+        ([], "sweep.h5.partial: a checkpoint that cannot be read"),
+    ):
+        assert main(["sweep", "scene.toml", "-o", "sweep.h5", *arguments]) == BAD_INPUT
+        error = capfd.readouterr().err
+        assert told in error and error.count("\n") == 1
+        partial.write_text("of another program")
+    assert partial.read_text() == "of another program" and not (folder / "sweep.h5").exists()
+    assert main(["sweep", "scene.toml", "--resume"]) == BAD_INPUT
+    assert "name the result with -o" in capfd.readouterr().err
 
 
 def test_sweep_of_a_reduced_model_by_two_workers(folder, capsys):
@@ -325,7 +342,7 @@ def test_bad_reduced_models(command, folder, rom, capfd):
         (["modal", "case.toml", "--vtk", "modes.stl"], "expected a file name ending in .vtu or .vtk"),
         (["mesh", "case.toml", "-o", "block.vtk"], "expected a file name ending in .msh"),
         (["report", "case.toml", "-o", "report.html"], "case.toml: not a readable HDF5 file"),
-        (["report", ".", "-o", "report.html"], "no results of modal, reduce, run, sweep or paper"),
+        (["report", ".", "-o", "report.html"], "no results of modal, reduce, run, sweep, optimise or paper"),
         (["report", "nowhere", "-o", "report.html"], "nowhere: no such file or folder"),
         (["report", ".", "-o", "report.pdf"], "expected a file name ending in .html"),
     ],
@@ -412,8 +429,8 @@ def test_killed_sweep_keeps_the_old_file_and_goes_on(folder):
     finished = subprocess.run([sys.executable, "-c", killer, *arguments], cwd=folder, env=environment, check=False)
     assert finished.returncode == -signal.SIGKILL
     assert (folder / "sweep.h5").read_text() == "precious"
-    assert len((folder / "sweep.h5.partial").read_text().splitlines()) == 1 + 2
-    assert main(arguments) == 0
+    assert 1 <= len(load("sweep.h5.partial", "sweep-checkpoint")[0]["point"]) <= 2
+    assert main([*arguments, "--resume"]) == 0
     assert Sweep.load("sweep.h5").shape == (4,)
     assert not (folder / "sweep.h5.partial").exists()
 

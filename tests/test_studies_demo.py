@@ -1,19 +1,18 @@
 """The demonstration, and what the paper says that it must show: impact mistuning."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from coupling.scene import Scene
 from coupling.sweep import Sweep, sweep
-from modal.calibrate import RigidModel
 from studies import demo
 from studies.forced_response import forced_responses
+from studies.paper_figure import Effort, PaperFigure, Structure
 
 MASS, FREQUENCY, RATIO, AMPLITUDE = 0.157, 2412.0, 0.002, 70e-6
-STIFFNESS = MASS * (2 * math.pi * FREQUENCY) ** 2
-RIGID = RigidModel(MASS, STIFFNESS, 2 * RATIO * math.sqrt(MASS * STIFFNESS), RATIO, "shroud", FREQUENCY)
+STRUCTURE = Structure(MASS, MASS * (2 * math.pi * FREQUENCY) ** 2, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
 
 
 def shows_impact_mistuning(response, first, fixed, peak):
@@ -34,34 +33,32 @@ def shows_impact_mistuning(response, first, fixed, peak):
     assert response.damped_mean[response.x == response.peak("undamped")[0]][0] < 0.12 * response.reference
 
 
-def test_rigid_model_shows_impact_mistuning(tmp_path, monkeypatch):
-    monkeypatch.setitem(demo._POINTS, "rigid", 41)
-    body = 0.02 * MASS
-    peaks = demo._peaks(np.eye(1) * MASS, np.eye(1) * STIFFNESS, np.ones(1), body)
-    fixed = FREQUENCY / math.sqrt(1 + body / MASS)
-    assert peaks == pytest.approx([fixed, FREQUENCY], rel=1e-12)
-    demo._write_scene(tmp_path, "rigid", peaks, RIGID, body, AMPLITUDE)
-    scene = Scene.load(tmp_path / "scene_rigid.toml")
-    assert scene.cavity[0].gap == pytest.approx(AMPLITUDE / 2)
-    assert scene.gravity.orientation_deg == 0.0
-    (response,) = forced_responses(sweep(scene))
+def test_rigid_model_shows_impact_mistuning():
+    (scene,) = PaperFigure.load("fig9", STRUCTURE, Effort(points=41, periods=1000, transient=600)).scenes.values()
+    frequencies = scene.to_dict()["sweep"]["excitation.frequency"]
+    half = scene.replace({"cavity.c1.gap": AMPLITUDE / 2, "sweep": {"excitation.frequency": frequencies}})
+    (response,) = forced_responses(sweep(half))
     assert response.trouble == 0
-    shows_impact_mistuning(response, FREQUENCY, fixed, peak=(0.35, 0.6))
+    shows_impact_mistuning(response, FREQUENCY, FREQUENCY / math.sqrt(1.02), peak=(0.35, 0.6))
 
 
 @pytest.mark.slow
 def test_demo_leaves_every_file_of_the_pipeline(tmp_path, capfd):
     report = demo.run_demo(tmp_path / "out", workers=2)
-    names = "case.toml modes.h5 report.html rom.h5 scene_rigid.toml scene_rom.toml sweep_rigid.h5 sweep_rom.h5"
-    assert {path.name for path in report.parent.iterdir()} == {*names.split(), "vane_cluster.msh"}
+    stems = ["fig9", "fig10_single", "fig10_separate", "fig10_shared", "fig12_reduced", "fig12_rigid"]
+    names = {f"{stem}{suffix}" for stem in stems for suffix in (".toml", ".h5")}
+    names |= {f"{figure}{suffix}" for figure in demo.FIGURES for suffix in (".png", ".claims.json")}
+    names |= {"case.toml", "modes.h5", "report.html", "rom.h5", "summary.png", "vane_cluster.msh"}
+    assert {path.name for path in report.parent.iterdir()} == names
     printed = capfd.readouterr().out
-    assert "vanedamp sweep scene_rom.toml -o sweep_rom.h5" in printed
-    for model, peak in {"rigid": (0.35, 0.6), "rom": (0.2, 0.6)}.items():
-        result = Sweep.load(report.parent / f"sweep_{model}.h5")
-        assert set(result.status) == {"ok"}
-        assert result.energy_residual.max() < 1e-9
-        (response,) = forced_responses(result)
+    assert "vanedamp sweep fig9.toml -o fig9.h5" in printed
+    curves = {"fig9": 1, "fig12_reduced": 0, "fig12_rigid": 0}
+    for stem, index in curves.items():
+        result = Sweep.load(report.parent / f"{stem}.h5")
+        assert set(result.status.ravel()) == {"ok"}
+        assert result.energy_residual.max() < 1e-8
+        response = forced_responses(result)[index]
         first = response.peak("undamped")[0]
         assert first == pytest.approx(2412.0, rel=1e-3)
-        shows_impact_mistuning(response, first, response.peak("fixed")[0], peak)
+        shows_impact_mistuning(response, first, response.peak("fixed")[0], (0.35, 0.6))
         assert response.peak("fixed")[0] / first == pytest.approx(1 / math.sqrt(1.02), rel=1e-3)

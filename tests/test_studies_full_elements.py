@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from structures import rod
 
 from coupling.engine import simulate
@@ -11,7 +12,8 @@ from coupling.inputs import InputError, validate
 from coupling.scene import Scene
 from rom.craig_bampton import reduce
 from rom.interface import Interface, InterfaceCoordinate
-from studies.full_elements import explicit_run
+from studies.full_elements import explicit_run, glued_frequencies_hz, lumped
+from studies.whole_mesh import CurveEffort, curve, ladder
 
 
 @pytest.fixture(scope="module")
@@ -44,3 +46,37 @@ def test_other_scenes_are_refused(case):
     matrices, tip, scene = case
     with pytest.raises(InputError, match="without friction"):
         explicit_run(matrices, tip, scene.replace({"damper.0.friction": 0.1}), 1.0, 1)
+
+
+def test_fixed_frequency_of_a_rod_with_a_body_at_its_tip(case):
+    """k tan k = 1 / m for a clamped unit rod with a body m at its end; lumped mass comes to it from below."""
+    matrices, tip, scene = case
+    free, glued = glued_frequencies_hz(matrices, tip, scene)
+    assert free == pytest.approx(0.25, rel=1e-3)
+    exact = brentq(lambda k: k * math.tan(k) - 1 / scene.damper[0].mass, 1e-3, math.pi / 2 - 1e-9) / (2 * math.pi)
+    assert glued == pytest.approx(exact, rel=1e-3) and glued < exact
+
+
+def test_lumping_keeps_the_mass(case):
+    matrices, _, _ = case
+    assert lumped(matrices).mass.sum() == pytest.approx(matrices.mass.sum())
+    assert lumped(matrices).mass.nnz <= matrices.mass.shape[0]
+
+
+@pytest.mark.slow
+def test_damped_curve_of_a_mesh_is_that_of_its_reduced_model(tmp_path):
+    """Rougher mesh and fewer periods than the benchmark's; its transients are the same in both."""
+    effort = CurveEffort(size=0.014, modes=10, periods=60, dropped=30, points=7)
+    made = curve(tmp_path, effort)
+    assert abs(made["fixed_error"]) < 2e-3
+    assert abs(made["peak_error"]) < 0.05
+    assert made["impacts_below_above"][1] > 0
+    assert len(made["peak_hz"]) == len(made["mesh_peak"])
+
+
+@pytest.mark.slow
+def test_reduced_models_come_to_the_whole_mesh(tmp_path):
+    made = ladder(tmp_path, (0, 1, 6), 1, np.random.default_rng(1))
+    assert made["error"][0] > made["error"][1] > made["error"][2] == 0
+    assert made["full"]["error"] < 0.02 and made["speed_up"]["factor"] > 100
+    assert made["full"]["free_dofs"] > 10_000 and made["full"]["curve_days"] > 0

@@ -2,12 +2,17 @@
 
 import csv
 import json
+import math
 
 import numpy as np
 import pytest
 
 from studies import stability, work_precision
 from studies.cli import main
+from studies.failing import DAMPING
+from studies.failure_maps import CO_SIMULATIONS, MAPS, MapEffort
+from studies.macro_step import macro_step
+from studies.peers import PEERS
 
 SMALL = stability.Effort(points=2, runs=3, modes=(0, 1, 2, 5, 10, 20))
 
@@ -50,6 +55,33 @@ def test_touches_shorter_than_a_step_are_missed_by_signs_alone():
     assert not any(part["curves"]["exact engine"])
 
 
+SMALL_MAP = MapEffort(across=2, up=2, phases=40, modes=(0, 2, 5))
+
+
+DEAR = {"missed impacts", *CO_SIMULATIONS}
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in DEAR else n for n in MAPS])
+def test_edges_of_the_maps_lie_on_the_analytic_limits(name):
+    """2/omega, 2 v_reg m*/(mu N), spectral radii of macro-steps, durations of touches, the contact mass of a rod."""
+    made = MAPS[name](SMALL_MAP)
+    edge, limit = (np.array(made[key], float) for key in ("edge", "limit"))
+    known = np.isfinite(limit)
+    assert known.any() and (np.isfinite(edge) == known).all()
+    np.testing.assert_allclose(edge[known], limit[known], rtol=0.05)
+    assert np.shape(made["value"]) == (len(made["y"]), len(made["x"]))
+    assert not made.get("missed_by_exact")
+
+
+def test_macro_step_of_a_far_too_light_body_is_the_structure_alone():
+    """Without a contact the structure's unit is exact: its multipliers are exp(lambda h), the body's 1."""
+    h = 0.1
+    matrix = macro_step(h, 1.0, 0.0, 0.0, "jacobi", 0)
+    decay = DAMPING / 2
+    size = np.sort(np.abs(np.linalg.eigvals(matrix)))[-4:]
+    np.testing.assert_allclose(size, [math.exp(-decay * h)] * 2 + [1, 1], rtol=1e-7)
+
+
 def test_work_precision_leaves_its_results(tmp_path, capsys):
     effort = work_precision.Effort(1, (100, 1000), (1e-6,), 2, 60, 200, 2, 1e5, 2000, None, ())
     result = work_precision.run_work_precision(tmp_path, effort)
@@ -62,6 +94,9 @@ def test_work_precision_leaves_its_results(tmp_path, capsys):
     assert chart["classification"] == "periodic-1"
     coarse, fine = (point["error"] for point in chart["points"] if point["method"] == "Moreau-Jean")
     assert fine < 0.3 * coarse
+    assert set(chart["absent"]) <= set(PEERS)
+    cvode = [point for point in chart["points"] if point["method"] == "SUNDIALS CVODE"]
+    assert "SUNDIALS CVODE" in chart["absent"] or cvode[0]["error"] < 1e-3
     work_precision.tell(result)
     assert "exact engine is" in capsys.readouterr().out
 

@@ -231,12 +231,12 @@ def test_names_are_escaped(results, tmp_path):
 
 
 def test_a_sweep_that_failed_everywhere_still_makes_a_page(results, tmp_path, monkeypatch):
-    import coupling.sweep
+    import coupling.points
 
-    def broken(_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("everywhere")
 
-    monkeypatch.setattr(coupling.sweep, "simulate", broken)
+    monkeypatch.setattr(coupling.points, "simulate", broken)
     sweep(validate(Scene, DATA | {"sweep": {"excitation.frequency": FREQUENCIES}}, "x")).save(tmp_path / "bad.h5")
     write_report(collect([tmp_path]), tmp_path / "report.html")
     assert "7 of 7 points ended with a status other than" in (tmp_path / "report.html").read_text(encoding="utf-8")

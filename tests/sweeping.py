@@ -1,0 +1,59 @@
+"""A small sweep, and sweeps as processes that can be killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import tomli_w
+
+from coupling.inputs import validate
+from coupling.scene import Scene
+
+ROOT = Path(__file__).resolve().parent.parent
+RESONANCE = 15.915494309189533
+DATA = {
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
+    "excitation": {"frequency": RESONANCE, "resonance_amplitude": 1e-3},
+    "cavity": [{"name": "c1", "gap": 5e-4}],
+    "damper": [{"cavity": "c1", "mass": 0.05, "friction": 0.3, "restitution": 0.6}],
+    "time": {"periods": 30, "transient": 10},
+    "sweep": {
+        "cavity.c1.gap": [5e-4, 2e-4],
+        "excitation.frequency": {"start": 0.97 * RESONANCE, "stop": 1.02 * RESONANCE, "num": 6},
+    },
+}
+
+
+def scene(**changes):
+    return validate(Scene, DATA | changes, "scene.toml")
+
+
+def write(folder, **changes):
+    (folder / "scene.toml").write_text(tomli_w.dumps(DATA | changes))
+
+
+def command(folder, *arguments, output="sweep.h5"):
+    """A sweep of the folder's scene.toml as a process."""
+    words = [sys.executable, "-m", "studies", "sweep", "scene.toml", "-o", output, *arguments]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen(words, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def stamp(path):
+    return path.stat().st_mtime_ns if path.exists() else 0
+
+
+def kill_after_a_flush(folder, delay, *arguments):
+    """Kill the sweep some time after its next checkpoint. Returns whether it was still running."""
+    partial = folder / "sweep.h5.partial"
+    before = stamp(partial)
+    process = command(folder, *arguments)
+    while stamp(partial) == before and process.poll() is None:
+        time.sleep(0.005)
+    time.sleep(delay)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    return process.returncode == -signal.SIGKILL

@@ -1,0 +1,211 @@
+"""The optimisation finds the optimum that is known, and keeps what it found. No test asserts a time."""
+
+import html
+import json
+import tomllib
+
+import numpy as np
+import pytest
+import tomli_w
+import xarray
+from sweeping import ROOT
+
+from coupling.engine import simulate
+from coupling.inputs import InputError
+from studies import optimise as module
+from studies.cli import BAD_INPUT, main
+from studies.optimisation import Optimisation
+from studies.optimise import deviations, optimise
+from studies.optimise_figures import optimisation_figure
+from studies.optimise_study import Design, Study
+
+EXAMPLE = ROOT / "docs" / "examples" / "optimise.toml"
+
+
+def study(folder, change=lambda data: None, quick=True):
+    """The example, with a tiny budget."""
+    data = tomllib.loads(EXAMPLE.read_text())
+    if quick:
+        data["time"] = {"periods": 60, "transient": 40}
+        data["optimise"] |= {"evaluations": 10, "samples": 3, "map": {"mass_ratio": 3, "gap_ratio": 2}}
+        data["optimise"]["band"] = {"start": 2380.0, "stop": 2430.0, "num": 3}
+    change(data)
+    path = folder / "optimise.toml"
+    path.write_text(tomli_w.dumps(data))
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("optimise")
+    calls = []
+    return optimise(Study.load(study(folder)), progress=lambda *call: calls.append(call), provenance={"a": 1}), calls
+
+
+def test_best_of_all_that_was_tried(found):
+    record, calls = found
+    nominal = record.history_amplitude[record.history_robust == 0]
+    assert record.nominal.amplitude == pytest.approx(nominal.min(), rel=1e-12)
+    assert record.robust.amplitude_tolerances <= record.nominal.amplitude_tolerances
+    assert record.nominal.amplitude <= record.nominal.amplitude_tolerances  # the design itself is in the sample
+    assert record.nominal_response.max() == pytest.approx(record.nominal.amplitude)
+    assert 0 < record.nominal.amplitude < 1
+    assert record.scenes == calls[-1][0] and record.trouble == 0
+    assert f"{record.scenes} scenes in" in record.sentence
+
+
+def test_designs_stay_within_their_bounds(found):
+    mass, gap, bodies = found[0].history_design.T
+    assert mass.min() >= 0.005 and mass.max() <= 0.05
+    assert gap.min() >= 0.1 and gap.max() <= 2.0
+    assert set(bodies) <= {1, 2, 3, 4} and len(set(bodies)) > 1
+
+
+def test_the_map_is_made_of_single_runs(found, tmp_path):
+    """A value of the map by the engine alone, with the scene put together by hand."""
+    record = found[0]
+    case = Study.load(study(tmp_path))
+    count = record.nominal.design.bodies
+    gap, total = record.map_gap_ratio[1] * 3e-5, record.map_mass_ratio[2] * 0.148
+    cavities = sorted(["c1", "c2"][i % 2] for i in range(count))
+    placed = [(name, cavities[:i].count(name) + 1, cavities.count(name) + 1) for i, name in enumerate(cavities)]
+    bodies = [
+        {"cavity": name, "mass": total / count, "friction": 0.4, "restitution": 0.7, "position": gap * (at / of - 0.5)}
+        for name, at, of in placed
+    ]
+    scene = case.scene.replace({"cavity.gap": gap, "damper": bodies})
+    peaks = [simulate(scene.replace({"excitation.frequency": f})).amplitude_mean for f in (2380.0, 2405.0, 2430.0)]
+    assert record.map_amplitude[2, 1] == pytest.approx(max(peaks) / 3e-5, rel=1e-9)
+
+
+def test_undamped_response_is_the_closed_form(found):
+    omega, first = 2 * np.pi * found[0].frequency, np.sqrt(3.4e7 / 0.148)
+    ratio, zeta = omega / first, 0.002
+    expected = 2 * zeta * np.sqrt(1 - zeta**2) / np.abs(1 - ratio**2 + 2j * zeta * ratio)
+    assert found[0].undamped == pytest.approx(expected, rel=1e-6)
+    assert found[0].mass == pytest.approx(0.148) and found[0].amplitude == pytest.approx(3e-5)
+
+
+@pytest.mark.slow
+def test_same_seed_same_answer(found, tmp_path):
+    again = optimise(Study.load(study(tmp_path)))
+    for name in ("map_amplitude", "history_design", "history_amplitude", "robust_response"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(found[0], name))
+    assert (again.nominal, again.robust) == (found[0].nominal, found[0].robust)
+
+
+def test_file_round_trip(found, tmp_path):
+    record = found[0]
+    record.save(tmp_path / "optimum.h5")
+    loaded = Optimisation.load(tmp_path / "optimum.h5")
+    assert loaded.to_json() == record.to_json()
+    assert loaded.provenance == {"a": 1} and not loaded.map_amplitude.flags.writeable
+    with xarray.open_dataset(tmp_path / "optimum.h5", engine="h5netcdf") as data:
+        assert data.map_amplitude.dims == ("map_mass_ratio", "map_gap_ratio")
+        assert data.frequency.attrs["units"] == "Hz"
+
+
+def test_sample_of_the_tolerances(tmp_path):
+    """A Latin hypercube: each of the strata of every tolerance once, and the design itself first."""
+    case = Study.load(study(tmp_path))
+    sample = deviations(case)
+    assert len(sample) == 4 and set(sample[0].values()) == {0.0}
+    for name, width in (("mass", 0.03), ("orientation_deg", 15.0)):
+        strata = sorted(int((one[name] / width + 1) / 2 * 3) for one in sample[1:])
+        assert strata == [0, 1, 2]
+    held = Study.load(study(tmp_path, lambda data: data["optimise"].pop("tolerances")))
+    assert len(deviations(held)) == 1
+
+
+def test_the_search_finds_a_known_optimum(tmp_path, monkeypatch):
+    """Runs replaced by a bowl with its lowest point at 2 %, 0.7 X and two bodies."""
+
+    def bowl(self, designs, sample):
+        values = [
+            (d.mass_ratio - 0.02) ** 2 * 1e3 + (d.gap_ratio - 0.7) ** 2 + 0.1 * (d.bodies - 2) ** 2 + 0.1
+            for d in designs
+        ]
+        shape = (len(designs), len(sample), 25)
+        self.scenes += np.prod(shape)
+        return np.broadcast_to(np.reshape(values, (-1, 1, 1)), shape), np.ones(shape)
+
+    monkeypatch.setattr(module._Trial, "_run", bowl)
+    record = optimise(Study.load(study(tmp_path, lambda data: data["optimise"].update(evaluations=600), quick=False)))
+    assert record.nominal.design.bodies == 2
+    assert record.nominal.design.mass_ratio == pytest.approx(0.02, abs=2e-3)
+    assert record.nominal.design.gap_ratio == pytest.approx(0.7, abs=0.05)
+    assert len(record.history_design) <= 2 * 600
+
+
+def test_one_value_is_held(tmp_path):
+    def hold(data):
+        data["optimise"]["variables"] = {"mass_ratio": 0.02, "gap_ratio": [0.4, 0.6], "bodies": 1}
+        data["optimise"].pop("tolerances")
+
+    record = optimise(Study.load(study(tmp_path, hold)))
+    assert set(record.history_design[:, 0]) == {0.02} and set(record.history_design[:, 2]) == {1.0}
+    assert record.robust == record.nominal
+
+
+def test_figure(found):
+    figure = optimisation_figure(found[0])
+    assert [trace.type for trace in figure.data] == ["contour", "scatter", "scatter"]
+    assert np.shape(figure.data[0].z) == (2, 3)
+    assert "%" in figure.layout.xaxis.title.text and "µm" in figure.layout.yaxis.title.text
+    assert figure.data[1].name.startswith("optimum as designed")
+    for trace, optimum in zip(figure.data[1:], (found[0].nominal, found[0].robust), strict=True):
+        assert trace.x[0] == 100 * optimum.design.mass_ratio and trace.y[0] == optimum.design.gap_ratio
+
+
+def test_command(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    study(tmp_path)
+    assert main(["optimise", "optimise.toml", "-o", "o.h5", "--json", "-", "--workers", "1"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["nominal"]["reduction"] == pytest.approx(1 - result["nominal"]["amplitude"])
+    assert Optimisation.load("o.h5").sentence == result["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda data: data.pop("optimise"), "optimise: missing"),
+        (lambda data: data["optimise"].pop("band"), "optimise.band: missing"),
+        (lambda data: data["optimise"]["variables"].update(gap_ratio=[2.0, 1.0]), "gap_ratio: expected [lowest, high"),
+        (lambda data: data["optimise"]["variables"].update(gap=1.0), "optimise.variables.gap: unknown key"),
+        (lambda data: data["optimise"]["tolerances"].update(orientation_deg=100.0), "gravity lifts the body"),
+        (lambda data: data["excitation"].pop("resonance_amplitude"), "excitation: name force or resonance_amplitude"),
+        (lambda data: data.pop("damper"), "damper: missing"),
+        (lambda data: data["structure"].update(damping_ratio=0.0), "an undamped resonance has no amplitude"),
+        (lambda data: data["optimise"].update(evaluations=2), "optimise.evaluations: should be greater"),
+    ],
+)  # fmt: skip
+def test_bad_studies(change, told, tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = study(tmp_path, change)
+    with pytest.raises(InputError):
+        Study.load(path)
+    assert main(["optimise", "optimise.toml", "-o", "o.h5"]) == BAD_INPUT
+    error = capfd.readouterr().err
+    assert "optimise.toml: " in error and told in error and error.count("\n") == 1
+    assert not (tmp_path / "o.h5").exists()
+
+
+def test_bodies_are_spread_over_the_cavities(tmp_path):
+    case = Study.load(study(tmp_path))
+    for count, expected in ((1, {"c1": 1}), (3, {"c1": 2, "c2": 1}), (4, {"c1": 2, "c2": 2})):
+        cavities = [damper.cavity for damper in case.with_bodies(count).damper]
+        assert {name: cavities.count(name) for name in set(cavities)} == expected
+    point = case.point(Design(0.02, 0.5, 3), dict.fromkeys(deviations(case)[0], 0.0), 2400.0)
+    assert [point[f"damper.{i}.position"] for i in range(3)] == pytest.approx([-2.5e-6, 2.5e-6, 0.0])
+    assert point["damper.mass"] == pytest.approx(0.02 * 0.148 / 3)
+
+
+def test_report_tells_the_optimum(found, tmp_path):
+    record = found[0]
+    record.save(tmp_path / "optimum.h5")
+    assert main(["report", str(tmp_path), "-o", str(tmp_path / "report.html")]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert record.sentence in html.unescape(page)
+    assert f"{100 * record.robust.reduction_tolerances:.1f}" in page
+    assert "Plotly.newPlot" in page and 'download="optimum-0.csv"' in page

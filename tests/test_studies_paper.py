@@ -1,0 +1,234 @@
+"""The paper's figures as studies: units and scenes of their files, their claims, and physics that must hold."""
+
+import json
+import math
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupling.engine import simulate
+from coupling.inputs import InputError
+from coupling.scene import Scene
+from coupling.sweep import Sweep, sweep
+from modal.store import Variable, save
+from studies import paper
+from studies.cli import main
+from studies.paper import Session, run_paper, study
+from studies.paper_claims import attached_closed_form, regime, verdict
+from studies.paper_curve import curves
+from studies.paper_figure import FOLDER, Bar, Effort, PaperFigure, Structure, linear_peaks, with_length, write_scene
+from studies.results import collect
+
+FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
+STIFFNESS = MASS * (2 * math.pi * FREQUENCY) ** 2
+STRUCTURE = Structure(MASS, STIFFNESS, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
+RIGID = ("fig9", "fig10", "fig14", "fig19", "mistuning", "systems")
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_scenes_are_in_units_of_the_structure(name):
+    figure = PaperFigure.load(name, STRUCTURE)
+    assert figure.title
+    for scene in figure.scenes.values():
+        assert scene.excitation.resonance_amplitude == AMPLITUDE
+        assert scene.structure.stiffness == STIFFNESS
+        # equal added mass: of loose bodies, or fixed to the structure
+        added = sum(damper.mass for damper in scene.damper) + scene.structure.mass - MASS
+        if name != "fig19":
+            assert added == pytest.approx(0.02 * MASS, rel=1e-12)
+        assert list(scene.sweep)[-1] == "excitation.frequency"
+
+
+def test_gaps_of_fig9_and_its_frequencies():
+    (scene,) = PaperFigure.load("fig9", STRUCTURE).scenes.values()
+    axes, _ = scene.sweep_points()
+    np.testing.assert_allclose(axes["cavity.c1.gap"] / AMPLITUDE, [1.0, 0.5, 0.1])
+    peaks = linear_peaks(scene)
+    assert peaks == pytest.approx([FREQUENCY / math.sqrt(1.02), FREQUENCY], rel=1e-12)
+    assert set(peaks) <= set(axes["excitation.frequency"])
+
+
+def test_counted_bodies_and_cavities():
+    scenes = PaperFigure.load("systems", STRUCTURE).scenes
+    many, row = scenes["many_cavities"], scenes["particles"]
+    assert [cavity.name for cavity in many.cavity] == [f"c{k}" for k in range(1, 9)]
+    assert [damper.cavity for damper in many.damper] == [cavity.name for cavity in many.cavity]
+    assert len(row.damper) == 32
+    assert len(row.cavity) == 1
+    places = [damper.position for damper in row.damper]
+    assert places == sorted(places)
+    assert max(places) == pytest.approx(-min(places))
+    assert max(places) < row.cavity[0].gap / 2
+
+
+def test_mass_of_fig19_moves_the_gap_by_the_length():
+    scenes = PaperFigure.load("fig19", STRUCTURE).scenes
+    bar = Bar(**tomllib.loads((FOLDER / "fig19.toml").read_text())["bar"])
+    nominal = scenes["nominal"]
+    mass, gap = nominal.damper[0].mass, nominal.cavity[0].gap
+    for name in ("light", "nominal", "heavy"):
+        other = scenes[name]
+        lengths = bar.length(other.damper[0].mass) + other.cavity[0].gap, bar.length(mass) + gap
+        assert lengths[0] == pytest.approx(lengths[1], rel=1e-13)  # one cavity for all
+        assert abs(other.damper[0].position) < other.cavity[0].gap / 2
+        change = {"light": -0.06, "nominal": 0.0, "heavy": 0.06}[name]
+        assert other.damper[0].mass / mass - 1 == pytest.approx(change, abs=1e-12)
+        assert scenes[f"{name}_same_gap"].damper[0].mass / mass - 1 == pytest.approx(change, abs=1e-12)
+        assert scenes[f"{name}_same_gap"].cavity[0].gap == AMPLITUDE / 2
+
+
+def test_a_bar_that_does_not_fit_is_refused():
+    scene = PaperFigure.load("fig10", STRUCTURE).scenes["single"]
+    with pytest.raises(InputError, match="more than the gap"):
+        with_length(scene, Bar(density=8190.0, section=1e-5), 0.06)
+
+
+def test_unknown_unit_is_refused():
+    with pytest.raises(InputError, match="unknown unit 'furlongs'"):
+        STRUCTURE.unit("furlongs")
+
+
+def test_written_scene_is_the_scene(tmp_path):
+    scene = PaperFigure.load("fig10", STRUCTURE).scenes["shared"]
+    write_scene(scene, tmp_path / "scene.toml")
+    assert Scene.load(tmp_path / "scene.toml") == scene
+
+
+def damped(name, curve, frequencies, periods=1500, transient=700, **changes):
+    """A curve of a figure at some frequencies, relative to that of its undamped resonance."""
+    scene = PaperFigure.load(name, STRUCTURE).scenes[curve]
+    axes = {**scene.to_dict()["sweep"], "excitation.frequency": [share * FREQUENCY for share in frequencies]} | changes
+    return curves(sweep(scene.replace({"sweep": axes, "time.periods": periods, "time.transient": transient})), curve)
+
+
+def test_damped_is_undamped_below_the_onset_and_less_at_the_resonance():
+    gaps = {"cavity.c1.gap": [0.5 * AMPLITUDE]}
+    (curve,) = damped("fig9", "", [0.955, 0.965, 0.974, 0.988, 1.0], **gaps)
+    np.testing.assert_allclose(curve.mean[:3], curve.undamped[:3], rtol=0.01)
+    np.testing.assert_allclose(curve.largest[:3], curve.undamped[:3], rtol=0.01)
+    assert curve.onset == 0.988 * FREQUENCY
+    assert 0.4 < curve.mean[3] < 0.6
+    assert curve.mean[4] < 0.12
+
+
+def test_halves_in_separate_cavities_do_what_the_whole_body_does():
+    shares = [0.955, 0.983, 0.985]
+    (single,), (separate,) = damped("fig10", "single", shares), damped("fig10", "separate", shares)
+    np.testing.assert_allclose(separate.mean, single.mean, rtol=0.02)
+    np.testing.assert_allclose(separate.impacts, 2 * single.impacts, rtol=0.02)
+
+
+def test_high_centrifugal_load_is_the_fixed_curve():
+    scene = PaperFigure.load("systems", STRUCTURE).scenes["rotating"]
+    loads = scene.sweep["damper.0.normal_load"]
+    (stuck,) = damped("systems", "rotating", [0.96, 0.985, 1.0, 1.02], **{"damper.0.normal_load": [loads[-1]]})
+    np.testing.assert_allclose(stuck.mean, stuck.fixed, rtol=1e-3)
+    assert not stuck.impacts.any()
+    np.testing.assert_allclose(stuck.attached, 1.0, rtol=1e-6)
+
+
+def test_attached_mass_follows_the_closed_form_in_the_1_1_regime():
+    (curve,) = damped("mistuning", "", [0.9625, 0.965, 0.9675], 2500, 2000, **{"cavity.c1.gap": [0.5 * AMPLITUDE]})
+    chosen, attached = regime(curve, 0.25, 0.7)
+    assert chosen.all()
+    # to the order of the body's mass over the structure's
+    np.testing.assert_allclose(curve.attached, attached, rtol=0.01)
+
+
+def test_closed_form_of_the_attached_mass():
+    # without loss rho = 0, so that Theta = 1 + xi and a = 8 (1 + xi)/(pi^2 xi)
+    theta, attached = attached_closed_form(np.array([0.5, 2.0]), 1.0, 1.0)
+    np.testing.assert_allclose(theta, [1.5, 3.0])
+    np.testing.assert_allclose(attached, 8 / np.pi**2 * np.array([3.0, 1.5]))
+    assert np.isnan(attached_closed_form(np.array([0.1]), 1.0, 0.7)[0])  # below rho/sqrt(1 + rho^2)
+
+
+def test_verdicts():
+    assert [verdict(True), verdict(False, True), verdict(False)] == ["shown", "partly", "not shown"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Claims of figures with few frequencies and periods."""
+    folder = tmp_path_factory.mktemp("paper")
+    session = Session(STRUCTURE, folder, effort=Effort(points=9, periods=120, transient=60))
+    for name in ("fig9", "fig10", "fig19"):
+        study(name, session)
+    return folder
+
+
+def test_claims_have_their_structure(folder):
+    found = collect([folder])
+    assert [Path(file).name for file in found.studies] == [f"{name}.claims.json" for name in ("fig10", "fig19", "fig9")]
+    for file, made in found.studies.items():
+        assert made.study == Path(file).name.removesuffix(".claims.json")
+        assert made.title
+        assert made.claims
+        for source in made.sources:
+            assert isinstance(Sweep.load(folder / source), Sweep)
+            assert Scene.load(folder / source.replace(".h5", ".toml")) == Sweep.load(folder / source).scene
+        assert (folder / f"{made.study}.png").stat().st_size > 10_000
+        for claim in made.claims:
+            assert claim.claim
+            assert claim.ours
+            assert claim.verdict in ("shown", "partly", "not shown")
+            assert claim.verdict == "shown" or claim.why
+            assert all(isinstance(value, float) for value in claim.figures.values())
+    assert not list(folder.glob("*.partial"))
+
+
+def test_resumed_session_takes_over_what_is_of_the_same_scene(folder, monkeypatch):
+    effort = Effort(points=9, periods=120, transient=60)
+    monkeypatch.setattr(paper, "sweep", None)
+    study("fig9", Session(STRUCTURE, folder, effort=effort, resume=True))
+    with pytest.raises(TypeError):  # another scene, and so another sweep
+        study("fig9", Session(replace(STRUCTURE, amplitude=60e-6), folder, effort=effort, resume=True))
+
+
+def test_confidence_goes_with_the_mean():
+    (curve,) = damped("fig9", "", [0.99], **{"cavity.c1.gap": [0.5 * AMPLITUDE]})
+    scene = PaperFigure.load("fig10", STRUCTURE).scenes["single"]
+    single = scene.replace({"sweep": {}, "excitation.frequency": 0.99 * FREQUENCY})
+    response = simulate(single.replace({"time.periods": 1500, "time.transient": 700}))
+    assert curve.confidence[0] * AMPLITUDE == pytest.approx(response.amplitude_mean_confidence)
+
+
+def test_modes_without_a_rigid_model_are_refused(tmp_path):
+    save(tmp_path / "modes.h5", "modes", {"shape": Variable(np.zeros(2), ("dof",))})
+    with pytest.raises(InputError, match="rigid model and a fatigue strength"):
+        Structure.load(tmp_path / "modes.h5", tmp_path / "rom.h5")
+
+
+def test_command_refuses_an_unknown_study(tmp_path, capsys):
+    assert main(["paper", "fig99", "-o", str(tmp_path / "out")]) == 2
+    assert "no study 'fig99'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_the_whole_paper(tmp_path, capsys):
+    made = {found.study: found for found in run_paper(tmp_path, count=2)}
+    assert list(made) == list(paper.NAMES)
+    printed = capsys.readouterr().out
+    for name, found in made.items():
+        assert json.loads((tmp_path / f"{name}.claims.json").read_text())["study"] == name
+        assert (tmp_path / f"{name}.png").is_file()
+        assert f"\n{name}: " in printed
+        assert all("not ok" not in claim.why for claim in found.claims)
+    figures = {name: [claim.figures for claim in found.claims] for name, found in made.items()}
+    verdicts = {name: [claim.verdict for claim in found.claims] for name, found in made.items()}
+    assert 0.45 < figures["fig9"][0]["reduction"] < 0.55
+    assert verdicts["fig9"] == ["shown"] * 3
+    assert verdicts["fig10"][0] == "shown"
+    assert figures["fig12"][1]["difference"] < 0.01
+    assert abs(figures["fig12"][3]["predicted_hz"] / figures["fig12"][3]["peak_hz"] - 1) < 0.002
+    assert figures["fig12"][4]["reduced_mean"] < figures["fig12"][4]["rigid_max"]
+    assert verdicts["fig13"][0] == "shown"
+    assert min(figures["fig14"][1].values()) > 0.5
+    assert min(figures["fig14"][2].values()) > 0.45
+    assert figures["mistuning"][0]["largest_error"] < 0.05
+    assert figures["mistuning"][0]["points"] > 40
+    assert figures["systems"][3]["distance_from_fixed"] < 0.01

@@ -1,0 +1,76 @@
+"""Other programs on the same scenes, each where it is installed; what they cannot express they say."""
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from coupling.engine import simulate
+from coupling.inputs import InputError
+from studies import method_scenes, peers
+
+PERIODS, SAMPLES = 3, 10
+
+
+@pytest.fixture(scope="module")
+def periodic():
+    """Two impacts a period, and the exact samples."""
+    scene = method_scenes.periodic(1000).replace({"time.periods": PERIODS, "time.transient": 0})
+    exact = simulate(scene, samples_per_period=SAMPLES)
+    return scene, np.column_stack([exact.displacement, exact.body_displacement])
+
+
+def needs(name):
+    package = peers.PEERS[name].needs.partition(".")[0]
+    if find_spec(package) is None:
+        pytest.skip(f"{name} is not installed")
+
+
+def error(periodic, name, setting):
+    scene, exact = periodic
+    run = peers.run_peer(name, scene, PERIODS, setting, SAMPLES)
+    assert run.status == "ok" and run.seconds > 0 and len(run.peak) == PERIODS
+    return (np.abs(run.samples - exact) / np.ptp(exact, axis=0)).max()
+
+
+@pytest.mark.parametrize(
+    ("name", "coarse", "fine", "bound"),
+    [("SUNDIALS CVODE", 1e-4, 1e-9, 1e-5), ("Exudyn", 300, 10_000, 2e-2), ("Siconos", 100, 3000, 5e-3)],
+)
+def test_peers_converge_to_the_exact_engine(periodic, name, coarse, fine, bound):
+    needs(name)
+    assert error(periodic, name, fine) < min(bound, 0.5 * error(periodic, name, coarse))
+
+
+def test_siconos_and_our_own_time_stepping_are_one_method(periodic):
+    """Both are Moreau-Jean's with theta = 1/2: the same impacts in the same steps."""
+    needs("Siconos")
+    scene, exact = periodic
+    ours = simulate(method_scenes.by(scene, method="moreau", steps_per_period=500), samples_per_period=SAMPLES)
+    theirs = peers.run_peer("Siconos", scene, PERIODS, 500, SAMPLES)
+    size = np.ptp(exact, axis=0)
+    apart = np.abs(theirs.samples - np.column_stack([ours.displacement, ours.body_displacement])) / size
+    assert apart.max() < 1e-3
+    assert theirs.penetration == pytest.approx(ours.penetration, rel=0.05)
+
+
+@pytest.mark.parametrize(("name", "setting"), [("Exudyn", 500), ("Siconos", 500), ("SUNDIALS CVODE", 1e-6)])
+def test_friction_and_bodies_in_one_cavity(name, setting):
+    """Two bodies with friction over the first periods, before chaos parts the runs."""
+    needs(name)
+    scene = method_scenes.double().replace({"time.periods": 2, "time.transient": 0})
+    run = peers.run_peer(name, scene, 2, setting)
+    np.testing.assert_allclose(run.peak, simulate(scene).peak, rtol=5e-3)
+
+
+def test_a_soft_wall_is_refused_with_the_reason():
+    needs("Siconos")
+    scene = method_scenes.single().replace({"contact": {"law": "compliant", "stiffness": 1e8}})
+    with pytest.raises(InputError, match="unilateral spring"):
+        peers.run_peer("Siconos", scene, 1, 100)
+
+
+def test_what_is_not_installed_is_said(monkeypatch):
+    monkeypatch.setitem(peers.PEERS, "Exudyn", peers.PEERS["Exudyn"]._replace(needs="no_such_module"))
+    with pytest.raises(InputError, match="not installed; pip install"):
+        peers.run_peer("Exudyn", method_scenes.single(), 1, 100)
