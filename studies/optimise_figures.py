@@ -29,15 +29,21 @@ def optimisation_figure(record: Optimisation) -> go.Figure:
             name=f"{name}: {_told(optimum)}", hovertext=_told(optimum), hoverinfo="text+name",
             marker={"symbol": symbol, "size": 15, "color": colour, "line": {"color": "#111827", "width": 1.5}},
         )  # fmt: skip
-    bodies = "1 body" if count == 1 else f"{count} bodies"
     figure.update_xaxes(title_text="mass of the bodies over that of the structure, %")
     figure.update_yaxes(title_text=f"gap over the undamped amplitude X = {1e6 * record.amplitude:.3g} µm")
     figure.update_layout(
-        title=f"Reduction with {bodies}", template="plotly_white",
+        title=f"Reduction with {_bodies(count)}", template="plotly_white",
         legend={"orientation": "h", "yanchor": "top", "y": -0.2, "x": 0.0},
     )  # fmt: skip
     return figure
 
 
 def _told(optimum: Optimum) -> str:
-    return f"{optimum.reduction:.0%}, within the tolerances {optimum.reduction_tolerances:.0%}"
+    return (
+        f"{_bodies(optimum.design.bodies)}, {optimum.reduction:.0%}, within the tolerances "
+        f"{optimum.reduction_tolerances:.0%}"
+    )
+
+
+def _bodies(count: int) -> str:
+    return "1 body" if count == 1 else f"{count} bodies"

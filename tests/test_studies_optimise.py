@@ -125,7 +125,7 @@ def test_the_search_finds_a_known_optimum(tmp_path, monkeypatch):
             (d.mass_ratio - 0.02) ** 2 * 1e3 + (d.gap_ratio - 0.7) ** 2 + 0.1 * (d.bodies - 2) ** 2 + 0.1
             for d in designs
         ]
-        shape = (len(designs), len(sample), 25)
+        shape = (len(designs), len(sample), len(self.study.table.frequencies))
         self.scenes += np.prod(shape)
         return np.broadcast_to(np.reshape(values, (-1, 1, 1)), shape), np.ones(shape)
 
