@@ -449,6 +449,8 @@ def _happen(rows, flows, st, rec, work, r, order, side):
     elif st.velocity[r] < 0.0:
         begin_push(rows, st, rec, r)
     _coordinates(flows, st, st.coordinates)
+    if side == CLOSES:
+        align_gaps(rows, st, st.coordinates)  # a motion in step with the excitation may touch at every period's start
     return settle(rows, st, rec, work)
 
 

@@ -48,6 +48,8 @@ def optimise(
     nominal, robust = trial.optimum(first), trial.optimum(second)
     if robust.amplitude_tolerances > nominal.amplitude_tolerances:
         robust = nominal  # the search as designed has found the better one
+    if robust.amplitude < nominal.amplitude:
+        nominal = robust
     axes = [np.linspace(*bounds, count) for bounds, count in (
         (table.variables.mass_ratio, table.map.mass_ratio), (table.variables.gap_ratio, table.map.gap_ratio)
     )]  # fmt: skip
@@ -118,7 +120,10 @@ class _Trial:
 
     def optimum(self, design: Design) -> Optimum:
         """Both amplitudes of a design."""
-        return Optimum(design, float(self.nominal([design])[0]), float(self.robust([design])[0]))
+        found = self.nominal([design]), self.robust([design])
+        for amplitudes, robust in zip(found, (False, True), strict=True):
+            self._remember([design], amplitudes, robust)
+        return Optimum(design, float(found[0][0]), float(found[1][0]))
 
     def response(self, design: Design) -> tuple[np.ndarray, np.ndarray]:
         """Amplitudes (f,) over X of a design and without bodies."""
@@ -138,7 +143,7 @@ class _Trial:
         def objective(columns: np.ndarray) -> np.ndarray:
             designs = [self._design(column) for column in np.atleast_2d(columns.T)]
             amplitudes = judge(designs)
-            self.history += [(d, float(a), judge == self.robust) for d, a in zip(designs, amplitudes, strict=True)]
+            self._remember(designs, amplitudes, judge == self.robust)
             return amplitudes
 
         found = differential_evolution(
@@ -152,6 +157,9 @@ class _Trial:
         ordered = sorted(self.history, key=lambda entry: (entry[0] != best, entry[1]))
         distinct = list(dict.fromkeys(design for design, _, _ in ordered))
         return np.array([[getattr(design, name) for name in self._variables] for design in distinct], float)
+
+    def _remember(self, designs: Sequence[Design], amplitudes: np.ndarray, robust: bool) -> None:
+        self.history += [(design, float(a), robust) for design, a in zip(designs, amplitudes, strict=True)]
 
     def _design(self, values: Sequence[float] | np.ndarray) -> Design:
         """The design of the variables' values; the others are held."""

@@ -79,12 +79,18 @@ def collect(paths: Sequence[str | Path]) -> Results:
     for path in map(Path, paths):
         if not path.exists():
             raise InputError(f"{path}: no such file or folder")
-        for file in [*sorted(path.glob("*.h5")), *sorted(path.glob(f"*{CLAIMS}"))] if path.is_dir() else [path]:
+        for file in _candidates(path) if path.is_dir() else [path]:
             if not _read(file, results) and not path.is_dir():
                 raise InputError(f"{file}: holds no result of modal, reduce, run, sweep, optimise or paper")
     if not any(vars(results).values()):
         raise InputError(f"{', '.join(map(str, paths))}: no results of modal, reduce, run, sweep, optimise or paper")
     return results
+
+
+def _candidates(folder: Path) -> list[Path]:
+    """Files of a folder that may be results; what a killed command has left half written is hidden."""
+    found = [*sorted(folder.glob("*.h5")), *sorted(folder.glob(f"*{CLAIMS}"))]
+    return [file for file in found if not file.name.startswith(".")]
 
 
 def _read(file: Path, results: Results) -> bool:

@@ -134,7 +134,7 @@ def test_the_search_finds_a_known_optimum(tmp_path, monkeypatch):
     assert record.nominal.design.bodies == 2
     assert record.nominal.design.mass_ratio == pytest.approx(0.02, abs=2e-3)
     assert record.nominal.design.gap_ratio == pytest.approx(0.7, abs=0.05)
-    assert len(record.history_design) <= 2 * 600
+    assert len(record.history_design) <= 2 * 600 + 4  # both optima are judged once more
 
 
 def test_one_value_is_held(tmp_path):
