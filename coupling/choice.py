@@ -17,14 +17,13 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from coupling.inputs import InputError
 from coupling.laws import Compliant, Massless, Newton
+from coupling.model_file import reduced_model
 from coupling.scene import Rom, Scene
 from coupling.sensitivity import sensitivity
 from rom.collision import Collision, pulse
@@ -72,30 +71,6 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
         if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
             groups.setdefault(_group(scene), []).append(scene)
     return {key: _choice(members) for key, members in groups.items()}
-
-
-def file_stamp(file: str) -> int:
-    """Tells a file from a later one of that name."""
-    path = Path(file)
-    return path.stat().st_mtime_ns if path.is_file() else 0
-
-
-def reduced_model(structure: Rom) -> ReducedModel:
-    """The reduced model of a structure that has been settled, with so many of its modes."""
-    assert structure.modes != "auto"
-    return _restricted(
-        structure.file, file_stamp(structure.file), structure.modes, structure.natural, structure.attached
-    )
-
-
-@lru_cache(maxsize=8)
-def _restricted(file: str, _stamp: int, modes: int | None, natural: bool, attached: bool) -> ReducedModel:
-    model = ReducedModel.load(file)
-    if modes is None:
-        return model
-    if attached:
-        return model.attached(modes)
-    return model.massless(modes) if natural else model.truncated(modes)
 
 
 def is_open(scene: Scene) -> bool:

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import eigh
 
-from coupling.choice import reduced_model, settle
-from coupling.engine import run_with_response
+from coupling.choice import settle
 from coupling.inputs import InputError
+from coupling.model_file import reduced_model
 from coupling.response import Status
+from coupling.run import run_with_response
 from coupling.scene import Rom, Scene
 from coupling.structure import linear_structure
 

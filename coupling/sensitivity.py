@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from coupling.laws import Compliant
+from coupling.run import respond
 from coupling.scene import Rom, Scene, Time
 from coupling.solver import Solver
 from rom.collision import Collision, Pulse
@@ -49,8 +50,6 @@ def sensitivity(
 
 
 def _amplitude(scene: Scene, modes: int, restitution: float, spring: float) -> float:
-    from coupling.engine import simulate  # which settles its scenes by this
-
     structure = scene.structure
     assert isinstance(structure, Rom)
     simple = replace(
@@ -62,4 +61,4 @@ def _amplitude(scene: Scene, modes: int, restitution: float, spring: float) -> f
         solver=Solver(),
         sweep={},
     )
-    return simulate(simple).amplitude_mean
+    return respond(simple).amplitude_mean

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
-from coupling.choice import file_stamp, reduced_model, settle
 from coupling.inputs import InputError
+from coupling.model_file import file_stamp, reduced_model
 from coupling.scene import Prescribed, Rigid, Rom, Scene
 from modal.store import frozen
 from rom.reduced import ReducedModel
@@ -210,9 +210,8 @@ def _basis(scene: Scene) -> _ModalBasis:
             frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
             {"structure": row}, {"structure": frozen([root])}, {},
         )  # fmt: skip
-    settled = settle(scene).scene.structure
-    assert isinstance(settled, Rom)
-    return _rom_basis(settled, file_stamp(settled.file))
+    assert isinstance(structure, Rom)
+    return _rom_basis(structure, file_stamp(structure.file))
 
 
 @lru_cache(maxsize=8)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from coupling import automaton, engine, state
-from coupling.engine import _Run
+from coupling import automaton, state
 from coupling.ledger import account
+from coupling.run import EngineRun, run_of
 from coupling.scene import Scene
 from coupling.watch import next_event
 from studies.timing import seconds
@@ -33,7 +33,7 @@ def awake_modes(scene: Scene, first: int, last: int) -> float:
 def time_of_a_period(scene: Scene, lengths: tuple[int, int]) -> float:
     """Mean seconds of the periods from the first to the second of two, in one run of the scene's method."""
     first, last = lengths
-    run = engine._run_of(scene.replace({"time.periods": last, "time.transient": 0}), False, 0)
+    run = run_of(scene.replace({"time.periods": last, "time.transient": 0}), False, 0)
     run.advance_to(first)
     return seconds(run.advance_to, last) / (last - first)
 
@@ -60,8 +60,8 @@ def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
             return {"search": float(np.median(search)), "account": float(np.median(accounting))}
 
 
-def _begun(scene: Scene, periods: int) -> _Run:
-    run = _Run(scene.replace({"time.periods": periods}), False, 0)
+def _begun(scene: Scene, periods: int) -> EngineRun:
+    run = EngineRun(scene.replace({"time.periods": periods}), False, 0)
     run.begin(scene.solver.max_events)
     return run
 

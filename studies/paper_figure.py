@@ -25,8 +25,8 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
 from scipy.linalg import eigh
 
-from coupling.choice import reduced_model
 from coupling.inputs import STRICT, InputError, Positive, Whole, read_toml, validate
+from coupling.model_file import reduced_model
 from coupling.scene import Rom, Scene
 from modal.store import load, replacing
 from rom.reduced import ReducedModel

@@ -13,8 +13,8 @@ import numpy as np
 
 from coupling import automaton as auto
 from coupling import state as st
-from coupling.engine import _Run
 from coupling.rows import Rows
+from coupling.run import EngineRun
 from coupling.scene import Scene
 
 SLIDES = (st.SLIP_LEFT, st.SLIP_RIGHT)
@@ -150,7 +150,7 @@ class Stepper:
 
     def __init__(self, scene: Scene, change=None) -> None:
         """change: alters the mutable run before it begins."""
-        self.run = _Run(scene, True, 0)
+        self.run = EngineRun(scene, True, 0)
         if change is not None:
             change(self.run)
         self.budget = scene.solver.max_events
