@@ -8,31 +8,15 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 import xarray
+from sweeping import RESONANCE, scene
 
 from coupling import points as module
 from coupling.engine import simulate
-from coupling.inputs import InputError, validate
-from coupling.scene import Scene
+from coupling.inputs import InputError
 from coupling.structure import excitation_force, receptance
 from coupling.sweep import LOSSES, MEASURES, Sweep, sweep, warm_up
 
-STIFFNESS, MASS, RATIO, BODY = 1.0e4, 1.0, 0.01, 0.05
-RESONANCE = math.sqrt(STIFFNESS / MASS) / (2 * math.pi)
-DATA = {
-    "structure": {"model": "rigid", "mass": MASS, "stiffness": STIFFNESS, "damping_ratio": RATIO},
-    "excitation": {"frequency": RESONANCE, "resonance_amplitude": 1e-3},
-    "cavity": [{"name": "c1", "gap": 5e-4}],
-    "damper": [{"cavity": "c1", "mass": BODY, "friction": 0.3, "restitution": 0.6}],
-    "time": {"periods": 30, "transient": 10},
-    "sweep": {
-        "cavity.c1.gap": [5e-4, 2e-4],
-        "excitation.frequency": {"start": 0.97 * RESONANCE, "stop": 1.02 * RESONANCE, "num": 6},
-    },
-}
-
-
-def scene(**changes):
-    return validate(Scene, DATA | changes, "scene.toml")
+STIFFNESS, MASS, RATIO, BODY = 1.0e4, 1.0, 0.01, 0.05  # of sweeping.DATA
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 """Case files: what they mean, and the one line that says what is wrong with them."""
 
+import cases
 import pytest
 
 from coupling.inputs import InputError
@@ -24,18 +25,7 @@ direction = [0, 1, 0]
 facets = "c1_floor"
 direction = [0, 1, 0]
 """
-BLOCK = """
-[mesh]
-generator = "block"
-length = 0.1
-width = 0.02
-thickness = 0.01
-divisions = [4, 1, 1]
-[material.default]
-young = 2e11
-poisson = 0.3
-density = 8000
-"""
+BLOCK = cases.BLOCK.split("[support]")[0]
 
 
 def load(text, tmp_path):
@@ -67,7 +57,7 @@ def test_mesh_is_found_beside_the_case(tmp_path):
 
 def test_generators_take_their_parameters(tmp_path):
     case = load(BLOCK, tmp_path)
-    assert case.mesh.parameters.divisions == (4, 1, 1)
+    assert case.mesh.parameters.divisions == (6, 2, 1)
     assert case.mesh.degree == 2
     cluster = load(changed(f'file = "{SHIPPED}"', 'generator = "vane_cluster"\nairfoils = 3'), tmp_path)
     assert cluster.mesh.parameters.airfoils == 3
@@ -170,7 +160,7 @@ def test_bad_input_is_one_line_with_the_key(old, new, message, tmp_path):
         ("thickness = 0.01", "thickness = -0.01", "mesh: thickness: expected a positive number of metres"),
         ("thickness = 0.01", 'thickness = "3"', "mesh: thickness: expected a number, not '3'"),
         ("thickness = 0.01\n", "", "mesh.thickness: missing"),
-        ("[4, 1, 1]", "[4, 1, 1.5]", "mesh.divisions[2]: should be a valid integer"),
+        ("[6, 2, 1]", "[6, 2, 1.5]", "mesh.divisions[2]: should be a valid integer"),
     ],
 )
 def test_bad_generator_parameters(old, new, message, tmp_path):
