@@ -34,6 +34,8 @@ from studies.results import Results, Study
 _TEMPLATE = Path(__file__).with_name("report.html")
 #: curves of one sweep in a chart; of more, evenly chosen ones, if a map shows them all
 _MOST_CURVES = 5
+#: scenes that a table can have side by side; of more, each is told below the other
+_MOST_COLUMNS = 4
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def write_report(results: Results, path: str | Path) -> None:
         ],
         provenance=_provenance(results),
         scenes=scenes,
-        keys=list(dict.fromkeys(key for scene in scenes.values() for key in scene)),
+        **_compared(scenes),
     )
     with replacing(path) as temporary:
         temporary.write_text(html, encoding="utf-8")
@@ -251,6 +253,14 @@ def _provenance(results: Results) -> dict[str, dict[str, str]]:
     for file in results.names:
         tables[file]["sha256"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
     return tables
+
+
+def _compared(scenes: Mapping[str, dict[str, str]]) -> dict[str, Any]:
+    """What all scenes have in common, by key, and the keys in which they differ."""
+    keys = dict.fromkeys(key for scene in scenes.values() for key in scene)
+    values = {key: [scene.get(key, "") for scene in scenes.values()] for key in keys}
+    common = {key: found[0] for key, found in values.items() if len(set(found)) == 1}
+    return {"common": common, "differing": [key for key in keys if key not in common], "most_columns": _MOST_COLUMNS}
 
 
 def _without_sweep(sweep: Sweep) -> dict[str, Any]:

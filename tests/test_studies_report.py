@@ -251,3 +251,19 @@ def test_files_of_the_same_name_are_told_apart(results, tmp_path):
     names = {trace["legendgroup"] for trace in charts(page)["response-0"]}
     assert names == {"rigid model (stiff/sweep)", "rigid model (soft/sweep)"}
     assert {'id="from-stiff-sweep-h5"', 'id="from-soft-sweep-h5"'} <= set(re.findall(r'id="[\w-]+"', page))
+
+
+def test_scenes_say_what_they_share_and_what_is_their_own(results, tmp_path):
+    for number in range(6):
+        case = DATA | {"damper": [DATA["damper"][0] | {"friction": 0.1 * number}]}
+        sweep(validate(Scene, case | {"sweep": {"excitation.frequency": FREQUENCIES[:2]}}, "x")).save(
+            tmp_path / f"case{number}.h5"
+        )
+    for files, told in (
+        (2, "<th>case0.h5</th><th>case1.h5</th>"),
+        (6, "<td>case5.h5</td><td><code>damper[0].friction</code> = 0.5</td>"),
+    ):
+        write_report(collect([tmp_path / f"case{number}.h5" for number in range(files)]), tmp_path / "report.html")
+        page = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert told in page
+        assert page.count("<td><code>damper[0].restitution</code></td><td>0.6</td>") == 1
