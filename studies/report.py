@@ -32,8 +32,8 @@ from studies.response_map import map_axes, map_figure, map_rows
 from studies.results import Results, Study
 
 _TEMPLATE = Path(__file__).with_name("report.html")
-#: curves of one sweep in a chart; of more, evenly chosen ones, if a map shows them all
-_MOST_CURVES = 5
+#: curves of a section's charts, and of one sweep that a map shows as a whole; of more, evenly chosen ones are drawn
+_MOST_CURVES, _MOST_BESIDE_MAP = 12, 5
 #: scenes that a table can have side by side; of more, each is told below the other
 _MOST_COLUMNS = 4
 
@@ -121,15 +121,17 @@ def _responses(sweeps: Mapping[str, tuple[str, Sweep]], study: Study | None) -> 
             called = stem.removeprefix(study.study).strip("_").replace("_", " ") or model
         else:
             called = model if models.count(model) == 1 else f"{model} ({stem})"
-        found += _curves(file, sweep, called)
+        found += _curves(file, sweep, called, max(1, _MOST_CURVES // len(sweeps)))
     return found
 
 
-def _curves(file: str, sweep: Sweep, name: str) -> list[ForcedResponse]:
+def _curves(file: str, sweep: Sweep, name: str, most: int) -> list[ForcedResponse]:
     found = [replace(response, source=file) for response in forced_responses(sweep, name)]
-    if len(found) <= _MOST_CURVES or map_axes(sweep) is None:
+    if map_axes(sweep) is not None:
+        most = min(most, _MOST_BESIDE_MAP)
+    if len(found) <= most:
         return found
-    return [found[index] for index in np.linspace(0, len(found) - 1, _MOST_CURVES).round().astype(int)]
+    return [found[index] for index in np.linspace(0, len(found) - 1, most).round().astype(int)]
 
 
 def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
