@@ -33,7 +33,7 @@ class Checkpoint:
         self.finished = Finished(size)
         self._path = None if path is None else Path(path)
         self._belongs = {"scene": scene.to_dict(), "model": _models(scene), "provenance": dict(provenance)}
-        self._next = self._cost = 0.0
+        self._next = 0.0
         self._unsaved = False
         if self._path is not None and self._path.exists():
             self._read(self._path)

@@ -14,7 +14,7 @@ from studies.paper import MODES, Session, prepare, study, tell
 from studies.paper_figure import Effort
 from studies.pictures import mode_picture, summary_picture
 from studies.results import CLAIMS
-from studies.workers import available_cores, new_pool
+from studies.workers import WorkerPool, available_cores
 
 #: figures of the paper, with fewer frequencies and periods than `vanedamp paper` takes
 FIGURES = ("fig9", "fig10", "fig12")
@@ -35,7 +35,7 @@ def run_demo(folder: Path, workers: int | None = None) -> Path:
     started = time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)
     results = [folder / "modes.h5", folder / "rom.h5"]
-    with new_pool(workers or available_cores()) as pool:
+    with WorkerPool(workers or available_cores()) as pool:
         # compiling the engine takes as long as the finite elements: side by side, and once for all workers
         compiled = pool.submit(warm_up)
         with _stage("mesh, modes, rigid model, reduced model"):

@@ -17,6 +17,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from coupling.checkpoint import clear
 from coupling.engine import simulate
 from coupling.inputs import InputError, nearest, read_toml, validate
 from coupling.scene import Rom, Scene
@@ -127,12 +128,12 @@ def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
     old = session.computed.get(stem) or (_kept(path) if session.resume else None)
     if old is None or old.scene != scene or any(old.provenance.get(key) != provenance[key] for key in provenance):
         if not session.resume:
-            checkpoint.unlink(missing_ok=True)
+            clear(checkpoint)
         write_scene(scene, session.folder / f"{stem}.toml")
         with progress(stem) as report:
             old = sweep(scene, session.pool, report, checkpoint, provenance)
         old.save(path)
-        checkpoint.unlink(missing_ok=True)
+        clear(checkpoint)
     session.computed[stem] = old
     return old
 

@@ -56,7 +56,7 @@ def workers(count: int | None) -> Iterator[Executor | None]:
     if count == 1:
         yield None
         return
-    with new_pool(count) as pool:
+    with WorkerPool(count) as pool:
         from coupling.sweep import warm_up
 
         pool.submit(warm_up).result()
@@ -70,8 +70,3 @@ def workers(count: int | None) -> Iterator[Executor | None]:
 def available_cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def new_pool(count: int) -> WorkerPool:
-    """A pool of so many processes."""
-    return WorkerPool(count)
