@@ -16,7 +16,7 @@ from modal.store import frozen
 FREQUENCY = "excitation.frequency"
 _LEVEL = "excitation.resonance_amplitude"
 #: a damped response within this share of the undamped one has not been touched by the bodies
-_UNTOUCHED = 0.01
+UNTOUCHED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class ForcedResponse:
     @property
     def onset(self) -> Any:
         """The first point at which the bodies change the mean response by more than 1 %; None if they never do."""
-        touched = np.flatnonzero(np.abs(self.damped_mean - self.undamped) > _UNTOUCHED * self.undamped)
+        touched = np.flatnonzero(np.abs(self.damped_mean - self.undamped) > UNTOUCHED * self.undamped)
         return self.x[touched[0]] if touched.size else None
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from coupling.sweep import Sweep
-from studies.forced_response import ForcedResponse, forced_responses
+from studies.forced_response import UNTOUCHED, ForcedResponse, forced_responses
 
 #: standard deviation of the smoothing, in points: frequencies are denser where the curves are steeper
 _SMOOTHING = 1.5
@@ -58,13 +58,17 @@ class Curve:
     @property
     def touched(self) -> np.ndarray:
         """Where the bodies hit something, or at least change the response by 1 %."""
-        return (self.impacts > 0) | (np.abs(self.mean - self.undamped) > 0.01 * self.undamped)
+        return (self.impacts > 0) | self._changed
 
     @property
     def onset(self) -> float:
         """The first frequency at which the bodies change the mean by 1 %; nan if they never do."""
-        changed = np.flatnonzero(np.abs(self.mean - self.undamped) > 0.01 * self.undamped)
+        changed = np.flatnonzero(self._changed)
         return float(self.frequency[changed[0]]) if changed.size else float("nan")
+
+    @property
+    def _changed(self) -> np.ndarray:
+        return np.abs(self.mean - self.undamped) > UNTOUCHED * self.undamped
 
     @property
     def scatter(self) -> dict[str, float]:
