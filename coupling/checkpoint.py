@@ -6,7 +6,6 @@ leaves one that can be read. Writing takes at most a thirtieth of the time.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import time
 from collections.abc import Mapping, Sequence
@@ -19,7 +18,7 @@ from coupling.handover import Handover
 from coupling.inputs import InputError
 from coupling.points import Block, Finished, Task
 from coupling.scene import Rom, Scene, axis_values
-from modal.store import StoreError, Variable, clear_leftovers, load, save
+from modal.store import StoreError, Variable, clear_leftovers, digest, load, save
 
 _KIND = "sweep-checkpoint"
 _SHARE = 30
@@ -110,7 +109,7 @@ def _models(scene: Scene) -> dict[str, str]:
     """Digest of every reduced model that the sweep names, by its file."""
     files = [scene.structure.file] if isinstance(scene.structure, Rom) else []
     files += [str(file) for file in _axis(scene, "structure.file")]
-    return {file: hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files if Path(file).is_file()}
+    return {file: digest(file) for file in files if Path(file).is_file()}
 
 
 def _axis(scene: Scene, path: str) -> Sequence[Any]:

@@ -7,7 +7,6 @@ that become scipy matrices.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import importlib
 import logging
 import os
@@ -31,6 +30,7 @@ from scipy import sparse
 
 from modal import msh
 from modal.msh import MeshError
+from modal.store import digest
 
 try:
     gmshio: Any = importlib.import_module("dolfinx.io.gmsh")
@@ -91,7 +91,7 @@ def read(path: str | os.PathLike[str]) -> Domain:
         volumes=_members(cells, names[3]),
         facets=_members(facets, names[2]),
         path=str(file),
-        sha256=hashlib.sha256(file.read_bytes()).hexdigest(),
+        sha256=digest(file),
     )
     _check_boundary(domain)
     return domain

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import glob
+import hashlib
 import io
 import json
 import math
@@ -87,6 +88,11 @@ def write_json(path: str | os.PathLike[str], data: Any) -> None:
 def json_text(data: Any) -> str:
     """Finite plain data as JSON. Raises ValueError for nan and infinity, which it does not know."""
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def digest(path: str | os.PathLike[str]) -> str:
+    """SHA-256 of a file's bytes: which file a result comes from."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def finite(data: Any) -> Any:

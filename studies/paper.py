@@ -6,7 +6,6 @@ with the same scene, model and versions can be taken over, so that an interrupte
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 import textwrap
@@ -23,7 +22,7 @@ from coupling.inputs import InputError, nearest, read_toml, validate
 from coupling.scene import Rom, Scene
 from coupling.sweep import Sweep, sweep
 from meshes.vane_cluster import SHIPPED
-from modal.store import StoreError, finite, load, write_json
+from modal.store import StoreError, digest, finite, load, write_json
 from rom.reduced import ReducedModel
 from studies import paper_claims, paper_plots, paper_reduced, systems
 from studies.paper_curve import Curve, curves
@@ -124,7 +123,7 @@ def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
     checkpoint = Path(f"{path}.partial")
     provenance: dict[str, Any] = {"versions": versions()}
     if isinstance(scene.structure, Rom):
-        provenance["model"] = hashlib.sha256(Path(scene.structure.file).read_bytes()).hexdigest()
+        provenance["model"] = digest(scene.structure.file)
     old = session.computed.get(stem) or (_kept(path) if session.resume else None)
     if old is None or old.scene != scene or any(old.provenance.get(key) != provenance[key] for key in provenance):
         if not session.resume:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import itertools
 import json
 import re
@@ -17,7 +16,7 @@ import numpy as np
 import plotly.offline
 
 from coupling.sweep import LOSSES, Sweep
-from modal.store import replacing
+from modal.store import digest, replacing
 from rom.reduced import ReducedModel
 from studies import figures
 from studies.charts import Chart, chart, dressed
@@ -253,7 +252,7 @@ def _provenance(results: Results) -> dict[str, dict[str, str]]:
     for file, record in (results.reduced | results.sweeps | results.histories | results.optimisations).items():
         tables[file] = _flat({key: value for key, value in record.provenance.items() if key != "scene"})
     for file in results.names:
-        tables[file]["sha256"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        tables[file]["sha256"] = digest(file)
     return tables
 
 
