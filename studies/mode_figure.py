@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
@@ -48,15 +48,25 @@ def sharp_edges(points: np.ndarray, triangles: np.ndarray, angle_deg: float = 30
     return edges[pairs[cosine < np.cos(np.radians(angle_deg))]]
 
 
-def is_small(values: Mapping[str, np.ndarray]) -> bool:
-    """Whether a page can carry the surface of a record of modes."""
+class Surface(NamedTuple):
+    """The nodes (n,) on a mesh's surface, and its triangles (t, 3) as places in them."""
+
+    nodes: np.ndarray
+    triangles: np.ndarray
+
+
+def small_surface(values: Mapping[str, np.ndarray]) -> Surface | None:
+    """The surface of a record of modes, if a page can carry it."""
     cells = values["cell"]
-    return cells.shape[1] in _FACES and len(surface(cells)) <= MOST_TRIANGLES
+    if cells.shape[1] not in _FACES:
+        return None
+    nodes, triangles = np.unique(surface(cells), return_inverse=True)
+    return Surface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * MOST_TRIANGLES else None
 
 
-def mode_figure(values: Mapping[str, np.ndarray], mode: int) -> go.Figure:
+def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.Figure:
     """The modes of a record of `vanedamp modal`, one at a time, beginning with `mode`."""
-    nodes, triangles = _of_surface(values)
+    nodes, triangles = of
     points = values["coordinates"][nodes]
     chosen = range(min(len(values["frequency"]), max(_MOST_MODES, mode + 1)))
     shapes = [values["shape"][index].reshape(-1, 3)[nodes] for index in chosen]
@@ -82,16 +92,10 @@ def mode_figure(values: Mapping[str, np.ndarray], mode: int) -> go.Figure:
     return figure
 
 
-def mode_rows(values: Mapping[str, np.ndarray], mode: int) -> Iterator[list[float]]:
+def mode_rows(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> Iterator[list[float]]:
     """x, y, z (m) and the displacements of a mode at the nodes of the surface."""
-    nodes, _ = _of_surface(values)
-    yield from np.column_stack([values["coordinates"][nodes], values["shape"][mode].reshape(-1, 3)[nodes]]).tolist()
-
-
-def _of_surface(values: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The nodes of the surface, and its triangles in their numbers."""
-    nodes, triangles = np.unique(surface(values["cell"]), return_inverse=True)
-    return nodes, triangles.reshape(-1, 3)
+    moved = values["shape"][mode].reshape(-1, 3)
+    yield from np.column_stack([values["coordinates"][of.nodes], moved[of.nodes]]).tolist()
 
 
 def _at_rest(points: np.ndarray, triangles: np.ndarray) -> go.Scatter3d:

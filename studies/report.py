@@ -22,7 +22,7 @@ from studies import figures
 from studies.charts import Chart, chart, dressed
 from studies.forced_response import ForcedResponse, forced_responses, model_name, shown
 from studies.history import History, history_figure
-from studies.mode_figure import is_small, mode_figure, mode_rows
+from studies.mode_figure import mode_figure, mode_rows, small_surface
 from studies.optimisation import Optimisation
 from studies.optimise_figures import optimisation_figure
 from studies.pictures import mode_picture
@@ -61,7 +61,7 @@ def write_report(results: Results, path: str | Path) -> None:
         for file, history in results.histories.items()
         if history.scene is not None
     }
-    sections = list(_sections(results))
+    sections = list(_sections(results, names))
     analyses = [_analysis(number, name, *record) for number, (name, record) in enumerate(results.modes.items())]
     html = template.render(
         plotly=plotly.offline.get_plotlyjs(),
@@ -87,20 +87,25 @@ def _anchor(name: str) -> str:
     return "from-" + re.sub(r"\W", "-", name)
 
 
-def _sections(results: Results) -> Iterator[Section]:
+def _sections(results: Results, names: Mapping[str, str]) -> Iterator[Section]:
     """What no study names, then every study with its own results."""
     claimed = {str(Path(name).with_name(source)) for name, study in results.studies.items() for source in study.sources}
     numbers = itertools.count()
-    yield _section(None, results, lambda name: name not in claimed, numbers)
+    yield _section(None, results, names, lambda name: name not in claimed, numbers)
     for file, study in results.studies.items():
         mine = {str(Path(file).with_name(source)) for source in study.sources}
-        yield _section(study, results, mine.__contains__, numbers)
+        yield _section(study, results, names, mine.__contains__, numbers)
 
 
-def _section(study: Study | None, results: Results, mine: Callable[[str], bool], numbers: Iterator[int]) -> Section:
+def _section(
+    study: Study | None,
+    results: Results,
+    names: Mapping[str, str],
+    mine: Callable[[str], bool],
+    numbers: Iterator[int],
+) -> Section:
     sweeps = {name: sweep for name, sweep in results.sweeps.items() if mine(name)}
     histories = {name: history for name, history in results.histories.items() if mine(name)}
-    names = results.names
     named = {file: (names[file], sweep) for file, sweep in sweeps.items()}
     return Section(
         study,
@@ -209,10 +214,12 @@ def _key_figures(response: ForcedResponse) -> dict[str, Any]:
 def _analysis(number: int, name: str, values: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
     bending = int(attributes["first_bending"]) if "first_bending" in attributes else None
     turned, picture = None, None
-    if is_small(values):
+    outside = small_surface(values)
+    if outside is not None:
         first = bending or 0
         header = ("x", "y", "z", "dx", "dy", "dz")
-        turned = chart(f"mode-{number}", mode_figure(values, first), header, mode_rows(values, first), [name])
+        figure, rows = mode_figure(values, outside, first), mode_rows(values, outside, first)
+        turned = chart(f"mode-{number}", figure, header, rows, [name])
     elif bending is not None:
         picture = mode_picture(name, bending)
     return {

@@ -216,7 +216,7 @@ def test_sweeps_alone_make_a_page(results, tmp_path):
 
 def test_page_without_a_picture_says_so(results, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "mode_picture", lambda *_: None)
-    monkeypatch.setattr(module, "is_small", lambda _: False)
+    monkeypatch.setattr(module, "small_surface", lambda _: None)
     write_report(collect([results / "modes.h5"]), tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "No picture: this machine cannot render one" in text
