@@ -121,10 +121,16 @@ def shown(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{value:.6g}"
 
 
+def for_people(units: str) -> tuple[float, str]:
+    """Factor and unit in which values of a unit are shown."""
+    return (1e6, "µm") if units == "m" else (1.0, units)
+
+
 def quantity(value: Any, units: str) -> str:
     """A value with its unit, lengths in micrometres."""
-    if units == "m" and not isinstance(value, str):
-        return f"{value * 1e6:.4g} µm"
+    factor, larger = for_people(units)
+    if factor != 1.0 and not isinstance(value, str):
+        return f"{value * factor:.4g} {larger}"
     return f"{shown(value)} {units}".removesuffix(" 1")
 
 

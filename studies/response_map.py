@@ -11,7 +11,7 @@ from plotly.subplots import make_subplots
 
 from coupling.sweep import Sweep
 from studies.charts import axis_title, dressed
-from studies.forced_response import FREQUENCY, quantity, reference_amplitude
+from studies.forced_response import FREQUENCY, for_people, quantity, reference_amplitude
 
 _FEWEST = 4  # values of the second axis that make a map
 _MOST_PANELS = 6
@@ -34,22 +34,18 @@ def map_figure(sweep: Sweep) -> go.Figure:
     )  # fmt: skip
     across, up = map_axes(sweep) or ("", "")
     units = sweep.units()
-    scales = [1e6 if units[path] == "m" else 1.0 for path in (across, up)]
+    (wide, wide_units), (high, high_units) = for_people(units[across]), for_people(units[up])
     for number, (_, x, y, values) in enumerate(panels):
         figure.add_heatmap(
-            x=scales[0] * x, y=scales[1] * y, z=values, coloraxis="coloraxis",
+            x=wide * x, y=high * y, z=values, coloraxis="coloraxis",
             row=number // columns + 1, col=number % columns + 1,
             hovertemplate="%{x:.6g}, %{y:.4g}: %{z:.3f}<extra></extra>",
         )  # fmt: skip
-    figure.update_xaxes(title_text=axis_title(across, _larger(units[across])))
-    figure.update_yaxes(title_text=axis_title(up, _larger(units[up])), col=1)
+    figure.update_xaxes(title_text=axis_title(across, wide_units))
+    figure.update_yaxes(title_text=axis_title(up, high_units), col=1)
     bar = {"title": {"text": "mean amplitude /<br>undamped maximum"}}
     figure.update_layout(coloraxis={"colorscale": "Viridis", "cmin": 0, "colorbar": bar})
     return dressed(figure, height=440 * -(-len(panels) // columns))
-
-
-def _larger(units: str) -> str:
-    return "µm" if units == "m" else units
 
 
 def map_rows(sweep: Sweep) -> Iterator[list[object]]:
