@@ -133,7 +133,9 @@ def _variation(values: Sequence[float] | np.ndarray) -> float:
 def fig13(reduced: Response, rigid: Response, alike: Response) -> list[Claim]:
     """The reduced model and the rigid one at their damped peaks; alike: the reduced one from a start 1 % aside."""
     mine, other = irregularity(reduced), irregularity(rigid)
-    apart = float(np.max(np.abs(reduced.section[-1] - alike.section[-1]) / np.abs(reduced.section).max(axis=0)))
+    # the structure near its resonance hides what its body does
+    ours, others = reduced.slip[reduced.transient :], alike.slip[alike.transient :]
+    apart = float(np.median(np.abs(ours - others) / np.ptp(ours, axis=0)))
     means = abs(reduced.amplitude_mean / alike.amplitude_mean - 1)
     return [
         claim(
@@ -143,7 +145,7 @@ def fig13(reduced: Response, rigid: Response, alike: Response) -> list[Claim]:
             f"mean), the peaks of the periods by {mine['peak']:.2%}",
             verdict(reduced.classification == "non-periodic"),
             f"It is the physics, not the numerics: the energy ledger closes to {reduced.energy_residual:.0e}. From a "
-            f"start 1 % aside the motion is {apart:.0%} of its range away in the end, while the mean amplitude "
+            f"start 1 % aside the body is {apart:.0%} of its range away in the median, while the mean amplitude "
             f"differs by {means:.2%}.",
             {**mine, "impacts_per_period": reduced.impacts_per_period, "mean_differs": means, "ends_apart": apart},
         ),
