@@ -20,6 +20,7 @@ from coupling.springs import begin_push, change_push, spring_energy, spring_forc
 from coupling.state import (
     AWAKE,
     CLOSED,
+    CLOSED_ROWS,
     CLOSES,
     EVENTS,
     FLOW,
@@ -154,7 +155,7 @@ def record_section(rows, flows, st, rec, work):
     for i in range(n):
         entry[0] += rows.response[i] * y[i]
         entry[1] += rows.response[i] * y[n + i]
-    momentum, energy = 0.0, 0.0
+    momentum, energy, part = 0.0, 0.0, rec.parts[st.counters[PERIOD]]
     for i in range(n):
         energy += 0.5 * (y[n + i] * y[n + i] + rows.stiffness[i] * y[i] * y[i])
     for k in range(b):
@@ -163,13 +164,16 @@ def record_section(rows, flows, st, rec, work):
             velocity += rows.floor[k, i] * y[n + i]
             height += rows.floor[k, i] * y[i]
         momentum += rows.mass[k] * velocity
-        energy += 0.5 * rows.mass[k] * velocity * velocity - rows.weight[k] * height
+        part[1 + k] = 0.5 * rows.mass[k] * velocity * velocity - rows.weight[k] * height
         entry[3 + k], entry[3 + b + k] = st.displacement[k], st.velocity[k]
     entry[2] = momentum
     for r in range(len(st.state)):
         # a Jenkins element keeps its spring's energy while it slides
         if st.state[r] == SPRUNG or (r < rows.friction_rows and not rigid(rows, r) and rows.limit[r] > 0.0):
             energy += spring_energy(rows, st, r)
+    part[0] = energy
+    for k in range(b):
+        energy += part[1 + k]
     st.ledger[STORED] = energy
     for i in range(len(st.ledger)):
         rec.ledger[st.counters[PERIOD], i] = st.ledger[i]
@@ -178,7 +182,12 @@ def record_section(rows, flows, st, rec, work):
 @kernel
 def _find_flow(flows, key):
     for s in range(len(flows.modes)):
-        if flows.modes[s] > 0 and flows.key[s, 0] == key[0] and flows.key[s, 1] == key[1]:
+        same = flows.modes[s] > 0
+        for r in range(len(key)):
+            if not same:
+                break
+            same = flows.key[s, r] == key[r]
+        if same:
             return s
     return -1
 
@@ -363,7 +372,7 @@ def _move(rows, flows, st, work, tau):
             shift_slip(st, r, shift)
     if flows.sprung[s]:
         _push(rows, flows, st, work, tau)
-    if st.key[0] != 0 or st.key[1] != 0:
+    if st.counters[CLOSED_ROWS] > 0:
         _stay_together(rows, st, work)
     measure_gaps(rows, st)
     for a in range(count):

@@ -15,6 +15,7 @@ from coupling.log import log_changes
 from coupling.springs import press, slide_or_hold, spring_force
 from coupling.state import (
     CLOSED,
+    CLOSED_ROWS,
     COAST,
     FLOW,
     HELD,
@@ -57,13 +58,10 @@ def settle(rows, st, rec, work):
             st.held[r] = -st.state[r] * rows.limit[r]
     if not _decide(rows, st, rec, work, k):
         return False
-    st.key[0], st.key[1] = 0, 0
+    st.counters[CLOSED_ROWS] = 0
     for r in range(len(st.state)):
-        state = st.state[r]
-        if r < friction and (state == STICK or state == SPRUNG):
-            st.key[0] |= 1 << r
-        elif r >= friction and (state == CLOSED or state == SPRUNG):
-            st.key[1] |= 1 << (r - friction)
+        st.key[r] = st.state[r] == SPRUNG or st.state[r] == (STICK if r < friction else CLOSED)
+        st.counters[CLOSED_ROWS] += st.key[r]
     log_changes(rows, st, rec, work)
     st.counters[SEARCHING] = 1
     return True

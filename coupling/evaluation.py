@@ -21,6 +21,8 @@ from coupling.statistics import mean_confidence, transient_length
 
 #: periods between two looks at whether the response is steady
 _CHUNK = 100
+#: share of the energy there is that counts as flow in any case
+_CARRIED = 1e-6
 
 
 class Run(Protocol):
@@ -37,14 +39,15 @@ class Run(Protocol):
 class Outcome:
     """What a run leaves behind: records of `periods` periods, counters, chunks of its log.
 
-    fastest: largest speed in the structure, m/s; penetration: relative to the free travel.
+    open_ledger: energy residual above which the method's figures are not to be used; penetration: relative to the
+    free travel.
     """
 
     rows: Rows
     records: Records
     periods: int
     events: int
-    fastest: float
+    open_ledger: float
     counters: dict[str, int]
     log: Sequence[np.ndarray]
     penetration: float = 0.0
@@ -84,6 +87,9 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     harmonic = 2 / span * records.harmonic[window].sum()
     evaluated = {name: float(value) for name, value in zip(st.ENERGIES, ledger[-1], strict=True)}
     peaks = records.peak[window]
+    balance = residual(records.ledger[: done + 1], records.parts[: done + 1])
+    if not balance <= run.open_ledger and status in (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN):
+        status = Status.ENERGY
     samples = len(records.samples) // scene.time.periods
     return Response(
         status=status,
@@ -98,7 +104,7 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         events=run.events,
         classification=classify(section[first:], records.impacts[window], evaluated["friction"]),
         energy=evaluated,
-        energy_residual=residual(records.ledger[: done + 1], _energy_scale(rows, section, run.fastest)),
+        energy_residual=balance,
         attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
         wall_time_s=time.perf_counter() - started,
         periods=done,
@@ -116,26 +122,18 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     )
 
 
-def residual(ledger: np.ndarray, scale: float) -> float:
-    """Imbalance of the energy ledger (periods + 1, 6), relative to its largest term.
+def residual(ledger: np.ndarray, parts: np.ndarray) -> float:
+    """Imbalance of the energy ledger (periods + 1, 6), relative to the energy that flowed.
 
-    At least to `scale`, J: what comes and goes within a period.
+    That is the largest of its terms, stored energy by its parts (periods + 1, 1 + b): what a heavy body only carries
+    along is not flow, nor is what two terms of the ledger would cancel. It is taken for no less than a millionth of the
+    energy there is, since what only comes and goes between two records does not show in them.
     """
-    change = ledger[-1] - ledger[0]
-    imbalance = change[st.EXCITATION] - change[st.VISCOUS : st.STORED].sum() - change[st.STORED]
-    largest = max(np.abs(change).max(), np.abs(ledger[:, st.STORED]).max(), scale)
-    return float(abs(imbalance) / largest) if largest > 0 else 0.0
-
-
-def _energy_scale(rows: Rows, section: np.ndarray, fastest: float) -> float:
-    """An energy below which all is round-off, J.
-
-    That of the bodies at the structure's speed or at the largest of their own at the periods' starts, or that of the
-    structure under its loads at rest.
-    """
-    own = section[:, 3 + len(rows.mass) :] ** 2 @ rows.mass
-    static = (np.abs(rows.force) ** 2 / rows.stiffness).sum() if len(rows.force) else 0.0
-    return float(max(rows.mass.sum() * fastest**2, own.max(), static) / 2)
+    change = ledger - ledger[0]
+    imbalance = change[-1, st.EXCITATION] - change[-1, st.VISCOUS :].sum()
+    swing = np.ptp(parts, axis=0).sum()
+    flowed = max(np.abs(change[:, : st.STORED]).max(), swing, _CARRIED * np.abs(parts).sum(axis=1).max())
+    return 0.0 if flowed == 0.0 else float(abs(imbalance) / flowed)
 
 
 def _attached(

@@ -22,6 +22,8 @@ from coupling.state import ALONE, DIFFERENCE, SUM
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
+#: bytes that the subsystems of one run may take
+ROOM = 2**29
 
 CRITICAL = "structure: a mode is critically damped to round-off; change its damping slightly"
 
@@ -29,7 +31,7 @@ CRITICAL = "structure: a mode is critically damped to round-off; change its damp
 class Flows(NamedTuple):
     """Stack of the subsystems met so far, first axis s. m is the largest number of complex modes."""
 
-    key: np.ndarray  # (s, 2) bit masks of the closed friction rows and contacts
+    key: np.ndarray  # (s, r) which rows are closed
     modes: np.ndarray  # (s,) number of complex modes, the excitation included
     eigenvalue: np.ndarray  # (s, m)
     shape: np.ndarray  # (s, 2n, m): (p, p') = constant + Re(shape c)
@@ -69,14 +71,14 @@ class Flows(NamedTuple):
 
 
 def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
-    """Room for `capacity` subsystems, none of them filled (key -1)."""
+    """Room for `capacity` subsystems, none of them filled (modes 0)."""
     n, b, r = len(rows.stiffness), len(rows.mass), len(rows.delassus)
     m = 2 * n + 1 + 2 * b * bool(np.isfinite(rows.spring[rows.friction_rows :]).any())
     pairs = m * (m + 2)
     z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
     return Flows(
-        np.full((capacity, 2), -1, np.int64), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
+        np.zeros((capacity, r), np.bool_), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
         z(m, 2 * b), np.zeros(capacity, np.bool_), np.zeros((capacity, b), np.bool_),
         z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
         f(b, b), z(b, m), z(m), f(m), f(m), z(m), z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
@@ -85,24 +87,24 @@ def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
     )  # fmt: skip
 
 
-def add_flow(flows: Flows, rows: Rows, key: tuple[int, int]) -> Flows:
-    """The stack with the subsystem of `key` = (closed friction rows, closed contacts) in its first free place."""
+def add_flow(flows: Flows, rows: Rows, closed: np.ndarray) -> Flows:
+    """The stack with the subsystem of the closed rows (r,) in its first free place.
+
+    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
+    """
     free = np.flatnonzero(flows.modes == 0)
     if len(free) == 0:
-        flows = Flows(
-            *(np.concatenate([old, new]) for old, new in zip(flows, empty_flows(rows, len(flows.key)), strict=True))
-        )
+        size, room = len(flows.modes), sum(part.nbytes for part in flows)
+        if 2 * room > ROOM:
+            flows = empty_flows(rows, size)
+        else:
+            more = empty_flows(rows, size)
+            flows = Flows(*(np.concatenate([old, new]) for old, new in zip(flows, more, strict=True)))
         free = np.flatnonzero(flows.modes == 0)
     place = free[0]
-    _fill(flows, rows, place, _closed_rows(rows, key))
-    flows.key[place] = key
+    _fill(flows, rows, place, np.flatnonzero(closed))
+    flows.key[place] = closed
     return flows
-
-
-def _closed_rows(rows: Rows, key: tuple[int, int]) -> np.ndarray:
-    friction, contacts = rows.friction_rows, len(rows.restitution)
-    closed = [r for r in range(friction) if key[0] >> r & 1]
-    return np.array(closed + [friction + c for c in range(contacts) if key[1] >> c & 1], int)
 
 
 def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:

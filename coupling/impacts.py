@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from coupling.compiled import inlined, kernel
-from coupling.complementarity import AT_LOW, DEPENDENT, solve_box
+from coupling.complementarity import AT_LOW, DEPENDENT, FREE, solve_box
 from coupling.gaps import SIMULTANEOUS, close, join_speeds, measure_gaps, rigid, slowest
 from coupling.log import log_event
-from coupling.state import COAST, IMPACT, IMPACT_LOSS, IMPACTS, OPEN, PERIOD, SPRUNG, STICK
+from coupling.state import CLOSED, COAST, IMPACT, IMPACT_LOSS, IMPACTS, OPEN, PERIOD, SPRUNG, STICK
 
 #: impacts of one contact that follow each other within this share of a period are the end of an inelastic collapse:
 #: bodies in a row can meet infinitely often in finite time (McNamara and Young 1992)
@@ -73,8 +73,9 @@ def collide(rows, st, rec, work):
     """Newton's law at all touching rigid contacts at once: v+ + k v- >= 0 and P >= 0 complement each other.
 
     Velocities of rows jump; the impulses are left in work.impulse (r,). An impact at the end of a chatter or of an
-    inelastic collapse is plastic, and what would leave for a flight below the tolerance (st.settling) stays, so that
-    bodies that chatter on one structure do not wake each other for ever. Returns False if the problem cannot be solved.
+    inelastic collapse is plastic. Contacts that would leave for a flight below the tolerance (st.settling) end their
+    chatter together (`_complete`), so that bodies that chatter on one structure do not wake each other for ever.
+    Returns False if the problem cannot be solved.
     """
     friction, problem = rows.friction_rows, work.problem
     k = close(rows, st, work)
@@ -94,10 +95,10 @@ def collide(rows, st, rec, work):
         problem.low[p], problem.high[p], problem.forced[p] = 0.0, np.inf, 0
         for q in range(k):
             problem.matrix[p, q] = rows.delassus[r, work.rows[q]]
-    solved = solve_box(problem, k, 0.0)
-    while solved and _hold_back(rows, st, work, k):
-        solved = solve_box(problem, k, 0.0)
-    if not solved:
+        work.reaction[p] = 0.0
+    if not solve_box(problem, k, 0.0):
+        return False
+    if _leave_slowly(rows, st, work, k) and not _complete(rows, st, work, k):
         return False
     _jump(rows, st, work, k)
     for p in range(k):
@@ -107,7 +108,7 @@ def collide(rows, st, rec, work):
             after = -problem.restitution[p] * before
         st.ledger[IMPACT_LOSS] -= 0.5 * impulse * (work.jerk[p] + after)
         if before < 0.0:
-            _count(rows, st, rec, r, before, after, impulse)
+            _count(rows, st, rec, r, before, after, max(impulse, work.reaction[p]))
     return True
 
 
@@ -121,18 +122,56 @@ def _share(restitution):
 
 
 @kernel
-def _hold_back(rows, st, work, k):
-    """Tie contacts that would separate too slowly. Returns whether there are any."""
+def _leave_slowly(rows, st, work, k):
+    """Mark the contacts (work.side) that rest or would separate too slowly. Returns whether any would separate."""
     problem, found = work.problem, False
     for p in range(k):
-        problem.forced[p] = 0  # the solver's own mark
         r = work.rows[p]
+        work.side[p] = problem.restitution[p] == 0.0 or work.acceleration[p] == 0.0
         after = problem.acceleration[p] - problem.restitution[p] * work.acceleration[p]
-        slow = _share(rows.restitution[r - rows.friction_rows]) * st.settling[r]
-        if problem.state[p] == AT_LOW and problem.low[p] == 0.0 and after < slow:
-            problem.b[p] -= problem.restitution[p] * work.acceleration[p]
-            problem.low[p], problem.restitution[p], found = -np.inf, 0.0, True
+        if problem.state[p] == AT_LOW and after < _share(rows.restitution[r - rows.friction_rows]) * st.settling[r]:
+            work.side[p], found = True, True
     return found
+
+
+@kernel
+def _complete(rows, st, work, k):
+    """End the chatter of the marked contacts together, by what their impacts and forces do until it is over.
+
+    A chatter that is over within CHATTER leaves its contacts closed without speed. Its impacts and the pressing forces
+    in between have then handed over impulses that only push: those of one step of Moreau's scheme of that length
+    (Moreau 1988), left in work.reaction. Contacts that keep an impulse in it are closed from now on; others leave.
+    What the forces press in that time is then still to come: the jump itself, which ties the contacts, is less by it.
+    Returns False if the problem cannot be solved.
+    """
+    problem = work.problem
+    for p in range(k):
+        problem.forced[p] = 0  # the solver's own mark
+        if work.side[p]:
+            problem.restitution[p] = 0.0
+            problem.b[p] = work.jerk[p] + _pressed(rows, st, work, p, k)
+    if not solve_box(problem, k, 0.0):
+        return False
+    for p in range(k):
+        problem.forced[p] = 0
+        if work.side[p]:
+            problem.b[p] = work.jerk[p]
+            if problem.state[p] == FREE:
+                problem.low[p], work.reaction[p] = -np.inf, problem.force[p]
+    return solve_box(problem, k, 0.0)
+
+
+@kernel
+def _pressed(rows, st, work, p, k):
+    """Speed (m/s) that touching contact p gains within CHATTER if none of them carries a force."""
+    r = work.rows[p]
+    speed = 0.0 if st.state[r] == CLOSED else -2.0 * st.settling[r]
+    for q in range(k):
+        other = work.rows[q]
+        if st.state[other] == CLOSED:
+            # the speed that its own force holds back
+            speed -= 2.0 * st.settling[other] * rows.delassus[r, other] / rows.delassus[other, other]
+    return speed
 
 
 @inlined

@@ -32,6 +32,8 @@ _ROUND_OFF = 1e-13
 _SETTLED = 1e-6
 #: events without time between them before the run is given up
 _STANDING = 100
+#: imbalance of the ledger above which a response is not to be used
+_OPEN_LEDGER = 1e-5
 #: columns of the integrals that go along with the state
 _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN = range(9)
 
@@ -128,7 +130,7 @@ class IvpRun:
         numbers = {"impacts": self.impacts, "evaluations": self.evaluations}
         log = [np.array(self.chunks)] if self.chunks else []
         return Outcome(
-            self.rows, self.records, self.period, self.events, self.fastest, numbers, log, max(self.deep, 0.0)
+            self.rows, self.records, self.period, self.events, _OPEN_LEDGER, numbers, log, max(self.deep, 0.0)
         )
 
     # -- motion between events
@@ -445,13 +447,14 @@ class IvpRun:
         springs = np.where(np.isfinite(system.spring), system.spring, 0.0)
         pressed = np.where(np.arange(len(slips)) >= system.friction_rows, np.minimum(slips + system.offset, 0.0), 0.0)
         spring = 0.5 * float(springs @ pressed**2)
-        energy = 0.5 * float(system.mass @ v**2 + system.stiffness @ q**2) - float(system.weight @ q) + spring
+        energy = 0.5 * (system.mass * v**2 + system.stiffness * q**2) - system.weight * q
+        self.records.parts[p] = [energy[:n].sum() + spring, *energy[n:]]
         ledger = self.records.ledger[p]
         ledger[[st.EXCITATION, st.VISCOUS, st.FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
         if p == 0:
             self.spring_before, self.before = spring, integrals.copy()
         ledger[st.CONTACT] = integrals[_CONTACT] - (spring - self.spring_before)
-        ledger[st.IMPACT_LOSS], ledger[st.STORED] = self.impact_loss, energy
+        ledger[st.IMPACT_LOSS], ledger[st.STORED] = self.impact_loss, energy.sum() + spring
         if p > 0:
             change = integrals - self.before
             self.records.square[p - 1] = change[_SQUARE]

@@ -34,8 +34,13 @@ SUM, DIFFERENCE, ALONE = range(3)
 # what is known of an event function: a bound of its second derivative; expansions; `safe` is its first root
 BOUNDED, EXPANDED, ROOT = range(3)
 
-COUNTERS = ("period", "flow", "searching", "logged", "events", "impacts", "evaluations", "segments", "awake", "carried")
-PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE, CARRIED = range(len(COUNTERS))
+COUNTERS = (
+    "period", "flow", "searching", "logged", "events", "impacts", "evaluations", "segments", "awake", "carried",
+    "closed",
+)  # fmt: skip
+(
+    PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE, CARRIED, CLOSED_ROWS,
+) = range(len(COUNTERS))  # fmt: skip
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")
 IMPACT, STICKS, SLIPS, DETACHES, RESTS = np.arange(len(KINDS))
@@ -50,7 +55,7 @@ class State(NamedTuple):
 
     counters: np.ndarray  # int, by the names above
     time: np.ndarray  # (1,) within the period, s
-    key: np.ndarray  # (2,) closed friction rows and contacts, bit masks
+    key: np.ndarray  # (r,) whether a row is closed: the set names the linear subsystem; counters[CLOSED_ROWS] of them
     amplitude: np.ndarray  # (m,) complex modal amplitudes; the first is the excitation's phase
     awake: np.ndarray  # (m,) the modes that are awake are the first counters[AWAKE] of these
     coordinates: np.ndarray  # (2n,) p and p' of the structure where a new subsystem begins
@@ -99,6 +104,7 @@ class Records(NamedTuple):
     impacts: np.ndarray
     section: np.ndarray  # (periods + 1, 3 + 2b): x, x', bodies' momentum, slips, slip velocities at the period's start
     ledger: np.ndarray  # (periods + 1, 6) cumulative, J
+    parts: np.ndarray  # (periods + 1, 1 + b): energy of the structure with all springs, and of each body, J
     samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples a period
     log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
 
@@ -158,7 +164,7 @@ def new_state(rows: Rows, modes: int, displacement: np.ndarray, velocity: np.nda
     """The state at time zero with the rows as given; `modes` is the room for complex modes."""
     r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
     state = State(
-        counters=np.zeros(len(COUNTERS), np.int64), time=np.zeros(1), key=np.zeros(2, np.int64),
+        counters=np.zeros(len(COUNTERS), np.int64), time=np.zeros(1), key=np.zeros(r, np.bool_),
         amplitude=np.zeros(modes, complex), awake=np.zeros(modes, np.int64), coordinates=np.zeros(2 * n),
         constant=np.zeros(n), slip_constant=np.zeros(b), displacement=np.array(displacement), low=np.zeros(r),
         velocity=np.array(velocity), drift=np.zeros(r),
@@ -184,7 +190,8 @@ def new_records(rows: Rows, periods: int, samples: int) -> Records:
         peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
         momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),
         section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
-        samples=np.zeros((periods * samples, 1 + b)), log=np.zeros((4096 + 4 * len(rows.delassus), 6)),
+        parts=np.zeros((periods + 1, 1 + b)), samples=np.zeros((periods * samples, 1 + b)),
+        log=np.zeros((4096 + 4 * len(rows.delassus), 6)),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from coupling import system as sy
 from coupling.cosimulation import cosimulation_matrices, march_cosimulation
-from coupling.evaluation import Outcome, Run, residual
+from coupling.evaluation import Outcome, Run
 from coupling.explicit import explicit_matrix, march_explicit
 from coupling.inputs import InputError
 from coupling.moreau import march_moreau, moreau_matrices
@@ -68,12 +68,7 @@ class SteppedRun:
                 return _STATUS[code]
             if counters[sy.PERIOD] >= periods:
                 break
-        open_ledger = residual(self.records.ledger[: counters[sy.PERIOD] + 1], self._body_energy) > _OPEN_LEDGER
-        return Status.ENERGY if open_ledger else Status.OK
-
-    @property
-    def _body_energy(self) -> float:
-        return float(self.rows.mass.sum() * self.motion.extremes[1] ** 2 / 2)
+        return Status.OK
 
     def outcome(self) -> Outcome:
         """What the run leaves behind."""
@@ -82,8 +77,8 @@ class SteppedRun:
             "impacts": int(counters[sy.IMPACTS]), "steps": int(counters[sy.STEPS]), "solves": int(counters[sy.SOLVES])
         }  # fmt: skip
         return Outcome(
-            self.rows, self.records, int(counters[sy.PERIOD]), numbers["impacts"], float(self.motion.extremes[1]),
-            numbers, [chunk for chunk in self.chunks if len(chunk)], float(self.motion.extremes[0]),
+            self.rows, self.records, int(counters[sy.PERIOD]), numbers["impacts"], _OPEN_LEDGER, numbers,
+            [chunk for chunk in self.chunks if len(chunk)], float(self.motion.deepest[0]),
         )  # fmt: skip
 
 

@@ -57,7 +57,7 @@ class Motion(NamedTuple):
     speed: np.ndarray  # (r,) at the beginning of the contact that is going on, m/s
     begun: np.ndarray  # (r,) time of that, s
     impulse: np.ndarray  # (r,) since then, N s
-    extremes: np.ndarray  # (2,) deepest penetration relative to the free travel, largest speed of the structure
+    deepest: np.ndarray  # (1,) penetration relative to the free travel
     losses: np.ndarray  # (6,) cumulative ledger, J
     counters: np.ndarray  # int
     coordinates: np.ndarray  # (6, N) scratch space
@@ -101,7 +101,7 @@ def start(
     offset = np.where(contacts, displacement - system.J @ q, 0.0)
     motion = Motion(
         q=q, v=v, half=np.zeros(n + b), force=np.zeros(r), elongation=np.zeros(system.friction_rows),
-        active=np.zeros(r, np.int64), speed=np.zeros(r), begun=np.zeros(r), impulse=np.zeros(r), extremes=np.zeros(2),
+        active=np.zeros(r, np.int64), speed=np.zeros(r), begun=np.zeros(r), impulse=np.zeros(r), deepest=np.zeros(1),
         losses=np.zeros(6), counters=np.zeros(5, np.int64),
         coordinates=np.zeros((6, n + b)), rows=np.zeros((8, r)), listed=np.zeros(r, np.int64),
     )  # fmt: skip

@@ -45,20 +45,25 @@ def record_start(system, motion, records):
     n, b, p = system.modes, len(system.mass) - system.modes, motion.counters[PERIOD]
     entry = records.section[p]
     entry[0], entry[1] = response_of(system, motion.q, 1.0, 0.0), rate_of(system, motion.v, 1.0, 0.0)
-    momentum, energy = 0.0, 0.0
+    momentum, part = 0.0, records.parts[p]
+    part[0] = 0.0
     for i in range(n + b):
-        energy += 0.5 * (system.mass[i] * motion.v[i] ** 2 + system.stiffness[i] * motion.q[i] ** 2)
+        energy = 0.5 * (system.mass[i] * motion.v[i] ** 2 + system.stiffness[i] * motion.q[i] ** 2)
         energy -= system.weight[i] * motion.q[i]
+        if i < n:
+            part[0] += energy
+        else:
+            part[1 + i - n] = energy
     for k in range(b):
         momentum += system.mass[n + k] * motion.v[n + k]
         entry[3 + k], entry[3 + b + k] = row_speed(system, k, motion.q), row_speed(system, k, motion.v)
     entry[2] = momentum
     for r in range(len(system.J)):
         if r >= system.friction_rows and system.spring[r] != math.inf:
-            energy += 0.5 * system.spring[r] * min(row_speed(system, r, motion.q) + system.offset[r], 0.0) ** 2
+            part[0] += 0.5 * system.spring[r] * min(row_speed(system, r, motion.q) + system.offset[r], 0.0) ** 2
         elif r < system.friction_rows and system.spring[r] != math.inf:
-            energy += 0.5 * system.spring[r] * motion.elongation[r] ** 2
-    motion.losses[STORED] = energy
+            part[0] += 0.5 * system.spring[r] * motion.elongation[r] ** 2
+    motion.losses[STORED] = part.sum()
     for i in range(len(motion.losses)):
         records.ledger[p, i] = motion.losses[i]
 
@@ -102,10 +107,7 @@ def tally(system, motion, records, k, q, v, impulse, before, deepest):
         for j in range(n if i < n else 0):
             if system.damping[i, j] != 0.0:
                 motion.losses[VISCOUS] += 0.5 * system.damping[i, j] * (v[j] + motion.v[j]) * moved
-    fast, deep = 0.0, 0.0
-    for i in range(n):
-        fast = max(fast, abs(motion.v[i]))
-    motion.extremes[1] = max(motion.extremes[1], fast)
+    deep = 0.0
     for r in range(len(system.J)):
         moved, now = 0.0, system.offset[r]
         contact = r >= system.friction_rows
@@ -127,7 +129,7 @@ def tally(system, motion, records, k, q, v, impulse, before, deepest):
             motion.losses[FRICTION] += loss
         else:
             motion.losses[FRICTION] += loss - 0.5 * system.spring[r] * (motion.elongation[r] ** 2 - before[r] ** 2)
-    motion.extremes[0] = max(motion.extremes[0], deep)
+    motion.deepest[0] = max(motion.deepest[0], deep)
     motion.counters[STEPS] += 1
     if not size < _BOUND:
         return DIVERGED

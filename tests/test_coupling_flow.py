@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, null_space
 
-from coupling.flow import _closed_rows, add_flow, empty_flows
+from coupling.flow import add_flow, empty_flows
 from coupling.inputs import validate
 from coupling.rows import rows_of
 from coupling.scene import Scene
@@ -60,11 +60,10 @@ def system(seed, modes, bodies, labels, proportional=False):
 
 
 def keys(rows):
-    """Every set of independent closed rows, as bit masks."""
-    friction, contacts = rows.friction_rows, len(rows.restitution)
+    """Every set of independent closed rows, as flags (r,) and as numbers."""
     jacobian = np.hstack([rows.structure, rows.bodies])
-    for key in itertools.product(range(1 << friction), range(1 << contacts)):
-        closed = _closed_rows(rows, key)
+    for flags in itertools.product([False, True], repeat=len(jacobian)):
+        key, closed = np.array(flags), np.flatnonzero(flags)
         if len(closed) == 0 or np.linalg.matrix_rank(jacobian[closed], tol=1e-6) == len(closed):
             yield key, closed
 
