@@ -87,7 +87,7 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     harmonic = 2 / span * records.harmonic[window].sum()
     evaluated = {name: float(value) for name, value in zip(st.ENERGIES, ledger[-1], strict=True)}
     peaks = records.peak[window]
-    balance = residual(records.ledger[: done + 1], records.parts[: done + 1])
+    balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(rows, records))
     if not balance <= run.open_ledger and status in (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN):
         status = Status.ENERGY
     samples = len(records.samples) // scene.time.periods
@@ -122,18 +122,25 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     )
 
 
-def residual(ledger: np.ndarray, parts: np.ndarray) -> float:
+def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> float:
     """Imbalance of the energy ledger (periods + 1, 6), relative to the energy that flowed.
 
     That is the largest of its terms, stored energy by its parts (periods + 1, 1 + b): what a heavy body only carries
-    along is not flow, nor is what two terms of the ledger would cancel. It is taken for no less than a millionth of the
-    energy there is, since what only comes and goes between two records does not show in them.
+    along is no flow. `exchanged` (J) is what comes and goes within a period. A millionth of the energy there is always
+    counts: below it the ledger would be judged by the round-off of what is only carried along.
     """
     change = ledger - ledger[0]
     imbalance = change[-1, st.EXCITATION] - change[-1, st.VISCOUS :].sum()
     swing = np.ptp(parts, axis=0).sum()
-    flowed = max(np.abs(change[:, : st.STORED]).max(), swing, _CARRIED * np.abs(parts).sum(axis=1).max())
+    flowed = max(np.abs(change[:, : st.STORED]).max(), swing, exchanged, _CARRIED * np.abs(parts).sum(axis=1).max())
     return 0.0 if flowed == 0.0 else float(abs(imbalance) / flowed)
+
+
+def _exchanged(rows: Rows, records: Records) -> float:
+    """Energy that comes and goes within a period, J: in collisions, and what the loads lend to each mode and body."""
+    modes = np.abs(rows.force) ** 2 / np.maximum(rows.stiffness, rows.omega**2)
+    bodies = np.abs(rows.inertia) ** 2 / (rows.mass * rows.omega**2)
+    return float(max(records.collided.max(), (modes.sum() + bodies.sum()) / 2))
 
 
 def _attached(

@@ -10,8 +10,8 @@ import numpy as np
 from coupling.compiled import inlined, kernel
 from coupling.complementarity import AT_LOW, DEPENDENT, FREE, solve_box
 from coupling.gaps import SIMULTANEOUS, close, join_speeds, measure_gaps, rigid, slowest
-from coupling.log import log_event
-from coupling.state import CLOSED, COAST, IMPACT, IMPACT_LOSS, IMPACTS, OPEN, PERIOD, SPRUNG, STICK
+from coupling.log import log_impact
+from coupling.state import CLOSED, COAST, IMPACT_LOSS, OPEN, SPRUNG, STICK
 
 #: impacts of one contact that follow each other within this share of a period are the end of an inelastic collapse:
 #: bodies in a row can meet infinitely often in finite time (McNamara and Young 1992)
@@ -55,17 +55,15 @@ def bounce(rows, st, rec, work, r):
     measure_gaps(rows, st)
     work.impulse[r] = impulse
     st.ledger[IMPACT_LOSS] -= 0.5 * (1.0 - restitution) * impulse * speed
-    _count(rows, st, rec, r, speed, -restitution * speed, impulse)
+    _note(rows, st, rec, r, speed, -restitution * speed, impulse)
     return True
 
 
 @inlined
-def _count(rows, st, rec, r, before, after, impulse):
-    """Count and log an impact."""
+def _note(rows, st, rec, r, before, after, impulse):
+    """Log an impact, and when it was."""
     st.last_impact[r] = st.time[0]
-    st.counters[IMPACTS] += 1
-    rec.impacts[st.counters[PERIOD]] += 1
-    log_event(rows.period, st.counters, st.time, rec.log, IMPACT, r, before, after, impulse)
+    log_impact(rows, st, rec, r, before, after, impulse)
 
 
 @kernel
@@ -108,7 +106,7 @@ def collide(rows, st, rec, work):
             after = -problem.restitution[p] * before
         st.ledger[IMPACT_LOSS] -= 0.5 * impulse * (work.jerk[p] + after)
         if before < 0.0:
-            _count(rows, st, rec, r, before, after, max(impulse, work.reaction[p]))
+            _note(rows, st, rec, r, before, after, max(impulse, work.reaction[p]))
     return True
 
 

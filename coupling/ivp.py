@@ -348,6 +348,9 @@ class IvpRun:
     def _count(self, r: int, before: float, after: float, impulse: float) -> None:
         self.impacts += 1
         self.records.impacts[min(self.period, len(self.records.impacts) - 1)] += 1
+        self.records.collided[min(self.period, len(self.records.impacts) - 1)] += (
+            0.5 * before**2 / self.rows.delassus[r, r]
+        )
         if self.keep:
             self.chunks.append((self.time, st.IMPACT, r, before, after, impulse))
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from coupling.compiled import kernel
-from coupling.state import DETACHES, LOGGED, OPEN, PERIOD, RESTS, SLIPS, SPRUNG, STICK, STICKS
+from coupling.compiled import inlined, kernel
+from coupling.state import DETACHES, IMPACT, IMPACTS, LOGGED, OPEN, PERIOD, RESTS, SLIPS, SPRUNG, STICK, STICKS
 
 
 @kernel
@@ -13,6 +13,16 @@ def log_event(period, counters, time, log, kind, r, before, after, impulse):
     counters[LOGGED] += 1
     entry[0] = counters[PERIOD] * period + time[0]
     entry[1], entry[2], entry[3], entry[4], entry[5] = kind, r, before, after, impulse
+
+
+@inlined
+def log_impact(rows, st, rec, r, before, after, impulse):
+    """Count an impact of row r and log it: relative velocities (m/s), impulse (N s)."""
+    period = st.counters[PERIOD]
+    st.counters[IMPACTS] += 1
+    rec.impacts[period] += 1
+    rec.collided[period] += 0.5 * before * before / rows.delassus[r, r]
+    log_event(rows.period, st.counters, st.time, rec.log, IMPACT, r, before, after, impulse)
 
 
 @kernel

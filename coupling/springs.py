@@ -5,17 +5,14 @@ from __future__ import annotations
 from coupling.compiled import kernel
 from coupling.complementarity import AT_HIGH, AT_LOW
 from coupling.gaps import rigid
-from coupling.log import log_event
+from coupling.log import log_event, log_impact
 from coupling.state import (
     COAST,
     CONTACT,
     DETACHES,
-    IMPACT,
-    IMPACTS,
     LEAVING,
     OPEN,
     OPENS,
-    PERIOD,
     RECLOSES,
     SLIP_LEFT,
     SLIP_RIGHT,
@@ -63,9 +60,7 @@ def begin_push(rows, st, rec, r):
     """A compliant contact begins at zero gap."""
     st.state[r], st.push[r] = SPRUNG, 0.0
     if st.velocity[r] < 0.0:
-        st.counters[IMPACTS] += 1
-        rec.impacts[st.counters[PERIOD]] += 1
-        log_event(rows.period, st.counters, st.time, rec.log, IMPACT, r, st.velocity[r], 0.0, 0.0)
+        log_impact(rows, st, rec, r, st.velocity[r], 0.0, 0.0)
 
 
 @kernel

@@ -105,6 +105,7 @@ class Records(NamedTuple):
     section: np.ndarray  # (periods + 1, 3 + 2b): x, x', bodies' momentum, slips, slip velocities at the period's start
     ledger: np.ndarray  # (periods + 1, 6) cumulative, J
     parts: np.ndarray  # (periods + 1, 1 + b): energy of the structure with all springs, and of each body, J
+    collided: np.ndarray  # energy of the relative motion that impacts turned round or took, J
     samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples a period
     log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
 
@@ -190,8 +191,8 @@ def new_records(rows: Rows, periods: int, samples: int) -> Records:
         peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
         momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),
         section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
-        parts=np.zeros((periods + 1, 1 + b)), samples=np.zeros((periods * samples, 1 + b)),
-        log=np.zeros((4096 + 4 * len(rows.delassus), 6)),
+        parts=np.zeros((periods + 1, 1 + b)), collided=np.zeros(periods + 1),
+        samples=np.zeros((periods * samples, 1 + b)), log=np.zeros((4096 + 4 * len(rows.delassus), 6)),
     )  # fmt: skip
 
 

@@ -167,6 +167,10 @@ def follow_contacts(system, motion, records, log, k, speed, impulse):
         if pushed and motion.active[r] == 0 and speed[r] < 0.0:
             motion.counters[IMPACTS] += 1
             records.impacts[p] += 1
+            mobility = 0.0
+            for i in range(len(system.mass)):
+                mobility += system.J[r, i] ** 2 / system.mass[i]
+            records.collided[p] += 0.5 * speed[r] ** 2 / mobility
             motion.speed[r], motion.impulse[r] = speed[r], 0.0
             motion.begun[r] = (p * (len(system.phase) - 1) + k) * h
         if pushed:

@@ -12,7 +12,7 @@ from coupling import state as st
 from coupling.gaps import SIMULTANEOUS
 from coupling.impacts import COLLAPSE
 from coupling.scene import Scene
-from coupling.watch import CHATTER
+from coupling.watch import ADHESION, CHATTER
 
 #: points at which the motion between two events is looked at
 POINTS = 9
@@ -55,7 +55,8 @@ def check_events(scene: Scene) -> Worst:
         _check_state(worst, first, first.at(0.0), None)
     for step in stepper.steps():
         end = _check_between(worst, step)
-        fastest = max(fastest, step.before.speed_size())
+        # speeds on both sides of an event have the round-off of the terms that they are sums of there
+        fastest = max(fastest, step.before.speed_size(), step.after.speed_size())
         now = step.after.at(0.0)
         hit = _check_event(worst, step, end, now, fastest, last)
         last[hit] = step.after.begun
@@ -87,7 +88,9 @@ def _check_bounds(worst: Worst, segment: Segment, path: Moment, step: Step | Non
     force, speed = np.atleast_2d(path.force), np.atleast_2d(path.speed)
     size = _force_sizes(segment)
     friction = np.abs(force[:, :k]) - rows.limit
-    pull = -force[:, k:]
+    # a compliant contact ends when its spring is pulled by ADHESION of the free travel, not before
+    springs = np.where(np.isfinite(rows.spring[k:]), rows.spring[k:], 0.0)
+    pull = -force[:, k:] - 2 * ADHESION * springs * rows.gap
     for excess in (friction.max(axis=0) / size[:k], pull.max(axis=0, initial=0.0) / size[k:]):
         worst.note("bound", excess.max(initial=0.0), BALANCE, step)
     slides = np.isin(segment.state[:k], SLIDES)

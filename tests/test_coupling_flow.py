@@ -63,7 +63,8 @@ def keys(rows):
     """Every set of independent closed rows, as flags (r,) and as numbers."""
     jacobian = np.hstack([rows.structure, rows.bodies])
     for flags in itertools.product([False, True], repeat=len(jacobian)):
-        key, closed = np.array(flags), np.flatnonzero(flags)
+        key = np.array(flags[::-1])
+        closed = np.flatnonzero(key)
         if len(closed) == 0 or np.linalg.matrix_rank(jacobian[closed], tol=1e-6) == len(closed):
             yield key, closed
 
