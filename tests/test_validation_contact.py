@@ -58,10 +58,16 @@ def test_impact_oscillator_keeps_the_law_of_motion():
 
 
 def test_orbit_of_nlvib_is_left_where_it_is_unstable(tmp_path):
-    """Beside the peak's orbit the motion leaves it as its multiplier says; at 0.635 rad/s it comes back."""
+    """Beside the peak's orbit the motion leaves it as its multiplier says; at 0.635 rad/s it comes back.
+
+    A multiplier leaves the unit circle at -1 on the way to the peak, and a pair of them off the axis down to 0.6 rad/s.
+    """
     chain = Chain(str(tmp_path))
     stable = chain.orbit(0.635, chain.settled(0.635))
     peak = chain.follow(np.linspace(0.635, 0.754, 30), stable)
+    assert chain.multipliers(0.754, peak).imag == pytest.approx(np.zeros(4), abs=1e-6)
+    low = chain.multipliers(0.6, chain.follow(np.linspace(0.635, 0.6, 15), stable))
+    assert np.abs(low.imag[np.abs(low) > 1.0]) == pytest.approx([1.365, 1.365], abs=0.01)
     for omega, orbit, away in ((0.635, stable, False), (0.754, peak, True)):
         multiplier = np.abs(chain.multipliers(omega, orbit)).max()
         state, distances = orbit + 1e-7, []

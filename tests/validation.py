@@ -72,21 +72,14 @@ class Case(NamedTuple):
 
     def lines(self) -> list[str]:
         """Rows of the table; title, source and test stand in the first."""
-        return [
-            _line(((self.title, self.source) if first else ("", "")) + figure.cells() + (self.test if first else "",))
-            for first, figure in zip(_first(), self.compute(), strict=False)
-        ]
+        rows = [("", "", *figure.cells(), "") for figure in self.compute()]
+        rows[0] = (self.title, self.source, *rows[0][2:-1], self.test)
+        return [_line(row) for row in rows]
 
 
 def case(title: str, source: str, test: str) -> Callable[[Callable[[], list[Figure]]], Case]:
     """Make a case of the function that computes its figures. test: "file::function" in tests/."""
     return lambda compute: Case(title, source, f"`{test}`", compute)
-
-
-def _first() -> Iterable[bool]:
-    yield True
-    while True:
-        yield False
 
 
 def _line(cells: Iterable[str]) -> str:

@@ -60,7 +60,7 @@ def square_plate(folder: Path, cells: int) -> np.ndarray:
     "test_validation_modes.py::test_square_membrane_converges",
 )
 def fv31() -> list[Figure]:
-    """The published figures are not better than 0.7 %: the fourth stands 0.7 % below what finer meshes converge to."""
+    """The fourth published figure stands 0.7 % below what meshes here and in other programs converge to."""
     return _modes(square_membrane, FV31, "mode {}, Hz", 8e-3)
 
 
