@@ -4,17 +4,36 @@
 #
 #     scripts/test_versions.sh [trixie] [sid] [TEST ...]      default: both releases, all tests of modal/ and rom/
 #
-# The folders stay in $VERSIONS (/var/tmp/vanedamp-versions), so that a second call takes the tests' time alone.
+# The folders stay in $VERSIONS (/var/tmp/vanedamp-versions), so that a second call takes the tests' time alone. Packages
+# come from where this machine's own come from, or from $MIRROR.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 home=${VERSIONS:-/var/tmp/vanedamp-versions}
-mirror=${MIRROR:-http://deb.debian.org/debian}
 
 say() { echo "test-versions: $*" >&2; }
 
 [ "$(id -u)" = 0 ] || { say "this needs root, for debootstrap and chroot"; exit 1; }
 command -v debootstrap >/dev/null || { say "apt-get install debootstrap first"; exit 1; }
+
+# The archive that this machine's apt takes its release from. Empty on another system than Debian, or where apt has no
+# server for it: then debootstrap takes its own default.
+archive() {
+    local id codename
+    id=$(. /etc/os-release && echo "$ID") codename=$(. /etc/os-release && echo "${VERSION_CODENAME:-sid}")
+    [ "$id" = debian ] || return 0
+    apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
+        awk -v release="$codename" '/^(http|https|ftp):/ && $2 == release && $3 == "main" && !found++ { print $1 }'
+}
+
+# How this machine reaches package servers: apt's proxies, pip's settings, certificates.
+share_settings() {
+    local root=$1
+    cp -L /etc/resolv.conf "$root/etc/resolv.conf"
+    [ ! -f /etc/ssl/certs/ca-certificates.crt ] || cp -L /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/"
+    [ ! -f /etc/pip.conf ] || cp /etc/pip.conf "$root/etc/pip.conf"
+    apt-config dump | grep -E '^Acquire::(http|https|ftp)::[^"]*"[^"]+"' >"$root/etc/apt/apt.conf.d/20network" || true
+}
 
 # A root folder with the mounts that its programs need; they are gone when the shell ends, whatever happens.
 inside() {
@@ -22,10 +41,12 @@ inside() {
     shift
     unshare --mount --propagation private bash -c '
         root=$1; shift
+        mapfile -t network < <(env | grep -iE "^(([a-z]+_proxy)|PIP_(INDEX_URL|EXTRA_INDEX_URL|TRUSTED_HOST|PROXY|DEFAULT_TIMEOUT))=")
         mount -t proc proc "$root/proc"
         mount --rbind /dev "$root/dev"
         mount --rbind /sys "$root/sys"
         exec env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 OMP_NUM_THREADS="${OMP_NUM_THREADS:-}" \
+            "${network[@]}" \
             OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 DEBIAN_FRONTEND=noninteractive \
             chroot "$root" "$@"' -- "$root" "$@"
 }
@@ -37,15 +58,12 @@ prepare() {
         rm -rf "$root"
         mkdir -p "$root"
         # the date on an archive's mirror may have passed
-        debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" "$mirror" >"$root.log" 2>&1 ||
+        debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" $mirror >"$root.log" 2>&1 ||
             { say "$suite: debootstrap failed, see $root.log"; return 1; }
         echo 'Acquire::Check-Valid-Until "false";' >"$root/etc/apt/apt.conf.d/10archive"
         touch "$root/bootstrapped"
     fi
-    cp -L /etc/resolv.conf "$root/etc/resolv.conf"
-    # how this machine reaches package servers
-    [ ! -f /etc/ssl/certs/ca-certificates.crt ] || cp -L /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/"
-    [ ! -f /etc/pip.conf ] || cp /etc/pip.conf "$root/etc/pip.conf"
+    share_settings "$root"
     mkdir -p "$root/vanedamp"
     git ls-files -z | tar --null -T - -cf - | tar -xf - -C "$root/vanedamp"
 }
@@ -67,6 +85,7 @@ done
 [ ${#suites[@]} -gt 0 ] || suites=(trixie sid)
 [ ${#tests[@]} -gt 0 ] || tests=(tests/test_modal_*.py tests/test_rom_*.py)
 
+mirror=${MIRROR:-$(archive)}
 mkdir -p "$home"
 failed=()
 for suite in "${suites[@]}"; do

@@ -6,8 +6,11 @@ from scipy import sparse
 from modal.matrices import Patch, SystemMatrices
 
 
-def rod(elements=400, damping_ratio=0.0):
-    """Clamped rod along x, of quadratic elements, with unit length, axial stiffness and mass; its patch is "tip"."""
+def rod(elements=400, damping_ratio=0.0, root=None):
+    """Rod along x, of quadratic elements, with unit length, axial stiffness and mass; its patch is "tip".
+
+    Its root is clamped, or held by a spring of `root` N/m.
+    """
     length = 1.0 / elements
     stiffness = np.array([[7.0, -8.0, 1.0], [-8.0, 16.0, -8.0], [1.0, -8.0, 7.0]]) / (3.0 * length)
     mass = np.array([[4.0, 2.0, -1.0], [2.0, 16.0, 2.0], [-1.0, 2.0, 4.0]]) * (length / 30.0)
@@ -15,9 +18,10 @@ def rod(elements=400, damping_ratio=0.0):
     count = 2 * elements + 1
     coordinates = np.zeros((count, 3))
     coordinates[:, 0] = np.linspace(0.0, 1.0, count)
-    fixed = np.setdiff1d(np.arange(3 * count), 3 * np.arange(1, count))
+    fixed = np.setdiff1d(np.arange(3 * count), 3 * np.arange(1 if root is None else 0, count))
+    spring = sparse.csr_array(([root or 0.0], ([0], [0])), shape=(3 * count, 3 * count))
     return SystemMatrices(
-        stiffness=_along_x(nodes, stiffness, count),
+        stiffness=_along_x(nodes, stiffness, count) + spring,
         mass=_along_x(nodes, mass, count),
         coordinates=coordinates,
         fixed=fixed,

@@ -2,16 +2,13 @@
 
 import numpy as np
 import pytest
+from closed_scenes import ball, one_to_one, period_one_start, rubbing, scene, table
 
 from coupling.engine import simulate
 from coupling.inputs import InputError, validate
 from coupling.response import Status
 from coupling.scene import Scene
 from coupling.structure import receptance
-
-
-def scene(**tables) -> Scene:
-    return validate(Scene, tables, "scene")
 
 
 def cluster(frequency_ratio=0.995, gap_ratio=0.5, mass_ratio=0.02, **changes) -> Scene:
@@ -22,33 +19,6 @@ def cluster(frequency_ratio=0.995, gap_ratio=0.5, mass_ratio=0.02, **changes) ->
         "cavity": [{"name": "c1", "gap": 30e-6 * gap_ratio}],
         "damper": [{"cavity": "c1", "mass": mass_ratio, "friction": 0.4, "restitution": 0.7}],
     }
-    return scene(**(data | changes))
-
-
-def table(acceleration, frequency=1.0, **damper) -> Scene:
-    """A body on a shaking table with acceleration amplitude `acceleration`, g = 10, horizontal, no walls near."""
-    return scene(
-        structure={"model": "prescribed", "displacement_amplitude": acceleration / (2 * np.pi * frequency) ** 2},
-        excitation={"frequency": frequency},
-        gravity={"acceleration": 10.0},
-        cavity=[{"name": "c", "gap": 1e3}],
-        damper=[{"cavity": "c", "mass": 1.0, "friction": 0.1} | damper],
-        time={"periods": 12, "transient": 4},
-    )
-
-
-def ball(restitution, acceleration_ratio, velocity=0.0, periods=400, height=0.0, **changes) -> Scene:
-    """A ball on a vertically shaken table: the left wall, gravity 10 pulling to it."""
-    omega = 2 * np.pi
-    data = {
-        "structure": {"model": "prescribed", "displacement_amplitude": acceleration_ratio * 10.0 / omega**2},
-        "excitation": {"frequency": 1.0},
-        "gravity": {"acceleration": 10.0, "orientation_deg": 90.0},
-        "cavity": [{"name": "c", "gap": 2e3}],
-        "damper": [{"cavity": "c", "mass": 1.0, "restitution": restitution, "position": -1e3 + height,
-                    "velocity": velocity}],
-        "time": {"periods": periods, "transient": periods - 50},
-    }  # fmt: skip
     return scene(**(data | changes))
 
 
@@ -112,17 +82,6 @@ def test_bouncing_ball_period_one(restitution):
             assert speeds == pytest.approx([-(5.0 + 5.0 * (1 - restitution) / (1 + restitution))] * 20, rel=1e-6)
 
 
-def period_one_start(restitution, ratio) -> Scene:
-    """Starts near the periodic orbit: at t = 0 the ball is where the orbit with impact phase t0 has it."""
-    threshold = np.pi * (1 - restitution) / (1 + restitution)
-    omega, amplitude = 2 * np.pi, ratio * 10.0 / (2 * np.pi) ** 2
-    t0 = np.arccos(threshold / ratio) / omega
-    flight = 1.0 - t0  # since the last impact
-    height = amplitude * np.sin(omega * t0) + 5.0 * flight - 5.0 * flight**2
-    velocity = 5.0 - 10.0 * flight - amplitude * omega
-    return ball(restitution, ratio, velocity=velocity, height=height)
-
-
 @pytest.mark.parametrize("ratio", [0.9, 1.1])
 def test_bouncing_ball_needs_its_threshold(ratio):
     """Below pi (1-e)/(1+e) no period-one orbit exists: started where it would be, the ball does not stay on it."""
@@ -141,27 +100,12 @@ def test_one_to_one_impact_regime(xi, r):
 
     Frequencies beside the backbone too; within 0.5 % at a body of 0.5 % of the mass, where the regime is stable.
     """
-    eps, damping, e = 0.005, 0.005, 0.7
-    rho = 2 / np.pi * (1 - e) / (1 + e)
-    theta = (1 + np.sqrt((1 + rho**2) * xi**2 - rho**2)) / (1 + rho**2)
-    assert 1 / (1 + rho**2) < theta < 1 / (1 - 4 / np.pi**2)
-    turn = (theta - 1) / xi - 1j * rho * theta / xi
-    loads = (-(1 - eps) * r**2 + 2j * damping * r + 1) * xi - 8 * eps * theta * turn * r**2 / np.pi**2
-    half_gap = 1 / abs(loads)
-    response = simulate(
-        scene(
-            structure={"model": "rigid", "mass": 1 - eps, "stiffness": 1.0, "damping": 2 * damping},
-            excitation={"frequency": r / (2 * np.pi), "force": 1.0},
-            gravity={"acceleration": 0.0},
-            cavity=[{"name": "c", "gap": 2 * half_gap}],
-            damper=[{"cavity": "c", "mass": eps, "restitution": e, "position": -half_gap}],
-            time={"periods": 1500, "transient": 1400},
-        )
-    )
+    case, half_gap, attached = one_to_one(xi, r)
+    response = simulate(case)
     assert response.classification == "periodic-1"
     assert response.impacts_per_period == 2
     assert response.amplitude_harmonic / half_gap == pytest.approx(xi, rel=5e-3)
-    assert response.attached_mass_fraction == pytest.approx(8 * theta * (theta - 1) / (np.pi * xi) ** 2, rel=1e-2)
+    assert response.attached_mass_fraction == pytest.approx(attached, rel=1e-2)
     assert response.energy_residual < 1e-10
 
 
@@ -208,16 +152,6 @@ def test_free_decay_is_closed_form():
     exact = 0.3 * np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
     assert response.displacement == pytest.approx(exact, abs=1e-14)
     assert response.energy["viscous"] == pytest.approx(-response.energy["stored"], rel=1e-12)
-
-
-def rubbing(frequency, force=0.0, friction=0.1, **tables):
-    """Unit mass on a spring of 1e4 N/m that rubs on the casing with friction * 10 N."""
-    return scene(
-        structure={"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.0},
-        excitation={"frequency": frequency, "force": force},
-        friction_damper=[{"normal_force": 10.0, "friction": friction}],
-        **tables,
-    )
 
 
 def test_free_decay_with_coulomb_friction():

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from validation_modes import FV32, SDLS01, square_plate, tapered_membrane
 
 from meshes.benchmarks import Block, build
 from modal.eigen import factorize, solve_modes
-from modal.elasticity import Material, Solid, assemble
+from modal.elasticity import Material, Solid
 from modal.matrices import patch_average
 
 
@@ -18,33 +19,21 @@ def converged(solutions):
 def test_tapered_cantilever_membrane(tmp_path):
     """NAFEMS FV32 (Selected Benchmarks for Natural Frequency Analysis, 1987): in-plane modes, plane stress.
 
-    The lower half of the plate's thickness with its middle plane on rollers: no bending, free to thin. The stress is
-    singular at the ends of the clamp, so that the modes which load them show an order far below the elements' four.
+    The stress is singular at the ends of the clamp, so that the modes which load them show an order far below the
+    elements' four.
     """
-    solutions = []
-    for cells in (4, 8, 16):
-        block = Block(10.0, 5.0, 0.025, tip_width=1.0, divisions=(cells, cells // 2, 1), hexahedra=True)
-        path, steel = build(block, tmp_path / "fv32.msh"), {"default": Material(200e9, 0.3, 8000.0)}
-        matrices = assemble(path, steel, {"root": "xyz", "bottom": "z"}, degree=2)
-        solutions.append(solve_modes(matrices, 6).frequencies_hz)
+    solutions = [tapered_membrane(tmp_path, cells) for cells in (4, 8, 16)]
     finest, orders = converged(solutions)
-    assert finest == pytest.approx([44.623, 130.03, 162.70, 246.05, 379.90, 391.44], rel=2e-3)
+    assert finest == pytest.approx([float(value) for value in FV32], rel=2e-3)
     assert np.all(orders > 1.1)
     assert np.all(np.diff(solutions, axis=0) < 0.0)
 
 
 def test_cantilever_square_plate(tmp_path):
     """SDLS01 (Guide de validation des progiciels de calcul de structures, 1990): a thin plate clamped on one edge."""
-    side, thickness, young, density = 1.0, 0.01, 2.1e11, 7800.0
-    solutions = []
-    for cells in (4, 8, 16):
-        block = Block(side, side, thickness, divisions=(cells, cells, 1), hexahedra=True)
-        path, steel = build(block, tmp_path / "sdls01.msh"), {"default": Material(young, 0.3, density)}
-        solutions.append(solve_modes(assemble(path, steel, {"root": "xyz"}, degree=2), 6).frequencies_hz)
+    solutions = [square_plate(tmp_path, cells) for cells in (4, 8, 16)]
     finest, orders = converged(solutions)
-    parameters = np.array([3.492, 8.525, 21.43, 27.33, 31.11, 54.44])
-    reference = parameters / (2 * np.pi * side**2) * np.sqrt(young * thickness**2 / (12 * density * (1 - 0.3**2)))
-    assert finest == pytest.approx(reference, rel=5e-3)
+    assert finest == pytest.approx([float(value) for value in SDLS01], rel=5e-3)
     assert np.all(orders > 1.3)
     assert np.all(np.diff(solutions, axis=0) < 0.0)
 

@@ -103,7 +103,9 @@ def test_a_range_of_many_modes_is_sliced(beam, share):
     assert expected.size > 100
     modes = solve_modes(beam, max_frequency=high, min_frequency=low)
     assert modes.frequencies_hz == pytest.approx(expected, rel=1e-8)
-    assert modes.shapes @ (beam.mass @ modes.shapes.T) == pytest.approx(np.eye(len(modes)), abs=1e-8)
+    # two slices are two Krylov spaces: what their modes have in common is a residual over the distance of their
+    # eigenvalues, r_i^T phi_j / (lambda_j - lambda_i), and no smaller than the residuals
+    assert modes.shapes @ (beam.mass @ modes.shapes.T) == pytest.approx(np.eye(len(modes)), abs=1e-7)
     assert modes.residuals.max() < 1e-7
 
 

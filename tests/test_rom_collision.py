@@ -82,7 +82,8 @@ def test_ladder_knows_what_pulses_lack():
 
     hard = [ladder.natural_ladder(model, np.array([0.1]), collisions=lambda m, y=y: collisions(m, y)) for y in (0, 1)]
     assert [rung.modes for rung in hard[0]] == [1, 2, 3]
-    assert hard[0][-1].collision == hard[1][-1].collision == 0.0
+    # the whole model against itself: round-off of sums of terms of order one
+    assert max(hard[0][-1].collision, hard[1][-1].collision) < 1e-14
     assert hard[0][0].collision > 0.02
     assert hard[1][1].collision < 0.1 * hard[0][1].collision < 1e-4
     # a contact that is not on the whole model leaves it out
