@@ -12,7 +12,7 @@ from coupling import state as st
 from coupling.gaps import SIMULTANEOUS
 from coupling.impacts import COLLAPSE
 from coupling.scene import Scene
-from coupling.watch import ADHESION, CHATTER
+from coupling.watch import ADHESION, CHATTER, RESOLUTION
 
 #: points at which the motion between two events is looked at
 POINTS = 9
@@ -95,7 +95,9 @@ def _check_bounds(worst: Worst, segment: Segment, path: Moment, step: Step | Non
         worst.note("bound", excess.max(initial=0.0), BALANCE, step)
     slides = np.isin(segment.state[:k], SLIDES)
     against = (speed[:, :k] * -segment.state[:k])[:, slides]
-    worst.note("bound", against.max(initial=0.0) / (segment.speed_size() + 1e-300), SPEED, step)
+    # a slip ends where its speed vanishes, which is known to the resolution of the time
+    tick = RESOLUTION * rows.period * np.abs(segment.kinematic()).max() / SPEED
+    worst.note("bound", against.max(initial=0.0) / (segment.speed_size() + tick + 1e-300), SPEED, step)
     assert np.array_equal(segment.held[:k][slides], -segment.state[:k][slides] * rows.limit[slides])
 
 
