@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from reference import Reference, agreement, integrate
+from reference import Reference, with_horizon
 from reference_ledger import ledger
 
 from coupling.engine import simulate
@@ -26,8 +26,7 @@ def follow(scene: Scene, periods: int, reduced: ReducedModel | None = None, fold
     if reduced is not None:
         reduced.save(folder / "rom.h5")
         scene = scene.replace({"structure.file": str(folder / "rom.h5")})
-    reference = integrate(scene, periods, reduced, pressed=True)
-    end = agreement(reference, integrate(scene, periods, reduced, pressed=True, rtol=1e-13, step=0.05), 1e-9)
+    reference, end = with_horizon(scene, periods, reduced)
     response = simulate(scene, events=True, samples_per_period=SAMPLES)
     assert response.status == Status.OK
     assert response.energy_residual < 1e-10

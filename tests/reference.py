@@ -21,6 +21,9 @@ from scipy.optimize import brentq
 from coupling.scene import Scene
 from rom.reduced import ReducedModel
 
+#: a few units in the last place
+_ULPS = 2.0**-49
+
 
 class Event(NamedTuple):
     """time (s); kind "impact", "stick", "slip", "detach" or "rest"; side "left", "right", "neighbour" or "floor".
@@ -73,6 +76,24 @@ class Reference:
         y = self.solution(t.ravel()).reshape((-1, *t.shape)) * self.system.length
         q, r, qd, rd = self.system.split(y)
         return q, r, qd * self.system.omega, rd * self.system.omega
+
+
+def with_horizon(scene: Scene, periods: int, reduced: ReducedModel | None = None) -> tuple[Reference, float]:
+    """The reference, and the time (s) until which two ways to the same motion can be compared.
+
+    Chaos multiplies every difference, and any other way begins with one: its modes, masses and lengths are rounded
+    otherwise. So the horizon is where a run with inputs a few units in the last place apart, and with other step
+    lengths and tolerances, has parted by 1e-9 of the narrowest half gap. Two runs of the same inputs would share their
+    errors and see farther than either can.
+    """
+    reference = integrate(scene, periods, reduced, pressed=True)
+    near = scene.replace(
+        {f"cavity.{cavity.name}.gap": cavity.gap * (1 + _ULPS) for cavity in scene.cavity}
+        | {f"damper.{index}.mass": damper.mass * (1 - _ULPS) for index, damper in enumerate(scene.damper)}
+        | {"excitation.frequency": scene.excitation.frequency * (1 + _ULPS)}
+    )
+    other = integrate(near, periods, reduced, pressed=True, rtol=1e-13, step=0.05)
+    return reference, agreement(reference, other, 1e-9)
 
 
 def agreement(one: Reference, other: Reference, tolerance: float) -> float:

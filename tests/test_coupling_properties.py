@@ -15,6 +15,7 @@ from images import compare, hairs, later, mirrored, record, renumbered, reordere
 from laws_by_event import check_events
 from worlds import between, scene_of, worlds
 
+from coupling import automaton as auto
 from coupling.engine import simulate
 from coupling.response import Status
 
@@ -43,9 +44,7 @@ def check_laws(data):
     """The ledger closes, nothing gives energy, and at every event the laws hold."""
     scene = scene_of(data)
     response = simulate(scene, events=True, samples_per_period=32)
-    # nearly elastic bodies in a row may hit each other more often than any budget allows: another test's answer
-    elastic = max(damper.restitution for damper in scene.damper) > 0.9
-    assume(not (elastic and response.status == Status.EVENT_BUDGET))
+    assume(not (hops(scene) and response.status == Status.EVENT_BUDGET))
     assert response.status == Status.OK
     assert response.energy_residual < 1e-10
     largest = max(abs(value) for value in response.energy.values())
@@ -57,6 +56,11 @@ def check_laws(data):
         if data["structure"]["model"] != "rom" or "left" not in data["cavity"][0]:
             check_walls(scene, response)
     check_events(scene)
+
+
+def hops(scene):
+    """Whether a body is elastic: pressed on its wall it hops as often as it likes, and no chatter ends that."""
+    return max(damper.restitution for damper in scene.damper) > 0.995
 
 
 def restitutions(scene, event):
@@ -79,7 +83,7 @@ def check_newton(scene, found):
         assert event.impulse >= 0.0
         assert before * after <= 0.0
         if abs(before) < 1e-4 * fastest or near or after == 0.0:
-            continue  # whether a plastic impact ends a chatter is judged where the accelerations are known: check_events
+            continue  # whether a plastic impact ends a chatter is judged by check_events, which knows the accelerations
         assert abs(after) >= restitution * abs(before) * (1 - 1e-12)
         if scene.structure.model == "rigid" and event.side != "body":
             mass = 1 / (1 / mass + 1 / scene.structure.mass)
@@ -118,7 +122,9 @@ def check_images(data):
     """Mirror image, cavities in another order, and a start at another phase: the same motion."""
     one = record(data)
     apart = [record(near) for near in hairs(data)]
-    assert not any(run.code for run in (one, *apart))
+    codes = {run.code for run in (one, *apart)}
+    assume(not (hops(scene_of(data)) and auto.EVENT_BUDGET in codes))
+    assert codes == {auto.DONE}
     image, change = mirrored(data)
     compare(one, unmirrored(record(image, change)), apart)
     moved, old = reordered(data, list(range(len(data["cavity"])))[::-1])

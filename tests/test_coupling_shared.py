@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from random_scenes import random_scene
-from reference import agreement, integrate
+from reference import with_horizon
 
 from coupling.engine import simulate
 from coupling.response import Status
@@ -27,8 +27,7 @@ def test_random_rows_of_bodies(structure, bodies, seed):
 def test_two_bodies_in_one_cavity_equal_dop853(seed):
     periods = 3
     scene = random_scene(seed, "rigid", 2, shared=True).replace({"time.periods": periods, "time.transient": 0})
-    reference = integrate(scene, periods, pressed=True)
-    end = agreement(reference, integrate(scene, periods, pressed=True, rtol=1e-13, step=0.05), 1e-9)
+    reference, end = with_horizon(scene, periods)
     response = simulate(scene, samples_per_period=64)
     time = response.time[response.time < end]
     assert len(time) > 8
