@@ -96,7 +96,12 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         phase=float(np.angle(1j * harmonic)),
         impacts_per_period=float(records.impacts[window].sum() / max(done - first, 1)),
         events=run.events,
-        classification=classify(section[first:], records.impacts[window], evaluated["friction"]),
+        classification=classify(
+            section[first:],
+            _state_scale(rows, section[first:], run.fastest),
+            records.impacts[window],
+            evaluated["friction"],
+        ),
         energy=evaluated,
         energy_residual=residual(records.ledger[: done + 1], _energy_scale(rows, section, run.fastest)),
         attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
@@ -136,6 +141,22 @@ def _energy_scale(rows: Rows, section: np.ndarray, fastest: float) -> float:
     own = section[:, 3 + len(rows.mass) :] ** 2 @ rows.mass
     static = (np.abs(rows.force) ** 2 / rows.stiffness).sum() if len(rows.force) else 0.0
     return float(max(rows.mass.sum() * fastest**2, own.max(), static) / 2)
+
+
+def _state_scale(rows: Rows, section: np.ndarray, fastest: float) -> np.ndarray:
+    """(states,) what each state of the section is to be measured by.
+
+    A displacement and its velocity have one scale, because either may vanish at the period's start. The bodies'
+    momentum is measured by what it would be at the largest speed: beside a heavy body, which all but rests, it is a
+    small difference of the slip's speed and the structure's, and its slow drift is nothing that the motion in the
+    cavity feels.
+    """
+    largest, b = np.abs(section).max(axis=0), len(rows.mass)
+    x = max(largest[0], largest[1] / rows.omega)
+    slips = np.maximum(largest[3 : 3 + b], largest[3 + b :] / rows.omega)
+    speed = max(fastest, largest[1], largest[3 + b :].max(initial=0.0))
+    momentum = rows.mass.sum() * speed
+    return np.array([x, rows.omega * x, momentum, *slips, *(rows.omega * slips)]) + np.finfo(float).tiny
 
 
 def _attached(
