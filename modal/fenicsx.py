@@ -301,8 +301,10 @@ def _lower_groups(
     topology.create_connectivity(1, 0)
     cells = _array(topology.connectivity(3, 0))
     count = topology.index_map(3).size_local
+    # one for every kind of cell since 0.11
+    of_cells = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
     # the vertices come first among the nodes of a cell, in the same order
-    corners = _array(geometry.dofmap).reshape(count, -1)[:, : cells.size // count].ravel()
+    corners = _array(of_cells).reshape(count, -1)[:, : cells.size // count].ravel()
     tags = np.empty(topology.index_map(0).size_local, dtype=np.int64)
     tags[cells] = np.asarray(geometry.input_global_indices)[corners] + 1
     ends = tags[_array(topology.connectivity(1, 0)).reshape(-1, 2)]
