@@ -6,10 +6,10 @@ PYTHON = .venv/bin/python
 TESTS = OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-versions check bench
+.PHONY: help setup demo test test-all test-arithmetic test-versions check bench
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 setup: ## install what is missing: system packages (apt, with sudo when not root) and .venv
 ifeq ($(origin PYTHON), file)
@@ -24,6 +24,9 @@ test: setup ## the tests, fast tier
 
 test-all: setup ## the tests with the slow verification tier
 	$(TESTS) -m "slow or not slow"
+
+test-arithmetic: setup ## the fast tier under the arithmetic of other processors, with a table (ARGUMENTS="generic TEST ...")
+	PYTHON=$(PYTHON) scripts/test_arithmetic.sh $(ARGUMENTS)
 
 test-versions: ## the finite element tests on Debian 13 and unstable, in root folders of their own (root, debootstrap)
 	scripts/test_versions.sh

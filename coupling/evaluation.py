@@ -102,7 +102,12 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         phase=float(np.angle(1j * harmonic)),
         impacts_per_period=float(records.impacts[window].sum() / max(done - first, 1)),
         events=run.events,
-        classification=classify(section[first:], records.impacts[window], evaluated["friction"]),
+        classification=classify(
+            section[first:],
+            _state_scale(rows, section[first:]),
+            records.impacts[window],
+            evaluated["friction"],
+        ),
         energy=evaluated,
         energy_residual=balance,
         attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
@@ -141,6 +146,21 @@ def _exchanged(rows: Rows, records: Records) -> float:
     modes = np.abs(rows.force) ** 2 / np.maximum(rows.stiffness, rows.omega**2)
     bodies = np.abs(rows.inertia) ** 2 / (rows.mass * rows.omega**2)
     return float(max(records.collided.max(), (modes.sum() + bodies.sum()) / 2))
+
+
+def _state_scale(rows: Rows, section: np.ndarray) -> np.ndarray:
+    """(states,) what each state of the section is to be measured by.
+
+    A displacement and its velocity have one scale, because either may vanish at the period's start. The bodies'
+    momentum is measured by what it would be at the largest speed: beside a heavy body, which all but rests, it is a
+    small difference of the slip's speed and the structure's, and its slow drift is nothing that the motion in the
+    cavity feels.
+    """
+    largest, b = np.abs(section).max(axis=0), len(rows.mass)
+    x = max(largest[0], largest[1] / rows.omega)
+    slips = np.maximum(largest[3 : 3 + b], largest[3 + b :] / rows.omega)
+    momentum = rows.mass.sum() * rows.omega * max(x, slips.max(initial=0.0))
+    return np.array([x, rows.omega * x, momentum, *slips, *(rows.omega * slips)]) + np.finfo(float).tiny
 
 
 def _attached(

@@ -139,21 +139,22 @@ class Response:
         }
 
 
-def classify(section: np.ndarray, impacts: np.ndarray, friction_loss: float, longest: int = 16) -> str:
+def classify(
+    section: np.ndarray, scale: np.ndarray, impacts: np.ndarray, friction_loss: float, longest: int = 16
+) -> str:
     """ "periodic-k", "non-periodic", "no-contact" or "stuck" from the section (periods + 1, states) of a steady state.
 
     A response has period k if the last section equals those k, 2k, ... periods before it within 1e-6 of each
-    state's range of values, over at least 8 repetitions or half of what there is.
+    state's scale (states,), over at least 8 repetitions or half of what there is.
     """
     if not impacts.any():
         return "no-contact" if friction_loss > 0 else "stuck"
-    scale = np.abs(section).max(axis=0) + np.finfo(float).tiny
     available = len(section) - 1
     for k in range(1, longest + 1):
         span = min(8 * k, available - k)
         if span < k:
             break
         late, early = section[-span:], section[-span - k : -k]
-        if np.max(np.abs(late - early) / scale) < 1e-6:
+        if np.all(np.abs(late - early) < 1e-6 * scale):
             return f"periodic-{k}"
     return "non-periodic"

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
 from coupling.inputs import InputError
@@ -18,6 +17,10 @@ from coupling.model_file import file_stamp, reduced_model
 from coupling.scene import Prescribed, Rigid, Rom, Scene
 from modal.store import frozen
 from rom.reduced import ReducedModel
+from rom.spectrum import rounding
+
+# share of a natural frequency that round-off of the stiffness may be worth
+_FREQUENCY_ERROR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -220,10 +223,23 @@ def _rom_basis(structure: Rom, _stamp: int) -> _ModalBasis:
 
 
 def modal_basis(model: ReducedModel) -> _ModalBasis:
-    """Real modes of a reduced model. Raises InputError if the structure can move freely (no support)."""
-    squares, shapes = eigh(model.stiffness, model.mass)
-    if squares[0] <= 1e-10 * squares[-1]:
+    """Real modes of a reduced model.
+
+    Raises InputError if the structure can move freely (no support), or if round-off of its stiffness alone moves the
+    lowest natural frequency by more than a thousandth.
+    """
+    if model.rigid_modes:
         raise InputError("structure: the reduced model has rigid-body motion; support it before reduction")
+    squares, shapes = model.natural
+    # half of the relative error of the square
+    errors = 0.5 * rounding(model.stiffness, shapes) / squares
+    if errors.max() > _FREQUENCY_ERROR:
+        worst = int(np.argmax(errors))
+        raise InputError(
+            f"structure: the natural frequency of {np.sqrt(squares[worst]) / (2 * np.pi):.4g} Hz is a difference of "
+            f"stiffnesses so large that their round-off alone is worth {errors[worst]:.1e} of it; give the model in "
+            "coordinates that keep soft and stiff motions apart, such as natural modes"
+        )
     damping = shapes.T @ model.damping @ shapes
     damping = (damping + damping.T) / 2
     noise = np.abs(damping - np.diag(np.diag(damping))).max(initial=0.0)

@@ -102,16 +102,15 @@ def solve_modes(
         eigenvalues, vectors = _lowest(pencil, count, floor)
     else:
         eigenvalues, vectors = _within(pencil, min_frequency, max_frequency, floor)
-    inertia = vectors @ pencil.mass
-    scale = 1.0 / np.sqrt(np.einsum("ij,ij->i", vectors, inertia))
+    vectors, inertia = _orthonormal(vectors, vectors @ pencil.mass)
     forces = vectors @ pencil.stiffness
     residuals = np.linalg.norm(forces - eigenvalues[:, None] * inertia, axis=1)
     residuals /= (eigenvalues - floor) * np.linalg.norm(inertia, axis=1)
     round_off = np.finfo(float).eps * np.einsum("ij,ij->i", np.abs(vectors), np.abs(vectors) @ abs(pencil.stiffness))
-    eigenvalues = np.where(eigenvalues > round_off * scale**2, eigenvalues, 0.0)
-    scale *= _signs(vectors, inertia @ matrices.movable_translations()[free])
+    eigenvalues = np.where(eigenvalues > round_off, eigenvalues, 0.0)
+    signs = _signs(vectors, inertia @ matrices.movable_translations()[free])
     shapes = np.zeros((len(eigenvalues), matrices.size))
-    shapes[:, free] = scale[:, None] * vectors
+    shapes[:, free] = signs[:, None] * vectors
     return Modes(np.sqrt(eigenvalues) / (2.0 * np.pi), shapes, residuals, matrices.provenance)
 
 
@@ -189,6 +188,24 @@ def _sliced(pencil: _Pencil, lower: float, upper: float, count: int) -> tuple[np
             f"{len(values)} of {count} modes found from {low:.6g} to {high:.6g} Hz; move the limits a little"
         )
     return values, vectors
+
+
+def _orthonormal(vectors: np.ndarray, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mass-orthonormal vectors from ascending eigenvectors, and their products with the mass.
+
+    Vectors with residuals r (in the norm of M^-1) are orthogonal to |phi_i^T M phi_j| <= (r_i + r_j) / |lambda_i -
+    lambda_j| alone where no Krylov space holds both, such as those of two slices. The lower one keeps its direction
+    (Cholesky): that adds at most their product to the relative residual of the higher one, while the other way round
+    the lower one's would grow by the ratio of their eigenvalues.
+    """
+    try:
+        factor = linalg.cholesky(vectors @ inertia.T, lower=True)
+    except linalg.LinAlgError:
+        raise SolverError(
+            "one mode was found twice, another one missed; move the limits of the range a little"
+        ) from None
+    both = [linalg.solve_triangular(factor, rows, lower=True) for rows in (vectors, inertia)]
+    return both[0], both[1]
 
 
 def _eigenvalue(frequency_hz: float) -> float:

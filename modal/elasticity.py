@@ -106,12 +106,13 @@ class Solid:
         return self._lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * self._shear * strain
 
     def assemble(self, clamped: Mapping[str, str], damping_ratio: float) -> SystemMatrices:
-        """Unconstrained matrices, every facet group as a patch, and the supports {facet group: "xyz" or components}.
+        """Unconstrained matrices, every group as a patch, and the supports {group: "xyz" or components}.
 
-        Elastic supports are part of the stiffness.
+        Groups are of facets, edges or points; the nodes of edges and points have the weight one. Elastic supports are
+        part of the stiffness.
         """
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        patches = {name: self._patch(facets) for name, facets in self.domain.facets.items()}
+        patches = {name: self._patch(name) for name in self.domain.groups}
         stiffness = self._material_stiffness(ufl.dx)
         for name in self.elastic:
             stiffness = stiffness + self._support_stiffness(name)
@@ -193,8 +194,14 @@ class Solid:
         traction += (normal - tangential) * ufl.inner(trial, outward) * outward
         return fenicsx.matrix(ufl.inner(traction, test) * fenicsx.over_facets(domain, domain.facet_group(name)))
 
-    def _patch(self, facets: np.ndarray) -> Patch:
-        nodes = fenicsx.group_nodes(self.space, facets)
+    def _nodes(self, name: str) -> np.ndarray:
+        parts = [fenicsx.group_nodes(self.space, group, dimension) for dimension, group in self.domain.group(name)]
+        return np.unique(np.concatenate(parts)).astype(np.int64)
+
+    def _patch(self, name: str) -> Patch:
+        nodes, facets = self._nodes(name), self.domain.facets.get(name)
+        if facets is None:
+            return Patch(nodes, np.ones(nodes.size))
         return Patch(nodes, fenicsx.facet_weights(self.domain, self.space, facets)[nodes])
 
     def _fixed(self, clamped: Mapping[str, str]) -> np.ndarray:
@@ -202,7 +209,7 @@ class Solid:
         for name, components in clamped.items():
             if not components or set(components) - set(_COMPONENTS):
                 raise ElasticityError(f"support {name!r}: expected components out of 'xyz', not {components!r}")
-            nodes = fenicsx.group_nodes(self.space, self.domain.facet_group(name)).astype(np.int64)
+            nodes = self._nodes(name)
             fixed.extend(3 * nodes + _COMPONENTS.index(component) for component in components)
         return np.unique(np.concatenate(fixed))
 

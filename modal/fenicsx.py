@@ -47,14 +47,38 @@ class Domain:
     mesh           dolfinx.mesh.Mesh, metres
     volumes        volume group name -> cell indices; cells outside every group are in the group "unnamed"
     facets         facet group name -> indices of boundary facets
+    edges, points  groups of element edges and of vertices: name -> their indices
     path, sha256   the file and its hash
     """
 
     mesh: Any
     volumes: Mapping[str, np.ndarray]
     facets: Mapping[str, np.ndarray]
+    edges: Mapping[str, np.ndarray]
+    points: Mapping[str, np.ndarray]
     path: str
     sha256: str
+
+    @property
+    def groups(self) -> dict[str, list[tuple[int, np.ndarray]]]:
+        """Name -> (dimension, indices) of what supports and interfaces can act on.
+
+        A name means a facet group where there is one, else the edges and points of that name together.
+        """
+        found: dict[str, list[tuple[int, np.ndarray]]] = {}
+        for dimension, groups in ((1, self.edges), (0, self.points)):
+            for name, entities in groups.items():
+                found.setdefault(name, []).append((dimension, entities))
+        return found | {name: [(2, entities)] for name, entities in self.facets.items()}
+
+    def group(self, name: str) -> list[tuple[int, np.ndarray]]:
+        """One of `groups`. Raises MeshError with those that exist, by kind."""
+        if name not in self.groups:
+            kinds = {"edge": self.edges, "point": self.points}
+            told = "".join(f"; {kind} groups: {', '.join(sorted(names))}" for kind, names in kinds.items() if names)
+            known = ", ".join(sorted(self.facets)) or "none"
+            raise MeshError(f"{self.path}: no facet group {name!r}; there are: {known}{told}")
+        return self.groups[name]
 
     def facet_group(self, name: str) -> np.ndarray:
         """Facet indices of a group. Raises MeshError with the groups that exist."""
@@ -80,16 +104,23 @@ def read(path: str | os.PathLike[str]) -> Domain:
         msh.merge(file)
         try:
             _prepare_groups()
+            lines, nodes = msh.taken(1), msh.taken(0)
         except MeshError as error:
             raise MeshError(f"{file}: {error}") from error
         names = {dimension: msh.groups(dimension) for dimension in (2, 3)}
         with _quiet():
             # three fields up to 0.9, more after them since
             mesh, cells, facets = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=3)[:3]
+    try:
+        edges, points = _lower_groups(mesh, lines, nodes)
+    except MeshError as error:
+        raise MeshError(f"{file}: {error}") from error
     domain = Domain(
         mesh=mesh,
         volumes=_members(cells, names[3]),
         facets=_members(facets, names[2]),
+        edges=edges,
+        points=points,
         path=str(file),
         sha256=digest(file),
     )
@@ -131,9 +162,10 @@ def node_coordinates(space: Any) -> np.ndarray:
     return np.array(space.tabulate_dof_coordinates())
 
 
-def group_nodes(space: Any, facets: np.ndarray) -> np.ndarray:
-    """Sorted indices of the nodes on facets."""
-    return np.sort(fem.locate_dofs_topological(space, 2, facets))
+def group_nodes(space: Any, entities: np.ndarray, dimension: int = 2) -> np.ndarray:
+    """Sorted indices of the nodes on facets (dimension 2), edges (1) or vertices (0)."""
+    space.mesh.topology.create_connectivity(dimension, 3)
+    return np.sort(fem.locate_dofs_topological(space, dimension, entities))
 
 
 def matrix(form: Any) -> sparse.csr_array:
@@ -208,9 +240,6 @@ def vtk_mesh(space: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _prepare_groups() -> None:
     """Refuse what dolfinx's reader keeps silent about, and bring the model to what every version of it takes."""
     _check_kinds()
-    lower = gmsh.model.getPhysicalGroups(0) + gmsh.model.getPhysicalGroups(1)
-    if lower:  # an empty list would remove every group
-        gmsh.model.removePhysicalGroups(lower)
     grouped = {
         entity for tag in msh.groups(3).values() for entity in gmsh.model.getEntitiesForPhysicalGroup(3, tag).tolist()
     }
@@ -221,6 +250,7 @@ def _prepare_groups() -> None:
     msh.check_disjoint(3, "volume")
     msh.check_volumes()
     msh.check_connected()
+    msh.drop_strays()
     gmsh.model.mesh.renumberNodes()
 
 
@@ -255,6 +285,45 @@ def _members(tags: Any, names: Mapping[str, int]) -> dict[str, np.ndarray]:
     if tags is None:
         return {}
     return {name: np.sort(tags.indices[tags.values == tag]).astype(np.int32) for name, tag in names.items()}
+
+
+def _lower_groups(
+    mesh: Any, lines: Mapping[str, np.ndarray], nodes: Mapping[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Edges and vertices of groups from their gmsh nodes, by the numbers that the mesh keeps of its input."""
+    topology, geometry = mesh.topology, mesh.geometry
+    if not (lines or nodes):
+        return {}, {}
+    for dimension in (0, 1):
+        topology.create_entities(dimension)
+        topology.create_connectivity(dimension, 3)
+    topology.create_connectivity(3, 0)
+    topology.create_connectivity(1, 0)
+    cells = _array(topology.connectivity(3, 0))
+    count = topology.index_map(3).size_local
+    # one for every kind of cell since 0.11
+    of_cells = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
+    # the vertices come first among the nodes of a cell, in the same order
+    corners = _array(of_cells).reshape(count, -1)[:, : cells.size // count].ravel()
+    tags = np.empty(topology.index_map(0).size_local, dtype=np.int64)
+    tags[cells] = np.asarray(geometry.input_global_indices)[corners] + 1
+    ends = tags[_array(topology.connectivity(1, 0)).reshape(-1, 2)]
+    return (
+        {name: _found(ends, group, "edge", name) for name, group in lines.items()},
+        {name: _found(tags[:, None], group, "point", name) for name, group in nodes.items()},
+    )
+
+
+def _found(known: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> np.ndarray:
+    """Indices (int32) of rows of gmsh nodes among those known. Raises MeshError for one that is not there."""
+    width = int(max(known.max(), wanted.max())) + 1
+    keys, asked = (np.sort(rows, axis=1) @ width ** np.arange(rows.shape[1])[::-1] for rows in (known, wanted))
+    order = np.argsort(keys)
+    places = np.minimum(np.searchsorted(keys, asked, sorter=order), keys.size - 1)
+    if np.any(keys[order[places]] != asked):
+        what = "an edge" if kind == "edge" else "a corner"
+        raise MeshError(f"{kind} group {name!r} holds what is not {what} of a volume element; mesh it with the volumes")
+    return np.unique(order[places]).astype(np.int32)
 
 
 def _check_boundary(domain: Domain) -> None:

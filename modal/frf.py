@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
-from scipy.optimize import least_squares
 
+from modal.rational import Fit, Rational
 from modal.store import frozen
 
 #: powers of i w that a response has over the displacement
 QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}
-_RELOCATIONS = 30
 # share of a damping ratio: a standard deviation above it means that the response does not determine the pole
 _UNCERTAIN = 0.5
+# share of the line spacing: in a narrower half-power bandwidth not two lines see a mode rise to half of its peak
+_NARROW = 0.5
+# highest probability that noise explains a mode
+_CHANCE = 1e-4
 
 
 class FrfError(ValueError):
@@ -94,126 +96,83 @@ def identify(frf: Frf, count: int = 1) -> Poles:
     the poles alone, their residues eliminated (Golub and Pereyra 1973), which is unbiased under noise. Unlike a circle
     fit it separates modes that overlap. Poles stay conjugate, which scipy's AAA (1.15 or newer) does not provide.
 
-    Raises FrfError for too few lines, or poles that are no damped modes of the band or not determined by it.
+    A pole is a mode when it lies in the band, its half-power bandwidth 2 zeta f is at least half the spacing of the
+    lines around it, its damping ratio is determined to better than half of it, and the fit is better than one with a
+    mode less by more than noise would make it: noise passes with a probability below 1e-4 (`Rational.chance`).
+
+    Raises FrfError for too few lines, and for poles that are no modes of the band.
     """
     lines = frf.frequencies_hz.size
     if count < 1 or 2 * lines < 4 * count + 4:
         raise FrfError(f"count: {count} modes need at least {2 * count + 2} frequency lines, there are {lines}")
+    if not np.any(frf.values):
+        raise FrfError("values: all are zero; a response without motion has no modes")
     if frf.frequencies_hz[0] <= 0.0:
         frf = frf.band(frf.frequencies_hz[1], frf.frequencies_hz[-1])
     s = 2j * np.pi * frf.frequencies_hz
-    scale = np.abs(s).max()
-    problem = _Rational(s / scale, frf.values / np.abs(frf.values).max(), QUANTITIES[frf.quantity])
-    start = problem.relocated(count)
-    found = least_squares(
-        lambda p: problem.misfit(p), np.column_stack([start.imag, np.log(-start.real)]).ravel(), x_scale="jac",
-        method="trf", xtol=1e-14, ftol=1e-14, gtol=1e-14,
-    )  # fmt: skip
-    poles = _unpacked(found.x)
-    order = np.argsort(np.abs(poles))
-    fitted, residues = problem.solve(poles[order])
-    misfit = float(np.linalg.norm(fitted - problem.values) / np.linalg.norm(problem.values))
+    scale, size = np.abs(s).max(), np.abs(frf.values).max()
+    problem = Rational(s / scale, frf.values / size, QUANTITIES[frf.quantity])
+    found = problem.best(count)
+    order = np.argsort(np.abs(found.poles))
+    poles = found.poles[order]
+    fitted, residues = problem.solve(poles)
     result = Poles(
-        frequencies_hz=frozen(np.abs(poles[order]) * scale / (2 * np.pi)),
-        damping_ratios=frozen(-poles[order].real / np.abs(poles[order])),
-        deviations=frozen(_deviations(found, poles, scale)[order]),
-        residues=frozen(residues * np.abs(frf.values).max() * scale, complex),
-        misfit=misfit,
-        fitted=frozen(fitted * np.abs(frf.values).max(), complex),
+        frequencies_hz=frozen(np.abs(poles) * scale / (2 * np.pi)),
+        damping_ratios=frozen(-poles.real / np.abs(poles)),
+        deviations=frozen(_deviations(found, scale)[order]),
+        residues=frozen(residues * size * scale, complex),
+        misfit=float(np.linalg.norm(fitted - problem.values) / np.linalg.norm(problem.values)),
+        fitted=frozen(fitted * size, complex),
     )
     _check(result, frf)
+    chance = problem.chance(found)
+    if chance > _CHANCE:
+        raise FrfError(
+            f"count: {count} poles fit the band {_span(frf)} hardly better than {count - 1}: noise does as well with a "
+            f"probability of up to {min(chance, 1.0):.2g}; one of them is no mode of the band; ask for fewer modes"
+        )
     return result
 
 
-@dataclass(frozen=True, eq=False)
-class _Rational:
-    """Scaled fitting problem: values (k, n) at s (n,), the responses' power of s over the displacement."""
-
-    s: np.ndarray
-    values: np.ndarray
-    power: int
-
-    def basis(self, poles: np.ndarray, terms: bool = True) -> np.ndarray:
-        """(n, 2 m + 2) real coefficients' functions: two for every pair of poles, and the modes outside the band."""
-        first, second = 1.0 / (self.s[:, None] - poles), 1.0 / (self.s[:, None] - poles.conj())
-        columns = [first + second, 1j * (first - second)]
-        if not terms:
-            return np.concatenate(columns, axis=1)
-        # stiffness of the modes above, mass of the modes below
-        outside = np.column_stack([np.ones_like(self.s), self.s**-2.0])
-        functions: np.ndarray = np.concatenate([*columns, outside], axis=1) * self.s[:, None] ** self.power
-        return functions
-
-    def solve(self, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Best fit (k, n) and residues (k, m) for given poles."""
-        functions = self.basis(poles)
-        coefficients = np.linalg.lstsq(_real(functions), _real(self.values.T), rcond=None)[0]
-        count = len(poles)
-        return (functions @ coefficients).T, (coefficients[:count] + 1j * coefficients[count : 2 * count]).T
-
-    def misfit(self, parameters: np.ndarray) -> np.ndarray:
-        """(2 n k,) real and imaginary parts of the best fit's error."""
-        return _real((self.solve(_unpacked(parameters))[0] - self.values).T).ravel()
-
-    def relocated(self, count: int) -> np.ndarray:
-        """(count,) poles by vector fitting, from lightly damped ones spread over the band."""
-        low, high = np.abs(self.s[0]), np.abs(self.s[-1])
-        spread = low + (high - low) * (np.arange(count) + 0.5) / count
-        poles = (-0.01 + 1j) * spread
-        for _ in range(_RELOCATIONS):
-            poles = self._relocate(poles)
-        return poles
-
-    def _relocate(self, poles: np.ndarray) -> np.ndarray:
-        """Zeros of the denominator that makes the fit linear; flipped into the left half plane."""
-        own, common, count = self.basis(poles), self.basis(poles, terms=False), len(poles)
-        blocks, targets = [], []
-        for values in self.values:
-            # what the response's own coefficients cannot fit is left to the common denominator
-            rows = _real(np.concatenate([own, -values[:, None] * common], axis=1))
-            triangle = linalg.qr(np.column_stack([rows, _real(values[:, None])]), mode="r")[0][: rows.shape[1] + 1]
-            width = own.shape[1]
-            blocks.append(triangle[width:, width:-1])
-            targets.append(triangle[width:, -1])
-        weights = np.linalg.lstsq(np.concatenate(blocks), np.concatenate(targets), rcond=None)[0]
-        rotation = np.zeros((2 * count, 2 * count))
-        for index, pole in enumerate(poles):
-            at = [index, count + index]
-            rotation[np.ix_(at, at)] = [[pole.real, pole.imag], [-pole.imag, pole.real]]
-        gains = np.concatenate([2.0 * np.ones(count), np.zeros(count)])
-        zeros = np.linalg.eigvals(rotation - np.outer(gains, weights))
-        upper = zeros[np.argsort(zeros.imag)][count:]
-        frequencies = np.maximum(np.abs(upper.imag), 1e-3 * np.abs(self.s[0]))
-        return -np.maximum(np.abs(upper.real), 1e-7 * frequencies) + 1j * frequencies
-
-
-def _real(values: np.ndarray) -> np.ndarray:
-    """Real over imaginary parts."""
-    return np.concatenate([values.real, values.imag])
-
-
-def _unpacked(parameters: np.ndarray) -> np.ndarray:
-    frequency, decay = parameters.reshape(-1, 2).T
-    return np.asarray(-np.exp(decay) + 1j * frequency)
-
-
-def _deviations(found: object, poles: np.ndarray, scale: float) -> np.ndarray:
-    """(m, 2) standard deviations of Hz and damping ratio, from the Jacobian at the solution."""
-    jacobian, residual = found.jac, found.fun  # type: ignore[attr-defined]
-    freedom = max(residual.size - jacobian.shape[1], 1)
-    covariance = np.linalg.pinv(jacobian.T @ jacobian) * (residual @ residual) / freedom
-    frequency, decay = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(-1, 2).T
+def _deviations(found: Fit, scale: float) -> np.ndarray:
+    """(m, 2) standard deviations of Hz and damping ratio, from the Jacobian; infinite where that is singular."""
+    jacobian, poles = found.jacobian, found.poles
+    size = np.linalg.norm(jacobian, axis=0)
+    if not np.all(size > 0.0):
+        return np.full((poles.size, 2), np.inf)
+    _, values, right = np.linalg.svd(jacobian / size, full_matrices=False)
+    if values[-1] <= values[0] * len(jacobian) * np.finfo(float).eps:
+        return np.full((poles.size, 2), np.inf)
+    freedom = max(len(jacobian) - jacobian.shape[1], 1)
+    spread = np.sqrt(found.misfit / freedom) * np.linalg.norm(right.T / values, axis=1) / size
+    frequency, decay = spread.reshape(-1, 2).T
     # lightly damped: |s| moves with its imaginary part, the ratio with the logarithm of its real part
     return np.column_stack([frequency * scale / (2 * np.pi), decay * -poles.real / np.abs(poles)])
 
 
+def _span(frf: Frf) -> str:
+    return f"{frf.frequencies_hz[0]:.6g} to {frf.frequencies_hz[-1]:.6g} Hz"
+
+
 def _check(poles: Poles, frf: Frf) -> None:
-    low, high = frf.frequencies_hz[0], frf.frequencies_hz[-1]
+    """Refuse what is no damped mode of the band or what its lines do not resolve."""
+    axis = frf.frequencies_hz
     for frequency, ratio, (_, deviation) in zip(
         poles.frequencies_hz, poles.damping_ratios, poles.deviations, strict=True
     ):
-        if not (low <= frequency <= high and 0.0 < ratio < 0.5 and deviation < _UNCERTAIN * ratio):
+        pole = f"count: a fitted pole at {frequency:.6g} Hz with the damping ratio {ratio:.3g} +- {deviation:.2g}"
+        if not (axis[0] <= frequency <= axis[-1] and ratio < 0.5):
+            raise FrfError(f"{pole} is no mode of the band {_span(frf)}; ask for fewer modes or another band")
+        after = int(np.clip(np.searchsorted(axis, frequency), 1, axis.size - 1))
+        spacing = axis[after] - axis[after - 1]
+        if 2.0 * ratio * frequency < _NARROW * spacing:
             raise FrfError(
-                f"count: a fitted pole at {frequency:.6g} Hz with the damping ratio {ratio:.3g} +- {deviation:.2g} is "
-                f"no mode of the band {low:.6g} to {high:.6g} Hz; ask for fewer modes or another band"
+                f"{pole} is no mode of the band {_span(frf)} that its lines resolve: half-power bandwidth "
+                f"{2.0 * ratio * frequency:.2g} Hz, line spacing {spacing:.3g} Hz; ask for fewer modes or measure "
+                "finer lines"
+            )
+        if not deviation < _UNCERTAIN * ratio:
+            raise FrfError(
+                f"{pole} is no mode of the band {_span(frf)} that its lines determine; ask for fewer modes or another "
+                "band"
             )

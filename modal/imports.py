@@ -1,7 +1,8 @@
 """Meshes of other programs (Abaqus and CalculiX .inp, Nastran .bdf, and what else meshio reads) as gmsh files.
 
 Sets of volume elements become volume groups. Facet groups are the boundary facets whose nodes are all in a node set, or
-those that shell elements of a set cover. meshio is an optional dependency.
+those that shell elements of a set cover. A node set without such a facet becomes a group of its nodes, and of the
+element edges whose nodes are all in it. meshio is an optional dependency.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def convert(
     """Write the mesh of another program as a gmsh file (2.2). Returns its path.
 
     volumes  sets of volume elements that become volume groups; left out: all
-    facets   sets of nodes or of shells that become facet groups; left out: all that hold a boundary facet
+    facets   sets of nodes or of shells that become groups of facets, or else of edges and points; left out: all
     scale    metres a unit of length of the file: 1e-3 for millimetres
 
     Groups must not overlap: name the sets that are wanted where others overlap them. 20-node bricks become 8-node ones
@@ -65,9 +66,17 @@ def convert(
     source = _read(Path(path))
     surface = _boundary(source)
     groups = {2: _facet_groups(source, surface, facets), 3: _volume_groups(source, volumes)}
+    edges = _edges(source)
+    groups[1], groups[0] = _node_groups(source, edges, groups[2], facets)
     for dimension, what in ((2, "facet"), (3, "volume")):
         _check_disjoint(source.path, what, groups[dimension])
-    _write(source, surface, groups, scale, output)
+    _write(
+        source,
+        {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]},
+        groups,
+        scale,
+        output,
+    )
     return Path(output)
 
 
@@ -175,24 +184,54 @@ def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] 
     for name, shells in source.shell_sets.items():
         covered = np.array([index for index, key in enumerate(keys) if key in shells], dtype=int)
         groups[name] = np.union1d(groups.get(name, covered), covered)
-    return _wanted(source.path, groups, wanted, "facets of", "set of nodes or shells")
+    found = _wanted(source.path, groups, wanted, "set of nodes or shells")
+    for name in sorted(set(wanted or ()) - set(found)):
+        if name not in source.node_sets:
+            raise MeshError(f"{source.path}: no facets of the mesh lie in {name!r}: its shells cover no outer facet")
+    return found
+
+
+def _edges(source: _Source) -> np.ndarray:
+    """(n, 2) nodes of the element edges, (n, 3) with the node between them of quadratic cells."""
+    if source.kind == "tetra10":
+        places = [[*sorted(pair), middle] for pair, middle in _BETWEEN.items()]
+    else:
+        pairs = {frozenset((face[i - 1], face[i])) for face in _FACES[source.kind] for i in range(len(face))}
+        places = [sorted(pair) for pair in pairs]
+    edges = np.concatenate([source.cells[:, place] for place in places])
+    return np.asarray(edges[np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True)[1]])
+
+
+def _node_groups(
+    source: _Source, edges: np.ndarray, facets: dict[str, np.ndarray], wanted: Collection[str] | None
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Node sets that are no facet groups: name -> indices into the edges, name -> corners of elements."""
+    corners = np.unique(source.cells[:, : _CORNERS[source.kind.removesuffix("10")]])
+    lines, points = {}, {}
+    for name, nodes in source.node_sets.items():
+        if name in facets or (wanted is not None and name not in wanted):
+            continue
+        inside = np.zeros(len(source.points), dtype=bool)
+        inside[nodes] = True
+        lines[name], points[name] = np.flatnonzero(inside[edges].all(axis=1)), corners[inside[corners]]
+        if wanted is not None and not points[name].size:
+            raise MeshError(f"{source.path}: the node set {name!r} holds no corner of a volume element")
+    return _kept(lines), _kept(points)
 
 
 def _volume_groups(source: _Source, wanted: Collection[str] | None) -> dict[str, np.ndarray]:
-    return _wanted(source.path, source.cell_sets, wanted, "elements of", "set of volume elements")
+    return _wanted(source.path, source.cell_sets, wanted, "set of volume elements")
 
 
 def _wanted(
-    path: Path, groups: dict[str, np.ndarray], wanted: Collection[str] | None, what: str, kind: str
+    path: Path, groups: dict[str, np.ndarray], wanted: Collection[str] | None, kind: str
 ) -> dict[str, np.ndarray]:
     if wanted is None:
         return _kept(groups)
     for name in sorted(wanted):
         if name not in groups:
             raise MeshError(f"{path}: no {kind} {name!r}; there are: {', '.join(sorted(groups)) or 'none'}")
-        if not groups[name].size:
-            raise MeshError(f"{path}: no {what} the mesh lie in {name!r}: a facet counts when all its nodes are in it")
-    return {name: groups[name] for name in groups if name in wanted}
+    return _kept({name: groups[name] for name in groups if name in wanted})
 
 
 def _check_disjoint(path: Path, what: str, groups: dict[str, np.ndarray]) -> None:
@@ -209,21 +248,28 @@ def _check_disjoint(path: Path, what: str, groups: dict[str, np.ndarray]) -> Non
 
 def _write(
     source: _Source,
-    surface: np.ndarray,
+    entities: dict[int, np.ndarray],
     groups: dict[int, dict[str, np.ndarray]],
     scale: float,
     output: str | os.PathLike[str],
 ) -> None:
+    """entities: nodes of the cells, facets, edges and points by dimension, which the groups' members number."""
     meshio = importlib.import_module("meshio")
-    names = {**{(2, n): i for i, n in enumerate(groups[2], 1)}, **{(3, n): i for i, n in enumerate(groups[3], 1)}}
+    kinds = {
+        3: source.kind,
+        2: _FACET_KINDS[source.kind],
+        1: "line3" if source.kind == "tetra10" else "line",
+        0: "vertex",
+    }
+    names = {(d, name): number for d, own in groups.items() for number, name in enumerate(own, 1)}
     rest = np.setdiff1d(np.arange(len(source.cells)), _all(groups[3].values()))
     blocks: list[tuple[str, np.ndarray, int, int]] = []
-    for name, members in groups[3].items():
-        blocks.append((source.kind, source.cells[members], names[3, name], names[3, name]))
+    for dimension in (3, 2, 1, 0):
+        for name, members in groups[dimension].items():
+            number = names[dimension, name]
+            blocks.append((kinds[dimension], entities[dimension][members], number, number))
     if rest.size:  # without a physical group
         blocks.append((source.kind, source.cells[rest], 0, len(groups[3]) + 1))
-    for name, members in groups[2].items():
-        blocks.append((_FACET_KINDS[source.kind], surface[members], names[2, name], names[2, name]))
     used = np.unique(source.cells)
     place = np.zeros(len(source.points), dtype=int)
     place[used] = np.arange(used.size)
@@ -232,10 +278,18 @@ def _write(
         points=scale * source.points[used],
         cells=[(kind, place[cells]) for kind, cells, _, _ in blocks],
         cell_data={t: [np.full(len(b[1]), b[i], dtype=np.int32) for b in blocks] for t, i in tags.items()},
-        field_data={name: np.array([tag, dimension]) for (dimension, name), tag in names.items()},
     )
     with replacing(output) as temporary:
         meshio.write(temporary, mesh, file_format="gmsh22", binary=True)
+        _name(Path(temporary), names)
+
+
+def _name(path: Path, names: dict[tuple[int, str], int]) -> None:
+    """Give the groups of a gmsh file their names; meshio would lose one of an edge and a point group of one name."""
+    lines = [f'{dimension} {tag} "{name}"' for (dimension, name), tag in names.items()]
+    section = "\n".join(["$PhysicalNames", str(len(lines)), *lines, "$EndPhysicalNames", ""]).encode()
+    head, end, rest = path.read_bytes().partition(b"$EndMeshFormat\n")
+    path.write_bytes(head + end + section + rest)
 
 
 def _all(members: Iterable[np.ndarray]) -> np.ndarray:

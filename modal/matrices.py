@@ -30,7 +30,8 @@ class Patch:
     """A group of nodes and their shares of the patch.
 
     nodes    (k,) node indices, each once
-    weights  (k,) m^2, integral of the node's shape function over the facet group; ones for a bare list of nodes
+    weights  (k,) m^2, integral of the node's shape function over the facet group; ones for nodes of edges and points
+             and for a bare list
     """
 
     nodes: np.ndarray

@@ -71,6 +71,50 @@ def groups(dimension: int) -> dict[str, int]:
     }
 
 
+def taken(dimension: int) -> dict[str, np.ndarray]:
+    """Corner nodes (k, 2) of the lines, or (k, 1) of the points, of every group of a dimension below 2.
+
+    The groups are taken out of the current model: not every version of dolfinx reads a model that has them.
+    """
+    found = {}
+    for name, tag in groups(dimension).items():
+        rows = [np.empty((0, dimension + 1), dtype=np.int64)]
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
+            for kind, _, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
+                width = gmsh.model.mesh.getElementProperties(kind)[3]
+                rows.append(np.asarray(nodes, dtype=np.int64).reshape(-1, width)[:, : dimension + 1])
+        found[name] = np.concatenate(rows)
+        if not found[name].size:
+            raise MeshError(f"group {name!r} of dimension {dimension} is empty; mesh it with the volumes")
+    if found:  # an empty list would remove every group
+        gmsh.model.removePhysicalGroups(gmsh.model.getPhysicalGroups(dimension))
+    return found
+
+
+def drop_strays() -> None:
+    """Take out of the current model what lies beside the volume elements, such as the centres of arcs.
+
+    dolfinx 0.5.2 writes past its memory when a node belongs to no volume element. Raises MeshError for groups of points
+    or lines there, and for nodes that cannot be taken out.
+    """
+    used = np.unique(np.concatenate(gmsh.model.mesh.getElements(3)[2]))
+    for dimension, kind in ((1, "edge"), (0, "point")):
+        for name, tag in groups(dimension).items():
+            nodes = gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)[0]
+            if not np.all(np.isin(nodes, used)):
+                raise MeshError(f"{kind} group {name!r} lies beside the volume elements; mesh it with the volumes")
+    if np.isin(gmsh.model.mesh.getNodes()[0], used).all():
+        return
+    for dimension in (2, 1, 0):
+        for entity in gmsh.model.getEntities(dimension):
+            nodes = gmsh.model.mesh.getNodes(*entity)[0]
+            if nodes.size and not np.isin(nodes, used).any():
+                gmsh.model.mesh.clear([entity])
+    stray = np.setdiff1d(gmsh.model.mesh.getNodes()[0], used)
+    if stray.size:
+        raise MeshError(f"{stray.size} nodes belong to no volume element, such as node {stray[0]}; remove them")
+
+
 def check_disjoint(dimension: int, kind: str) -> None:
     """Raise MeshError when an element lies in two groups of a dimension: readers keep the first and say nothing."""
     names = list(groups(dimension))

@@ -19,7 +19,7 @@ def massless(model: ReducedModel, modes: int) -> ReducedModel:
     squares, shapes = spectrum(model.mass, model.stiffness)
     if not 0 < modes <= model.size:
         raise ReducedModelError(f"modes: expected 1 to {model.size} (the modes of this model), not {modes}")
-    check_elastic(squares[modes:], squares)
+    check_elastic(model.rigid_modes, modes)
     static = shapes[:, modes:] / squares[modes:] @ (model.selection @ shapes[:, modes:]).T
     kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": ()}
     return model.projected(shapes[:, :modes], **kept, **residual_fields(model, static))
@@ -30,7 +30,7 @@ def attached(model: ReducedModel, modes: int) -> ReducedModel:
     squares, shapes = spectrum(model.mass, model.stiffness)
     if not 0 < modes < model.size:
         raise ReducedModelError(f"modes: expected 1 to {model.size - 1} (fewer than all of this model), not {modes}")
-    check_elastic(squares[modes:], squares)
+    check_elastic(model.rigid_modes, modes)
     dropped = shapes[:, modes:]
     static = (model.selection @ dropped).T / squares[modes:, None]
     block = np.hstack(krylov(static, np.diag(squares[modes:]), np.eye(len(static)), 1))

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import linalg
 
 from rom.boundary import residual_fields
 from rom.fields import ReducedModelError
-from rom.spectrum import check_elastic, krylov
+from rom.spectrum import check_elastic, krylov, rigid_motions, spectrum
 
 if TYPE_CHECKING:
     from rom.reduced import ReducedModel
@@ -43,7 +42,7 @@ def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedMode
     inertia, rigidity = (matrix[np.ix_(dropped, dropped)] for matrix in (model.mass, model.stiffness))
     own: list[np.ndarray] = []
     if (blocks or model.residual_flexibility is not None) and dropped.size:
-        check_elastic(linalg.eigvalsh(rigidity, inertia), model.squares)
+        check_elastic(rigid_motions(rigidity, *spectrum(inertia, rigidity)), 0)
         static = np.linalg.solve(rigidity, model.selection[:, dropped].T)
         if model.residual_flexibility is not None:
             lost = np.zeros((model.size, len(model.interface)))

@@ -35,7 +35,7 @@ class Findings:
 
     asymmetry      largest of the matrices', relative
     definiteness   of mass and of stiffness: lowest eigenvalue relative to the highest, diagonal scaled to one
-    rigid_motions  number of natural frequencies that vanish
+    rigid_motions  number of motions that no support holds (ReducedModel.rigid_modes)
     condensed      number of coordinates without mass
     """
 
@@ -109,9 +109,7 @@ def external_model(
         matrices["mass"], matrices["stiffness"], rows, damping=matrices.get("damping"), damping_ratio=damping_ratio,
         directions=directions, base_load=base_load, residual_flexibility=residual, provenance=dict(provenance or {}),
     )  # fmt: skip
-    natural = model.natural_frequencies_hz
-    rigid = int(np.count_nonzero(natural < 1e-4 * natural[-1] * np.sqrt(_INDEFINITE)))
-    return model, Findings(asymmetry, (definiteness[0], definiteness[1]), rigid, int(massless.sum()))
+    return model, Findings(asymmetry, (definiteness[0], definiteness[1]), model.rigid_modes, int(massless.sum()))
 
 
 def _condensed(

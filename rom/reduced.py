@@ -18,7 +18,7 @@ from rom import record
 from rom.boundary import attached, boundary_form, massless
 from rom.cut import truncated
 from rom.fields import ReducedModelError, check_definite, check_interface, checked, shaped, symmetric
-from rom.spectrum import halved, modal_damping, spectrum
+from rom.spectrum import halved, modal_damping, rigid_motions, spectrum
 
 __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
 
@@ -132,9 +132,8 @@ class ReducedModel:
 
     @property
     def rigid_modes(self) -> int:
-        """How many natural frequencies vanish beside the highest."""
-        natural = self.natural_frequencies_hz
-        return int(np.count_nonzero(natural < 1e-6 * natural[-1]))
+        """How many motions no support holds: `rom.spectrum.rigid_motions`."""
+        return rigid_motions(self.stiffness, *self.natural)
 
     @property
     def static_stiffness(self) -> np.ndarray:
@@ -267,10 +266,15 @@ class ReducedModel:
         """Read the record that `save` wrote. Raises modal.store.StoreError."""
         return cls(**record.load(path))
 
-    @cached_property
+    @property
     def squares(self) -> np.ndarray:
         """(n,) squared undamped angular frequencies, ascending."""
-        return spectrum(self.mass, self.stiffness)[0]
+        return self.natural[0]
+
+    @cached_property
+    def natural(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) squared undamped angular frequencies, ascending, and mass-normalised shapes (n, n) as columns."""
+        return spectrum(self.mass, self.stiffness)
 
     def _index(self, label: str) -> int:
         if label not in self.interface:

@@ -164,7 +164,10 @@ class ElasticTable:
 
 @dataclass(frozen=True, config=STRICT)
 class Support:
-    """Facet groups that are held: all components, or those named, as in {group = "y"}, or by springs."""
+    """Groups of facets, edges or points that are held: all components, or those named, as in {group = "y"}.
+
+    Springs are spread over facet groups.
+    """
 
     clamped: Annotated[dict[str, str], BeforeValidator(_components)] = field(default_factory=dict)
     elastic: dict[str, ElasticTable] = field(default_factory=dict)
@@ -200,7 +203,10 @@ class ModesTable:
 
 @dataclass(frozen=True, config=STRICT)
 class InterfaceTable:
-    """One interface coordinate: the displacement of a facet group along a direction, or its rotation about it."""
+    """One interface coordinate: the displacement of a group along a direction, or its rotation about it.
+
+    `facets` names a facet group, or else a group of edges or points (a node set), whose average is that of its nodes.
+    """
 
     facets: str
     direction: Direction
@@ -285,20 +291,24 @@ class Case:
 
     @property
     def facet_groups(self) -> set[str]:
-        """Every facet group that the case names."""
+        """Every group that supports and interfaces name."""
         return {*self.support.clamped, *self.support.elastic, *(table.facets for table in self.interface.values())}
 
-    def check_groups(self, facets: Iterable[str], volumes: Iterable[str]) -> None:
-        """Raise InputError for a facet or volume group that the mesh does not have."""
-        facets, volumes = list(facets), list(volumes)
+    def check_groups(
+        self, facets: Iterable[str], volumes: Iterable[str], lower: Mapping[str, Iterable[str]] | None = None
+    ) -> None:
+        """Raise InputError for a group that the mesh does not have; lower: kind ("edge", "point") -> groups."""
+        surfaces = {"facet": list(facets)}
+        known = surfaces | {kind: list(names) for kind, names in (lower or {}).items()}
         for group in self.support.clamped:
-            _check_group("support.clamped", "facet group", group, facets)
+            _check_group("support.clamped", group, known)
         for group in self.support.elastic:
-            _check_group(f"support.elastic.{group}", "facet group", group, facets)
+            _check_group(f"support.elastic.{group}", group, surfaces)
         for label, table in self.interface.items():
-            _check_group(f"interface.{label}.facets", "facet group", table.facets, facets)
+            _check_group(f"interface.{label}.facets", table.facets, known)
         for group in self.material:
-            _check_group(f"material.{group}", "volume group", group, [*volumes, "default"])
+            if group != "default":
+                _check_group(f"material.{group}", group, {"volume": [*volumes, "default"]})
 
 
 def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) -> None:
@@ -334,9 +344,13 @@ def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
             raise InputError(f"{path}: mesh.file: no such file {mesh['file']}; `vanedamp mesh` writes one")
 
 
-def _check_group(key: str, kind: str, group: str, known: list[str]) -> None:
-    if group not in known:
-        raise InputError(f"{key}: no {kind} '{group}' in the mesh; it has {', '.join(sorted(known)) or 'none'}")
+def _check_group(key: str, group: str, known: Mapping[str, list[str]]) -> None:
+    """Raise InputError for a group that is none of those known, by kind; the first kind is the usual one."""
+    if any(group in names for names in known.values()):
+        return
+    (kind, names), *others = known.items()
+    told = "".join(f"; {other} groups: {', '.join(sorted(found))}" for other, found in others if found)
+    raise InputError(f"{key}: no {kind} group '{group}' in the mesh; it has {', '.join(sorted(names)) or 'none'}{told}")
 
 
 def _known(word: str, known: Iterable[str]) -> str:

@@ -51,7 +51,8 @@ def assemble(case: Case) -> Structure:
     label = case.response_label  # an open choice is refused before the work
     with _mesh(case) as path:
         solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports)
-        case.check_groups(solid.domain.facets, solid.domain.volumes)
+        domain = solid.domain
+        case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
         matrices = solid.assemble(case.support.clamped, case.damping_ratio)
     if label is not None:
         _functional(case, matrices, label)

@@ -21,7 +21,7 @@ def ledger(result: Reference) -> dict[str, float]:
     terms = {
         "excitation": load,
         "viscous": np.einsum("nt,nm,mt->t", qd, system.C, qd),
-        "friction": system.friction @ np.abs(rd) + _slider_loss(result, y, qd),
+        "friction": system.friction @ np.abs(rd) + _slider_loss(result, t, qd),
         "contact": _contact_loss(system, y),
     }
     energies = {name: float(weights @ term) * unit for name, term in terms.items()}
@@ -40,13 +40,22 @@ def imbalance(energies: dict[str, float]) -> float:
     return abs(energies["excitation"] - losses) / max(map(abs, energies.values()))
 
 
-def _slider_loss(result: Reference, y: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Power lost in the Jenkins elements: the spring's force on what does not elongate it."""
+def _slider_loss(result: Reference, t: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """Power lost in the Jenkins elements: the spring's force on what does not elongate it, from slip to stick.
+
+    The elongation would not tell: a spring that turns a hair before its bound has it, too.
+    """
     system = result.system
-    slips = np.abs(system.elongation(y)) > system.limit[:, None] * (1 - 1e-9)
-    speed = system.V @ qd
-    slips &= speed * system.elongation(y) > 0
-    return (system.spring * system.limit) @ (np.abs(speed) * slips)
+    slips = np.array([_sliding(result, element, t) for element in range(len(system.spring))]).reshape(-1, len(t))
+    return (system.spring * system.limit) @ (np.abs(system.V @ qd) * slips)
+
+
+def _sliding(result: Reference, element: int, t: np.ndarray) -> np.ndarray:
+    """Whether an element slides at scaled times t: since a slip, or from the start if its first event is a stick."""
+    events = [event for event in result.events if event.side == "casing" and event.damper == element]
+    times = np.array([event.time * result.system.omega for event in events])
+    slides = np.array([bool(events) and events[0].kind == "stick", *(event.kind == "slip" for event in events)])
+    return slides[np.searchsorted(times, t, side="right")]
 
 
 def _contact_loss(system: System, y: np.ndarray) -> np.ndarray:

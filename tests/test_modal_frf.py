@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from modal.frf import QUANTITIES, Frf, FrfError, identify
+from modal.rational import Rational
 
 
 def response(frequencies, modes, quantity="receptance"):
@@ -67,5 +68,84 @@ def test_refuses_bands_without_the_modes_asked_for():
         identify(frf, 500)
     with pytest.raises(FrfError, match="no mode of the band"):
         identify(Frf(AXIS, np.ones_like(AXIS) + 0.01 * np.random.default_rng(0).standard_normal(AXIS.size)), 1)
+    with pytest.raises(FrfError, match="no mode of the band"):
+        identify(frf, 3)
+    with pytest.raises(FrfError, match="all are zero"):
+        identify(Frf(AXIS, np.zeros_like(AXIS)))
     with pytest.raises(FrfError, match="quantity: expected one of"):
         Frf(AXIS, AXIS, "compliance")
+
+
+def noise(rng, shape, kind):
+    """Of unit variance: complex, in the real part alone, or of a Hann window, which neighbouring lines share."""
+    if kind == "real":
+        return rng.standard_normal(shape) + 0j
+    values = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2.0)
+    if kind == "hann":
+        values = (values - 0.5 * (np.roll(values, 1, -1) + np.roll(values, -1, -1))) / np.sqrt(1.5)
+    return values
+
+
+@pytest.mark.parametrize(
+    ("quantity", "lines", "responses", "count"),
+    [("receptance", 16, 1, 1), ("accelerance", 801, 1, 1), ("mobility", 100, 3, 1), ("accelerance", 100, 1, 2)],
+)
+def test_noise_has_no_modes(quantity, lines, responses, count):
+    """One in 10^4 may pass by the bound of `Rational.chance`: none of these 100, around zero or around a constant."""
+    axis = np.linspace(2200.0, 2700.0, lines)
+    for seed in range(100):
+        values = noise(np.random.default_rng(seed), (responses, lines), ["complex", "real", "hann"][seed % 3])
+        with pytest.raises(FrfError, match="no mode of the band"):
+            identify(Frf(axis, values + (100.0 if seed % 2 else 0.0), quantity), count)
+
+
+@pytest.mark.parametrize(("kind", "responses"), [("real", 1), ("complex", 3)])
+def test_the_chance_of_noise_is_bounded(kind, responses):
+    """Of 300 noise responses no more fall below a bound than it says, within three standard deviations."""
+    s, chances = 1j * np.linspace(0.8, 1.0, 16), []
+    for seed in range(300):
+        problem = Rational(s, noise(np.random.default_rng(seed), (responses, s.size), kind), 0)
+        chances.append(problem.chance(problem.best(1)))
+    for bound in (0.5, 0.1, 0.01):
+        share = np.mean(np.array(chances) < bound)
+        assert share <= bound + 3.0 * np.sqrt(bound * (1.0 - bound) / len(chances))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.1])
+@pytest.mark.parametrize("kind", ["complex", "real"])
+@pytest.mark.parametrize("ratio", [1e-4, 1e-3, 1e-2])
+def test_modes_under_noise_are_not_refused(kind, ratio, share):
+    """Noise of up to 10 % of the peak, four lines in the half-power bandwidth, other modes below and above the band."""
+    bandwidth = 2.0 * ratio * 2414.0
+    axis = 2414.0 + bandwidth * np.arange(-20.0, 20.0, 0.25)
+    clean = response(axis, [(2414.0, ratio, 1.0), (900.0, 0.01, 2.0), (5000.0, 0.01, 3.0)])
+    peak = np.abs(clean).max()
+    for seed in range(5):
+        poles = identify(Frf(axis, clean + share * peak * noise(np.random.default_rng(seed), axis.shape, kind)), 1)
+        deviations = np.hypot(poles.deviations[0], [1e-5 * bandwidth, 1e-3 * ratio])
+        # ten lines at 10 % noise leave the ratio within some 6 %; noise in one part doubles what that part shows
+        assert np.all(np.abs([poles.frequencies_hz[0] - 2414.0, poles.damping_ratios[0] - ratio]) < 6.0 * deviations)
+        assert poles.deviations[0, 1] < 0.1 * ratio
+
+
+def test_close_modes_under_noise_are_not_refused():
+    """Two modes half a bandwidth apart at 1 % noise of the peak, three responses."""
+    gains = np.array([[1.0, 0.8], [1.0, -0.8], [0.3, 1.0]])
+    clean = np.array([response(AXIS, [(2414.0, 0.005, a), (2426.0, 0.005, b)]) for a, b in gains])
+    for seed in range(5):
+        disturbed = clean + 0.01 * np.abs(clean).max() * noise(np.random.default_rng(seed), clean.shape, "complex")
+        poles = identify(Frf(AXIS, disturbed), 2)
+        assert poles.frequencies_hz == pytest.approx([2414.0, 2426.0], abs=0.3)
+        assert poles.damping_ratios == pytest.approx([0.005, 0.005], rel=0.05)
+        with pytest.raises(FrfError, match="no mode of the band"):
+            identify(Frf(AXIS, disturbed), 3)
+
+
+def test_refuses_a_mode_between_two_lines():
+    """A bandwidth of a tenth of the line spacing, and one line disturbed: both are spikes on single lines."""
+    clean = response(AXIS, [(2414.0, 0.1 * 0.625 / (2 * 2414.0), 1.0)])
+    disturbance = 1e-3 * np.abs(clean).max() * noise(np.random.default_rng(0), AXIS.shape, "complex")
+    spike = np.where(np.arange(AXIS.size) == 300, 100.0, 0.0)
+    for values in (clean, clean + disturbance, spike + noise(np.random.default_rng(1), AXIS.shape, "complex")):
+        with pytest.raises(FrfError, match=r"its lines resolve: half-power bandwidth .* Hz, line spacing 0\.625 Hz"):
+            identify(Frf(AXIS, values))
