@@ -8,7 +8,6 @@ t (quadratic eigenvalue problem of a viscously damped structure, Tisseur and Mee
 
 from __future__ import annotations
 
-import contextlib
 from typing import NamedTuple
 
 import numpy as np
@@ -17,13 +16,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from coupling.inputs import InputError
+from coupling.modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
 from coupling.rows import Rows
 from coupling.state import ALONE, DIFFERENCE, SUM
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
-
-CRITICAL = "structure: a mode is critically damped to round-off; change its damping slightly"
 
 
 class Flows(NamedTuple):
@@ -86,7 +84,10 @@ def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
 
 
 def add_flow(flows: Flows, rows: Rows, key: tuple[int, int]) -> Flows:
-    """The stack with the subsystem of `key` = (closed friction rows, closed contacts) in its first free place."""
+    """The stack with the subsystem of `key` = (closed friction rows, closed contacts) in its first free place.
+
+    Raises IllConditioned (coupling.modes) for one that doubles cannot resolve.
+    """
     free = np.flatnonzero(flows.modes == 0)
     if len(free) == 0:
         flows = Flows(
@@ -115,23 +116,29 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     # coordinates z = (p, xi): bodies are at x = carrier p + xi, besides the parabolas of free ones; z = lift eta
     basis = null_space(inner) if len(inner) else np.eye(n)
     lift, drop = block_diag(basis, springs.lift), block_diag(basis.T, springs.drop)
+    kept = lift @ drop
     spread = np.vstack([np.hstack([np.eye(n), carrier.T]), np.hstack([np.zeros((b, n)), np.eye(b)])])
     loads = lift.T @ spread  # loads on (p, x) become loads on eta
     functional = _functional(rows, carrier)
     law = np.hstack([functional[sprung], rows.bodies[sprung]])
-    mass = loads @ np.diag(np.r_[np.ones(n), rows.mass]) @ loads.T
-    z_damping = block_diag(rows.damping, np.zeros((b, b))) + law.T * rows.dashpot[sprung] @ law
-    z_stiffness = block_diag(np.diag(rows.stiffness), np.zeros((b, b))) + law.T * rows.spring[sprung] @ law
-    damping, stiffness = lift.T @ z_damping @ lift, lift.T @ z_stiffness @ lift
-    harmonic = lift @ _solve_harmonic(
-        stiffness + 1j * rows.omega * damping - rows.omega**2 * mass, loads @ np.r_[rows.force, rows.inertia]
-    )
+    elastic = np.vstack([np.eye(n, n + b), law]) * np.sqrt(np.r_[rows.stiffness, rows.spring[sprung]])[:, None]
     if rows.proportional and lift.shape[1] == n and not len(sprung) and not np.any(cluster < 0):
-        eigenvalue, shape, project = _proportional_modes(rows)
+        real = RealModes(np.sqrt(rows.stiffness), np.eye(n), np.eye(n), rows.damping)
     else:
-        eigenvalue, shape, project = _complex_modes(mass, damping, stiffness, polished=len(sprung) > 0)
-    eigenvalue, shape, project = _one_of_each_pair(eigenvalue, shape, project)
-    shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
+        root = np.sqrt(rows.stiffness)
+        loss = block_diag(rows.damping / root / root[:, None], np.diag(rows.dashpot[sprung] / rows.spring[sprung]))
+        real = real_modes(np.sqrt(np.r_[np.ones(n), rows.mass])[:, None] * loads.T, elastic @ lift, loss)
+    # from here on eta are the amplitudes of the real modes
+    lift, drop, loads = lift @ real.shape, real.project @ drop, real.shape.T @ loads
+    dynamic = np.diag(real.frequency**2 - rows.omega**2) + 1j * rows.omega * real.damping
+    harmonic = lift @ _solve_harmonic(dynamic, loads @ np.r_[rows.force, rows.inertia])
+    eigenvalue, shape, displacement, velocity = complex_modes(real.frequency, real.damping)
+    shape = np.vstack([lift @ shape, lift @ (shape * eigenvalue)])
+    project = np.hstack([displacement @ drop, velocity @ drop])
+    felt = np.abs(np.vstack([functional, rows.response]))
+    _check_split(rows, felt.max(axis=0), law, sprung, (shape @ project).real - np.kron(np.eye(2), kept))
+    flexibility = lift / real.frequency**2
+    _check_rest(rows, felt, flexibility @ loads)
     m = len(eigenvalue) + 1
     flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, cluster < 0
     flows.eigenvalue[s, :m] = np.r_[1j * rows.omega, eigenvalue]
@@ -149,10 +156,10 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
         flows.body_acceleration[s][np.ix_(members, members)] = 1 / rows.mass[members].sum()
     flows.body[s, :, :m] = body
     flows.motion[s, :, :m] = functional @ full[:n] + rows.bodies @ own
-    flows.static[s] = lift @ np.linalg.solve(stiffness, loads)
+    flows.static[s] = flexibility @ loads
     if len(inner):
-        kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
-        flows.held[s] = kept - lift @ np.linalg.solve(stiffness, lift.T @ z_stiffness @ kept)
+        fixed = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
+        flows.held[s] = fixed - flexibility @ (elastic @ lift).T @ elastic @ fixed
     flows.response[s, :m] = rows.response @ full[:n]
     flows.response[s, 0] += rows.table
     rate = np.abs(flows.eigenvalue[s, :m])
@@ -163,6 +170,29 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     flows.turn[s, :m] = np.exp(flows.eigenvalue[s, :m] * rows.period / 8)
     _fill_forces(flows, rows, s, full[structure], rigid, sprung)
     _fill_energy(flows, rows, s, full[structure], body)
+
+
+def _check_split(rows: Rows, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, error: np.ndarray) -> None:
+    """Refuse a subsystem whose states (p, xi, p', xi') come back from their modes with an `error` above LOST.
+
+    Each coordinate counts by what the rows and the response feel of it (felt (n,)), its rate by its own frequency or
+    that of the excitation.
+    """
+    n, b = len(rows.stiffness), len(rows.mass)
+    size = np.r_[1 / np.maximum(felt, 1e-8 * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
+    stiffness = np.r_[rows.stiffness, np.zeros(b)] + rows.spring[sprung] @ law**2
+    rate = np.maximum(rows.omega, np.sqrt(stiffness / np.r_[np.ones(n), rows.mass]))
+    size = np.r_[size, size * rate]
+    if not np.all(np.abs(error) * size <= LOST * size[:, None]):
+        raise IllConditioned("states come back from their modes changed")
+
+
+def _check_rest(rows: Rows, felt: np.ndarray, static: np.ndarray) -> None:
+    """Refuse a subsystem that weight would carry so far that its round-off there is more than LOST of a gap."""
+    n, eps = len(rows.stiffness), np.finfo(float).eps
+    far = felt @ np.abs(static[:n, n:] @ rows.weight)
+    if len(rows.gap) and not eps * far.max(initial=0.0) <= LOST * rows.gap.min():
+        raise IllConditioned("at rest under its weight the structure is too far away")
 
 
 def _fill_forces(flows: Flows, rows: Rows, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
@@ -337,76 +367,25 @@ def _sprung_bodies(rows: Rows, cluster: np.ndarray, sprung: np.ndarray) -> _Spru
             columns.append(member[inside].T)
             rests.append(first[inside])
         elif len(inside) > 1:
-            mass = member[inside] @ rows.mass
-            relative = null_space(mass[None, :])
-            columns.append(member[inside].T @ relative)
-            rests.append(relative.T @ (np.eye(len(inside)) - mass / mass.sum()) @ first[inside])
+            spread, gather = _about_centre(member[inside] @ rows.mass)
+            columns.append(member[inside].T @ spread)
+            rests.append(gather @ first[inside])
     anchored = (cluster >= 0) & (part[cluster] == part[groups])
     return _SprungBodies(np.hstack(columns), np.vstack(rests), anchored, np.where(cluster < 0, -1, part[cluster]))
 
 
-def _complex_modes(
-    mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, polished: bool
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Eigenvalues (2k,) of the free motion, vectors of (eta, eta') (2k, 2k) and their inverse.
+def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k, k-1) and (k-1, k): displacements of k masses about their centre from coordinates, and these from those.
 
-    polished: correct the eigenvalues of the linearised problem on the quadratic one. Beside a stiff contact the slow
-    modes have lost the digits that the energies of many impacts need; elsewhere it is not worth its time.
+    Each mass moves against all that are heavier: products of masses alone, so that a light one beside a heavy one keeps
+    its digits (Helmert's orthogonal contrasts).
     """
-    k = len(mass)
-    if k == 0:
-        return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)
-    reduced = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
-    # a real matrix: LAPACK returns exact conjugate pairs
-    values, vectors = np.linalg.eig(np.vstack([np.hstack([np.zeros((k, k)), np.eye(k)]), reduced]))
-    values, vectors = values.astype(complex), vectors.astype(complex)
-    scaled = vectors * np.repeat([np.abs(values).max(), 1.0], k)[:, None]
-    if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=0)) > 1e9:
-        raise InputError(CRITICAL)
-    if not polished:
-        return values, vectors, np.linalg.inv(vectors)
-    pairs = [
-        _polish(value, shape, mass, damping, stiffness) for value, shape in zip(values, vectors[:k].T, strict=True)
-    ]
-    values, shapes = (np.array(part).T for part in zip(*pairs, strict=True))
-    vectors = np.vstack([shapes, shapes * values])
-    # symmetric matrices: shapes are left vectors, too, up to combinations of those with the same eigenvalue
-    left = np.hstack([(values[:, None] * shapes.T) @ mass + shapes.T @ damping, shapes.T @ mass])
-    return values, vectors, np.linalg.solve(left @ vectors, left)
-
-
-def _polish(
-    value: complex, shape: np.ndarray, mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray
-) -> tuple[complex, np.ndarray]:
-    """Two steps of inverse iteration and Rayleigh quotient for (value^2 mass + value damping + stiffness) shape = 0."""
-    for _ in range(2):
-        slope = 2 * value * mass + damping
-        form = shape @ slope @ shape
-        if abs(form) < 1e-3 * (np.abs(shape) @ np.abs(slope) @ np.abs(shape)):
-            return value, shape  # a combination of modes with the same eigenvalue
-        with contextlib.suppress(np.linalg.LinAlgError):  # singular to the last bit: as good as it gets
-            better = np.linalg.solve(value**2 * mass + value * damping + stiffness, slope @ shape)
-            shape = better / np.linalg.norm(better)
-        value -= (shape @ (value**2 * mass + value * damping + stiffness) @ shape) / (shape @ slope @ shape)
-    return value, shape
-
-
-def _one_of_each_pair(
-    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each conjugate pair the upper one, with twice its vector: displacement = Re(vector c)."""
-    keep = values.imag >= 0
-    return values[keep], vectors[:, keep] * np.where(values.imag > 0, 2.0, 1.0)[keep], inverse[keep]
-
-
-def _proportional_modes(rows: Rows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    half = np.diag(rows.damping) / 2
-    root = np.sqrt((half**2 - rows.stiffness).astype(complex))
-    if np.any(np.abs(root) < 1e-7 * half):
-        raise InputError(CRITICAL)
-    plus, minus = -half + root, -half - root
-    eye = np.eye(len(half))
-    vectors = np.block([[eye, eye], [np.diag(plus), np.diag(minus)]])
-    difference = np.diag(1 / (plus - minus))
-    inverse = np.block([[-minus * difference, difference], [plus * difference, -difference]])
-    return np.r_[plus, minus], vectors, inverse
+    order = np.argsort(mass, kind="stable")
+    spread, gather = np.zeros((len(mass), len(mass) - 1)), np.zeros((len(mass) - 1, len(mass)))
+    for i, light in enumerate(order[:-1]):
+        heavier = order[i + 1 :]
+        total = mass[heavier].sum()
+        spread[light, i], spread[heavier, i] = 1.0, -mass[light] / total
+        gather[i, light], gather[i, heavier] = 1.0, -mass[heavier] / total
+        gather[i] *= total / (total + mass[light])
+    return spread, gather

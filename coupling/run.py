@@ -16,6 +16,7 @@ from coupling.evaluation import Outcome, Run, evaluate, run_scene
 from coupling.flow import add_flow, empty_flows
 from coupling.handover import Handover, given, taken
 from coupling.inputs import InputError
+from coupling.modes import IllConditioned
 from coupling.response import Response, Status
 from coupling.rows import rows_of
 from coupling.scene import Scene
@@ -26,6 +27,7 @@ _STATUS = {
     auto.EVENT_BUDGET: Status.EVENT_BUDGET,
     auto.ACCURACY_LOST: Status.ACCURACY_LOST,
     auto.UNDECIDED: Status.UNDECIDED,
+    auto.ILL_CONDITIONED: Status.ILL_CONDITIONED,
 }
 
 
@@ -115,13 +117,25 @@ class EngineRun:
                 self.rows, self.flows, self.state, self.channels, self.records, self.scratch, periods, max_events
             )
             if code == auto.NEEDS_FLOW:
-                key = (int(self.state.key[0]), int(self.state.key[1]))
-                self.flows = add_flow(self.flows, self.rows, key)
-                continue
+                code = self._add_flow()
+                if code == auto.DONE:
+                    continue
             self.log.take(self.records.log, int(self.state.counters[st.LOGGED]))
             self.state.counters[st.LOGGED] = 0
             if code != auto.LOG_FULL:
                 return int(code)
+
+    def _add_flow(self) -> int:
+        """Add the subsystem that the state calls for. Returns DONE or ILL_CONDITIONED."""
+        key = (int(self.state.key[0]), int(self.state.key[1]))
+        try:
+            self.flows = add_flow(self.flows, self.rows, key)
+        except IllConditioned as error:
+            counters = self.state.counters
+            if key == (0, 0) and counters[st.EVENTS] == counters[st.PERIOD] == 0:
+                raise InputError(f"structure: {error}; change its damping slightly") from None
+            return int(auto.ILL_CONDITIONED)
+        return int(auto.DONE)
 
     def advance_to(self, periods: int) -> Status:
         """Advance to the end of `periods`, from the decision of the initial state. Returns how that ended."""

@@ -1,0 +1,211 @@
+"""Modes of a linear subsystem to full relative accuracy, however far apart its masses and stiffnesses lie.
+
+Real modes come from the factors of mass and stiffness, never from these matrices: in a sum with a body of 1e12 times
+its mass nothing is left of the structure. Complex modes are computed in the coordinates of the real ones, ordered from
+quick to slow and measured by their energy, where a slow mode's small numbers stand beside those of its like (Demmel et
+al., Linear Algebra Appl. 299, 1999, on factors; Tisseur and Meerbergen, SIAM Review 43, 2001, on quadratic eigenvalue
+problems).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+from scipy.linalg.lapack import dgejsv
+from scipy.sparse.csgraph import connected_components
+
+#: largest condition of the complex modes, their vectors as long as their energy: beyond, two are one to round-off
+DEFECTIVE = 1e7
+#: largest relative residual of an eigenpair, and largest error of a state that is split into modes and put together
+LOST = 1e-9
+
+#: products of a left and a right vector below this share of their size belong to combinations of equal modes
+_MIXED = 1e-3
+_EPS = float(np.finfo(float).eps)
+#: complex numbers in a batch of eigenpairs that are polished at once
+_BATCH = 1 << 20
+
+
+class IllConditioned(ArithmeticError):
+    """Doubles cannot tell the modes of a subsystem apart, or have lost too many digits in them."""
+
+
+class RealModes(NamedTuple):
+    """Undamped modes of q coordinates eta = shape a, a = project eta: a'' + damping a' + frequency^2 a = loads."""
+
+    frequency: np.ndarray  # (q,) rad/s
+    shape: np.ndarray  # (q, q)
+    project: np.ndarray  # (q, q)
+    damping: np.ndarray  # (q, q) N s/m per kg
+
+
+class ComplexModes(NamedTuple):
+    """Free motion a = Re(shape c), c = displacement a + velocity a' at time zero; of conjugate pairs the upper ones."""
+
+    eigenvalue: np.ndarray  # (m,) 1/s
+    shape: np.ndarray  # (q, m)
+    displacement: np.ndarray  # (m, q)
+    velocity: np.ndarray  # (m, q)
+
+
+def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> RealModes:
+    """Modes of q coordinates eta whose kinetic energy is |inertia eta'|^2 / 2 and potential energy |elastic eta|^2 / 2.
+
+    inertia: (k, q) and elastic: (e, q), both of rank q; loss: (e, e), s, such that the damping matrix is
+    elastic^T loss elastic. The singular values of one factor over the other are the frequencies, by Jacobi's rotations,
+    which keep the digits of small ones beside large ones (Drmac and Veselic, SIAM J. Matrix Anal. Appl. 29, 2008).
+    Raises IllConditioned for a factor of lower rank.
+    """
+    if not inertia.shape[1]:
+        none = np.zeros((0, 0))
+        return RealModes(np.zeros(0), none, none, none)
+    r, r_inverse, _ = _inverse(inertia)
+    scaled, u, v, work, _, info = dgejsv(elastic @ r_inverse, joba=2, jobu=0, jobv=0, jobr=0, jobt=1, jobp=1)
+    frequency, strain = scaled * (work[0] / work[1]), u[:, : len(v)]
+    if info or not frequency[-1] > 0:
+        raise IllConditioned("no real modes")
+    _, _, elastic_inverse = _inverse(elastic)
+    # a mode is known by its motion and by the strain it brings, and each entry is taken from where it is sharper:
+    # soft modes hardly strain stiff springs, and quick ones hardly move heavy bodies
+    shape = np.where(
+        _reach(r_inverse) < _reach(elastic_inverse) * frequency,
+        r_inverse @ v,
+        elastic_inverse @ (strain * frequency),
+    )
+    project = np.where(_reach(r.T) < _reach(elastic.T) / frequency, r.T @ v, (elastic.T @ strain) / frequency).T
+    damping, noise = strain.T @ loss @ strain, np.abs(strain.T) @ np.abs(loss) @ np.abs(strain)
+    damping[np.abs(damping) <= 8 * _EPS * noise] = 0.0
+    return RealModes(frequency, shape, project, frequency[:, None] * (damping + damping.T) / 2 * frequency)
+
+
+def _inverse(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(r, r^-1, factor^-1) of factor (k, q) = orthonormal times r; r need not be triangular.
+
+    Rows in the order of their sizes and columns in that of what is left of them: rows may differ by any factor.
+    """
+    order = np.argsort(-np.abs(factor).max(axis=1), kind="stable")
+    q, r, pivot = qr(factor[order], mode="economic", pivoting=True)
+    if not np.all(np.diag(r)):
+        raise IllConditioned("a motion without mass or stiffness")
+    back, orthonormal = np.argsort(pivot), np.empty_like(q)
+    orthonormal[order] = q
+    r_inverse = solve_triangular(r, np.eye(len(r)))[back]
+    return r[:, back], r_inverse, r_inverse @ orthonormal.T
+
+
+def _reach(matrix: np.ndarray) -> np.ndarray:
+    """How far an error of one in all inputs reaches each output of a matrix, (rows, 1)."""
+    return np.abs(matrix).sum(axis=1, keepdims=True)
+
+
+def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> ComplexModes:
+    """Free motion of a'' + damping a' + frequency^2 a = 0, damping (q, q) symmetric.
+
+    Raises IllConditioned where modes coalesce to round-off (critical damping) or do not satisfy the equation.
+    """
+    q = len(frequency)
+    number, block = connected_components(damping != 0, directed=False) if q else (0, np.zeros(0, int))
+    alone = np.bincount(block, minlength=number)[block] == 1
+    parts = [_single(frequency[alone], np.diag(damping)[alone], np.flatnonzero(alone), q)]
+    for b in np.unique(block[~alone]):
+        members = np.flatnonzero(block == b)
+        members = members[np.argsort(-frequency[members], kind="stable")]  # from quick to slow, as QR steps like it
+        parts.append(_coupled(frequency[members], damping[np.ix_(members, members)], members, q))
+    return ComplexModes(
+        np.concatenate([part.eigenvalue for part in parts]), np.hstack([part.shape for part in parts]),
+        np.vstack([part.displacement for part in parts]), np.vstack([part.velocity for part in parts]),
+    )  # fmt: skip
+
+
+def _single(w: np.ndarray, damping: np.ndarray, place: np.ndarray, q: int) -> ComplexModes:
+    """Modes that damping does not couple: oscillators of one degree of freedom."""
+    half = damping / 2
+    root = np.sqrt(((half - w) * (half + w)).astype(complex))
+    if np.any(np.abs(root) * DEFECTIVE < w):
+        raise IllConditioned("a mode is critically damped to round-off")
+    real = root.imag == 0
+    first = -half - np.where(real, root, -root)
+    # the slow one of two real eigenvalues would cancel
+    values, who = np.r_[first, (w**2 / first)[real]], np.r_[np.arange(len(w)), np.flatnonzero(real)]
+    shapes = np.eye(len(w), dtype=complex)[who]
+    left, norm = _left(values, shapes, w)
+    return _placed(values, shapes, left / norm[:, None], place, q)
+
+
+def _coupled(w: np.ndarray, damping: np.ndarray, place: np.ndarray, q: int) -> ComplexModes:
+    """Modes that damping couples, w descending."""
+    k = len(w)
+    linear = np.zeros((2 * k, 2 * k))  # of (w a, a'): skew but for the damping
+    linear[::2, 1::2], linear[1::2, ::2], linear[1::2, 1::2] = np.diag(w), -np.diag(w), -damping
+    # a real matrix: LAPACK returns exact conjugate pairs
+    values, vectors = np.linalg.eig(linear)
+    upper = values.imag >= 0
+    values, vectors = values[upper].astype(complex), vectors[:, upper].astype(complex)
+    if not np.all(values):
+        raise IllConditioned("a slow mode is lost")
+    shapes = np.where(np.abs(values) > w[:, None], vectors[1::2] / values, vectors[::2] / w[:, None]).T
+    batches = np.array_split(np.arange(len(values)), 1 + len(values) * k * k // _BATCH)
+    polished = [_polish(values[batch], shapes[batch], w, damping) for batch in batches]
+    values, shapes = (np.concatenate(part) for part in zip(*polished, strict=True))
+    pairs = values.imag > 0
+    every, each = np.r_[values, values[pairs].conj()], np.vstack([shapes, shapes[pairs].conj()])
+    right = np.hstack([each, each * every[:, None]])
+    length = np.linalg.norm(right * np.r_[w, np.ones(k)], axis=1)  # energy
+    if not np.linalg.cond(right * np.r_[w, np.ones(k)] / length[:, None]) < DEFECTIVE:
+        raise IllConditioned("a mode is critically damped to round-off")
+    # left vectors are what symmetry says, up to combinations of those with the same eigenvalue
+    left, norm = _left(every, each, w)
+    length *= np.linalg.norm(left / np.r_[w, np.ones(k)], axis=1)
+    left /= np.where(np.abs(norm) > _MIXED * length, norm, length)[:, None]
+    product, noise = left @ right.T, np.abs(left) @ np.abs(right.T)
+    product[np.abs(product) <= 8 * _EPS * noise] = 0.0  # round-off would turn a slow mode's speed into displacement
+    if np.any(np.abs(product - np.eye(len(left))) > 8 * _EPS * noise):
+        left = np.linalg.solve(product, left)
+    return _placed(values, shapes, left[: len(values)], place, q)
+
+
+def _left(values: np.ndarray, shapes: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Left vectors (m, 2k) on (a, a') by symmetry, and their products with the right ones (m,).
+
+    Springs stand for inertia and damping, so that no small difference of these two is left to round-off.
+    """
+    strained = -shapes * w**2 / values[:, None]
+    norm = values * (shapes**2).sum(axis=1) + (strained * shapes).sum(axis=1)
+    return np.hstack([strained, shapes]), norm
+
+
+def _placed(values: np.ndarray, shapes: np.ndarray, left: np.ndarray, place: np.ndarray, q: int) -> ComplexModes:
+    """Modes of the coordinates `place` as modes of all q, with twice the shapes of those that stand for a pair."""
+    full = np.zeros((3, len(values), q), complex)
+    full[:, :, place] = np.where(values.imag > 0, 2.0, 1.0)[:, None] * shapes, *np.hsplit(left, 2)
+    return ComplexModes(values, full[0].T, full[1], full[2])
+
+
+def _polish(
+    values: np.ndarray, shapes: np.ndarray, w: np.ndarray, damping: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A step of inverse iteration and of Rayleigh's quotient on the quadratic problem; values (m,), shapes (m, k)."""
+    real, scale = values.imag == 0, 1 / np.maximum(w, np.abs(values)[:, None])
+    near = values * (1 + 4 * _EPS)  # off the eigenvalue by round-off: the matrix must not be singular to the last bit
+    diagonal = np.arange(len(w))
+    dynamic = near[:, None, None] * damping * scale[:, :, None] * scale[:, None, :]
+    dynamic[:, diagonal, diagonal] += (near[:, None] - 1j * w) * (near[:, None] + 1j * w) * scale**2
+    slope = 2 * values[:, None] * shapes + shapes @ damping
+    better = np.linalg.solve(dynamic, (scale * slope)[:, :, None])[:, :, 0]
+    # the largest part is real: a slow mode's small imaginary ones are not to be drowned in its round-off
+    rows = np.arange(len(values))
+    better = scale * better / better[rows, np.abs(better).argmax(axis=1)][:, None]
+    force = (values[:, None] - 1j * w) * (values[:, None] + 1j * w) * better + values[:, None] * (better @ damping)
+    slope = 2 * values[:, None] * better + better @ damping
+    form, size = (better * slope).sum(axis=1), (np.abs(better) * np.abs(slope)).sum(axis=1)
+    good = np.abs(form) > _MIXED * size  # otherwise a combination of modes with nearly the same eigenvalue
+    values = values - np.where(good, (better * force).sum(axis=1) / np.where(good, form, 1), 0)
+    shapes = np.where(good[:, None], better, shapes)
+    values.imag[real], shapes.imag[real] = 0.0, 0.0  # a fused multiply-add leaves its round-off there
+    force = (values[:, None] - 1j * w) * (values[:, None] + 1j * w) * shapes + values[:, None] * (shapes @ damping)
+    residual = np.linalg.norm(scale * force, axis=1) / np.linalg.norm(shapes / scale, axis=1)
+    if not np.all(residual < LOST):
+        raise IllConditioned("an eigenvalue does not satisfy its equation")
+    return values, shapes
