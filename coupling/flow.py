@@ -22,6 +22,10 @@ from coupling.state import ALONE, DIFFERENCE, SUM
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
+#: share of a gap that round-off may be at the place where weight would carry the structure
+FAR = 1e-6
+#: what rows feel of a mode counts at least as this share of what they feel of the others
+_UNFELT = 1e-8
 
 
 class Flows(NamedTuple):
@@ -116,7 +120,6 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     # coordinates z = (p, xi): bodies are at x = carrier p + xi, besides the parabolas of free ones; z = lift eta
     basis = null_space(inner) if len(inner) else np.eye(n)
     lift, drop = block_diag(basis, springs.lift), block_diag(basis.T, springs.drop)
-    kept = lift @ drop
     spread = np.vstack([np.hstack([np.eye(n), carrier.T]), np.hstack([np.zeros((b, n)), np.eye(b)])])
     loads = lift.T @ spread  # loads on (p, x) become loads on eta
     functional = _functional(rows, carrier)
@@ -130,13 +133,15 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
         real = real_modes(np.sqrt(np.r_[np.ones(n), rows.mass])[:, None] * loads.T, elastic @ lift, loss)
     # from here on eta are the amplitudes of the real modes
     lift, drop, loads = lift @ real.shape, real.project @ drop, real.shape.T @ loads
-    dynamic = np.diag(real.frequency**2 - rows.omega**2) + 1j * rows.omega * real.damping
-    harmonic = lift @ _solve_harmonic(dynamic, loads @ np.r_[rows.force, rows.inertia])
-    eigenvalue, shape, displacement, velocity = complex_modes(real.frequency, real.damping)
-    shape = np.vstack([lift @ shape, lift @ (shape * eigenvalue)])
-    project = np.hstack([displacement @ drop, velocity @ drop])
+    mass, damping, stiffness = np.eye(len(drop)), real.damping, np.diag(real.frequency**2)
+    harmonic = lift @ _solve_harmonic(
+        stiffness + 1j * rows.omega * damping - rows.omega**2 * mass, loads @ np.r_[rows.force, rows.inertia]
+    )
+    eigenvalue, shape, project = complex_modes(real.frequency, damping)
+    eigenvalue, shape, project = _one_of_each_pair(eigenvalue, shape, project)
+    shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
     felt = np.abs(np.vstack([functional, rows.response]))
-    _check_split(rows, felt.max(axis=0), law, sprung, (shape @ project).real - np.kron(np.eye(2), kept))
+    _check_split(rows, felt.max(axis=0), law, sprung, shape, project)
     flexibility = lift / real.frequency**2
     _check_rest(rows, felt, flexibility @ loads)
     m = len(eigenvalue) + 1
@@ -158,8 +163,8 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     flows.motion[s, :, :m] = functional @ full[:n] + rows.bodies @ own
     flows.static[s] = flexibility @ loads
     if len(inner):
-        fixed = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
-        flows.held[s] = fixed - flexibility @ (elastic @ lift).T @ elastic @ fixed
+        kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
+        flows.held[s] = kept - flexibility @ (elastic @ lift).T @ elastic @ kept
     flows.response[s, :m] = rows.response @ full[:n]
     flows.response[s, 0] += rows.table
     rate = np.abs(flows.eigenvalue[s, :m])
@@ -172,26 +177,29 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     _fill_energy(flows, rows, s, full[structure], body)
 
 
-def _check_split(rows: Rows, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, error: np.ndarray) -> None:
-    """Refuse a subsystem whose states (p, xi, p', xi') come back from their modes with an `error` above LOST.
+def _check_split(
+    rows: Rows, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, shape: np.ndarray, project: np.ndarray
+) -> None:
+    """Refuse a subsystem whose modes cancel, so that round-off in a state (p, xi, p', xi') grows to more than LOST.
 
     Each coordinate counts by what the rows and the response feel of it (felt (n,)), its rate by its own frequency or
     that of the excitation.
     """
     n, b = len(rows.stiffness), len(rows.mass)
-    size = np.r_[1 / np.maximum(felt, 1e-8 * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
+    size = np.r_[1 / np.maximum(felt, _UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
     stiffness = np.r_[rows.stiffness, np.zeros(b)] + rows.spring[sprung] @ law**2
     rate = np.maximum(rows.omega, np.sqrt(stiffness / np.r_[np.ones(n), rows.mass]))
     size = np.r_[size, size * rate]
-    if not np.all(np.abs(error) * size <= LOST * size[:, None]):
-        raise IllConditioned("states come back from their modes changed")
+    growth = sum(np.abs(part(shape)) @ np.abs(part(project)) for part in (np.real, np.imag)) * size / size[:, None]
+    if not growth.max(initial=0.0) * np.finfo(float).eps <= LOST:
+        raise IllConditioned("its modes cancel")
 
 
 def _check_rest(rows: Rows, felt: np.ndarray, static: np.ndarray) -> None:
-    """Refuse a subsystem that weight would carry so far that its round-off there is more than LOST of a gap."""
+    """Refuse a subsystem that weight would carry so far that its round-off there is more than FAR of a gap."""
     n, eps = len(rows.stiffness), np.finfo(float).eps
     far = felt @ np.abs(static[:n, n:] @ rows.weight)
-    if len(rows.gap) and not eps * far.max(initial=0.0) <= LOST * rows.gap.min():
+    if len(rows.gap) and not eps * far.max(initial=0.0) <= FAR * rows.gap.min():
         raise IllConditioned("at rest under its weight the structure is too far away")
 
 
@@ -389,3 +397,11 @@ def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         gather[i, light], gather[i, heavier] = 1.0, -mass[heavier] / total
         gather[i] *= total / (total + mass[light])
     return spread, gather
+
+
+def _one_of_each_pair(
+    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each conjugate pair the upper one, with twice its vector: displacement = Re(vector c)."""
+    keep = values.imag >= 0
+    return values[keep], vectors[:, keep] * np.where(values.imag > 0, 2.0, 1.0)[keep], inverse[keep]

@@ -41,15 +41,6 @@ class RealModes(NamedTuple):
     damping: np.ndarray  # (q, q) N s/m per kg
 
 
-class ComplexModes(NamedTuple):
-    """Free motion a = Re(shape c), c = displacement a + velocity a' at time zero; of conjugate pairs the upper ones."""
-
-    eigenvalue: np.ndarray  # (m,) 1/s
-    shape: np.ndarray  # (q, m)
-    displacement: np.ndarray  # (m, q)
-    velocity: np.ndarray  # (m, q)
-
-
 def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> RealModes:
     """Modes of q coordinates eta whose kinetic energy is |inertia eta'|^2 / 2 and potential energy |elastic eta|^2 / 2.
 
@@ -64,8 +55,8 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
     r, r_inverse, _ = _inverse(inertia)
     scaled, u, v, work, _, info = dgejsv(elastic @ r_inverse, joba=2, jobu=0, jobv=0, jobr=0, jobt=1, jobp=1)
     frequency, strain = scaled * (work[0] / work[1]), u[:, : len(v)]
-    if info or not frequency[-1] > 0:
-        raise IllConditioned("no real modes")
+    if info or not (frequency[-1] > 0 and np.isfinite(frequency[0])):
+        raise IllConditioned("its frequencies are too far apart")
     _, _, elastic_inverse = _inverse(elastic)
     # a mode is known by its motion and by the strain it brings, and each entry is taken from where it is sharper:
     # soft modes hardly strain stiff springs, and quick ones hardly move heavy bodies
@@ -100,41 +91,44 @@ def _reach(matrix: np.ndarray) -> np.ndarray:
     return np.abs(matrix).sum(axis=1, keepdims=True)
 
 
-def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> ComplexModes:
-    """Free motion of a'' + damping a' + frequency^2 a = 0, damping (q, q) symmetric.
+def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Eigenvalues (2q,), vectors of (a, a') (2q, 2q) and their inverse: a'' + damping a' + frequency^2 a = 0.
 
-    Raises IllConditioned where modes coalesce to round-off (critical damping) or do not satisfy the equation.
+    damping: (q, q) symmetric. Conjugate pairs are exactly so. Raises IllConditioned where modes coalesce to round-off
+    (critical damping) or do not satisfy the equation.
     """
     q = len(frequency)
     number, block = connected_components(damping != 0, directed=False) if q else (0, np.zeros(0, int))
-    alone = np.bincount(block, minlength=number)[block] == 1
-    parts = [_single(frequency[alone], np.diag(damping)[alone], np.flatnonzero(alone), q)]
-    for b in np.unique(block[~alone]):
-        members = np.flatnonzero(block == b)
+    values, shapes, left = np.zeros(2 * q, complex), np.zeros((2 * q, q), complex), np.zeros((2 * q, 2 * q), complex)
+    done = 0
+    alone = np.flatnonzero(np.bincount(block, minlength=number)[block] == 1)
+    for b in [-1, *np.unique(np.delete(block, alone))]:
+        members = np.flatnonzero(block == b) if b >= 0 else alone
         members = members[np.argsort(-frequency[members], kind="stable")]  # from quick to slow, as QR steps like it
-        parts.append(_coupled(frequency[members], damping[np.ix_(members, members)], members, q))
-    return ComplexModes(
-        np.concatenate([part.eigenvalue for part in parts]), np.hstack([part.shape for part in parts]),
-        np.vstack([part.displacement for part in parts]), np.vstack([part.velocity for part in parts]),
-    )  # fmt: skip
+        inside = damping[np.ix_(members, members)]
+        solve = _coupled if b >= 0 else _single
+        part = np.arange(done, done + 2 * len(members))
+        values[part], shapes[np.ix_(part, members)], left[np.ix_(part, np.r_[members, q + members])] = solve(
+            frequency[members], inside
+        )
+        done += len(part)
+    return values, np.vstack([shapes.T, shapes.T * values]), left
 
 
-def _single(w: np.ndarray, damping: np.ndarray, place: np.ndarray, q: int) -> ComplexModes:
+def _single(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Modes that damping does not couple: oscillators of one degree of freedom."""
-    half = damping / 2
+    half = np.diag(damping) / 2
     root = np.sqrt(((half - w) * (half + w)).astype(complex))
     if np.any(np.abs(root) * DEFECTIVE < w):
         raise IllConditioned("a mode is critically damped to round-off")
-    real = root.imag == 0
-    first = -half - np.where(real, root, -root)
+    first = -half - root
     # the slow one of two real eigenvalues would cancel
-    values, who = np.r_[first, (w**2 / first)[real]], np.r_[np.arange(len(w)), np.flatnonzero(real)]
-    shapes = np.eye(len(w), dtype=complex)[who]
+    values, shapes = np.r_[first, np.where(root.imag == 0, w**2 / first, first.conj())], np.tile(np.eye(len(w)), (2, 1))
     left, norm = _left(values, shapes, w)
-    return _placed(values, shapes, left / norm[:, None], place, q)
+    return values, shapes, left / norm[:, None]
 
 
-def _coupled(w: np.ndarray, damping: np.ndarray, place: np.ndarray, q: int) -> ComplexModes:
+def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Modes that damping couples, w descending."""
     k = len(w)
     linear = np.zeros((2 * k, 2 * k))  # of (w a, a'): skew but for the damping
@@ -150,20 +144,20 @@ def _coupled(w: np.ndarray, damping: np.ndarray, place: np.ndarray, q: int) -> C
     polished = [_polish(values[batch], shapes[batch], w, damping) for batch in batches]
     values, shapes = (np.concatenate(part) for part in zip(*polished, strict=True))
     pairs = values.imag > 0
-    every, each = np.r_[values, values[pairs].conj()], np.vstack([shapes, shapes[pairs].conj()])
-    right = np.hstack([each, each * every[:, None]])
+    values, shapes = np.r_[values, values[pairs].conj()], np.vstack([shapes, shapes[pairs].conj()])
+    right = np.hstack([shapes, shapes * values[:, None]])
     length = np.linalg.norm(right * np.r_[w, np.ones(k)], axis=1)  # energy
     if not np.linalg.cond(right * np.r_[w, np.ones(k)] / length[:, None]) < DEFECTIVE:
         raise IllConditioned("a mode is critically damped to round-off")
     # left vectors are what symmetry says, up to combinations of those with the same eigenvalue
-    left, norm = _left(every, each, w)
+    left, norm = _left(values, shapes, w)
     length *= np.linalg.norm(left / np.r_[w, np.ones(k)], axis=1)
     left /= np.where(np.abs(norm) > _MIXED * length, norm, length)[:, None]
     product, noise = left @ right.T, np.abs(left) @ np.abs(right.T)
     product[np.abs(product) <= 8 * _EPS * noise] = 0.0  # round-off would turn a slow mode's speed into displacement
     if np.any(np.abs(product - np.eye(len(left))) > 8 * _EPS * noise):
         left = np.linalg.solve(product, left)
-    return _placed(values, shapes, left[: len(values)], place, q)
+    return values, shapes, left
 
 
 def _left(values: np.ndarray, shapes: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -174,13 +168,6 @@ def _left(values: np.ndarray, shapes: np.ndarray, w: np.ndarray) -> tuple[np.nda
     strained = -shapes * w**2 / values[:, None]
     norm = values * (shapes**2).sum(axis=1) + (strained * shapes).sum(axis=1)
     return np.hstack([strained, shapes]), norm
-
-
-def _placed(values: np.ndarray, shapes: np.ndarray, left: np.ndarray, place: np.ndarray, q: int) -> ComplexModes:
-    """Modes of the coordinates `place` as modes of all q, with twice the shapes of those that stand for a pair."""
-    full = np.zeros((3, len(values), q), complex)
-    full[:, :, place] = np.where(values.imag > 0, 2.0, 1.0)[:, None] * shapes, *np.hsplit(left, 2)
-    return ComplexModes(values, full[0].T, full[1], full[2])
 
 
 def _polish(

@@ -16,7 +16,7 @@ from coupling.evaluation import Outcome, Run, evaluate, run_scene
 from coupling.flow import add_flow, empty_flows
 from coupling.handover import Handover, given, taken
 from coupling.inputs import InputError
-from coupling.modes import IllConditioned
+from coupling.modes import IllConditioned, complex_modes
 from coupling.response import Response, Status
 from coupling.rows import rows_of
 from coupling.scene import Scene
@@ -104,8 +104,15 @@ class EngineRun:
         self.scratch = st.new_scratch(self.rows, modes)
 
     def begin(self, max_events: int) -> int:
-        """Decide the initial state and record it. Returns the automaton's code."""
+        """Decide the initial state and record it. Returns the automaton's code.
+
+        Raises InputError for a structure that is critically damped without any contact.
+        """
         self.begun = True
+        try:
+            complex_modes(np.sqrt(self.rows.stiffness), self.rows.damping)
+        except IllConditioned as error:
+            raise InputError(f"structure: {error}; change its damping slightly") from None
         if not auto.begin(self.rows, self.state, self.records, self.scratch):
             return auto.UNDECIDED
         return self.advance(0, max_events)
@@ -130,10 +137,7 @@ class EngineRun:
         key = (int(self.state.key[0]), int(self.state.key[1]))
         try:
             self.flows = add_flow(self.flows, self.rows, key)
-        except IllConditioned as error:
-            counters = self.state.counters
-            if key == (0, 0) and counters[st.EVENTS] == counters[st.PERIOD] == 0:
-                raise InputError(f"structure: {error}; change its damping slightly") from None
+        except IllConditioned:
             return int(auto.ILL_CONDITIONED)
         return int(auto.DONE)
 
