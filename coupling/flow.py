@@ -22,7 +22,7 @@ from coupling.state import ALONE, DIFFERENCE, SUM
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
-#: share of a gap that round-off may be at the place where weight would carry the structure
+#: share of a gap or a period that round-off may be where modes swing far out: a heavy body on a spring, weight
 FAR = 1e-6
 #: what rows feel of a mode counts at least as this share of what they feel of the others
 _UNFELT = 1e-8
@@ -180,7 +180,7 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
 def _check_split(
     rows: Rows, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, shape: np.ndarray, project: np.ndarray
 ) -> None:
-    """Refuse a subsystem whose modes cancel, so that round-off in a state (p, xi, p', xi') grows to more than LOST.
+    """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
 
     Each coordinate counts by what the rows and the response feel of it (felt (n,)), its rate by its own frequency or
     that of the excitation.
@@ -190,8 +190,11 @@ def _check_split(
     stiffness = np.r_[rows.stiffness, np.zeros(b)] + rows.spring[sprung] @ law**2
     rate = np.maximum(rows.omega, np.sqrt(stiffness / np.r_[np.ones(n), rows.mass]))
     size = np.r_[size, size * rate]
-    growth = sum(np.abs(part(shape)) @ np.abs(part(project)) for part in (np.real, np.imag)) * size / size[:, None]
-    if not growth.max(initial=0.0) * np.finfo(float).eps <= LOST:
+    grows = np.finfo(float).eps * size / size[:, None]
+    parts = sum(np.abs(part(shape)) @ np.abs(part(project)) for part in (np.real, np.imag))
+    # the search for events knows no more of an amplitude than its modulus
+    whole = np.abs(shape) @ np.abs(project)
+    if not (np.all(parts * grows <= LOST) and np.all(whole * grows <= FAR)):
         raise IllConditioned("its modes cancel")
 
 
