@@ -23,6 +23,8 @@ LOST = 1e-9
 
 #: products of a left and a right vector below this share of their size belong to combinations of equal modes
 _MIXED = 1e-3
+#: condition of modes beyond which some nearly coalesce
+_NEAR = 1e2
 _EPS = float(np.finfo(float).eps)
 #: complex numbers in a batch of eigenpairs that are polished at once
 _BATCH = 1 << 20
@@ -123,9 +125,11 @@ def _single(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray,
         raise IllConditioned("a mode is critically damped to round-off")
     first = -half - root
     # the slow one of two real eigenvalues would cancel
-    values, shapes = np.r_[first, np.where(root.imag == 0, w**2 / first, first.conj())], np.tile(np.eye(len(w)), (2, 1))
-    left, norm = _left(values, shapes, w)
-    return values, shapes, left / norm[:, None]
+    second, eye = np.where(root.imag == 0, w**2 / first, first.conj()), np.eye(len(w))
+    # one difference for both: near critical damping its round-off is then common to their amplitudes
+    part = np.diag(1 / (first - second))
+    left = np.block([[-second * part, part], [first * part, -part]])
+    return np.r_[first, second], np.vstack([eye, eye]), left
 
 
 def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -147,7 +151,8 @@ def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray
     values, shapes = np.r_[values, values[pairs].conj()], np.vstack([shapes, shapes[pairs].conj()])
     right = np.hstack([shapes, shapes * values[:, None]])
     length = np.linalg.norm(right * np.r_[w, np.ones(k)], axis=1)  # energy
-    if not np.linalg.cond(right * np.r_[w, np.ones(k)] / length[:, None]) < DEFECTIVE:
+    condition = np.linalg.cond(right * np.r_[w, np.ones(k)] / length[:, None])
+    if not condition < DEFECTIVE:
         raise IllConditioned("a mode is critically damped to round-off")
     # left vectors are what symmetry says, up to combinations of those with the same eigenvalue
     left, norm = _left(values, shapes, w)
@@ -157,6 +162,8 @@ def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray
     product[np.abs(product) <= 8 * _EPS * noise] = 0.0  # round-off would turn a slow mode's speed into displacement
     if np.any(np.abs(product - np.eye(len(left))) > 8 * _EPS * noise):
         left = np.linalg.solve(product, left)
+    if condition > _NEAR:
+        left += left @ (np.eye(2 * k) - right.T @ left)  # what modes that nearly coalesce make of a state must cancel
     return values, shapes, left
 
 
