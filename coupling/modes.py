@@ -9,6 +9,7 @@ problems).
 
 from __future__ import annotations
 
+import contextlib
 from typing import NamedTuple
 
 import numpy as np
@@ -182,12 +183,8 @@ def _polish(
 ) -> tuple[np.ndarray, np.ndarray]:
     """A step of inverse iteration and of Rayleigh's quotient on the quadratic problem; values (m,), shapes (m, k)."""
     real, scale = values.imag == 0, 1 / np.maximum(w, np.abs(values)[:, None])
-    near = values * (1 + 4 * _EPS)  # off the eigenvalue by round-off: the matrix must not be singular to the last bit
-    diagonal = np.arange(len(w))
-    dynamic = near[:, None, None] * damping * scale[:, :, None] * scale[:, None, :]
-    dynamic[:, diagonal, diagonal] += (near[:, None] - 1j * w) * (near[:, None] + 1j * w) * scale**2
     slope = 2 * values[:, None] * shapes + shapes @ damping
-    better = np.linalg.solve(dynamic, (scale * slope)[:, :, None])[:, :, 0]
+    better = _inverse_step(values, scale, w, damping, scale * slope)
     # the largest part is real: a slow mode's small imaginary ones are not to be drowned in its round-off
     rows = np.arange(len(values))
     better = scale * better / better[rows, np.abs(better).argmax(axis=1)][:, None]
@@ -203,3 +200,20 @@ def _polish(
     if not np.all(residual < LOST):
         raise IllConditioned("an eigenvalue does not satisfy its equation")
     return values, shapes
+
+
+def _inverse_step(
+    values: np.ndarray, scale: np.ndarray, w: np.ndarray, damping: np.ndarray, right: np.ndarray
+) -> np.ndarray:
+    """Solutions of the scaled quadratic problem beside each eigenvalue for right sides (m, k).
+
+    Off it by round-off: the matrix must not be singular to the last bit, as it can be beside two that nearly coalesce.
+    """
+    diagonal = np.arange(len(w))
+    for shift in (4 * _EPS, 1e-10, 1e-6):
+        near = values * (1 + shift)
+        dynamic = near[:, None, None] * damping * scale[:, :, None] * scale[:, None, :]
+        dynamic[:, diagonal, diagonal] += (near[:, None] - 1j * w) * (near[:, None] + 1j * w) * scale**2
+        with contextlib.suppress(np.linalg.LinAlgError):
+            return np.linalg.solve(dynamic, right[:, :, None])[:, :, 0]
+    raise IllConditioned("an eigenvalue is not simple")
