@@ -41,8 +41,8 @@ from coupling.state import (
 )
 from coupling.watch import carry, longest_hop, next_event
 
-# what advance() returns
-DONE, NEEDS_FLOW, LOG_FULL, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED = range(6)
+# what advance() returns, and ILL_CONDITIONED: the flow that it needs cannot be had
+DONE, NEEDS_FLOW, LOG_FULL, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED, ILL_CONDITIONED = range(7)
 
 #: differences below this share of their terms are round-off
 _EQUAL = 1e-14

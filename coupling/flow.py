@@ -8,7 +8,6 @@ t (quadratic eigenvalue problem of a viscously damped structure, Tisseur and Mee
 
 from __future__ import annotations
 
-import contextlib
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from coupling.inputs import InputError
+from coupling.modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
 from coupling.rows import Rows
 from coupling.state import ALONE, DIFFERENCE, SUM
 
@@ -24,8 +24,10 @@ from coupling.state import ALONE, DIFFERENCE, SUM
 SLOW = 1e-2
 #: bytes that the subsystems of one run may take
 ROOM = 2**29
-
-CRITICAL = "structure: a mode is critically damped to round-off; change its damping slightly"
+#: share of a gap or a period that round-off may be where modes swing far out: a heavy body on a spring, weight
+FAR = 1e-6
+#: what rows feel of a mode counts at least as this share of what they feel of the others
+_UNFELT = 1e-8
 
 
 class Flows(NamedTuple):
@@ -91,6 +93,7 @@ def add_flow(flows: Flows, rows: Rows, closed: np.ndarray) -> Flows:
     """The stack with the subsystem of the closed rows (r,) in its first free place.
 
     Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
+    Raises IllConditioned (coupling.modes) for one that doubles cannot resolve.
     """
     free = np.flatnonzero(flows.modes == 0)
     if len(free) == 0:
@@ -121,19 +124,26 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     loads = lift.T @ spread  # loads on (p, x) become loads on eta
     functional = _functional(rows, carrier)
     law = np.hstack([functional[sprung], rows.bodies[sprung]])
-    mass = loads @ np.diag(np.r_[np.ones(n), rows.mass]) @ loads.T
-    z_damping = block_diag(rows.damping, np.zeros((b, b))) + law.T * rows.dashpot[sprung] @ law
-    z_stiffness = block_diag(np.diag(rows.stiffness), np.zeros((b, b))) + law.T * rows.spring[sprung] @ law
-    damping, stiffness = lift.T @ z_damping @ lift, lift.T @ z_stiffness @ lift
+    elastic = np.vstack([np.eye(n, n + b), law]) * np.sqrt(np.r_[rows.stiffness, rows.spring[sprung]])[:, None]
+    if rows.proportional and lift.shape[1] == n and not len(sprung) and not np.any(cluster < 0):
+        real = RealModes(np.sqrt(rows.stiffness), np.eye(n), np.eye(n), rows.damping)
+    else:
+        root = np.sqrt(rows.stiffness)
+        loss = block_diag(rows.damping / root / root[:, None], np.diag(rows.dashpot[sprung] / rows.spring[sprung]))
+        real = real_modes(np.sqrt(np.r_[np.ones(n), rows.mass])[:, None] * loads.T, elastic @ lift, loss)
+    # from here on eta are the amplitudes of the real modes
+    lift, drop, loads = lift @ real.shape, real.project @ drop, real.shape.T @ loads
+    mass, damping, stiffness = np.eye(len(drop)), real.damping, np.diag(real.frequency**2)
     harmonic = lift @ _solve_harmonic(
         stiffness + 1j * rows.omega * damping - rows.omega**2 * mass, loads @ np.r_[rows.force, rows.inertia]
     )
-    if rows.proportional and lift.shape[1] == n and not len(sprung) and not np.any(cluster < 0):
-        eigenvalue, shape, project = _proportional_modes(rows)
-    else:
-        eigenvalue, shape, project = _complex_modes(mass, damping, stiffness, polished=len(sprung) > 0)
+    eigenvalue, shape, project = complex_modes(real.frequency, damping)
     eigenvalue, shape, project = _one_of_each_pair(eigenvalue, shape, project)
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
+    felt = np.abs(np.vstack([functional, rows.response]))
+    _check_split(rows, felt.max(axis=0), law, sprung, shape, project)
+    flexibility = lift / real.frequency**2
+    _check_rest(rows, felt, flexibility @ loads)
     m = len(eigenvalue) + 1
     flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, cluster < 0
     flows.eigenvalue[s, :m] = np.r_[1j * rows.omega, eigenvalue]
@@ -151,10 +161,10 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
         flows.body_acceleration[s][np.ix_(members, members)] = 1 / rows.mass[members].sum()
     flows.body[s, :, :m] = body
     flows.motion[s, :, :m] = functional @ full[:n] + rows.bodies @ own
-    flows.static[s] = lift @ np.linalg.solve(stiffness, loads)
+    flows.static[s] = flexibility @ loads
     if len(inner):
         kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
-        flows.held[s] = kept - lift @ np.linalg.solve(stiffness, lift.T @ z_stiffness @ kept)
+        flows.held[s] = kept - flexibility @ (elastic @ lift).T @ elastic @ kept
     flows.response[s, :m] = rows.response @ full[:n]
     flows.response[s, 0] += rows.table
     rate = np.abs(flows.eigenvalue[s, :m])
@@ -165,6 +175,35 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     flows.turn[s, :m] = np.exp(flows.eigenvalue[s, :m] * rows.period / 8)
     _fill_forces(flows, rows, s, full[structure], rigid, sprung)
     _fill_energy(flows, rows, s, full[structure], body)
+
+
+def _check_split(
+    rows: Rows, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, shape: np.ndarray, project: np.ndarray
+) -> None:
+    """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
+
+    Each coordinate counts by what the rows and the response feel of it (felt (n,)), its rate by its own frequency or
+    that of the excitation.
+    """
+    n, b = len(rows.stiffness), len(rows.mass)
+    size = np.r_[1 / np.maximum(felt, _UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
+    stiffness = np.r_[rows.stiffness, np.zeros(b)] + rows.spring[sprung] @ law**2
+    rate = np.maximum(rows.omega, np.sqrt(stiffness / np.r_[np.ones(n), rows.mass]))
+    size = np.r_[size, size * rate]
+    grows = np.finfo(float).eps * size / size[:, None]
+    parts = sum(np.abs(part(shape)) @ np.abs(part(project)) for part in (np.real, np.imag))
+    # the search for events knows no more of an amplitude than its modulus
+    whole = np.abs(shape) @ np.abs(project)
+    if not (np.all(parts * grows <= LOST) and np.all(whole * grows <= FAR)):
+        raise IllConditioned("its modes cancel")
+
+
+def _check_rest(rows: Rows, felt: np.ndarray, static: np.ndarray) -> None:
+    """Refuse a subsystem that weight would carry so far that its round-off there is more than FAR of a gap."""
+    n, eps = len(rows.stiffness), np.finfo(float).eps
+    far = felt @ np.abs(static[:n, n:] @ rows.weight)
+    if len(rows.gap) and not eps * far.max(initial=0.0) <= FAR * rows.gap.min():
+        raise IllConditioned("at rest under its weight the structure is too far away")
 
 
 def _fill_forces(flows: Flows, rows: Rows, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
@@ -339,58 +378,28 @@ def _sprung_bodies(rows: Rows, cluster: np.ndarray, sprung: np.ndarray) -> _Spru
             columns.append(member[inside].T)
             rests.append(first[inside])
         elif len(inside) > 1:
-            mass = member[inside] @ rows.mass
-            relative = null_space(mass[None, :])
-            columns.append(member[inside].T @ relative)
-            rests.append(relative.T @ (np.eye(len(inside)) - mass / mass.sum()) @ first[inside])
+            spread, gather = _about_centre(member[inside] @ rows.mass)
+            columns.append(member[inside].T @ spread)
+            rests.append(gather @ first[inside])
     anchored = (cluster >= 0) & (part[cluster] == part[groups])
     return _SprungBodies(np.hstack(columns), np.vstack(rests), anchored, np.where(cluster < 0, -1, part[cluster]))
 
 
-def _complex_modes(
-    mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, polished: bool
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Eigenvalues (2k,) of the free motion, vectors of (eta, eta') (2k, 2k) and their inverse.
+def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k, k-1) and (k-1, k): displacements of k masses about their centre from coordinates, and these from those.
 
-    polished: correct the eigenvalues of the linearised problem on the quadratic one. Beside a stiff contact the slow
-    modes have lost the digits that the energies of many impacts need; elsewhere it is not worth its time.
+    Each mass moves against all that are heavier: products of masses alone, so that a light one beside a heavy one keeps
+    its digits (Helmert's orthogonal contrasts).
     """
-    k = len(mass)
-    if k == 0:
-        return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)
-    reduced = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
-    # a real matrix: LAPACK returns exact conjugate pairs
-    values, vectors = np.linalg.eig(np.vstack([np.hstack([np.zeros((k, k)), np.eye(k)]), reduced]))
-    values, vectors = values.astype(complex), vectors.astype(complex)
-    scaled = vectors * np.repeat([np.abs(values).max(), 1.0], k)[:, None]
-    if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=0)) > 1e9:
-        raise InputError(CRITICAL)
-    if not polished:
-        return values, vectors, np.linalg.inv(vectors)
-    pairs = [
-        _polish(value, shape, mass, damping, stiffness) for value, shape in zip(values, vectors[:k].T, strict=True)
-    ]
-    values, shapes = (np.array(part).T for part in zip(*pairs, strict=True))
-    vectors = np.vstack([shapes, shapes * values])
-    # symmetric matrices: shapes are left vectors, too, up to combinations of those with the same eigenvalue
-    left = np.hstack([(values[:, None] * shapes.T) @ mass + shapes.T @ damping, shapes.T @ mass])
-    return values, vectors, np.linalg.solve(left @ vectors, left)
-
-
-def _polish(
-    value: complex, shape: np.ndarray, mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray
-) -> tuple[complex, np.ndarray]:
-    """Two steps of inverse iteration and Rayleigh quotient for (value^2 mass + value damping + stiffness) shape = 0."""
-    for _ in range(2):
-        slope = 2 * value * mass + damping
-        form = shape @ slope @ shape
-        if abs(form) < 1e-3 * (np.abs(shape) @ np.abs(slope) @ np.abs(shape)):
-            return value, shape  # a combination of modes with the same eigenvalue
-        with contextlib.suppress(np.linalg.LinAlgError):  # singular to the last bit: as good as it gets
-            better = np.linalg.solve(value**2 * mass + value * damping + stiffness, slope @ shape)
-            shape = better / np.linalg.norm(better)
-        value -= (shape @ (value**2 * mass + value * damping + stiffness) @ shape) / (shape @ slope @ shape)
-    return value, shape
+    order = np.argsort(mass, kind="stable")
+    spread, gather = np.zeros((len(mass), len(mass) - 1)), np.zeros((len(mass) - 1, len(mass)))
+    for i, light in enumerate(order[:-1]):
+        heavier = order[i + 1 :]
+        total = mass[heavier].sum()
+        spread[light, i], spread[heavier, i] = 1.0, -mass[light] / total
+        gather[i, light], gather[i, heavier] = 1.0, -mass[heavier] / total
+        gather[i] *= total / (total + mass[light])
+    return spread, gather
 
 
 def _one_of_each_pair(
@@ -399,16 +408,3 @@ def _one_of_each_pair(
     """Of each conjugate pair the upper one, with twice its vector: displacement = Re(vector c)."""
     keep = values.imag >= 0
     return values[keep], vectors[:, keep] * np.where(values.imag > 0, 2.0, 1.0)[keep], inverse[keep]
-
-
-def _proportional_modes(rows: Rows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    half = np.diag(rows.damping) / 2
-    root = np.sqrt((half**2 - rows.stiffness).astype(complex))
-    if np.any(np.abs(root) < 1e-7 * half):
-        raise InputError(CRITICAL)
-    plus, minus = -half + root, -half - root
-    eye = np.eye(len(half))
-    vectors = np.block([[eye, eye], [np.diag(plus), np.diag(minus)]])
-    difference = np.diag(1 / (plus - minus))
-    inverse = np.block([[-minus * difference, difference], [plus * difference, -difference]])
-    return np.r_[plus, minus], vectors, inverse

@@ -111,12 +111,16 @@ def damping_ratio(restitution: float) -> float:
     if not 0 < restitution <= 1:
         raise InputError(f"restitution: a contact with a dashpot needs a value above 0, up to 1 (got {restitution:g})")
     loss = -math.log(restitution)
-    if loss < 2:
-        angle = brentq(lambda a: (math.pi - 2 * a) * math.tan(a) - loss, 0, math.pi / 2 * (1 - 1e-12), xtol=1e-15)
-        return math.sin(angle)
+    return float(brentq(lambda ratio: 2 * ratio * _turn(ratio) - loss, 0.0, 1 / math.sqrt(restitution), xtol=1e-15))
 
-    def excess(ratio: float) -> float:
-        spread = math.sqrt(ratio**2 - 1)
-        return 2 * ratio * (math.acosh(ratio) / spread if spread > 0 else 1.0) - loss
 
-    return float(brentq(excess, 1.0, 1 / math.sqrt(restitution), xtol=1e-15))
+def _turn(ratio: float) -> float:
+    """acos(z)/sqrt(1 - z^2) of a damping ratio z, and its continuation acosh(z)/sqrt(z^2 - 1) above critical damping.
+
+    By half angles, which keep their digits about z = 1.
+    """
+    if ratio == 1.0:
+        return 1.0
+    away = abs(1 - ratio)
+    turn = math.asin if ratio < 1 else math.asinh
+    return 2 * turn(math.sqrt(away / 2)) / math.sqrt(away * (1 + ratio))

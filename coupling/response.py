@@ -19,6 +19,8 @@ class Status(StrEnum):
 
     PENETRATION: a body is deeper in a wall than `solver.penetration` allows, an impact was missed; DIVERGED: the motion
     grew beyond all bounds; ENERGY: the ledger of a stepping method is open by a tenth, its figures are not to be used.
+    ILL_CONDITIONED: while some contacts are closed, modes are critically damped to round-off or masses and stiffnesses
+    so far apart that doubles cannot resolve the motion; change a damping, a mass or a stiffness.
     NOT_STEADY: no end of the transient in sight; UNCERTAIN: the mean's confidence interval is still too wide. The other
     troubles mean that the figures cover only the periods that were completed.
     """
@@ -27,6 +29,7 @@ class Status(StrEnum):
     EVENT_BUDGET = "event_budget"
     ACCURACY_LOST = "accuracy_lost"
     UNDECIDED = "undecided_contact"
+    ILL_CONDITIONED = "ill_conditioned"
     PENETRATION = "penetration"
     DIVERGED = "diverged"
     ENERGY = "energy_not_balanced"

@@ -16,6 +16,7 @@ from coupling.evaluation import Outcome, Run, evaluate, run_scene
 from coupling.flow import add_flow, empty_flows
 from coupling.handover import Handover, given, taken
 from coupling.inputs import InputError
+from coupling.modes import IllConditioned, complex_modes
 from coupling.response import Response, Status
 from coupling.rows import rows_of
 from coupling.scene import Scene
@@ -26,6 +27,7 @@ _STATUS = {
     auto.EVENT_BUDGET: Status.EVENT_BUDGET,
     auto.ACCURACY_LOST: Status.ACCURACY_LOST,
     auto.UNDECIDED: Status.UNDECIDED,
+    auto.ILL_CONDITIONED: Status.ILL_CONDITIONED,
 }
 
 #: imbalance of the ledger above which a response is not to be used: ordinary runs stay a thousand times below
@@ -105,8 +107,15 @@ class EngineRun:
         self.scratch = st.new_scratch(self.rows, modes)
 
     def begin(self, max_events: int) -> int:
-        """Decide the initial state and record it. Returns the automaton's code."""
+        """Decide the initial state and record it. Returns the automaton's code.
+
+        Raises InputError for a structure that is critically damped without any contact.
+        """
         self.begun = True
+        try:
+            complex_modes(np.sqrt(self.rows.stiffness), self.rows.damping)
+        except IllConditioned as error:
+            raise InputError(f"structure: {error}; change its damping slightly") from None
         if not auto.begin(self.rows, self.state, self.records, self.scratch):
             return auto.UNDECIDED
         return self.advance(0, max_events)
@@ -118,12 +127,21 @@ class EngineRun:
                 self.rows, self.flows, self.state, self.channels, self.records, self.scratch, periods, max_events
             )
             if code == auto.NEEDS_FLOW:
-                self.flows = add_flow(self.flows, self.rows, self.state.key)
-                continue
+                code = self._add_flow()
+                if code == auto.DONE:
+                    continue
             self.log.take(self.records.log, int(self.state.counters[st.LOGGED]))
             self.state.counters[st.LOGGED] = 0
             if code != auto.LOG_FULL:
                 return int(code)
+
+    def _add_flow(self) -> int:
+        """Add the subsystem that the state calls for. Returns DONE or ILL_CONDITIONED."""
+        try:
+            self.flows = add_flow(self.flows, self.rows, self.state.key)
+        except IllConditioned:
+            return int(auto.ILL_CONDITIONED)
+        return int(auto.DONE)
 
     def advance_to(self, periods: int) -> Status:
         """Advance to the end of `periods`, from the decision of the initial state. Returns how that ended."""
