@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from coupling.compiled import inlined, kernel
-from coupling.events import exp_minus_line, exp_minus_one
+from coupling.events import exp_minus_line, exp_minus_one, secular, secular_bound
 from coupling.state import ALONE, AWAKE, CONTACT, DIFFERENCE, EXCITATION, FLOW, PERIOD, VISCOUS
+
+#: Gauss's rule on [0, 1]: exact for polynomials of degree 9
+_NODES = tuple(0.5 + 0.5 * x for x in np.polynomial.legendre.leggauss(5)[0].tolist())
+_WEIGHTS = tuple(0.5 * w for w in np.polynomial.legendre.leggauss(5)[1].tolist())
 
 #: shares of the response below this part of the largest count for nothing in its square
 _NEGLIGIBLE = 1e-9
@@ -53,7 +59,7 @@ def _gather(flows, st, work, s):
             last -= 1
             place = last
         j = st.awake[a]
-        change = st.amplitude[j] * work.first[a]
+        change = work.gain[a]
         work.order[place] = j
         work.change[place] = change
         work.total[place] = 2.0 * st.amplitude[j] + change
@@ -151,9 +157,8 @@ def _free_bodies(rows, flows, st, rec, work, s, period, tau, waves, flat):
     momentum = speed * flat
     if drift != 0.0:
         # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
-        first, line = work.first[0].conjugate(), work.line[0].conjugate()
-        slope = (line + complex(0.0, rows.omega * tau) * first) / (rows.omega * rows.omega)
-        momentum += drift * slope * st.amplitude[0].conjugate()
+        slope = work.bend[0].conjugate() + complex(0.0, rows.omega * tau) * work.gain[0].conjugate()
+        momentum += drift / (rows.omega * rows.omega) * slope
     rec.momentum[period] += momentum
     # the base accelerates all bodies alike
     st.ledger[EXCITATION] += rows.inertia[0].imag / rows.mass[0] * momentum.imag
@@ -161,7 +166,7 @@ def _free_bodies(rows, flows, st, rec, work, s, period, tau, waves, flat):
 
 @inlined
 def _slow_pair(flows, st, rec, s, period, i, tau, constant):
-    """A pair of modes whose product hardly changes: by series of its integral."""
+    """A pair of modes whose product hardly changes: by series of its integral, with driven modes by Gauss's rule."""
     j, k, kind = flows.slow[s, i]
     c, rate = st.amplitude[j], flows.eigenvalue[s, j]
     if kind == ALONE:
@@ -170,7 +175,10 @@ def _slow_pair(flows, st, rec, s, period, i, tau, constant):
     other, rate_other = st.amplitude[k], flows.eigenvalue[s, k]
     if kind == DIFFERENCE:
         other, rate_other = other.conjugate(), rate_other.conjugate()
-    product = c * other * _slow_integral(rate + rate_other, tau)
+    if kind == DIFFERENCE and flows.driven[s] > 0:
+        product = _integral_of_driven(flows, st, s, j, k, tau)
+    else:
+        product = c * other * _slow_integral(rate + rate_other, tau)
     st.ledger[VISCOUS] += (flows.slow_loss[s, i] * product).real
     st.ledger[CONTACT] += (flows.slow_dashpot[s, i] * product).real
     rec.square[period] += (flows.slow_square[s, i] * product).real
@@ -188,6 +196,24 @@ def _slow_integral(rate, tau):
         return complex(tau, 0.0)
     series = 1.0 + z * (1 / 4) * (1.0 + z * (1 / 5) * (1.0 + z * (1 / 6)))
     return tau * (1.0 + z * (1 / 2) * (1.0 + z * (1 / 3) * series))
+
+
+@kernel
+def _integral_of_driven(flows, st, s, j, k, tau):
+    """Integral of c_j conj(c_k) over [0, tau]."""
+    total = 0.0j
+    for i in range(len(_NODES)):
+        t = _NODES[i] * tau
+        total += _WEIGHTS[i] * _amplitude(flows, st, s, j, t) * _amplitude(flows, st, s, k, t).conjugate()
+    return tau * total
+
+
+@inlined
+def _amplitude(flows, st, s, j, t):
+    """Amplitude of mode j at t."""
+    rate = flows.eigenvalue[s, j]
+    growth, _ = secular(rate, flows.eigenvalue[s, 0], t)
+    return st.amplitude[j] * (1.0 + exp_minus_one(rate * t)) + flows.load[s, j] * st.amplitude[0] * growth
 
 
 @inlined
@@ -212,9 +238,17 @@ def _peak(rows, flows, st, work, s, tau, constant, peak):
         size += part
         x0 += wave.real
         v0 += rate.real * wave.real - rate.imag * wave.imag
-        wave += wave * work.first[a]
+        wave += flows.response[s, j] * work.gain[a]
         x1 += wave.real
         v1 += rate.real * wave.real - rate.imag * wave.imag
+    driven = flows.driven[s]
+    for j in range(1, driven + 1):
+        drive = flows.response[s, j] * flows.load[s, j] * st.amplitude[0]
+        work.drive[j] = drive
+        fourth += secular_bound(drive, work.rate[j], work.rate[0], rows.period, 4)
+        size += (abs(drive.real) + abs(drive.imag)) * tau
+        v0 += drive.real
+        v1 += (flows.response[s, j] * flows.load[s, j] * (st.amplitude[0] + work.gain[0])).real
     if size <= peak or tau <= 0.0:
         return peak
     peak = max(peak, abs(x0), abs(x1))
@@ -240,13 +274,24 @@ def _peak(rows, flows, st, work, s, tau, constant, peak):
                 wave, rate = work.wave[a] * work.turn[a], work.rate[a]
                 x1 += wave.real
                 v1 += rate.real * wave.real - rate.imag * wave.imag
+            for j in range(1, driven + 1):
+                growth, _ = secular(work.rate[j], work.rate[0], h)
+                x1 += (work.drive[j] * growth).real
+                v1 += (work.drive[j] * (work.rate[j] * growth + work.turn[0])).real
             peak = max(peak, abs(x1))
         if v0 * v1 < 0.0 and _may_exceed(peak, x0, v0, x1, v1, h, fourth):
-            peak = max(peak, _extremum(work.rate[:count], work.wave[:count], constant, x0, v0, x1, v1, h))
+            top = _extremum(
+                work.rate[:count], work.wave[:count], work.drive[: driven + 1], constant, x0, v0, x1, v1, h
+            )
+            peak = max(peak, top)
         x0, v0 = x1, v1
         if i < pieces - 1:
             for a in range(count):
                 work.wave[a] *= work.turn[a]
+            for j in range(1, driven + 1):
+                growth, _ = secular(work.rate[j], work.rate[0], h)
+                work.wave[j] += work.drive[j] * growth
+                work.drive[j] *= work.turn[0]
     return peak
 
 
@@ -261,7 +306,7 @@ def _may_exceed(peak, x0, v0, x1, v1, h, fourth):
 
 
 @kernel
-def _extremum(rates, waves, constant, x0, v0, x1, v1, h):
+def _extremum(rates, waves, drives, constant, x0, v0, x1, v1, h):
     """|x| where its slope vanishes within [0, h], v0 and v1 of opposite sign: Newton from the cubic interpolant."""
     # slope v0 + b u + c u^2, u = t/h; the root on [0, 1] by the formula that does not cancel
     b = 6.0 * (x1 - x0) / h - 4.0 * v0 - 2.0 * v1
@@ -290,6 +335,22 @@ def _extremum(rates, waves, constant, x0, v0, x1, v1, h):
             x, v, w, third, fourth = x + d0, v + d1, w + d2, third + d3, fourth + d4
             fifth += twice * d4 - square * d3
             sixth += (abs(part.real) + abs(part.imag)) * square * square * square
+        for j in range(1, len(drives)):
+            rate, excitation = rates[j], rates[0]
+            growth, _ = secular(rate, excitation, t)
+            part, turn = drives[j] * growth, drives[j] * (1.0 + exp_minus_one(excitation * t))
+            x += part.real
+            part, turn = rate * part + turn, excitation * turn
+            v += part.real
+            part, turn = rate * part + turn, excitation * turn
+            w += part.real
+            part, turn = rate * part + turn, excitation * turn
+            third += part.real
+            part, turn = rate * part + turn, excitation * turn
+            fourth += part.real
+            part = rate * part + turn
+            fifth += part.real
+            sixth += secular_bound(drives[j], rate, excitation, 2.0 * math.pi / excitation.imag, 6)
         if v * v0 > 0.0:
             lo = t
         else:
@@ -333,3 +394,9 @@ def _sample(rows, flows, st, rec, s, tau, constant):
             entry[0] += (flows.response[s, j] * st.amplitude[j] * (1.0 + first)).real
             for r in range(len(rows.mass)):
                 entry[1 + r] += (flows.motion[s, r, j] * st.amplitude[j] * line).real
+        for j in range(1, flows.driven[s] + 1):
+            growth, beyond = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, 0], t)
+            drive = flows.load[s, j] * st.amplitude[0]
+            entry[0] += (flows.response[s, j] * drive * growth).real
+            for r in range(len(rows.mass)):
+                entry[1 + r] += (flows.motion[s, r, j] * drive * beyond).real

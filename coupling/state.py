@@ -86,6 +86,7 @@ class Channels(NamedTuple):
     noise: np.ndarray  # round-off of its value at the start, besides that of k0
     safe: np.ndarray  # time before which no root can lie
     g: np.ndarray  # (k, m)
+    drive: np.ndarray  # (k, m): of the driven modes
     lower: np.ndarray  # (2, DEGREE + 1) scratch space: lower polynomials of one of them (coupling.events)
 
 
@@ -106,9 +107,9 @@ class Records(NamedTuple):
 class Scratch(NamedTuple):
     """Space for intermediate results."""
 
-    first: np.ndarray  # (m,) exp(lambda tau) - 1 of the awake modes
-    line: np.ndarray  # (m,) exp(lambda tau) - 1 - lambda tau
-    speed: np.ndarray  # (m,)
+    gain: np.ndarray  # (m,) change of the awake modes' amplitudes over the segment
+    bend: np.ndarray  # (m,) what exceeds the tangent in displacements, as amplitudes
+    drive: np.ndarray  # (m,) share of the response in the growth of driven modes, 1/s
     coordinates: np.ndarray  # (2n,)
     slips: np.ndarray  # (2b,)
     on_structure: np.ndarray  # (n,)
@@ -174,7 +175,7 @@ def new_channels(rows: Rows, modes: int) -> Channels:
     """Room for two event functions a row."""
     k = 2 * len(rows.delassus)
     integers, reals = np.zeros((4, k), np.int64), np.zeros((5, k))
-    return Channels._make([*integers, *reals, np.zeros((k, modes), complex), np.zeros((2, DEGREE + 1))])
+    return Channels._make([*integers, *reals, *np.zeros((2, k, modes), complex), np.zeros((2, DEGREE + 1))])
 
 
 def new_records(rows: Rows, periods: int, samples: int) -> Records:
