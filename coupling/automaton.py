@@ -341,16 +341,17 @@ def _amplitudes(flows, st, work, tau):
         work.gain[a] = st.amplitude[j] * first
         work.bend[a] = st.amplitude[j] * exp_minus_line(z, first)
     if flows.driven[s] > 0:
-        _grow(flows, st, work, s, tau)
+        load = flows.load[s, : flows.driven[s] + 1]
+        _grow(flows.eigenvalue[s], load, st.amplitude[0], work.gain, work.bend, tau)
 
 
 @kernel
-def _grow(flows, st, work, s, tau):
+def _grow(eigenvalue, load, phase, gain, bend, tau):
     """What the excitation adds to the modes that it drives: the first ones, always awake."""
-    for j in range(1, flows.driven[s] + 1):
-        growth, beyond = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, 0], tau)
-        work.gain[j] += flows.load[s, j] * st.amplitude[0] * growth
-        work.bend[j] += flows.load[s, j] * st.amplitude[0] * beyond
+    for j in range(1, len(load)):
+        growth, beyond = secular(eigenvalue[j], eigenvalue[0], tau)
+        gain[j] += load[j] * phase * growth
+        bend[j] += load[j] * phase * beyond
 
 
 @inlined

@@ -30,7 +30,7 @@ SLOW = 1e-2
 
 #: modes that fall behind the excitation by less than this, in radians a period, are driven. Beyond, the response in
 #: step with it is at most 2 pi / NEAR times what one period adds: two digits are lost at worst
-NEAR = 1e-1
+NEAR = 2e-2
 
 CRITICAL = "structure: a mode is critically damped to round-off; change its damping slightly"
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from coupling.compiled import inlined, kernel
 from coupling.events import exp_minus_line, exp_minus_one, secular, secular_bound
 from coupling.state import ALONE, AWAKE, CONTACT, DIFFERENCE, EXCITATION, FLOW, PERIOD, VISCOUS
 
-#: Gauss's rule on [0, 1]: exact for polynomials of degree 9
-_NODES = tuple(0.5 + 0.5 * x for x in np.polynomial.legendre.leggauss(5)[0].tolist())
-_WEIGHTS = tuple(0.5 * w for w in np.polynomial.legendre.leggauss(5)[1].tolist())
+#: of the series for products with driven modes: what is left out is below 1e-16
+_TERMS = 11
 
 #: shares of the response below this part of the largest count for nothing in its square
 _NEGLIGIBLE = 1e-9
@@ -166,7 +163,7 @@ def _free_bodies(rows, flows, st, rec, work, s, period, tau, waves, flat):
 
 @inlined
 def _slow_pair(flows, st, rec, s, period, i, tau, constant):
-    """A pair of modes whose product hardly changes: by series of its integral, with driven modes by Gauss's rule."""
+    """A pair of modes whose product hardly changes: by series of its integral."""
     j, k, kind = flows.slow[s, i]
     c, rate = st.amplitude[j], flows.eigenvalue[s, j]
     if kind == ALONE:
@@ -175,8 +172,13 @@ def _slow_pair(flows, st, rec, s, period, i, tau, constant):
     other, rate_other = st.amplitude[k], flows.eigenvalue[s, k]
     if kind == DIFFERENCE:
         other, rate_other = other.conjugate(), rate_other.conjugate()
-    if kind == DIFFERENCE and flows.driven[s] > 0:
-        product = _integral_of_driven(flows, st, s, j, k, tau)
+    if kind == DIFFERENCE and k <= flows.driven[s] and j > 0:
+        # in a frame that turns with the excitation
+        excitation, phase = flows.eigenvalue[s, 0], st.amplitude[0]
+        product = tau * _driven_integral(
+            c, (rate - excitation) * tau, flows.load[s, j] * phase * tau,
+            other, (rate_other + excitation) * tau, (flows.load[s, k] * phase).conjugate() * tau,
+        )  # fmt: skip
     else:
         product = c * other * _slow_integral(rate + rate_other, tau)
     st.ledger[VISCOUS] += (flows.slow_loss[s, i] * product).real
@@ -199,21 +201,22 @@ def _slow_integral(rate, tau):
 
 
 @kernel
-def _integral_of_driven(flows, st, s, j, k, tau):
-    """Integral of c_j conj(c_k) over [0, tau]."""
-    total = 0.0j
-    for i in range(len(_NODES)):
-        t = _NODES[i] * tau
-        total += _WEIGHTS[i] * _amplitude(flows, st, s, j, t) * _amplitude(flows, st, s, k, t).conjugate()
-    return tau * total
-
-
-@inlined
-def _amplitude(flows, st, s, j, t):
-    """Amplitude of mode j at t."""
-    rate = flows.eigenvalue[s, j]
-    growth, _ = secular(rate, flows.eigenvalue[s, 0], t)
-    return st.amplitude[j] * (1.0 + exp_minus_one(rate * t)) + flows.load[s, j] * st.amplitude[0] * growth
+def _driven_integral(c, delay, push, other, other_delay, other_push):
+    """Integral of c d over [0, 1], c' = delay c + push and alike for the other, d."""
+    # coefficients of the Taylor series
+    product = c * other
+    total = product
+    for n in range(1, _TERMS):
+        product = (delay + other_delay) * product + push * other + c * other_push
+        c, other = delay * c, other_delay * other
+        if n == 1:
+            c, other = c + push, other + other_push
+        share = 1.0 / n
+        product, c, other = share * product, share * c, share * other
+        total += product * (1.0 / (n + 1.0))
+        if n > 2 and abs(product.real) + abs(product.imag) <= 1e-18 * (abs(total.real) + abs(total.imag)):
+            break
+    return total
 
 
 @inlined
@@ -242,13 +245,10 @@ def _peak(rows, flows, st, work, s, tau, constant, peak):
         x1 += wave.real
         v1 += rate.real * wave.real - rate.imag * wave.imag
     driven = flows.driven[s]
-    for j in range(1, driven + 1):
-        drive = flows.response[s, j] * flows.load[s, j] * st.amplitude[0]
-        work.drive[j] = drive
-        fourth += secular_bound(drive, work.rate[j], work.rate[0], rows.period, 4)
-        size += (abs(drive.real) + abs(drive.imag)) * tau
-        v0 += drive.real
-        v1 += (flows.response[s, j] * flows.load[s, j] * (st.amplitude[0] + work.gain[0])).real
+    if driven > 0:
+        load = flows.load[s, : driven + 1]
+        more = _drive(flows.eigenvalue[s], flows.response[s], load, st.amplitude[0], work.gain[0], rows.period, work.drive)
+        v0, v1, size, fourth = v0 + more[0], v1 + more[1], size + more[2] * tau, fourth + more[3]
     if size <= peak or tau <= 0.0:
         return peak
     peak = max(peak, abs(x0), abs(x1))
@@ -264,6 +264,34 @@ def _peak(rows, flows, st, work, s, tau, constant, peak):
         h = tau / pieces
         for a in range(count):
             work.turn[a] = exp_minus_one(work.rate[a] * h) + 1.0
+    return _climb(
+        work.rate[:count], work.wave, work.turn, work.drive[: driven + 1], work.growth, constant, x0, v0, x1, v1, tau, h,
+        pieces, fourth, peak,
+    )  # fmt: skip
+
+
+@kernel
+def _drive(eigenvalue, response, load, phase, change, period, drive):
+    """Share of the response in the growth of driven modes: sets drive, 1/s.
+
+    Returns what it adds to the speed at both ends and to the bounds of the response, by time, and fourth derivative.
+    """
+    v0, v1, size, fourth = 0.0, 0.0, 0.0, 0.0
+    for j in range(1, len(load)):
+        drive[j] = response[j] * load[j] * phase
+        v0 += drive[j].real
+        v1 += (response[j] * load[j] * (phase + change)).real
+        size += abs(drive[j].real) + abs(drive[j].imag)
+        fourth += secular_bound(drive[j], eigenvalue[j], eigenvalue[0], period, 4)
+    return v0, v1, size, fourth
+
+
+@kernel
+def _climb(rates, waves, turns, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak):
+    """The largest |response| on a grid of so many pieces of length h, the last one shorter, and before."""
+    count, driven = len(rates), len(drives)
+    for j in range(1, driven):
+        growths[j], _ = secular(rates[j], rates[0], h)
     end, end_slope = x1, v1
     for i in range(pieces):
         x1, v1 = constant, 0.0
@@ -271,27 +299,22 @@ def _peak(rows, flows, st, work, s, tau, constant, peak):
             x1, v1, h = end, end_slope, tau - i * h
         else:
             for a in range(count):
-                wave, rate = work.wave[a] * work.turn[a], work.rate[a]
+                wave, rate = waves[a] * turns[a], rates[a]
                 x1 += wave.real
                 v1 += rate.real * wave.real - rate.imag * wave.imag
-            for j in range(1, driven + 1):
-                growth, _ = secular(work.rate[j], work.rate[0], h)
-                x1 += (work.drive[j] * growth).real
-                v1 += (work.drive[j] * (work.rate[j] * growth + work.turn[0])).real
+            for j in range(1, driven):
+                x1 += (drives[j] * growths[j]).real
+                v1 += (drives[j] * (rates[j] * growths[j] + turns[0])).real
             peak = max(peak, abs(x1))
         if v0 * v1 < 0.0 and _may_exceed(peak, x0, v0, x1, v1, h, fourth):
-            top = _extremum(
-                work.rate[:count], work.wave[:count], work.drive[: driven + 1], constant, x0, v0, x1, v1, h
-            )
-            peak = max(peak, top)
+            peak = max(peak, _extremum(rates, waves, drives, constant, x0, v0, x1, v1, h))
         x0, v0 = x1, v1
         if i < pieces - 1:
             for a in range(count):
-                work.wave[a] *= work.turn[a]
-            for j in range(1, driven + 1):
-                growth, _ = secular(work.rate[j], work.rate[0], h)
-                work.wave[j] += work.drive[j] * growth
-                work.drive[j] *= work.turn[0]
+                waves[a] *= turns[a]
+            for j in range(1, driven):
+                waves[j] += drives[j] * growths[j]
+                drives[j] *= turns[0]
     return peak
 
 

@@ -134,6 +134,7 @@ class Scratch(NamedTuple):
     wave: np.ndarray  # (m,) share of the response
     rate: np.ndarray  # (m,) its eigenvalue
     turn: np.ndarray  # (m,) exp(rate t) for one step of a grid
+    growth: np.ndarray  # (m,) of driven modes over that step
 
 
 class Problem(NamedTuple):
@@ -203,7 +204,7 @@ def new_problem(r: int) -> Problem:
 def new_scratch(rows: Rows, modes: int) -> Scratch:
     """Scratch space for a scene."""
     r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
-    complexes, reals, integers = np.zeros((8, modes), complex), np.zeros((4, r)), np.zeros((7, r), np.int64)
+    complexes, reals, integers = np.zeros((9, modes), complex), np.zeros((4, r)), np.zeros((7, r), np.int64)
     sizes = (2 * n, 2 * b, n, b, n, n)
     return Scratch._make(
         [*complexes[:3], *(np.zeros(size) for size in sizes), *reals, *integers, new_problem(r),

@@ -51,8 +51,7 @@ CHATTER = 3e-7
 def next_event(rows, flows, st, ch):
     """Time to the next event and its channel, or to the period's end and -1.
 
-    What is known beyond the period's end stays known in the next segment (`carry`), but not of driven modes: the
-    bounds of their growth hold within a period.
+    What is known beyond the period's end stays known in the next segment (`carry`).
     """
     s = st.counters[FLOW]
     driven = flows.driven[s]
@@ -67,7 +66,7 @@ def next_event(rows, flows, st, ch):
             if ch.safe[i] < tau:
                 k, tau = i, ch.safe[i]
         if k < 0:
-            st.counters[CARRIED] = count if driven == 0 else 0
+            st.counters[CARRIED] = count
             return left, -1
         if ch.known[k] == ROOT:
             st.counters[CARRIED] = 0
@@ -182,12 +181,14 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
         bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
     if flows.driven[s] > 0:
         on_motion, on_velocity = (0.0, sign) if order == VELOCITY else (sign, 0.0)
-        first, second, largest, _ = _watch_growth(rows, flows, st, ch, s, r, on_motion, on_velocity, 0.0, k)
+        first, second, largest, _ = _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, 0.0, k)
         if order == VELOCITY:
             slope += first
         curvature += second
         bound += largest
     _know(st, ch, r, order, what, value, slope, bound - ch.k2[k], k)
+    if flows.driven[s] > 0:
+        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)
     if what == CLOSES or what == OPENS:
         st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
     if st.released[r] != 0:
@@ -195,23 +196,31 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
     return k + 1
 
 
+@inlined
+def _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, on_force, k):
+    load = flows.load[s, : flows.driven[s] + 1]
+    return _watch_growth(
+        flows.eigenvalue[s], flows.motion[s, r], flows.velocity[s, r], flows.force[s, r], on_motion, on_velocity,
+        on_force, load, st.amplitude[0], rows.period, ch.drive[k],
+    )  # fmt: skip
+
+
 @kernel
-def _watch_growth(rows, flows, st, ch, s, r, on_motion, on_velocity, on_force, k):
-    """Share of driven modes in event function k, a sum of the row's motion, velocity and force times these factors.
+def _watch_growth(eigenvalue, motion, velocity, force, on_motion, on_velocity, on_force, load, phase, period, drive):
+    """Share of driven modes in an event function, a sum of a row's motion, velocity and force times these factors.
 
     Returns its first two derivatives at the segment's start, and bounds of the second and third.
     """
     first, second, second_bound, third_bound = 0.0, 0.0, 0.0, 0.0
-    excitation = flows.eigenvalue[s, 0]
-    for j in range(1, flows.driven[s] + 1):
-        rate = flows.eigenvalue[s, j]
-        row = on_motion * flows.motion[s, r, j] + on_velocity * flows.velocity[s, r, j] + on_force * flows.force[s, r, j]
-        drive = row * flows.load[s, j] * st.amplitude[0]
-        ch.drive[k, j] = drive
-        first += drive.real
-        second += (drive * (rate + excitation)).real
-        second_bound += secular_bound(drive, rate, excitation, rows.period, 2)
-        third_bound += secular_bound(drive, rate, excitation, rows.period, 3)
+    excitation = eigenvalue[0]
+    for j in range(1, len(load)):
+        rate = eigenvalue[j]
+        part = (on_motion * motion[j] + on_velocity * velocity[j] + on_force * force[j]) * load[j] * phase
+        drive[j] = part
+        first += part.real
+        second += (part * (rate + excitation)).real
+        second_bound += secular_bound(part, rate, excitation, period, 2)
+        third_bound += secular_bound(part, rate, excitation, period, 3)
     return first, second, second_bound, third_bound
 
 
@@ -273,8 +282,8 @@ def _watch_spring(rows, flows, st, ch, s, r, k):
     ch.k1[k] = spring * st.velocity[r] + dashpot * acceleration
     ch.k2[k] = spring * st.drift[r]
     if flows.driven[s] > 0:
-        ch.k1[k] += _watch_growth(rows, flows, st, ch, s, r, 0.0, dashpot, 0.0, k)[0]
-        _watch_growth(rows, flows, st, ch, s, r, spring, dashpot, 0.0, k)
+        ch.k1[k] += _watch_drive(rows, flows, st, ch, s, r, 0.0, dashpot, 0.0, k)[0]
+        _watch_drive(rows, flows, st, ch, s, r, spring, dashpot, 0.0, k)
     # the contact ended at zero force
     ch.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
     return k + 1
@@ -296,7 +305,7 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
         bound += size * (rate.real * rate.real + rate.imag * rate.imag)
     curvature, third = 0.0, 0.0
     if flows.driven[s] > 0:
-        first, curvature, second_bound, third = _watch_growth(rows, flows, st, ch, s, r, 0.0, 0.0, sign, k)
+        first, curvature, second_bound, third = _watch_drive(rows, flows, st, ch, s, r, 0.0, 0.0, sign, k)
         slope += first
         bound += second_bound
     elif constant > swing:
@@ -306,6 +315,8 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
         constant += ADHESION * rows.spring[r] * rows.gap[r - rows.friction_rows]
     ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
     _know(st, ch, r, FORCE, side, constant + value, slope, bound, k)
+    if flows.driven[s] > 0:
+        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)
     if st.released[r] == -side:
         for a in range(st.counters[AWAKE]):
             j = st.awake[a]
