@@ -92,7 +92,8 @@ def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
         np.full((capacity, 2), -1, np.int64), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
         z(m, 2 * b), np.zeros(capacity, np.bool_), np.zeros((capacity, b), np.bool_),
         z(r, m), z(r, m), z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
-        f(b, b), z(b, m), z(m), f(m), f(m), z(m), np.zeros(capacity, np.int64), z(m), z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
+        f(b, b), z(b, m), z(m), f(m), f(m), z(m), np.zeros(capacity, np.int64), z(m),
+        z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
         np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 3), np.int64),
         z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
     )  # fmt: skip

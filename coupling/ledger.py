@@ -247,7 +247,9 @@ def _peak(rows, flows, st, work, s, tau, constant, peak):
     driven = flows.driven[s]
     if driven > 0:
         load = flows.load[s, : driven + 1]
-        more = _drive(flows.eigenvalue[s], flows.response[s], load, st.amplitude[0], work.gain[0], rows.period, work.drive)
+        more = _drive(
+            flows.eigenvalue[s], flows.response[s], load, st.amplitude[0], work.gain[0], rows.period, work.drive
+        )
         v0, v1, size, fourth = v0 + more[0], v1 + more[1], size + more[2] * tau, fourth + more[3]
     if size <= peak or tau <= 0.0:
         return peak
@@ -265,8 +267,8 @@ def _peak(rows, flows, st, work, s, tau, constant, peak):
         for a in range(count):
             work.turn[a] = exp_minus_one(work.rate[a] * h) + 1.0
     return _climb(
-        work.rate[:count], work.wave, work.turn, work.drive[: driven + 1], work.growth, constant, x0, v0, x1, v1, tau, h,
-        pieces, fourth, peak,
+        work.rate[:count], work.wave, work.turn, work.drive[: driven + 1], work.growth, constant, x0, v0, x1, v1, tau,
+        h, pieces, fourth, peak,
     )  # fmt: skip
 
 

@@ -187,7 +187,9 @@ class Stepper:
             state=state.state.copy(), displacement=state.displacement.copy(), velocity=state.velocity.copy(),
             drift=state.drift.copy(), held=state.held.copy(), level=state.level.copy(),
             constant=state.constant.copy(), amplitude=state.amplitude[awake], eigenvalue=flows.eigenvalue[s, awake],
-            load=flows.load[s, awake], motion=flows.motion[s][:, awake], velocity_row=flows.velocity[s][:, awake], force=flows.force[s][:, awake], shape=flows.shape[s, : 2 * n][:, awake],
+            load=flows.load[s, awake],
+            motion=flows.motion[s][:, awake], velocity_row=flows.velocity[s][:, awake],
+            force=flows.force[s][:, awake], shape=flows.shape[s, : 2 * n][:, awake],
         )  # fmt: skip
 
 
