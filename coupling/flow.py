@@ -5,10 +5,11 @@ others move freely. The state of a subsystem is a vector of complex modal amplit
 (eigenvalue i omega), every displacement is  constant + polynomial + Re sum_j row_j c_j exp(lambda_j t),  exact for any
 t (quadratic eigenvalue problem of a viscously damped structure, Tisseur and Meerbergen 2001).
 
-In step with the excitation a mode r would answer with load/(i omega - lambda_r): near its own frequency, hardly damped,
-this and c_r are large and cancel. Such driven modes keep their whole motion in c_r, which the excitation makes grow:
-c_r(t) = c_r exp(lambda_r t) + load_r c_0 D(t)  with  D(t) = (exp(i omega t) - exp(lambda_r t))/(i omega - lambda_r),
-t exp(lambda_r t) at resonance without damping (coupling.events.secular). All rows stay functionals of c.
+In step with the excitation a mode r would answer with load_r c_0/(i omega - lambda_r): near its own frequency, hardly
+damped, this and c_r are large and cancel. Such driven modes keep their whole motion in c_r, which the excitation makes
+grow by c_r' = lambda_r c_r + load_r c_0: c_r(t) = c_r exp(lambda_r t) + load_r c_0 D(t) with
+D(t) = (exp(i omega t) - exp(lambda_r t))/(i omega - lambda_r), which is t exp(i omega t) at resonance without damping
+(coupling.events.secular). All rows stay functionals of c.
 """
 
 from __future__ import annotations
@@ -28,9 +29,13 @@ from coupling.state import ALONE, DIFFERENCE, SUM
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
 
-#: modes that fall behind the excitation by less than this, in radians a period, are driven. Beyond, the response in
-#: step with it is at most 2 pi / NEAR times what one period adds: two digits are lost at worst
+#: modes with |i omega - lambda| times the period below this are driven. Beyond, the response in step with the
+#: excitation is at most 1/NEAR times what one period adds: less than two digits cancel. Driven modes cost time, so that
+#: a wider bound would slow down scenes more than 0.3 % beside their resonance. coupling.events.secular relies on it
 NEAR = 2e-2
+
+#: eigenvalues (2k,) of k coordinates, vectors of them and their rates (2k, 2k) and their inverse
+_Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 CRITICAL = "structure: a mode is critically damped to round-off; change its damping slightly"
 
@@ -61,8 +66,8 @@ class Flows(NamedTuple):
     speed: np.ndarray  # (s, m): largest speed of a mode over all rows and the response
     acceleration: np.ndarray  # (s, m): largest acceleration of its terms, whether closed rows hold them or not
     turn: np.ndarray  # (s, m): change of its amplitude over an eighth of a period, as a factor
-    driven: np.ndarray  # (s,) number of modes near the excitation's frequency: 1, 2, ... up to it
-    load: np.ndarray  # (s, m): rate at which the excitation makes a driven mode grow
+    driven: np.ndarray  # (s,) number of driven modes: they come first, after the excitation
+    load: np.ndarray  # (s, m): rate at which the excitation makes them grow
     # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a
     # segment is the form at its end minus the form at its start. Where the rate by which a product of two modes
     # changes vanishes beside the frequency the form would cancel: such pairs are left out of the forms, and listed.
@@ -138,12 +143,12 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     z_stiffness = block_diag(np.diag(rows.stiffness), np.zeros((b, b))) + law.T * rows.spring[sprung] @ law
     damping, stiffness = lift.T @ z_damping @ lift, lift.T @ z_stiffness @ lift
     if rows.proportional and lift.shape[1] == n and not len(sprung) and not np.any(cluster < 0):
-        eigenvalue, shape, project = _proportional_modes(rows)
+        modes = _proportional_modes(rows)
     else:
-        eigenvalue, shape, project = _complex_modes(mass, damping, stiffness, polished=len(sprung) > 0)
+        modes = _complex_modes(mass, damping, stiffness, polished=len(sprung) > 0)
     load = loads @ np.r_[rows.force, rows.inertia]
-    order, harmonic, growth = _excite(rows, mass, damping, stiffness, load, eigenvalue, shape, project)
-    eigenvalue, shape, project = _one_of_each_pair(eigenvalue[order], shape[:, order], project[order])
+    modes, harmonic, growth = _excite(rows, mass, damping, stiffness, load, modes)
+    eigenvalue, shape, project = _one_of_each_pair(*modes)
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
     m = len(eigenvalue) + 1
     flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, cluster < 0
@@ -206,27 +211,21 @@ def _fill_forces(flows: Flows, rows: Rows, s: int, full: np.ndarray, rigid: np.n
 
 
 def _excite(
-    rows: Rows,
-    mass: np.ndarray,
-    damping: np.ndarray,
-    stiffness: np.ndarray,
-    load: np.ndarray,
-    eigenvalue: np.ndarray,
-    shape: np.ndarray,
-    project: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Order (2k,) of the modes, driven ones first; eta (k,) in step with the load but for these; their growth."""
-    k, delay = len(mass), 1j * rows.omega - eigenvalue
-    driven = (np.abs(delay) * rows.period < NEAR) & load.any()
-    order = np.argsort(~driven, kind="stable")
+    rows: Rows, mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
+) -> tuple[_Modes, np.ndarray, np.ndarray]:
+    """The modes, driven ones first; eta (k,) in step with a harmonic load, without their share; their growth."""
+    eigenvalue, shape, project = modes
+    if not load.any():  # free decay, at any frequency
+        return modes, np.zeros_like(load), np.zeros(0)
+    k, apart = len(mass), 1j * rows.omega - eigenvalue
+    driven = np.abs(apart) * rows.period < NEAR
     if not driven.any():
-        # free decay, at any frequency, has no motion in step
-        dynamic = stiffness + 1j * rows.omega * damping - rows.omega**2 * mass
-        return order, np.linalg.solve(dynamic, load) if load.any() else 0j * load, np.zeros(0)
+        return modes, np.linalg.solve(stiffness + 1j * rows.omega * damping - rows.omega**2 * mass, load), np.zeros(0)
     growth = project[:, k:] @ np.linalg.solve(mass, load)
-    harmonic = shape[:k] @ np.where(driven, 0, growth / np.where(driven, 1, delay))
-    # the load has two halves that turn against each other; the other one is in step with the conjugate mode
-    return order, harmonic, growth[driven] / 2
+    harmonic = shape[:k] @ np.where(driven, 0, growth / np.where(driven, 1, apart))
+    order = np.argsort(~driven, kind="stable")
+    # a real load is half of what turns with the excitation, half of what turns against it, in step with the conjugate
+    return (eigenvalue[order], shape[:, order], project[order]), harmonic, growth[driven] / 2
 
 
 def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
@@ -245,7 +244,7 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
     # all harmonic loads are in phase with the sine: real amplitudes
     work = -rows.force.imag @ velocity - rows.inertia.imag @ body_rate
     free = rows.mass * (np.diagonal(flows.body_acceleration[s]) != 0)
-    # the excitation and the modes that it drives turn together
+    # the excitation and the modes that it drives turn together: a product of one with a conjugate one is slow
     together = np.arange(m) <= flows.driven[s]
     along, _ = _reciprocal(rate + rate[0], rows.period)
     against, _ = _reciprocal(rate - rate[0], rows.period, together)
@@ -302,7 +301,10 @@ def _reciprocal(rate: np.ndarray, period: float, together: np.ndarray | bool = F
 
 
 def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Functional (..., m) of the amplitudes whose rate is the one given; `reciprocal` of the rates of its terms."""
+    """Functional (..., m) of the amplitudes whose rate is the one given; `reciprocal` of the rates of its terms.
+
+    By parts: a driven mode's rate has a term in mode 0.
+    """
     integral: np.ndarray = functional * reciprocal
     integral[..., 0] -= integral @ load * reciprocal[0]
     return integral
@@ -311,12 +313,9 @@ def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.nda
 def _antiderivatives(
     product: np.ndarray, reciprocal: np.ndarray, left: np.ndarray, right: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same for a form (m, m), with the loads on its two factors: what is left for slow pairs, and the form.
-
-    The rate of a driven mode has a term in mode 0, so that each of two passes settles one factor of mode 0.
-    """
+    """The same for a form (m, m), with the loads on its two factors: what is left to slow pairs, and the form."""
     rest, integral = product, product * reciprocal
-    for _ in range(2 if left.any() else 0):
+    for _ in range(2 if left.any() else 0):  # the second time for the pair of mode 0 with itself
         rest = product.copy()
         rest[0] -= left @ integral
         rest[:, 0] -= integral @ right

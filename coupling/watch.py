@@ -188,7 +188,7 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
         bound += largest
     _know(st, ch, r, order, what, value, slope, bound - ch.k2[k], k)
     if flows.driven[s] > 0:
-        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)
+        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)  # as far as the bounds hold
     if what == CLOSES or what == OPENS:
         st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
     if st.released[r] != 0:
@@ -198,6 +198,7 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
 
 @inlined
 def _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, on_force, k):
+    """Watch what the excitation adds to driven modes (`_watch_growth`)."""
     load = flows.load[s, : flows.driven[s] + 1]
     return _watch_growth(
         flows.eigenvalue[s], flows.motion[s, r], flows.velocity[s, r], flows.force[s, r], on_motion, on_velocity,
@@ -207,7 +208,7 @@ def _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, on_force, k)
 
 @kernel
 def _watch_growth(eigenvalue, motion, velocity, force, on_motion, on_velocity, on_force, load, phase, period, drive):
-    """Share of driven modes in an event function, a sum of a row's motion, velocity and force times these factors.
+    """Growth of driven modes in an event function, a sum of a row's motion, velocity and force times these factors.
 
     Returns its first two derivatives at the segment's start, and bounds of the second and third.
     """
@@ -282,7 +283,9 @@ def _watch_spring(rows, flows, st, ch, s, r, k):
     ch.k1[k] = spring * st.velocity[r] + dashpot * acceleration
     ch.k2[k] = spring * st.drift[r]
     if flows.driven[s] > 0:
-        ch.k1[k] += _watch_drive(rows, flows, st, ch, s, r, 0.0, dashpot, 0.0, k)[0]
+        # the row's velocity has its share of the growth already, its acceleration has not
+        acceleration, _, _, _ = _watch_drive(rows, flows, st, ch, s, r, 0.0, 1.0, 0.0, k)
+        ch.k1[k] += dashpot * acceleration
         _watch_drive(rows, flows, st, ch, s, r, spring, dashpot, 0.0, k)
     # the contact ended at zero force
     ch.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
@@ -304,7 +307,7 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
         slope += rate.real * g.real - rate.imag * g.imag
         bound += size * (rate.real * rate.real + rate.imag * rate.imag)
     curvature, third = 0.0, 0.0
-    if flows.driven[s] > 0:
+    if flows.driven[s] > 0:  # a force that grows is always watched
         first, curvature, second_bound, third = _watch_drive(rows, flows, st, ch, s, r, 0.0, 0.0, sign, k)
         slope += first
         bound += second_bound
@@ -316,7 +319,7 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
     ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
     _know(st, ch, r, FORCE, side, constant + value, slope, bound, k)
     if flows.driven[s] > 0:
-        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)
+        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)  # as far as the bounds hold
     if st.released[r] == -side:
         for a in range(st.counters[AWAKE]):
             j = st.awake[a]
