@@ -78,7 +78,7 @@ def _drive(eigenvalue, response, load, phase, change, period, drive):
     return v0, v1, size, fourth
 
 
-@kernel
+@inlined
 def _climb(rates, waves, turns, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak):
     """The largest |response| on a grid of so many pieces of length h, the last one shorter, and before."""
     count, driven = len(rates), len(drives)
