@@ -12,7 +12,7 @@ import math
 
 from coupling.compiled import entry, inlined, kernel
 from coupling.contact import add_force, constant_loads, keep_released, settle, stop_riders
-from coupling.events import POSITION, VELOCITY, exp_minus_line, exp_minus_one
+from coupling.events import POSITION, VELOCITY, exp_minus_line, exp_minus_one, secular
 from coupling.gaps import SIMULTANEOUS, align_gaps, close, join, join_speeds, measure_gaps, only, rigid, shift_slip
 from coupling.impacts import all_move, bounce, collide
 from coupling.ledger import account
@@ -73,7 +73,7 @@ def advance(rows, flows, st, ch, rec, work, periods, max_events):
         if st.counters[LOGGED] + 2 * len(rows.delassus) >= len(rec.log):
             return LOG_FULL
         tau, who = next_event(rows, flows, st, ch)
-        _exponentials(flows, st, work, tau)
+        _amplitudes(flows, st, work, tau)
         account(rows, flows, st, rec, work, tau)
         _move(rows, flows, st, work, tau)
         if who < 0:
@@ -319,7 +319,7 @@ def _constant_forces(rows, flows, st, work, s):
 
 @inlined
 def _wake(flows, st):
-    """Put modes to sleep whose acceleration is negligible beside the largest."""
+    """Put modes to sleep whose acceleration is negligible beside the largest, but none that the excitation drives."""
     s, largest, fastest = st.counters[FLOW], 0.0, 0.0
     for j in range(flows.modes[s]):
         c = st.amplitude[j]
@@ -331,7 +331,7 @@ def _wake(flows, st):
     count = 1
     for j in range(1, flows.modes[s]):
         c = st.amplitude[j]
-        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > _ASLEEP * largest:
+        if j <= flows.driven[s] or (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > _ASLEEP * largest:
             st.awake[count] = j
             count += 1
         else:
@@ -340,13 +340,27 @@ def _wake(flows, st):
 
 
 @inlined
-def _exponentials(flows, st, work, tau):
-    """The awake modes' exponentials over the segment."""
+def _amplitudes(flows, st, work, tau):
+    """Changes of the awake modes' amplitudes over the segment."""
     s = st.counters[FLOW]
     for a in range(st.counters[AWAKE]):
-        z = flows.eigenvalue[s, st.awake[a]] * tau
-        work.first[a] = exp_minus_one(z)
-        work.line[a] = exp_minus_line(z, work.first[a])
+        j = st.awake[a]
+        z = flows.eigenvalue[s, j] * tau
+        first = exp_minus_one(z)
+        work.gain[a] = st.amplitude[j] * first
+        work.bend[a] = st.amplitude[j] * exp_minus_line(z, first)
+    if flows.driven[s] > 0:
+        load = flows.load[s, : flows.driven[s] + 1]
+        _grow(flows.eigenvalue[s], load, st.amplitude[0], work.gain, work.bend, tau)
+
+
+@kernel
+def _grow(eigenvalue, load, phase, gain, bend, tau):
+    """What the excitation adds to the modes that it drives: the first ones, always awake."""
+    for j in range(1, len(load)):
+        growth, beyond = secular(eigenvalue[j], eigenvalue[0], tau)
+        gain[j] += load[j] * phase * growth
+        bend[j] += load[j] * phase * beyond
 
 
 @inlined
@@ -362,9 +376,8 @@ def _move(rows, flows, st, work, tau):
         shift, speed = tau * (st.velocity[r] + 0.5 * st.drift[r] * tau), st.drift[r] * tau
         for a in range(count):
             j = st.awake[a]
-            g = flows.motion[s, r, j] * st.amplitude[j]
-            shift += (g * work.line[a]).real
-            speed += (g * flows.eigenvalue[s, j] * work.first[a]).real
+            shift += (flows.motion[s, r, j] * work.bend[a]).real
+            speed += (flows.velocity[s, r, j] * work.gain[a]).real
         st.velocity[r] += speed
         if r < friction:
             st.ledger[FRICTION] -= st.held[r] * shift
@@ -376,7 +389,7 @@ def _move(rows, flows, st, work, tau):
         _stay_together(rows, st, work)
     measure_gaps(rows, st)
     for a in range(count):
-        st.amplitude[st.awake[a]] *= 1.0 + work.first[a]
+        st.amplitude[st.awake[a]] += work.gain[a]
     if tau > 0.0:
         for r in range(len(st.released)):
             st.released[r] = 0
@@ -402,9 +415,7 @@ def _push(rows, flows, st, work, tau):
         if st.state[r] == SPRUNG:
             st.push[r] += st.level[r] * tau
             for a in range(st.counters[AWAKE]):
-                j = st.awake[a]
-                part = flows.force[s, r, j] * st.amplitude[j] / flows.eigenvalue[s, j]
-                st.push[r] += (part * work.first[a]).real
+                st.push[r] += (flows.impulse[s, r, st.awake[a]] * work.gain[a]).real
 
 
 @inlined

@@ -4,6 +4,12 @@ Bodies held to the structure add their mass to it, bodies on closed springs (com
 others move freely. The state of a subsystem is a vector of complex modal amplitudes c, and with c_0 the excitation
 (eigenvalue i omega), every displacement is  constant + polynomial + Re sum_j row_j c_j exp(lambda_j t),  exact for any
 t (quadratic eigenvalue problem of a viscously damped structure, Tisseur and Meerbergen 2001).
+
+In step with the excitation a mode r would answer with load_r c_0/(i omega - lambda_r): near its own frequency, hardly
+damped, this and c_r are large and cancel. Such driven modes keep their whole motion in c_r, which the excitation makes
+grow by c_r' = lambda_r c_r + load_r c_0: c_r(t) = c_r exp(lambda_r t) + load_r c_0 D(t) with
+D(t) = (exp(i omega t) - exp(lambda_r t))/(i omega - lambda_r), which is t exp(i omega t) at resonance without damping
+(coupling.events.secular). All rows stay functionals of c.
 """
 
 from __future__ import annotations
@@ -15,7 +21,6 @@ from scipy.linalg import block_diag, null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from coupling.inputs import InputError
 from coupling.modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
 from coupling.rows import Rows
 from coupling.state import ALONE, DIFFERENCE, SUM
@@ -28,6 +33,13 @@ ROOM = 2**29
 FAR = 1e-6
 #: what rows feel of a mode counts at least as this share of what they feel of the others
 _UNFELT = 1e-8
+#: modes with |i omega - lambda| times the period below this are driven. Beyond, the response in step with the
+#: excitation is at most 1/NEAR times what one period adds: less than two digits cancel. Driven modes cost time, so that
+#: a wider bound would slow down scenes more than 0.3 % beside their resonance. coupling.events.secular relies on it
+NEAR = 2e-2
+
+#: eigenvalues (2k,) of k coordinates, vectors of them and their rates (2k, 2k) and their inverse
+_Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Flows(NamedTuple):
@@ -44,7 +56,9 @@ class Flows(NamedTuple):
     attached: np.ndarray  # (s, b) whether rigid rows hold a body to the structure
     kick: np.ndarray  # (s, r, m): change of c by a unit impulse on a row
     motion: np.ndarray  # (s, r, m): displacement of each row
+    velocity: np.ndarray  # (s, r, m): its rate
     force: np.ndarray  # (s, r, m): force of each closed row
+    impulse: np.ndarray  # (s, r, m): its antiderivative, for rows with springs
     closed_inverse: np.ndarray  # (s, r, r): inverse Delassus matrix of the rigid closed rows
     static: np.ndarray  # (s, n + b, n + b): constant (p, xi) under constant loads on (p, x)
     held: np.ndarray  # (s, n + b, n): constant (p, xi) kept by constraints inside the structure
@@ -54,6 +68,8 @@ class Flows(NamedTuple):
     speed: np.ndarray  # (s, m): largest speed of a mode over all rows and the response
     acceleration: np.ndarray  # (s, m): largest acceleration of its terms, whether closed rows hold them or not
     turn: np.ndarray  # (s, m): change of its amplitude over an eighth of a period, as a factor
+    driven: np.ndarray  # (s,) number of driven modes: they come first, after the excitation
+    load: np.ndarray  # (s, m): rate at which the excitation makes them grow
     # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a
     # segment is the form at its end minus the form at its start. Where the rate by which a product of two modes
     # changes vanishes beside the frequency the form would cancel: such pairs are left out of the forms, and listed.
@@ -82,8 +98,9 @@ def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
     return Flows(
         np.zeros((capacity, r), np.bool_), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
         z(m, 2 * b), np.zeros(capacity, np.bool_), np.zeros((capacity, b), np.bool_),
-        z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
-        f(b, b), z(b, m), z(m), f(m), f(m), z(m), z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
+        z(r, m), z(r, m), z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
+        f(b, b), z(b, m), z(m), f(m), f(m), z(m), np.zeros(capacity, np.int64), z(m),
+        z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
         np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 3), np.int64),
         z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
     )  # fmt: skip
@@ -133,12 +150,11 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
         real = real_modes(np.sqrt(np.r_[np.ones(n), rows.mass])[:, None] * loads.T, elastic @ lift, loss)
     # from here on eta are the amplitudes of the real modes
     lift, drop, loads = lift @ real.shape, real.project @ drop, real.shape.T @ loads
-    mass, damping, stiffness = np.eye(len(drop)), real.damping, np.diag(real.frequency**2)
-    harmonic = lift @ _solve_harmonic(
-        stiffness + 1j * rows.omega * damping - rows.omega**2 * mass, loads @ np.r_[rows.force, rows.inertia]
+    damping, stiffness = real.damping, np.diag(real.frequency**2)
+    modes, harmonic, growth = _excite(
+        rows, damping, stiffness, loads @ np.r_[rows.force, rows.inertia], complex_modes(real.frequency, damping)
     )
-    eigenvalue, shape, project = complex_modes(real.frequency, damping)
-    eigenvalue, shape, project = _one_of_each_pair(eigenvalue, shape, project)
+    eigenvalue, shape, project = _one_of_each_pair(*modes)
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
     felt = np.abs(np.vstack([functional, rows.response]))
     _check_split(rows, felt.max(axis=0), law, sprung, shape, project)
@@ -147,7 +163,11 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     m = len(eigenvalue) + 1
     flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, cluster < 0
     flows.eigenvalue[s, :m] = np.r_[1j * rows.omega, eigenvalue]
-    full = np.hstack([np.r_[harmonic, 1j * rows.omega * harmonic][:, None], shape])
+    driven = len(growth)
+    flows.driven[s], flows.load[s, 1 : driven + 1] = driven, growth
+    harmonic = lift @ harmonic
+    in_step = np.r_[harmonic, 1j * rows.omega * harmonic + shape[: n + b, :driven] @ growth]
+    full = np.hstack([in_step[:, None], shape])
     structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
     flows.shape[s, :, :m] = full[structure]
     flows.excited[s] = full[xi, 0]
@@ -161,6 +181,7 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
         flows.body_acceleration[s][np.ix_(members, members)] = 1 / rows.mass[members].sum()
     flows.body[s, :, :m] = body
     flows.motion[s, :, :m] = functional @ full[:n] + rows.bodies @ own
+    flows.velocity[s, :, :m] = _rate(flows, s, flows.motion[s, :, :m])
     flows.static[s] = flexibility @ loads
     if len(inner):
         kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
@@ -208,8 +229,10 @@ def _check_rest(rows: Rows, felt: np.ndarray, static: np.ndarray) -> None:
 
 def _fill_forces(flows: Flows, rows: Rows, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
     m = flows.modes[s]
-    rate = rows.spring[sprung, None] + rows.dashpot[sprung, None] * flows.eigenvalue[s, :m]
-    flows.force[s, sprung, :m] = -rate * flows.motion[s, sprung, :m]
+    rate, load = flows.eigenvalue[s, :m], flows.load[s, :m]
+    spring, dashpot = rows.spring[sprung, None], rows.dashpot[sprung, None]
+    push = -spring * flows.motion[s, sprung, :m] - dashpot * flows.velocity[s, sprung, :m]
+    flows.force[s, sprung, :m], flows.impulse[s, sprung, :m] = push, _antiderivative(push, 1 / rate, load)
     if not len(rigid):
         return
     pull = rows.structure @ np.hstack([-np.diag(rows.stiffness), -rows.damping])
@@ -226,51 +249,77 @@ def _fill_forces(flows: Flows, rows: Rows, s: int, full: np.ndarray, rigid: np.n
     flows.force[s, rigid, :m] = force
 
 
-def _solve_harmonic(dynamic: np.ndarray, load: np.ndarray) -> np.ndarray:
+def _excite(
+    rows: Rows, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
+) -> tuple[_Modes, np.ndarray, np.ndarray]:
+    """The modes, driven ones first; eta (k,) in step with a harmonic load, without their share; their growth."""
+    eigenvalue, shape, project = modes
     if not load.any():  # free decay, at any frequency
-        return np.zeros_like(load)
-    try:
-        return np.linalg.solve(dynamic, load)
-    except np.linalg.LinAlgError:
-        raise InputError(
-            "excitation.frequency: the response of an undamped structure at its own frequency grows without bound; "
-            "give it damping or another frequency"
-        ) from None
+        return modes, np.zeros_like(load), np.zeros(0)
+    k, apart = len(load), 1j * rows.omega - eigenvalue
+    driven = np.abs(apart) * rows.period < NEAR
+    if not driven.any():
+        dynamic = stiffness + 1j * rows.omega * damping - rows.omega**2 * np.eye(k)
+        return modes, np.linalg.solve(dynamic, load), np.zeros(0)
+    growth = project[:, k:] @ load
+    harmonic = shape[:k] @ np.where(driven, 0, growth / np.where(driven, 1, apart))
+    order = np.argsort(~driven, kind="stable")
+    # a real load is half of what turns with the excitation, half of what turns against it, in step with the conjugate
+    return (eigenvalue[order], shape[:, order], project[order]), harmonic, growth[driven] / 2
+
+
+def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
+    """Time derivative of functionals (..., m) of the amplitudes."""
+    m = flows.modes[s]
+    rate: np.ndarray = functional * flows.eigenvalue[s, :m]
+    rate[..., 0] += functional @ flows.load[s, :m]
+    return rate
 
 
 def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.ndarray) -> None:
     n, m = len(rows.stiffness), flows.modes[s]
-    velocity, rate = full[n:], flows.eigenvalue[s, :m]
-    response, momentum = flows.response[s, :m], rows.mass @ body * rate
+    velocity, rate, load = full[n:], flows.eigenvalue[s, :m], flows.load[s, :m]
+    body_rate = _rate(flows, s, body)
+    response, momentum = flows.response[s, :m], rows.mass @ body_rate
     # all harmonic loads are in phase with the sine: real amplitudes
-    work = -rows.force.imag @ velocity - rows.inertia.imag @ (body * rate)
+    work = -rows.force.imag @ velocity - rows.inertia.imag @ body_rate
     free = rows.mass * (np.diagonal(flows.body_acceleration[s]) != 0)
+    # the excitation and the modes that it drives turn together: a product of one with a conjugate one is slow
+    together = np.arange(m) <= flows.driven[s]
     along, _ = _reciprocal(rate + rate[0], rows.period)
-    against, _ = _reciprocal(rate - rate[0], rows.period)
+    against, _ = _reciprocal(rate - rate[0], rows.period, together)
     back, _ = _reciprocal(rate.conj() - rate[0], rows.period)
     alone, slow_alone = _reciprocal(rate, rows.period)
-    mean = 2 * response * alone
-    free_momentum = free @ flows.motion[s, : len(free), :m] * rate
+    mean = 2 * _antiderivative(response, alone, load)
+    free_momentum = free @ flows.velocity[s, : len(free), :m]
+    work_along, work_against = _antiderivative(work, along, load), work * against
+    response_back = _antiderivative(response.conj(), back, load.conj())
+    momentum_back = _antiderivative(momentum.conj(), back, load.conj())
     flows.work[s, :m], flows.momentum[s, :m] = work, momentum
     flows.linear[s, :m] = np.hstack([
-        _real_map(-0.5j * work * (along - against), 0 * work).take([0, 1], axis=-1),
-        _real_map(0.5 * work * (along + against), 0 * work).take([0, 1], axis=-1),
-        _real_map(0.5 * response * against, 0.5 * response.conj() * back),
-        _real_map(0.5 * momentum * against, 0.5 * momentum.conj() * back),
+        _real_map(-0.5j * (work_along - work_against), 0 * work).take([0, 1], axis=-1),
+        _real_map(0.5 * (work_along + work_against), 0 * work).take([0, 1], axis=-1),
+        _real_map(0.5 * response * against, 0.5 * response_back),
+        _real_map(0.5 * momentum * against, 0.5 * momentum_back),
         np.column_stack([mean.real, -mean.imag, free_momentum.real, -free_momentum.imag]),
     ])  # fmt: skip
     sprung = np.isfinite(rows.spring) & flows.force[s].any(axis=1)
-    push, damper = flows.motion[s, sprung, :m] * rate, np.diag(rows.dashpot[sprung])
+    push, damper = flows.velocity[s, sprung, :m], np.diag(rows.dashpot[sprung])
     reciprocal, slow = zip(
-        *(_reciprocal(total, rows.period) for total in (rate[:, None] + rate, rate[:, None] + rate.conj())), strict=True
+        _reciprocal(rate[:, None] + rate, rows.period),
+        _reciprocal(rate[:, None] + rate.conj(), rows.period, np.outer(together, together)),
+        strict=True,
     )
     forms = (flows.loss, flows.dashpot, flows.square), (flows.slow_loss, flows.slow_dashpot, flows.slow_square)
     products = [
         [left.T @ middle @ right for right in (left, left.conj())]
         for left, middle in ((velocity, rows.damping), (push, damper), (response[None], np.eye(1)))
     ]
+    integral: list[np.ndarray] = [np.zeros(0)] * 2
     for form, product in zip(forms[0], products, strict=True):
-        form[s, :m, :m] = _real_form(*(part * r for part, r in zip(product, reciprocal, strict=True)))
+        for kind, other in ((SUM, load), (DIFFERENCE, load.conj())):
+            product[kind], integral[kind] = _antiderivatives(product[kind], reciprocal[kind], load, other)
+        form[s, :m, :m] = _real_form(*integral)
     flows.damped[s] = rows.dashpot[sprung].any()
     flows.uncoupled[s] = rows.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + 1
     listed = [(j, k, kind) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
@@ -285,10 +334,33 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
     flows.slow_count[s] = len(listed)
 
 
-def _reciprocal(rate: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """1/rate, 0 where a product with this rate hardly changes over a period, and whether that is so."""
-    slow = np.abs(rate) * period < SLOW
+def _reciprocal(rate: np.ndarray, period: float, together: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """1/rate, 0 where a product with this rate hardly changes over a period or is said to, and whether that is so."""
+    slow = (np.abs(rate) * period < SLOW) | together
     return np.where(slow, 0, 1 / np.where(slow, 1, rate)), slow
+
+
+def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Functional (..., m) of the amplitudes whose rate is the one given; `reciprocal` of the rates of its terms.
+
+    By parts: a driven mode's rate has a term in mode 0.
+    """
+    integral: np.ndarray = functional * reciprocal
+    integral[..., 0] -= integral @ load * reciprocal[0]
+    return integral
+
+
+def _antiderivatives(
+    product: np.ndarray, reciprocal: np.ndarray, left: np.ndarray, right: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same for a form (m, m), with the loads on its two factors: what is left to slow pairs, and the form."""
+    rest, integral = product, product * reciprocal
+    for _ in range(2 if left.any() else 0):  # the second time for the pair of mode 0 with itself
+        rest = product.copy()
+        rest[0] -= left @ integral
+        rest[:, 0] -= integral @ right
+        integral = rest * reciprocal
+    return rest, integral
 
 
 def _real_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 
 from coupling.compiled import inlined, kernel
-from coupling.events import exp_minus_line, exp_minus_one
+from coupling.events import exp_minus_line, exp_minus_one, secular
+from coupling.peaks import highest
 from coupling.state import ALONE, AWAKE, CONTACT, DIFFERENCE, EXCITATION, FLOW, PERIOD, VISCOUS
+
+#: of the series for products with driven modes: what is left out is below 1e-16
+_TERMS = 11
 
 #: shares of the response below this part of the largest count for nothing in its square
 _NEGLIGIBLE = 1e-9
@@ -26,7 +30,7 @@ def account(rows, flows, st, rec, work, tau):
     _with_excitation(rows, flows, st, rec, work, s, period, tau, constant)
     for i in range(flows.slow_count[s]):
         _slow_pair(flows, st, rec, s, period, i, tau, constant)
-    rec.peak[period] = _peak(rows, flows, st, work, s, tau, constant, rec.peak[period])
+    rec.peak[period] = highest(rows, flows, st, work, s, tau, constant, rec.peak[period])
     if rec.samples.shape[0] > 0:
         _sample(rows, flows, st, rec, s, tau, constant)
 
@@ -53,7 +57,7 @@ def _gather(flows, st, work, s):
             last -= 1
             place = last
         j = st.awake[a]
-        change = st.amplitude[j] * work.first[a]
+        change = work.gain[a]
         work.order[place] = j
         work.change[place] = change
         work.total[place] = 2.0 * st.amplitude[j] + change
@@ -151,9 +155,8 @@ def _free_bodies(rows, flows, st, rec, work, s, period, tau, waves, flat):
     momentum = speed * flat
     if drift != 0.0:
         # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
-        first, line = work.first[0].conjugate(), work.line[0].conjugate()
-        slope = (line + complex(0.0, rows.omega * tau) * first) / (rows.omega * rows.omega)
-        momentum += drift * slope * st.amplitude[0].conjugate()
+        slope = work.bend[0].conjugate() + complex(0.0, rows.omega * tau) * work.gain[0].conjugate()
+        momentum += drift / (rows.omega * rows.omega) * slope
     rec.momentum[period] += momentum
     # the base accelerates all bodies alike
     st.ledger[EXCITATION] += rows.inertia[0].imag / rows.mass[0] * momentum.imag
@@ -170,7 +173,15 @@ def _slow_pair(flows, st, rec, s, period, i, tau, constant):
     other, rate_other = st.amplitude[k], flows.eigenvalue[s, k]
     if kind == DIFFERENCE:
         other, rate_other = other.conjugate(), rate_other.conjugate()
-    product = c * other * _slow_integral(rate + rate_other, tau)
+    if kind == DIFFERENCE and k <= flows.driven[s] and j > 0:
+        # in a frame that turns with the excitation
+        excitation, phase = flows.eigenvalue[s, 0], st.amplitude[0]
+        product = tau * _driven_integral(
+            c, (rate - excitation) * tau, flows.load[s, j] * phase * tau,
+            other, (rate_other + excitation) * tau, (flows.load[s, k] * phase).conjugate() * tau,
+        )  # fmt: skip
+    else:
+        product = c * other * _slow_integral(rate + rate_other, tau)
     st.ledger[VISCOUS] += (flows.slow_loss[s, i] * product).real
     st.ledger[CONTACT] += (flows.slow_dashpot[s, i] * product).real
     rec.square[period] += (flows.slow_square[s, i] * product).real
@@ -190,124 +201,23 @@ def _slow_integral(rate, tau):
     return tau * (1.0 + z * (1 / 2) * (1.0 + z * (1 / 3) * series))
 
 
-@inlined
-def _peak(rows, flows, st, work, s, tau, constant, peak):
-    """Largest |response| on [0, tau] and before.
-
-    Between points of a grid the response differs from its cubic Hermite interpolant by at most (bound of the fourth
-    derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is polished by Newton.
-    Where interpolant and bound stay below the peak so far there is nothing to find.
-    """
-    fourth, size = 0.0, abs(constant)
-    x0, v0, x1, v1 = constant, 0.0, constant, 0.0
-    count = st.counters[AWAKE]
-    for a in range(count):
-        j = st.awake[a]
-        rate = flows.eigenvalue[s, j]
-        wave = flows.response[s, j] * st.amplitude[j]
-        work.wave[a], work.rate[a] = wave, rate
-        square = rate.real * rate.real + rate.imag * rate.imag
-        part = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
-        fourth += part * square * square
-        size += part
-        x0 += wave.real
-        v0 += rate.real * wave.real - rate.imag * wave.imag
-        wave += wave * work.first[a]
-        x1 += wave.real
-        v1 += rate.real * wave.real - rate.imag * wave.imag
-    if size <= peak or tau <= 0.0:
-        return peak
-    peak = max(peak, abs(x0), abs(x1))
-    if not _may_exceed(peak, x0, v0, x1, v1, tau, fourth):
-        return peak
-    h = 0.125 * rows.period
-    if fourth * min(h, tau) ** 4 <= 0.384 * size:
-        pieces = math.ceil(tau / h)
-        for a in range(count):
-            work.turn[a] = flows.turn[s, st.awake[a]]
-    else:
-        pieces = min(math.ceil(tau * math.sqrt(math.sqrt(fourth / (0.384 * size)))), 4096)
-        h = tau / pieces
-        for a in range(count):
-            work.turn[a] = exp_minus_one(work.rate[a] * h) + 1.0
-    end, end_slope = x1, v1
-    for i in range(pieces):
-        x1, v1 = constant, 0.0
-        if i == pieces - 1:
-            x1, v1, h = end, end_slope, tau - i * h
-        else:
-            for a in range(count):
-                wave, rate = work.wave[a] * work.turn[a], work.rate[a]
-                x1 += wave.real
-                v1 += rate.real * wave.real - rate.imag * wave.imag
-            peak = max(peak, abs(x1))
-        if v0 * v1 < 0.0 and _may_exceed(peak, x0, v0, x1, v1, h, fourth):
-            peak = max(peak, _extremum(work.rate[:count], work.wave[:count], constant, x0, v0, x1, v1, h))
-        x0, v0 = x1, v1
-        if i < pieces - 1:
-            for a in range(count):
-                work.wave[a] *= work.turn[a]
-    return peak
-
-
-@inlined
-def _may_exceed(peak, x0, v0, x1, v1, h, fourth):
-    """Whether |x| may exceed peak within [0, h]: cubic interpolant of the ends, and what it may be wrong by."""
-    room = peak - fourth * h * h * h * h / 384.0
-    # the interpolant's basis functions of the slopes stay below 4/27 h
-    rise = max(x0, x1) + (4 / 27) * h * (max(v0, 0.0) + max(-v1, 0.0))
-    fall = min(x0, x1) + (4 / 27) * h * (min(v0, 0.0) + min(-v1, 0.0))
-    return rise > room or -fall > room
-
-
 @kernel
-def _extremum(rates, waves, constant, x0, v0, x1, v1, h):
-    """|x| where its slope vanishes within [0, h], v0 and v1 of opposite sign: Newton from the cubic interpolant."""
-    # slope v0 + b u + c u^2, u = t/h; the root on [0, 1] by the formula that does not cancel
-    b = 6.0 * (x1 - x0) / h - 4.0 * v0 - 2.0 * v1
-    c = 3.0 * (v0 + v1) - 6.0 * (x1 - x0) / h
-    root = math.sqrt(max(b * b - 4.0 * c * v0, 0.0))
-    lo, hi = 0.0, h
-    t = (
-        h * (-2.0 * v0 / (b + math.copysign(root, b)))
-        if b * v0 < 0.0
-        else h * (-b - math.copysign(root, v0)) / (2.0 * c)
-    )
-    if not lo < t < hi:
-        t = h * v0 / (v0 - v1)
-    x = x0
-    for _ in range(8):
-        # derivatives at t by the recurrence of the modes' characteristic polynomials
-        x, v, w, third, fourth, fifth, sixth = constant, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for a in range(len(rates)):
-            rate, wave = rates[a], waves[a]
-            part = wave + wave * exp_minus_one(rate * t)
-            twice, square = 2.0 * rate.real, rate.real * rate.real + rate.imag * rate.imag
-            d0, d1 = part.real, rate.real * part.real - rate.imag * part.imag
-            d2 = twice * d1 - square * d0
-            d3 = twice * d2 - square * d1
-            d4 = twice * d3 - square * d2
-            x, v, w, third, fourth = x + d0, v + d1, w + d2, third + d3, fourth + d4
-            fifth += twice * d4 - square * d3
-            sixth += (abs(part.real) + abs(part.imag)) * square * square * square
-        if v * v0 > 0.0:
-            lo = t
-        else:
-            hi = t
-        step = -v / w if w != 0.0 else math.inf
-        for _ in range(3):
-            slope = v + step * (w + step * (third / 2 + step * (fourth / 6 + step * fifth / 24)))
-            step -= slope / (w + step * (third + step * (fourth / 2 + step * fifth / 6)))
-        if lo <= t + step <= hi:
-            top = x + step * (v + step * (w / 2 + step * (third / 6 + step * (fourth / 24 + step * fifth / 120))))
-            square = step * step
-            # x has no slope there: a step that is wrong by its square root leaves its digits
-            if sixth * square * square * square < 1e-13 * abs(top):
-                return abs(top)
-            t += step
-        else:
-            t = 0.5 * (lo + hi)
-    return abs(x)
+def _driven_integral(c, delay, push, other, other_delay, other_push):
+    """Integral of c d over [0, 1], c' = delay c + push and alike for the other, d."""
+    # coefficients of the Taylor series
+    product = c * other
+    total = product
+    for n in range(1, _TERMS):
+        product = (delay + other_delay) * product + push * other + c * other_push
+        c, other = delay * c, other_delay * other
+        if n == 1:
+            c, other = c + push, other + other_push
+        share = 1.0 / n
+        product, c, other = share * product, share * c, share * other
+        total += product * (1.0 / (n + 1.0))
+        if n > 2 and abs(product.real) + abs(product.imag) <= 1e-18 * (abs(total.real) + abs(total.imag)):
+            break
+    return total
 
 
 @kernel
@@ -333,3 +243,9 @@ def _sample(rows, flows, st, rec, s, tau, constant):
             entry[0] += (flows.response[s, j] * st.amplitude[j] * (1.0 + first)).real
             for r in range(len(rows.mass)):
                 entry[1 + r] += (flows.motion[s, r, j] * st.amplitude[j] * line).real
+        for j in range(1, flows.driven[s] + 1):
+            growth, beyond = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, 0], t)
+            drive = flows.load[s, j] * st.amplitude[0]
+            entry[0] += (flows.response[s, j] * drive * growth).real
+            for r in range(len(rows.mass)):
+                entry[1 + r] += (flows.motion[s, r, j] * drive * beyond).real

@@ -91,6 +91,7 @@ class Channels(NamedTuple):
     noise: np.ndarray  # round-off of its value at the start, besides that of k0
     safe: np.ndarray  # time before which no root can lie
     g: np.ndarray  # (k, m)
+    drive: np.ndarray  # (k, m): of the driven modes
     lower: np.ndarray  # (2, DEGREE + 1) scratch space: lower polynomials of one of them (coupling.events)
 
 
@@ -113,9 +114,9 @@ class Records(NamedTuple):
 class Scratch(NamedTuple):
     """Space for intermediate results."""
 
-    first: np.ndarray  # (m,) exp(lambda tau) - 1 of the awake modes
-    line: np.ndarray  # (m,) exp(lambda tau) - 1 - lambda tau
-    speed: np.ndarray  # (m,)
+    gain: np.ndarray  # (m,) change of the awake modes' amplitudes over the segment
+    bend: np.ndarray  # (m,) what exceeds the tangent in displacements, as amplitudes
+    drive: np.ndarray  # (m,) share of the response in the growth of driven modes, 1/s
     coordinates: np.ndarray  # (2n,)
     slips: np.ndarray  # (2b,)
     on_structure: np.ndarray  # (n,)
@@ -140,6 +141,7 @@ class Scratch(NamedTuple):
     wave: np.ndarray  # (m,) share of the response
     rate: np.ndarray  # (m,) its eigenvalue
     turn: np.ndarray  # (m,) exp(rate t) for one step of a grid
+    growth: np.ndarray  # (m,) of driven modes over that step
 
 
 class Problem(NamedTuple):
@@ -181,7 +183,7 @@ def new_channels(rows: Rows, modes: int) -> Channels:
     """Room for two event functions a row."""
     k = 2 * len(rows.delassus)
     integers, reals = np.zeros((4, k), np.int64), np.zeros((5, k))
-    return Channels._make([*integers, *reals, np.zeros((k, modes), complex), np.zeros((2, DEGREE + 1))])
+    return Channels._make([*integers, *reals, *np.zeros((2, k, modes), complex), np.zeros((2, DEGREE + 1))])
 
 
 def new_records(rows: Rows, periods: int, samples: int) -> Records:
@@ -210,7 +212,7 @@ def new_problem(r: int) -> Problem:
 def new_scratch(rows: Rows, modes: int) -> Scratch:
     """Scratch space for a scene."""
     r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
-    complexes, reals, integers = np.zeros((8, modes), complex), np.zeros((4, r)), np.zeros((7, r), np.int64)
+    complexes, reals, integers = np.zeros((9, modes), complex), np.zeros((4, r)), np.zeros((7, r), np.int64)
     sizes = (2 * n, 2 * b, n, b, n, n)
     return Scratch._make(
         [*complexes[:3], *(np.zeros(size) for size in sizes), *reals, *integers, new_problem(r),

@@ -6,7 +6,16 @@ import math
 
 from coupling.compiled import ZERO, inlined, kernel
 from coupling.complementarity import AT_HIGH, AT_LOW
-from coupling.events import FORCE, POSITION, VELOCITY, expand, first_root_of_parabola, safe_step
+from coupling.events import (
+    FORCE,
+    POSITION,
+    VELOCITY,
+    add_secular,
+    expand,
+    first_root_of_parabola,
+    safe_step,
+    secular_bound,
+)
 from coupling.state import (
     AWAKE,
     BOUNDED,
@@ -45,6 +54,7 @@ def next_event(rows, flows, st, ch):
     What is known beyond the period's end stays known in the next segment (`carry`).
     """
     s = st.counters[FLOW]
+    driven = flows.driven[s]
     left = max(rows.period - st.time[0], 0.0)
     shortest = RESOLUTION * rows.period
     eigenvalue, awake = flows.eigenvalue[s], st.awake[: st.counters[AWAKE]]
@@ -69,6 +79,11 @@ def next_event(rows, flows, st, ch):
         noise, second, calm = expand(
             ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau, ch.lower
         )
+        if driven > 0:
+            drive = ch.drive[k, : driven + 1]
+            more, bound = add_secular(ch.order[k], drive, eigenvalue, tau, rows.period, ch.lower)
+            noise, second = noise + more, second + bound
+            calm = calm + bound if calm >= 0.0 else calm
         step, found = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, rows.period, shortest)
         ch.known[k] = ROOT if found else EXPANDED
         ch.safe[k] = tau + step if found else max(ch.safe[k], tau + step)
@@ -155,9 +170,8 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
     bound, curvature = 0.0, ch.k2[k]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
-        rate, g = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * st.amplitude[j]
-        if order == VELOCITY:
-            g *= rate
+        rate, g = flows.eigenvalue[s, j], flows.velocity[s, r, j] if order == VELOCITY else flows.motion[s, r, j]
+        g *= sign * st.amplitude[j]
         once = rate * g
         ch.g[k, j] = g
         if order == VELOCITY:
@@ -165,12 +179,50 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
         else:
             curvature += rate.real * once.real - rate.imag * once.imag
         bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
+    if flows.driven[s] > 0:
+        on_motion, on_velocity = (0.0, sign) if order == VELOCITY else (sign, 0.0)
+        first, second, largest, _ = _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, 0.0, k)
+        if order == VELOCITY:
+            slope += first
+        curvature += second
+        bound += largest
     _know(st, ch, r, order, what, value, slope, bound - ch.k2[k], k)
+    if flows.driven[s] > 0:
+        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)  # as far as the bounds hold
     if what == CLOSES or what == OPENS:
         st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
     if st.released[r] != 0:
         _leave(rows, flows, st, ch, s, r, order, sign, k)
     return k + 1
+
+
+@inlined
+def _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, on_force, k):
+    """Watch what the excitation adds to driven modes (`_watch_growth`)."""
+    load = flows.load[s, : flows.driven[s] + 1]
+    return _watch_growth(
+        flows.eigenvalue[s], flows.motion[s, r], flows.velocity[s, r], flows.force[s, r], on_motion, on_velocity,
+        on_force, load, st.amplitude[0], rows.period, ch.drive[k],
+    )  # fmt: skip
+
+
+@kernel
+def _watch_growth(eigenvalue, motion, velocity, force, on_motion, on_velocity, on_force, load, phase, period, drive):
+    """Growth of driven modes in an event function, a sum of a row's motion, velocity and force times these factors.
+
+    Returns its first two derivatives at the segment's start, and bounds of the second and third.
+    """
+    first, second, second_bound, third_bound = 0.0, 0.0, 0.0, 0.0
+    excitation = eigenvalue[0]
+    for j in range(1, len(load)):
+        rate = eigenvalue[j]
+        part = (on_motion * motion[j] + on_velocity * velocity[j] + on_force * force[j]) * load[j] * phase
+        drive[j] = part
+        first += part.real
+        second += (part * (rate + excitation)).real
+        second_bound += secular_bound(part, rate, excitation, period, 2)
+        third_bound += secular_bound(part, rate, excitation, period, 3)
+    return first, second, second_bound, third_bound
 
 
 @inlined
@@ -195,6 +247,11 @@ def _leave(rows, flows, st, ch, s, r, order, sign, k):
         second = g * rate * rate
         jerk += (second * rate).real
         snap += (abs(second.real) + abs(second.imag)) * square
+    excitation = flows.eigenvalue[s, 0]
+    for j in range(1, flows.driven[s] + 1):
+        rate, drive = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * flows.load[s, j] * st.amplitude[0]
+        jerk += (drive * (rate * rate + rate * excitation + excitation * excitation)).real
+        snap += secular_bound(drive, rate, excitation, rows.period, 4)
     quick = (2.0 if order == POSITION else 1.5) * jerk / snap
     shortest = 1e3 * RESOLUTION * rows.period
     ch.safe[k], ch.known[k] = max(quick if quick == quick else rows.period, shortest), EXPANDED
@@ -219,13 +276,17 @@ def _watch_spring(rows, flows, st, ch, s, r, k):
     acceleration = st.drift[r]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
-        rate = flows.eigenvalue[s, j]
-        g = flows.motion[s, r, j] * st.amplitude[j]
-        ch.g[k, j] = (spring + dashpot * rate) * g
-        acceleration += (rate * rate * g).real
+        velocity = flows.velocity[s, r, j] * st.amplitude[j]
+        ch.g[k, j] = spring * flows.motion[s, r, j] * st.amplitude[j] + dashpot * velocity
+        acceleration += (flows.eigenvalue[s, j] * velocity).real
     ch.k0[k] = spring * st.displacement[r] + dashpot * st.velocity[r]
     ch.k1[k] = spring * st.velocity[r] + dashpot * acceleration
     ch.k2[k] = spring * st.drift[r]
+    if flows.driven[s] > 0:
+        # the row's velocity has its share of the growth already, its acceleration has not
+        acceleration, _, _, _ = _watch_drive(rows, flows, st, ch, s, r, 0.0, 1.0, 0.0, k)
+        ch.k1[k] += dashpot * acceleration
+        _watch_drive(rows, flows, st, ch, s, r, spring, dashpot, 0.0, k)
     # the contact ended at zero force
     ch.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
     return k + 1
@@ -245,15 +306,21 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
         value += g.real
         slope += rate.real * g.real - rate.imag * g.imag
         bound += size * (rate.real * rate.real + rate.imag * rate.imag)
-    if constant > swing:
+    curvature, third = 0.0, 0.0
+    if flows.driven[s] > 0:  # a force that grows is always watched
+        first, curvature, second_bound, third = _watch_drive(rows, flows, st, ch, s, r, 0.0, 0.0, sign, k)
+        slope += first
+        bound += second_bound
+    elif constant > swing:
         return k  # the force never comes near its bound: nothing to watch
     if st.state[r] == SPRUNG and r >= rows.friction_rows:
         # bodies that touch without force, as in a free flight side by side, are not parted by round-off
         constant += ADHESION * rows.spring[r] * rows.gap[r - rows.friction_rows]
     ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
     _know(st, ch, r, FORCE, side, constant + value, slope, bound, k)
+    if flows.driven[s] > 0:
+        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)  # as far as the bounds hold
     if st.released[r] == -side:
-        curvature, third = 0.0, 0.0
         for a in range(st.counters[AWAKE]):
             j = st.awake[a]
             rate = flows.eigenvalue[s, j]

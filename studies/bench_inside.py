@@ -48,7 +48,7 @@ def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
     search, accounting = np.zeros(rounds), np.zeros(rounds)
     while True:
         tau = _search(run.rows, run.flows, run.state, run.channels, 1)
-        _exponentials(run.flows, run.state, run.scratch, tau)
+        _amplitudes(run.flows, run.state, run.scratch, tau)
         for turn in range(-1, rounds):  # the first compiles
             one = seconds(_search, run.rows, run.flows, run.state, run.channels, _REPEATS)
             two = seconds(_account, run.rows, run.flows, run.state, run.records, run.scratch, tau, _REPEATS)
@@ -76,8 +76,8 @@ def _search(rows: Any, flows: Any, st: Any, channels: Any, times: int) -> float:
 
 
 @njit(error_model="numpy")
-def _exponentials(flows: Any, st: Any, scratch: Any, tau: float) -> None:
-    automaton._exponentials(flows, st, scratch, tau)
+def _amplitudes(flows: Any, st: Any, scratch: Any, tau: float) -> None:
+    automaton._amplitudes(flows, st, scratch, tau)
 
 
 @njit(error_model="numpy")

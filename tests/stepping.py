@@ -56,7 +56,9 @@ class Segment:
     constant: np.ndarray
     amplitude: np.ndarray
     eigenvalue: np.ndarray
+    load: np.ndarray
     motion: np.ndarray
+    velocity_row: np.ndarray
     force: np.ndarray
     shape: np.ndarray
 
@@ -65,16 +67,20 @@ class Segment:
         single, tau = np.ndim(tau) == 0, np.atleast_1d(tau)
         rows, n = self.rows, len(self.constant)
         z = self.eigenvalue[:, None] * tau
-        now = self.amplitude[:, None] * np.exp(z)
-        first = self.amplitude[:, None] * np.expm1(z)
-        line = self.amplitude[:, None] * _exp_minus_line(z)
+        # of driven modes: D(t) = t exp(i omega t) (1 + w), where 1 + w = (exp(d) - 1)/d
+        d = np.where(self.load[:, None] == 0.0, 0.0, z - z[0])
+        w = np.divide(_exp_minus_line(d), d, out=np.zeros_like(d), where=d != 0.0)
+        drive = self.load[:, None] * self.amplitude[0] * tau
+        first = self.amplitude[:, None] * np.expm1(z) + drive * (1.0 + w) * np.exp(z[0])
+        line = self.amplitude[:, None] * _exp_minus_line(z) + drive * (w + (1.0 + w) * np.expm1(z[0]))
+        now = self.amplitude[:, None] + first
         gap = np.repeat(self.displacement[:, None], len(tau), 1)
         speed = np.repeat(self.velocity[:, None], len(tau), 1)
         moves = self.moves
         gap[moves] += (
             self.velocity[moves, None] * tau + 0.5 * self.drift[moves, None] * tau**2 + (self.motion[moves] @ line).real
         )
-        speed[moves] += self.drift[moves, None] * tau + ((self.motion[moves] * self.eigenvalue) @ first).real
+        speed[moves] += self.drift[moves, None] * tau + (self.velocity_row[moves] @ first).real
         springs = np.isfinite(rows.spring) & (np.arange(len(gap)) < rows.friction_rows) & (self.state != st.SPRUNG)
         gap[springs] = self.displacement[springs, None]  # a Jenkins element slides with its spring as it is
         _ride(rows, gap, speed)
@@ -102,7 +108,8 @@ class Segment:
 
     def kinematic(self) -> np.ndarray:
         """(r,) accelerations at the beginning as the motion has them (rows that move)."""
-        return self.drift + (self.motion @ (self.eigenvalue**2 * self.amplitude)).real
+        change = self.eigenvalue * self.amplitude + self.load * self.amplitude[0]
+        return self.drift + (self.velocity_row @ change).real
 
     def dynamic(self, moment: Moment) -> np.ndarray:
         """(r,) accelerations by Newton's second law under the forces of a moment."""
@@ -116,9 +123,8 @@ class Segment:
         """Amplitude of the fastest motion, m/s."""
         rows, n = self.rows, len(self.constant)
         modal = np.abs(self.shape[n:]) @ np.abs(self.amplitude)
-        moving = np.abs(self.velocity).max() + np.abs(self.motion * self.eigenvalue).max(axis=0, initial=0.0) @ np.abs(
-            self.amplitude
-        )
+        moving = np.abs(self.velocity).max()
+        moving += np.abs(self.velocity_row).max(axis=0, initial=0.0) @ np.abs(self.amplitude)
         return float(max(moving, modal.max(initial=0.0), np.abs(rows.table) * rows.omega))
 
     def force_size(self) -> np.ndarray:
@@ -181,7 +187,9 @@ class Stepper:
             state=state.state.copy(), displacement=state.displacement.copy(), velocity=state.velocity.copy(),
             drift=state.drift.copy(), held=state.held.copy(), level=state.level.copy(),
             constant=state.constant.copy(), amplitude=state.amplitude[awake], eigenvalue=flows.eigenvalue[s, awake],
-            motion=flows.motion[s][:, awake], force=flows.force[s][:, awake], shape=flows.shape[s, : 2 * n][:, awake],
+            load=flows.load[s, awake],
+            motion=flows.motion[s][:, awake], velocity_row=flows.velocity[s][:, awake],
+            force=flows.force[s][:, awake], shape=flows.shape[s, : 2 * n][:, awake],
         )  # fmt: skip
 
 

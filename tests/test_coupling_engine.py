@@ -257,16 +257,6 @@ def test_mistakes_of_the_model_are_named():
         simulate(cluster(structure={"model": "rigid", "mass": 1.0, "stiffness": 1e8, "damping_ratio": 1.0}))
 
 
-def test_undamped_structure_at_its_own_frequency_is_refused():
-    with pytest.raises(InputError, match="grows without bound"):
-        simulate(
-            scene(
-                structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.0},
-                excitation={"frequency": 1 / (2 * np.pi), "force": 1.0},
-            )
-        )
-
-
 def test_overdamped_structure_decays_without_oscillation():
     data = scene(
         structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 2.0},

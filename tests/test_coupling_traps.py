@@ -452,17 +452,6 @@ def test_equal_columns_thrown_from_their_walls(contact):
     assert response.slip[1, :3] == pytest.approx(response.slip[1, 3:], abs=1e-9)
 
 
-def test_undamped_resonance_is_refused():
-    """Growth without bound has no harmonic response: a mistake of the input, told as such."""
-    with pytest.raises(ValueError, match=r"damp|resonan"):
-        simulate(
-            scene(
-                structure={"model": "rigid", "mass": 1.0, "stiffness": (2 * np.pi) ** 2, "damping": 0.0},
-                excitation={"frequency": 1.0, "force": 1.0},
-            )
-        )
-
-
 @pytest.mark.parametrize("shape", ["one body", "row"])
 def test_bodies_stay_apart_in_a_long_run(shape):
     """Slips and gaps say the same of each body, however long the run: round-off must not add up between them."""
