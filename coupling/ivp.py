@@ -28,6 +28,8 @@ from coupling.rows import rows_of
 from coupling.scene import Scene
 from coupling.structure import linear_structure
 
+#: gaps below this share of the free travel are closed at the start
+_TOUCHING = 1e-12
 #: events without time between them before the run is given up
 _STANDING = 100
 
@@ -91,9 +93,9 @@ class IvpRun:
         )
 
     def _begin(self) -> bool:
-        u = self.unforced
-        for r in np.flatnonzero(u.slider):  # a spring that is at its bound is there exactly
-            self.y[u.d.start + r] = np.clip(self.y[u.d.start + r], *(np.array([-1, 1]) * u.limit[r] / self.rows.spring[r]))
+        u, place = self.unforced, self.y[self.unforced.d]
+        gap = np.concatenate([np.zeros(self.rows.friction_rows), self.rows.gap])
+        place[np.abs(place) <= _TOUCHING * gap] = 0.0
         decided = self._decide(-1, -1)
         self.record.start(self.y)
         return decided
