@@ -178,12 +178,16 @@ class IvpRun:
         self._arrive(row, kind, z)
         self.record.turning(self.time, self.y)
         self._calm(z)
-        touching = u.rigid_contact & (z[u.d] == 0)
-        if np.any(touching & (z[u.s] < 0)):
+        for _ in range(_STANDING):
+            # an impact may close gaps that are about to
+            if not np.any(u.rigid_contact & (z[u.d] == 0) & (z[u.s] < 0)):
+                break
             if not self._impact(z):
                 return False
             self._calm(z)
-            self.record.turning(self.time, self.y)
+        else:
+            return False
+        self.record.turning(self.time, self.y)
         contacts = decide(u, self.time, z)
         if contacts is None:
             return False

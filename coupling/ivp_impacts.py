@@ -16,7 +16,7 @@ from coupling.rows import Rows
 from coupling.state import Problem
 
 #: a flight shorter than this share of a period, and all that follow it, are the end of a chatter
-CHATTER = 1e-7
+CHATTER = 3e-7
 #: impacts of a contact that follow each other within this share of a period are the end of a collapse
 COLLAPSE = 1e-12
 #: gaps that close within this share of a period close now; speeds below this share of the fastest are zero
