@@ -28,6 +28,8 @@ from coupling.rows import rows_of
 from coupling.scene import Scene
 from coupling.structure import linear_structure
 
+#: the shortest first step, as a share of a period
+_SHORTEST = 1e-12
 #: gaps below this share of the free travel are closed at the start
 _TOUCHING = 1e-12
 #: events without time between them before the run is given up
@@ -137,7 +139,7 @@ class IvpRun:
         u, end, evaluations = self.unforced, grid[-1], 0
         solver = DOP853(
             self.rate, self.time, self.y, end, max_step=self.step, rtol=self.tolerance, atol=self.absolute,
-            first_step=min(self.step, end - self.time),
+            first_step=min(self._first_step(), end - self.time),
         )  # fmt: skip
         times, states, order = [], [], self.guards.order
         while solver.status == "running":
@@ -161,6 +163,19 @@ class IvpRun:
         evaluations = solver.nfev
         event = None if root is None else root[1]
         return Arc(np.concatenate(times), np.hstack(states), event, now, last, evaluations)
+
+    def _first_step(self) -> float:
+        """Twice the time to the first event by the functions' parabolas, so that round-off is that of the flight."""
+        u, guards = self.unforced, self.guards
+        now = u.extended(self.time, self.y[: u.size])
+        rate = u.rates(self.motion, now)
+        value = np.where(guards.order > 0, 0.0, guards.functional @ now)
+        slope, curvature = guards.functional @ rate, guards.functional @ u.rates(self.motion, rate)
+        with np.errstate(all="ignore"):
+            root = np.sqrt(slope**2 - 2 * curvature * value)
+            times = np.where(slope > 0, -(slope + root) / curvature, 2 * value / (root - slope))
+        times = times[np.isfinite(times) & (times > 0)]
+        return float(np.clip(2 * times.min(initial=np.inf), _SHORTEST * self.rows.period, self.step))
 
     def rate(self, t: float, y: np.ndarray) -> np.ndarray:
         """Rates of the state and of the integrals."""

@@ -18,9 +18,9 @@ from coupling.state import Problem
 #: a flight shorter than this share of a period, and all that follow it, are the end of a chatter
 CHATTER = 3e-7
 #: impacts of a contact that follow each other within this share of a period are the end of a collapse
-COLLAPSE = 1e-12
+COLLAPSE = 1e-13
 #: gaps that close within this share of a period close now; speeds below this share of the fastest are zero
-TOUCH, STILL = 1e-13, 1e-12
+TOUCH, STILL = 1e-14, 1e-12
 
 
 class Impact(NamedTuple):

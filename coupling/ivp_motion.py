@@ -76,6 +76,12 @@ class Unforced:
         phase = self.rows.omega * np.asarray(t, float)
         return np.concatenate([z, [np.ones_like(phase), np.cos(phase), np.sin(phase)]])
 
+    def rates(self, motion: Motion, extended: np.ndarray) -> np.ndarray:
+        """The rates (size + 3,) of an extended state, or of its rates."""
+        omega = self.rows.omega
+        turn = [0.0, -omega * extended[self.sine], omega * extended[self.cosine]]
+        return np.concatenate([motion.rate @ extended, turn])
+
 
 class Motion:
     """The linear system that the states of the rows name.
