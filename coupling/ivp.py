@@ -2,8 +2,8 @@
 
 An independent witness of the exact engine: it shares the rows of a scene with it, and the solution of complementarity
 problems, but neither motion nor search nor decisions. Impacts are jumps between two integrations, closed contacts and
-sticking bodies constraints on accelerations (coupling.ivp_motion, coupling.ivp_contact, coupling.ivp_impacts); events are
-searched on the solver's interpolant, where none can be missed (coupling.ivp_roots). Energies and harmonics are
+sticking bodies constraints on accelerations (coupling.ivp_motion, coupling.ivp_contact, coupling.ivp_impacts); events
+are searched on the solver's interpolant, where none can be missed (coupling.ivp_roots). Energies and harmonics are
 integrated along (coupling.ivp_records).
 """
 
@@ -17,10 +17,8 @@ from scipy.integrate import DOP853
 from coupling import state as st
 from coupling.evaluation import Outcome
 from coupling.ivp_contact import decide
-from coupling.ivp_impacts import COLLAPSE, calm, collide
-from coupling.ivp_motion import GAP, LOOSE, OPENS, REST, SLIDE, SLIP, SPRUNG, Contacts, Guards, Motion, Unforced
-from coupling.ivp_motion import FREE as UNFORCED
-from coupling.ivp_motion import HIGH, LOW
+from coupling.ivp_impacts import COLLAPSE, FRESH, TOUCH, calm, collide
+from coupling.ivp_motion import GAP, HIGH, LOW, OPENS, REST, SLIP, UNFORCED, Contacts, Motion, Unforced
 from coupling.ivp_records import Recorder
 from coupling.ivp_roots import NODES, first_root
 from coupling.response import Status
@@ -29,7 +27,7 @@ from coupling.scene import Scene
 from coupling.structure import linear_structure
 
 #: the shortest first step, as a share of a period
-_SHORTEST = 1e-12
+_SHORTEST = 1e-26
 #: gaps below this share of the free travel are closed at the start
 _TOUCHING = 1e-12
 #: events without time between them before the run is given up
@@ -39,13 +37,13 @@ _STANDING = 100
 class Arc(NamedTuple):
     """Motion between two events: states (size, k) at the points t (k,) of the grid, and what has ended it.
 
-    event: index of the event function, None at the end of the grid; end, last: time and state there.
+    event: index of the event function, None at the end of the grid; duration, last: time since the start, state there.
     """
 
     t: np.ndarray
     y: np.ndarray
     event: int | None
-    end: float
+    duration: float
     last: np.ndarray
     evaluations: int
     failed: bool = False
@@ -66,15 +64,16 @@ class IvpRun:
         self.time, self.step = 0.0, self.rows.period / self.steps
         self.problem = st.new_problem(u.r)
         self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
-        self.last_impact = np.full(u.r, -np.inf)
-        self.motion: Motion | None = None
-        self.guards: Guards
+        self.since = np.full(u.r, np.inf)  # s, since each contact's last impact
+        self.begun = False
+        nothing = np.zeros(u.r, int)
+        self._follow(Contacts(nothing + UNFORCED, nothing.astype(float), nothing, nothing))
         self.tolerance = self.solver.rtol or 1e-9
         self.absolute = self.tolerance * self.record.sizes(_reach(scene, u))
 
     def advance_to(self, periods: int) -> Status:
         """Continue to the end of `periods`, or to what ends the run."""
-        if self.motion is None and not self._begin():
+        if not self.begun and not self._begin():
             return Status.UNDECIDED
         with np.errstate(all="ignore"):
             while self.record.period < periods:
@@ -95,7 +94,7 @@ class IvpRun:
         )
 
     def _begin(self) -> bool:
-        u, place = self.unforced, self.y[self.unforced.d]
+        self.begun, place = True, self.y[self.unforced.d]
         gap = np.concatenate([np.zeros(self.rows.friction_rows), self.rows.gap])
         place[np.abs(place) <= _TOUCHING * gap] = 0.0
         decided = self._decide(-1, -1)
@@ -117,12 +116,13 @@ class IvpRun:
         self.record.points(arc.t, arc.y)
         if self.record.deep > self.solver.deepest:
             return Status.PENETRATION
-        before, self.time, self.y = self.time, arc.end, arc.last
+        self.time, self.y = self.time + arc.duration, arc.last
+        self.since += arc.duration
         if arc.event is None:
-            self.guards = self.guards._replace(order=np.zeros_like(self.guards.order))
+            self.guards.order[:] = 0
             return self._end_period()
         self.events += 1
-        self.standing = self.standing + 1 if self.time - before < 1e-13 * self.rows.period else 0
+        self.standing = self.standing + 1 if arc.duration < COLLAPSE * self.rows.period else 0
         if self.standing > _STANDING:
             return Status.UNDECIDED
         decided = self._decide(int(self.guards.row[arc.event]), int(self.guards.kind[arc.event]))
@@ -130,39 +130,33 @@ class IvpRun:
 
     def _end_period(self) -> Status:
         self.time = 0.0
-        self.last_impact -= self.rows.period
         self.record.end_period(self.y)
         return Status.OK
 
     def _integrate(self, grid: np.ndarray) -> Arc:
         """The motion from now to the first event, or to the end of the grid."""
-        u, end, evaluations = self.unforced, grid[-1], 0
+        u, far = self.unforced, grid - self.time
         solver = DOP853(
-            self.rate, self.time, self.y, end, max_step=self.step, rtol=self.tolerance, atol=self.absolute,
-            first_step=min(self._first_step(), end - self.time),
+            lambda tau, y: self.rate(self.time + tau, y), 0.0, self.y, far[-1], max_step=self.step,
+            rtol=self.tolerance, atol=self.absolute, first_step=min(self._first_step(), far[-1]),
         )  # fmt: skip
-        times, states, order = [], [], self.guards.order
-        while solver.status == "running":
+        states, order, reached, root = [], self.guards.order, 0, None
+        while solver.status == "running" and root is None:
             solver.step()
             if solver.status == "failed":
-                return Arc(grid[:0], self.y[:, None][:, :0], None, solver.t, self.y, solver.nfev, True)
-            piece = solver.dense_output()
-            root, now, last = None, solver.t, solver.y
+                return Arc(grid[:0], self.y[:, None][:, :0], None, 0.0, self.y, solver.nfev, True)
+            piece, now, last = solver.dense_output(), solver.t, solver.y
             if len(order):
                 at = solver.t_old + NODES * (solver.t - solver.t_old)
-                root = first_root(self.guards.functional @ u.extended(at, piece(at)[: u.size]), order)
+                root = first_root(self.guards.functional @ u.extended(self.time + at, piece(at)[: u.size]), order)
             if root is not None:
                 now = solver.t_old + root[0] * (solver.t - solver.t_old)
                 last = piece(now)
-            inside = grid[(grid > solver.t_old) & (grid <= now)]
-            times.append(inside)
-            states.append(piece(inside) if len(inside) else np.zeros((len(self.y), 0)))
-            order = np.zeros_like(order)
-            if root is not None:
-                break
-        evaluations = solver.nfev
-        event = None if root is None else root[1]
-        return Arc(np.concatenate(times), np.hstack(states), event, now, last, evaluations)
+            passed = reached + np.count_nonzero(far[reached:] <= now)
+            states += [piece(tau) for tau in far[reached:passed]]
+            order, reached = np.zeros_like(order), passed
+        points = np.array(states).reshape(reached, len(self.y)).T
+        return Arc(grid[:reached], points, None if root is None else root[1], now, last, solver.nfev)
 
     def _first_step(self) -> float:
         """Twice the time to the first event by the functions' parabolas, so that round-off is that of the flight."""
@@ -206,14 +200,9 @@ class IvpRun:
         contacts = decide(u, self.time, z)
         if contacts is None:
             return False
-        self.record.springs(self.time, self.y, self._state, contacts.state)
+        self.record.springs(self.time, self.y, self.motion.contacts.state, contacts.state)
         self._follow(contacts)
         return True
-
-    @property
-    def _state(self) -> np.ndarray:
-        """States of the rows before this event."""
-        return np.full(self.unforced.r, UNFORCED) if self.motion is None else self.motion.contacts.state
 
     def _follow(self, contacts: Contacts) -> None:
         u = self.unforced
@@ -236,22 +225,23 @@ class IvpRun:
     def _calm(self, z: np.ndarray) -> None:
         """Zero to the round-off of the run's largest speed is zero: two slips may come to rest together."""
         self.fastest = max(self.fastest, float(np.abs(z[self.unforced.s]).max(initial=0.0)))
-        calm(self.unforced, z, self.fastest)
+        # gaps of contacts that have just collided are known beyond the round-off of places
+        touch = np.where(self.since > FRESH * self.rows.period, TOUCH * self.rows.period, 0.0)
+        calm(self.unforced, z, self.fastest, touch)
 
     def _impact(self, z: np.ndarray) -> bool:
         u, rows, complete = self.unforced, self.rows, self.solver.complete_chatter is not False
         pressing, resting, collapsed = np.zeros(u.r), np.zeros(u.r, bool), np.zeros(u.r, bool)
-        if complete and self.motion is not None:
+        if complete:
             extended = u.extended(self.time, z)
-            resting = self._state == REST
+            resting = self.motion.contacts.state == REST
             push = np.diag(rows.delassus) * (self.motion.force @ extended)
             pressing = np.where(resting, push, -(self.motion.rate[u.s] @ extended))
-            collapsed = self.time - self.last_impact < COLLAPSE * rows.period
+            collapsed = self.since < COLLAPSE * rows.period
         impact = collide(u, z, pressing, resting, collapsed, self.problem)
         if impact is None:
             return False
-        hit = impact.row[impact.before < 0]
-        self.last_impact[hit] = self.time
+        self.since[impact.row[impact.before < 0]] = 0.0
         self.record.impact(self.time, impact)
         return True
 

@@ -1,9 +1,9 @@
 """Which rows rest, slide, open or press after an event, derivative by derivative.
 
-Forces and accelerations of the rows at rest complement each other (Pfeiffer and Glocker, 1996, chapter 5). Where a force
-is at its bound and its row does not accelerate, as at the instant at which bodies let go, the first derivatives that do
-not vanish decide: their rates obey the same complementarity, and so on (the motion is analytic between events). What
-springs do where their force, or their gap, is zero follows from its first derivative that is not.
+Forces and accelerations of the rows at rest complement each other (Pfeiffer and Glocker, 1996, chapter 5). Where a
+force is at its bound and its row does not accelerate, as at the instant at which bodies let go, their rates obey the
+same complementarity, and so on up to the first derivatives that do not vanish: the motion is analytic between events.
+What springs do where their force, or their gap, is zero follows from its first derivative that is not.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from coupling.complementarity import AT_HIGH, AT_LOW, solve_box
-from coupling.ivp_motion import HELD, HIGH, LOOSE, LOW, NEVER, REST, SLIDE, SPRUNG, Contacts, Unforced
-from coupling.ivp_motion import FREE as UNFORCED
+from coupling.ivp_motion import HELD, HIGH, LOOSE, LOW, NEVER, REST, SLIDE, SPRUNG, UNFORCED, Contacts, Unforced
 from coupling.state import new_problem
 
 #: derivatives that are looked at
@@ -154,7 +153,7 @@ class _Decision:
         return known
 
     def _sizes(self, k: int, known: np.ndarray) -> np.ndarray:
-        """Sizes of the terms that the rows' accelerations are sums of: by amplitude, as what passes zero has round-off."""
+        """Sizes of the terms that accelerations are sums of: by amplitude, as zero has its round-off."""
         rows, u = self.unforced.rows, self.unforced
         own = np.sqrt(rows.stiffness)
         rate = np.abs(self.p[k + 1]) + own * np.abs(self.p[k])

@@ -1,7 +1,7 @@
 """Newton's law at all touching contacts at once, and the end of a chatter, for an integrator.
 
-Pfeiffer and Glocker (1996), chapter 8. Chatter: Nordmark and Piiroinen (2009); a row of bodies can meet infinitely often
-in finite time without being pressed together (McNamara and Young 1992).
+Pfeiffer and Glocker (1996), chapter 8. Chatter: Nordmark and Piiroinen (2009); a row of bodies can meet infinitely
+often in finite time without being pressed together (McNamara and Young 1992).
 """
 
 from __future__ import annotations
@@ -18,9 +18,11 @@ from coupling.state import Problem
 #: a flight shorter than this share of a period, and all that follow it, are the end of a chatter
 CHATTER = 3e-7
 #: impacts of a contact that follow each other within this share of a period are the end of a collapse
-COLLAPSE = 1e-13
-#: gaps that close within this share of a period close now; speeds below this share of the fastest are zero
-TOUCH, STILL = 1e-14, 1e-12
+COLLAPSE = 1e-24
+#: gaps that close within this share of a period close now, unless they have been closed for this share of it
+TOUCH, FRESH = 1e-14, 1e-9
+#: speeds below this share of the fastest are zero
+STILL = 1e-12
 
 
 class Impact(NamedTuple):
@@ -78,10 +80,13 @@ def _solve(rows: Rows, touching: np.ndarray, excess: np.ndarray, tied: np.ndarra
     return bool(solve_box(problem, k, 0.0))
 
 
-def calm(u: Unforced, z: np.ndarray, fastest: float) -> None:
-    """Make zero exactly, in place, what is zero to round-off: gaps about to close, speeds of what touches, slips."""
-    rows, still = u.rows, STILL * fastest
-    touching = u.rigid_contact & (z[u.d] <= TOUCH * rows.period * np.maximum(-z[u.s], still))
+def calm(u: Unforced, z: np.ndarray, fastest: float, touch: np.ndarray) -> None:
+    """Make zero exactly, in place, what is zero to round-off: gaps about to close, speeds of what touches, slips.
+
+    touch: (r,) time (s) within which a gap closes that is closed now.
+    """
+    still = STILL * fastest
+    touching = u.rigid_contact & (z[u.d] <= touch * np.maximum(-z[u.s], still))
     z[u.d] = np.where(touching, 0.0, z[u.d])
     stopped = (touching | u.friction) & (np.abs(z[u.s]) <= still)
     z[u.s] = np.where(stopped, 0.0, z[u.s])

@@ -17,7 +17,7 @@ from coupling.rows import Rows
 
 # states of a row: no force; at rest by an unknown force; at rest while other rows carry its force, which is constant;
 # sliding; a spring that holds or presses; a soft contact that has ended at zero force, before its gap is open
-FREE, REST, HELD, SLIDE, SPRUNG, LOOSE = range(6)
+UNFORCED, REST, HELD, SLIDE, SPRUNG, LOOSE = range(6)
 # what an event function stands for: a gap closes; a slip stops; a force reaches its low or high bound; a gap that was
 # left under compression opens; its spring would push again
 GAP, SLIP, LOW, HIGH, OPENS, PUSHES = range(6)
@@ -126,7 +126,7 @@ class Motion:
         contact = r >= u.rows.friction_rows
         if state == SLIDE:
             return [] if order == NEVER else [(-np.sign(contacts.held[r]) * speed, r, SLIP, order)]
-        if state == FREE:
+        if state == UNFORCED:
             return [(place, r, GAP, order)] if contact and order != NEVER else []
         if state == LOOSE:
             push = u.rows.spring[r] * place + u.rows.dashpot[r] * speed

@@ -6,7 +6,7 @@ import numpy as np
 
 from coupling import state as st
 from coupling.ivp_impacts import Impact
-from coupling.ivp_motion import FREE, LOOSE, SLIDE, SPRUNG, Unforced
+from coupling.ivp_motion import LOOSE, SLIDE, SPRUNG, Unforced
 from coupling.scene import Scene
 
 #: the integrals; behind them the impulses of all rows
@@ -46,7 +46,7 @@ class Recorder:
         energy = max(mass * (rows.omega * reach) ** 2, 1e-300)
         integrals = np.full(self.count, momentum)
         integrals[:_SQUARE], integrals[_SQUARE] = energy, reach**2 / rows.omega
-        integrals[_COS : _SIN + 1], integrals[_MOMENTUM_COS : _PUSH] = reach / rows.omega, momentum / rows.omega
+        integrals[_COS : _SIN + 1], integrals[_MOMENTUM_COS:_PUSH] = reach / rows.omega, momentum / rows.omega
         return np.concatenate([place, rows.omega * place, integrals])
 
     def rates(self, extended: np.ndarray, found: np.ndarray) -> np.ndarray:
@@ -132,7 +132,7 @@ class Recorder:
             if new[r] == SPRUNG:
                 if old[r] == LOOSE:
                     self.spring_loss -= energy
-                elif self.log is not None and s < 0 and d == 0:
+                elif s < 0:
                     self.begun[r] = self._count(t, int(r), s, 0.0, 0.0), push
                 continue
             self.spring_loss += energy

@@ -41,13 +41,11 @@ def first_root(samples: np.ndarray, order: np.ndarray) -> tuple[float, int] | No
     """
     found = None
     for k, values in enumerate(samples):
-        if order[k] > 0:
-            coefficients = _DEFLATED @ (values[1:] / NODES[1:] ** order[k])
-        else:
-            coefficients = _WHOLE @ values
+        zero = order[k] > 0
+        coefficients = _DEFLATED @ (values[1:] / NODES[1:] ** order[k]) if zero else _WHOLE @ values
         if coefficients.min() > 0:
             continue
-        if order[k] > 0:
+        if zero:
             coefficients[0] = max(coefficients[0], np.finfo(float).tiny)
         limit = 1.0 if found is None else found[0]
         root = _first(coefficients, 0.0, 1.0, limit, _ROUND_OFF * float(np.abs(coefficients).max()))
