@@ -24,7 +24,7 @@ _STEPS = 40
 
 
 def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
-    """Run with the relative tolerance `setting`. Raises InputError for springs before sliders."""
+    """Run with the relative tolerance `setting`."""
     ours = by(scene, method="solve_ivp", rtol=setting, steps_per_period=_STEPS)
     job = CvodeRun(ours.replace({"time.periods": periods, "time.transient": 0}), False, samples)
     started = time.thread_time()
