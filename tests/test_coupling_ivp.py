@@ -78,6 +78,8 @@ def check(scene, factor=1e3):
     for k in count():
         if k >= min(len(expected), len(parted), len(rough)) or who(expected[k]) != who(parted[k]):
             break
+        if k < len(found) and who(rough[k]) != who(found[k]):
+            break
         growth = max(growth, abs(expected[k].time - parted[k].time) / (APART * period))
         own = abs(rough[k].time - found[k].time) / period if k < len(found) else 0.0
         if max(growth * APART, own) > PARTED or expected[k].time > min(end, our_end) - 10 * COLLAPSE * period:
