@@ -1,0 +1,91 @@
+"""The first root of event functions over one step of an integrator, found with certainty on its interpolant.
+
+Over a step an event function is a polynomial: a linear functional of the interpolant, and the excitation, which a
+polynomial of degree 8 follows to round-off. Its Bernstein coefficients enclose it (Farin, Curves and Surfaces for
+CAGD): without a negative one there is no root, and with one change of sign there is exactly one. Halving decides the
+rest, so that roots that come in pairs are not missed, however close they lie.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import comb
+
+import numpy as np
+from scipy.optimize import brentq
+
+_DEGREE = 8
+#: where the functions are sampled, as shares of the step
+NODES = (1 - np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)) / 2
+#: intervals that are halved no more, as a share of the step
+_SHORTEST = 1e-14
+#: coefficients below this share of the function's size in the step are round-off
+_ROUND_OFF = 1e-14
+
+
+def _from_samples(nodes: np.ndarray) -> np.ndarray:
+    """The matrix that turns samples at the nodes into Bernstein coefficients."""
+    n = len(nodes) - 1
+    basis = [[comb(n, k) * x**k * (1 - x) ** (n - k) for k in range(n + 1)] for x in nodes]
+    return np.linalg.inv(np.array(basis))
+
+
+_WHOLE, _DEFLATED = _from_samples(NODES), _from_samples(NODES[1:])
+
+
+def first_root(samples: np.ndarray, order: np.ndarray) -> tuple[float, int] | None:
+    """The first place in 0 < x <= 1 at which one of several functions turns negative, and which one; None without.
+
+    samples: (functions, nodes) at NODES; order: (functions,) of the zero at x = 0 that a function leaves upwards; it is
+    taken out of the function, so that round-off cannot find it again.
+    """
+    found = None
+    for k, values in enumerate(samples):
+        zero = order[k] > 0
+        coefficients = _DEFLATED @ (values[1:] / NODES[1:] ** order[k]) if zero else _WHOLE @ values
+        if coefficients.min() > 0:
+            continue
+        if zero:
+            coefficients[0] = max(coefficients[0], np.finfo(float).tiny)
+        limit = 1.0 if found is None else found[0]
+        root = _first(coefficients, 0.0, 1.0, limit, _ROUND_OFF * float(np.abs(coefficients).max()))
+        if root is not None and (found is None or root < found[0]):
+            found = root, k
+    return found
+
+
+def _first(b: np.ndarray, start: float, end: float, limit: float, noise: float) -> float | None:
+    """First root, before `limit`, of the polynomial with Bernstein coefficients b between start and end."""
+    if b.min() > 0 or start > limit:
+        return None
+    if b[0] <= 0:
+        return start
+    if end - start < _SHORTEST or np.abs(b).max() <= noise:
+        return end if b[-1] < 0 else None
+    signs = np.sign(b[b != 0])
+    if b[-1] < 0 and np.count_nonzero(np.diff(signs)) == 1:
+        inside = brentq(_polynomial(b), 0.0, 1.0, xtol=1e-16, rtol=1e-15)
+        return start + float(inside) * (end - start)
+    left, right = _halves(b)
+    middle = (start + end) / 2
+    root = _first(left, start, middle, limit, noise)
+    return _first(right, middle, end, limit, noise) if root is None else root
+
+
+def _polynomial(b: np.ndarray) -> Callable[[float], float]:
+    n = len(b) - 1
+    weighted = [comb(n, k) * float(value) for k, value in enumerate(b)]
+
+    def value(x: float) -> float:
+        return sum(part * x**k * (1 - x) ** (n - k) for k, part in enumerate(weighted))
+
+    return value
+
+
+def _halves(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of both halves (de Casteljau)."""
+    left, right, row = np.empty_like(b), np.empty_like(b), b
+    for k in range(len(b)):
+        left[k], right[-1 - k] = row[0], row[-1]
+        row = (row[:-1] + row[1:]) / 2
+    return left, right
