@@ -86,6 +86,7 @@ class Flows(NamedTuple):
     slow_dashpot: np.ndarray  # (s, p) complex: power in the dashpots
     slow_square: np.ndarray  # (s, p) complex: its share of the squared response
     slow_count: np.ndarray  # (s,)
+    calm: np.ndarray  # (s, m) whether a mode itself hardly changes over a period; place 0: whether any does
 
 
 def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
@@ -102,7 +103,7 @@ def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
         f(b, b), z(b, m), z(m), f(m), f(m), z(m), np.zeros(capacity, np.int64), z(m),
         z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
         np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 3), np.int64),
-        z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
+        z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64), np.zeros((capacity, m), np.bool_),
     )  # fmt: skip
 
 
@@ -322,6 +323,10 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
         form[s, :m, :m] = _real_form(*integral)
     flows.damped[s] = rows.dashpot[sprung].any()
     flows.uncoupled[s] = rows.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + 1
+    # such modes swing far out where they are quick to cross: the square of their sum is taken at once
+    calm = np.abs(rate) * rows.period < SLOW / 2
+    products[2] = [np.where(np.outer(calm, calm), 0, product) for product in products[2]]
+    flows.calm[s, :m], flows.calm[s, 0] = calm, calm.any()
     listed = [(j, k, kind) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
     count = len(listed)
     for i, (j, k, kind) in enumerate(listed):
@@ -330,7 +335,7 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
             form[s, i] = half * product[kind][j, k]
     listed += [(j, 0, ALONE) for j in np.flatnonzero(slow_alone)]
     flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 3)
-    flows.slow_square[s, count : len(listed)] = 2 * response[slow_alone]
+    flows.slow_square[s, count : len(listed)] = 2 * np.where(calm, 0, response)[slow_alone]
     flows.slow_count[s] = len(listed)
 
 

@@ -170,6 +170,12 @@ def test_a_heavy_body_is_the_ground(mass, restitution):
     assert response.energy_residual < 1e-13
 
 
+def test_mean_square_beside_a_heavy_body():
+    """The response is as it is beside the ground, whatever the mass: differences go with its reciprocal."""
+    ground, heavy = (simulate(struck(mass, 0.7)).amplitude_rms for mass in (1e10, 1e14))
+    assert heavy == pytest.approx(ground, rel=1e-9)
+
+
 def test_a_body_too_heavy_for_doubles_ends_the_run():
     response = simulate(struck(1e21, 0.7), events=True)
     assert response.status == Status.ILL_CONDITIONED
