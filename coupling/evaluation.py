@@ -22,7 +22,7 @@ from coupling.statistics import mean_confidence, transient_length
 #: periods between two looks at whether the response is steady
 _CHUNK = 100
 #: share of the energy there is that counts as flow in any case
-_CARRIED = 1e-6
+_CARRIED = 1e-3
 
 
 class Run(Protocol):
@@ -131,7 +131,7 @@ def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> f
     """Imbalance of the energy ledger (periods + 1, 6), relative to the energy that flowed.
 
     That is the largest of its terms, stored energy by its parts (periods + 1, 1 + b): what a heavy body only carries
-    along is no flow. `exchanged` (J) is what comes and goes within a period. A millionth of the energy there is always
+    along is no flow. `exchanged` (J) is what comes and goes within a period. A thousandth of the energy there is always
     counts: below it the ledger would be judged by the round-off of what is only carried along.
     """
     change = ledger - ledger[0]

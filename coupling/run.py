@@ -30,8 +30,8 @@ _STATUS = {
     auto.ILL_CONDITIONED: Status.ILL_CONDITIONED,
 }
 
-#: imbalance of the ledger above which a response is not to be used: ordinary runs stay a thousand times below
-_OPEN_LEDGER = 1e-8
+#: imbalance of the ledger above which a response is not to be used: ordinary runs stay ten thousand times below
+_OPEN_LEDGER = 1e-6
 
 
 def respond(scene: Scene, events: bool = False, samples_per_period: int = 0, start: Handover | None = None) -> Response:

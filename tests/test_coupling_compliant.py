@@ -73,7 +73,7 @@ def test_bodies_settle_on_their_springs(bodies):
     assert response.slip_velocity[-1] == pytest.approx(np.zeros(bodies), abs=1e-12)
     fallen = 10.0 * masses @ ([damper.position for damper in case.damper] - rest)
     assert response.energy["contact"] == pytest.approx(fallen - (weights**2).sum() / 2e4, rel=1e-10)
-    assert response.energy_residual < 1e-13
+    assert response.energy_residual < 1e-12
     if bodies == 1:
         last = named(response, "impact")[-1]
         assert (last.relative_velocity_after, last.impulse) == (0.0, 0.0)  # never over
@@ -143,11 +143,11 @@ def test_a_stiff_contact_is_newtons():
 def bar(modes, stiffness):
     """(reduced model, tables) of a free bar on which the ground falls: Doyen, Ern and Piperno (2011).
 
-    Seen from the falling frame, in which the bar is at rest until the ground, of ten thousand times its mass, arrives.
+    Seen from the falling frame, in which the bar is at rest until the ground, of three hundred times its mass, arrives.
     """
     length, young, density, g = 10.0, 900.0, 1.0, 10.0
     omegas = np.pi * np.arange(modes + 1) * math.sqrt(young / density) / length
-    omegas[0] = 1.05e-5 * omegas[-1]  # a structure has to be held: by a hanger that nothing here notices
+    omegas[0] = 4e-3  # a structure has to be held: by a hanger that nothing here notices
     shapes = np.sqrt(np.r_[1.0, np.full(modes, 2.0)] / (density * length))
     model = ReducedModel.from_matrices(
         mass=np.eye(modes + 1),
@@ -159,7 +159,7 @@ def bar(modes, stiffness):
         "excitation": {"frequency": 1 / 7.2, "at": "end"},
         "gravity": {"acceleration": g, "orientation_deg": 90.0},
         "cavity": [{"name": "c", "gap": 1000.0, "floor": "end"}],
-        "damper": [{"cavity": "c", "mass": 1e5, "position": -495.0}],
+        "damper": [{"cavity": "c", "mass": 3e3, "position": -495.0}],
         "contact": {"law": "compliant", "stiffness": stiffness},
         "time": {"periods": 1, "transient": 0},
     }
@@ -179,7 +179,7 @@ def test_bar_on_a_wall(tmp_path):
         model.save(tmp_path / "bar.h5")
         response = simulate(scene(structure={"model": "rom", "file": str(tmp_path / "bar.h5")}, **tables), events=True)
         assert response.status == Status.OK
-        # in contact the pair hangs so softly that its equilibrium is 1e8 m away, and digits go into that
+        # in contact the pair hangs so softly that its equilibrium is 1e6 m away, and digits go into that
         assert response.energy_residual < 1e-6
         assert [event.kind for event in response.event_list] == ["impact", "detach"] * 3
         times = [event.time for event in response.event_list]

@@ -40,7 +40,8 @@ def test_chatter_ends_where_the_geometric_series_does():
     np.testing.assert_allclose(
         part["curves"]["measured"], part["curves"]["limit"], rtol=2e-5
     )  # the last hops take 3e-7 periods
-    assert "ok" not in part["without_completion"]
+    # without completion it goes on until the clock resolves no more: beyond the budget where little is lost
+    assert part["without_completion"][-1] == "event_budget"
 
 
 def test_newmark_makes_energy_in_contacts():
