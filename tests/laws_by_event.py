@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from stepping import SLIDES, Moment, Segment, Step, Stepper
@@ -36,6 +36,8 @@ class Worst:
     momentum: float = 0.0
     restitution: float = 0.0
     jump: float = 0.0
+    ledger: float = 0.0
+    scenes: int = 0
     steps: int = 0
     impacts: int = 0
 
@@ -44,10 +46,16 @@ class Worst:
         where = "" if step is None else f" at {step.before.begun:.17g} + {step.span:.3g} s"
         assert value <= limit, f"{name} {value:.3g} above {limit:.3g}{where}"
 
+    def merge(self, other: Worst) -> None:
+        """Take in what another run has met."""
+        for field in fields(self):
+            mine, its = getattr(self, field.name), getattr(other, field.name)
+            setattr(self, field.name, mine + its if field.type == "int" else max(mine, its))
+
 
 def check_events(scene: Scene) -> Worst:
     """Step through a run. Raises AssertionError at the first law that is broken."""
-    worst, stepper = Worst(), Stepper(scene)
+    worst, stepper = Worst(scenes=1), Stepper(scene)
     rows = stepper.run.rows
     fastest, last = SLOW * rows.omega * rows.gap.max(), np.full(len(rows.delassus), -np.inf)
     if stepper.code == auto.DONE:
