@@ -36,6 +36,8 @@ SETTINGS = settings(
     report_multiple_bugs=False,
     suppress_health_check=list(HealthCheck),
 )
+#: steps of one scene among thousands that are looked at: a chatter can be followed for ever
+LONGEST = 150
 #: imbalance of the ledger, relative to the energy that flowed
 LEDGER = 1e-10
 
@@ -44,8 +46,11 @@ def impacts(response):
     return [event for event in response.event_list if event.kind == "impact"]
 
 
-def check_laws(data):
-    """The ledger closes, nothing gives energy, and at every event the laws hold. Returns the largest violations."""
+def check_laws(data, longest=None):
+    """The ledger closes, nothing gives energy, and the laws hold at the first `longest` events.
+
+    Returns the largest violations.
+    """
     scene = scene_of(data)
     response = simulate(scene, events=True, samples_per_period=32)
     assume(not (hops(scene) and response.status == Status.EVENT_BUDGET))
@@ -58,7 +63,7 @@ def check_laws(data):
         check_newton(scene, impacts(response))
         if data["structure"]["model"] != "rom" or "left" not in data["cavity"][0]:
             check_walls(scene, response)
-    worst = check_events(scene)
+    worst = check_events(scene, longest)
     worst.note("ledger", response.energy_residual, LEDGER)
     return worst
 
@@ -134,7 +139,7 @@ def laws_of(kind: str, first: int, examples: int) -> Worst:
     @settings(SETTINGS, max_examples=examples)
     @given(data=st.data())
     def check(data):
-        largest.merge(check_laws(data.draw(worlds(laws=(law,), elements=elements))))
+        largest.merge(check_laws(data.draw(worlds(laws=(law,), elements=elements)), LONGEST))
 
     check()
     return largest
