@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from random_scenes import random_reduced, random_scene
 from stepping import Stepper
 
 from coupling import state as st
@@ -610,3 +611,43 @@ def test_a_held_structure_vibrates_on(tmp_path):
     assert sprung.energy_residual < 1e-10
     assert rigid.energy_residual < 1e-10
     assert rigid.amplitude_max == pytest.approx(sprung.amplitude_max, rel=0.01)
+
+
+def test_chatters_of_a_set_end_together_by_pushes():
+    """Two bodies that chatter on one structure at once: what ends their chatter pushes each of them, and is finite.
+
+    Tied to their walls at the first impact that is slow enough, one of them would be pulled: by 4e-9 N s here.
+    """
+    response = simulate(
+        scene(
+            structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.01},
+            initial={"displacement": 0.5},
+            excitation={"frequency": 0.15, "force": 0.1},
+            gravity={"acceleration": 0.3, "orientation_deg": 90.0},
+            cavity=[{"name": "a", "gap": 1.0}, {"name": "b", "gap": 1.0}],
+            damper=[
+                {"cavity": "a", "mass": 0.5, "restitution": 0.8, "position": -0.499},
+                {"cavity": "b", "mass": 0.5, "restitution": 0.7, "position": -0.498},
+            ],
+        ),
+        events=True,
+    )
+    assert response.status == Status.OK
+    assert response.energy_residual < 1e-10
+    rests = {event.damper for event in response.event_list if event.kind == "rest"}
+    assert rests == {0, 1}
+    assert min(event.impulse for event in impacts(response)) >= 0.0
+    assert len(impacts(response)) < 1000
+
+
+def test_four_bodies_that_chatter_at_once_stay_within_their_budget(tmp_path):
+    """Each impact of one wakes those that rest: chatters within chatters, thousands of impacts a period."""
+    random_reduced(37).save(tmp_path / "rom.h5")
+    data = random_scene(37, "rom", 4).replace(
+        {"structure.file": str(tmp_path / "rom.h5"), "time.periods": 20, "time.transient": 0,
+         "solver.max_events": 100_000}
+    )  # fmt: skip
+    response = simulate(data, events=True)
+    assert response.status == Status.OK
+    assert response.energy_residual < 1e-10
+    assert min(event.impulse for event in impacts(response)) >= 0.0
