@@ -10,7 +10,7 @@ import numpy as np
 
 from coupling.compiled import ZERO, kernel
 from coupling.complementarity import AT_HIGH, AT_LOW, DEPENDENT, FREE, solve_box
-from coupling.gaps import align_gaps, join_speeds, measure_gaps, rigid, slowest
+from coupling.gaps import join_speeds, measure_gaps, rigid, slowest
 from coupling.log import log_changes
 from coupling.springs import press, slide_or_hold, spring_force
 from coupling.state import (
@@ -62,8 +62,6 @@ def settle(rows, st, rec, work):
     for r in range(len(st.state)):
         st.key[r] = st.state[r] == SPRUNG or st.state[r] == (STICK if r < friction else CLOSED)
         st.counters[CLOSED_ROWS] += st.key[r]
-    align_gaps(rows, st, st.coordinates)
-    measure_gaps(rows, st)
     log_changes(rows, st, rec, work)
     st.counters[SEARCHING] = 1
     return True

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from coupling.compiled import inlined, kernel
-from coupling.state import CLOSED, OPEN, STICK, TOUCHING
+from coupling.state import OPEN
 
 #: gaps closed to this share of the free travel are closed at the same instant
 SIMULTANEOUS = 1e-12
@@ -34,83 +34,24 @@ def measure_gaps(rows, st):
             st.displacement[r], st.velocity[r] = (right - left) + (far - near), faster - slower
 
 
-@kernel
+@inlined
 def align_gaps(rows, st, y):
     """Take open gaps to walls that move apart from the floor anew from slips and structure: round-off would add up.
 
     y: (2n,) p and p' of the structure. A gap about to close is left alone: it must not change sides.
     """
-    _follow_walls(rows, st, y)
+    n = len(st.constant)
     for r in range(rows.friction_rows, len(st.state)):
         scale = rows.gap[r - rows.friction_rows]
         if rows.rides[r] or st.state[r] != OPEN or st.displacement[r] < _NEAR * scale:
             continue
         k, sign = (rows.before[r], -1.0) if rows.before[r] >= 0 else (rows.after[r], 1.0)
-        place, speed = _wall(rows, r, k, sign, y)
-        st.displacement[r] = 0.5 * scale + (sign * (st.displacement[k] + st.low[k]) + place)
-        st.velocity[r] = sign * st.velocity[k] + speed
-
-
-@inlined
-def _follow_walls(rows, st, y):
-    """Put bodies that rest at a wall that moves apart from the floor where it is, and with them all that touches them.
-
-    Their speeds were equal to round-off when they came to rest: what was missing would add up as long as they rest.
-    What sticks on the floor has its place there.
-    """
-    friction, count = rows.friction_rows, len(st.state)
-    follows = False
-    for r in range(friction, count):
-        before, after = rows.before[r], rows.after[r]
-        if before < 0:
-            follows = _rests(rows, st, r) and not rows.rides[r] and st.state[after] < STICK
-            if follows:
-                place, speed = _wall(rows, r, after, 1.0, y)
-                st.displacement[after] = -0.5 * rows.gap[r - friction] - place
-                st.low[after], st.velocity[after] = 0.0, -speed
-        elif after >= 0:
-            follows = follows and st.displacement[r] == 0.0 and st.state[after] < STICK
-            if follows:
-                _join(rows, st, r, before, after)
-    follows = False
-    for r in range(count - 1, friction - 1, -1):
-        before, after = rows.before[r], rows.after[r]
-        if after < 0:
-            follows = _rests(rows, st, r) and not rows.rides[r] and st.state[before] < STICK
-            if follows:
-                place, speed = _wall(rows, r, before, -1.0, y)
-                st.displacement[before] = 0.5 * rows.gap[r - friction] + place
-                st.low[before], st.velocity[before] = 0.0, speed
-        elif before >= 0:
-            follows = follows and st.displacement[r] == 0.0 and st.state[before] < STICK
-            if follows:
-                _join(rows, st, r, after, before)
-
-
-@inlined
-def _rests(rows, st, r):
-    """Whether the bodies of contact r rest against each other."""
-    return rigid(rows, r) and (st.state[r] == CLOSED or st.state[r] == TOUCHING)
-
-
-@inlined
-def _join(rows, st, r, one, other):
-    """Put a body where another is that it touches in contact r; one that rests against it has its speed."""
-    st.displacement[other], st.low[other] = st.displacement[one], st.low[one]
-    if _rests(rows, st, r):
-        st.velocity[other] = st.velocity[one]
-
-
-@inlined
-def _wall(rows, r, k, sign, y):
-    """How far and how fast the wall of contact r has moved apart from the floor under body k: their part of the gap."""
-    n = len(rows.stiffness)
-    place, speed = 0.0, 0.0
-    for i in range(n):
-        apart = rows.structure[r, i] + sign * rows.floor[k, i]
-        place += apart * y[i]
-        speed += apart * y[n + i]
-    return place, speed
+        place, speed = sign * (st.displacement[k] + st.low[k]), sign * st.velocity[k]
+        for i in range(n):
+            apart = rows.structure[r, i] + sign * rows.floor[k, i]
+            place += apart * y[i]
+            speed += apart * y[n + i]
+        st.displacement[r], st.velocity[r] = 0.5 * scale + place, speed
 
 
 @inlined
