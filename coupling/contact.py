@@ -75,7 +75,7 @@ def stop_riders(rows, flows, st):
     """
     s, stopped = st.counters[FLOW], False
     for r in range(rows.friction_rows):
-        if (st.state[r] == SLIP_LEFT or st.state[r] == SLIP_RIGHT) and st.drift[r] == 0.0 and rigid(rows, r):
+        if (st.state[r] == SLIP_LEFT or st.state[r] == SLIP_RIGHT) and st.drift[r] == 0.0:
             still = True
             for j in range(flows.modes[s]):
                 still = still and flows.motion[s, r, j] == 0.0

@@ -27,6 +27,8 @@ from coupling.state import ALONE, DIFFERENCE, SUM
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
+#: share of its terms below which the motion of a row is round-off
+HELD_STILL = 1e-14
 #: bytes that the subsystems of one run may take
 ROOM = 2**29
 #: share of a gap or a period that round-off may be where modes swing far out: a heavy body on a spring, weight
@@ -181,7 +183,10 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
         members = free & (springs.cluster == c)
         flows.body_acceleration[s][np.ix_(members, members)] = 1 / rows.mass[members].sum()
     flows.body[s, :, :m] = body
-    flows.motion[s, :, :m] = functional @ full[:n] + rows.bodies @ own
+    motion = functional @ full[:n] + rows.bodies @ own
+    terms = np.abs(functional) @ np.abs(full[:n]) + np.abs(rows.bodies) @ np.abs(own)
+    # a row that others hold is at rest: round-off would make a Jenkins element there stick and slip without end
+    flows.motion[s, :, :m] = np.where(np.abs(motion) <= HELD_STILL * terms, 0, motion)
     flows.velocity[s, :, :m] = _rate(flows, s, flows.motion[s, :, :m])
     flows.static[s] = flexibility @ loads
     if len(inner):

@@ -327,6 +327,7 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
             second = ch.g[k, j] * rate * rate
             curvature += second.real
             third += (abs(second.real) + abs(second.imag)) * abs(rate)
-        ch.safe[k] = max(2.9 * curvature / third, 1e3 * RESOLUTION * rows.period)
+        quick = 2.9 * curvature / third if third > 0.0 else rows.period
+        ch.safe[k] = max(quick, 1e3 * RESOLUTION * rows.period)
         ch.known[k] = EXPANDED
     return k + 1

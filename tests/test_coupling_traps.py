@@ -651,3 +651,35 @@ def test_four_bodies_that_chatter_at_once_stay_within_their_budget(tmp_path):
     assert response.status == Status.OK
     assert response.energy_residual < 1e-10
     assert min(event.impulse for event in impacts(response)) >= 0.0
+
+
+@pytest.mark.parametrize("force", [0.2, 0.5, 1.0, 2.0])
+def test_a_jenkins_element_whose_point_is_held(force, tmp_path):
+    """A Coulomb element at the same point stops a Jenkins element that slides: its slip is zero, not round-off.
+
+    Otherwise it would stick and slip at the same instant for ever, on one processor or another.
+    """
+    rng = np.random.default_rng(3)
+    modes = 8
+    model = ReducedModel.from_matrices(
+        mass=np.eye(modes),
+        stiffness=np.diag(np.r_[1.0, np.sort(rng.uniform(2.0, 140.0, modes - 1))]),
+        interface={"one": np.r_[1.0, rng.uniform(-0.5, 0.5, modes - 1)], "two": rng.uniform(-1.0, 1.0, modes)},
+        damping_ratio=0.01,
+    )
+    model.save(tmp_path / "rom.h5")
+    elements = [
+        {"normal_force": 0.03 * force, "friction": 1.0, "stiffness": 27.2, "at": "two"},
+        {"normal_force": 0.9 * force, "friction": 0.95, "at": "two"},
+    ]
+    response = simulate(
+        scene(
+            structure={"model": "rom", "file": str(tmp_path / "rom.h5")},
+            excitation={"frequency": 0.148, "force": force, "at": "one"},
+            friction_damper=elements,
+            time={"periods": 20, "transient": 0},
+            solver={"max_events": 5000},
+        )
+    )
+    assert response.status == Status.OK
+    assert response.energy_residual < 1e-10
