@@ -18,7 +18,7 @@ class Status(StrEnum):
     """How a run ended.
 
     PENETRATION: a body is deeper in a wall than `solver.penetration` allows, an impact was missed; DIVERGED: the motion
-    grew beyond all bounds; ENERGY: the ledger of a stepping method is open by a tenth, its figures are not to be used.
+    grew beyond all bounds; ENERGY: the ledger is open by more than the method's bound, its figures are not to be used.
     ILL_CONDITIONED: while some contacts are closed, modes are critically damped to round-off or masses and stiffnesses
     so far apart that doubles cannot resolve the motion; change a damping, a mass or a stiffness.
     NOT_STEADY: no end of the transient in sight; UNCERTAIN: the mean's confidence interval is still too wide. The other
