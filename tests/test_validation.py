@@ -1,0 +1,28 @@
+"""Every figure of docs/validation.md: against its reference, and against what the page prints."""
+
+from pathlib import Path
+
+import pytest
+import validation_contact
+import validation_modes
+from validation import Page
+
+CASES = [*validation_contact.CASES, *validation_modes.CASES]
+
+
+@pytest.fixture(scope="module")
+def page():
+    return Page()
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_figures(case, page):
+    for figure in case.compute():
+        assert figure.holds, figure
+        page.check(case, figure)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_named_tests_are_there(case):
+    file, function = case.test.strip("`").split("::")
+    assert f"def {function}(" in (Path(__file__).parent / file).read_text()
