@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 
 from coupling.modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
 from coupling.rows import Rows
-from coupling.state import ALONE, DIFFERENCE, SUM
+from coupling.state import ALONE, CALM, DIFFERENCE, SUM
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
@@ -45,7 +45,10 @@ _Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Flows(NamedTuple):
-    """Stack of the subsystems met so far, first axis s. m is the largest number of complex modes."""
+    """Stack of the subsystems met so far, first axis s. m is the largest number of complex modes.
+
+    Compiled functions hand over every array of it in each call: one more has cost half the engine's speed.
+    """
 
     key: np.ndarray  # (s, r) which rows are closed
     modes: np.ndarray  # (s,) number of complex modes, the excitation included
@@ -83,19 +86,18 @@ class Flows(NamedTuple):
     square: np.ndarray  # (s, m, m, 4): squared response of two modes
     damped: np.ndarray  # (s,) whether contacts with dashpots are closed
     uncoupled: np.ndarray  # (s,) whether damping couples no two free modes
-    slow: np.ndarray  # (s, p, 3): pairs left out (j, k, kind); kind SUM, DIFFERENCE or ALONE
+    slow: np.ndarray  # (s, p, 3): pairs left out (j, k, kind), SUM, DIFFERENCE or ALONE; then modes (j, 0, CALM)
     slow_loss: np.ndarray  # (s, p) complex: viscous power of such a pair
     slow_dashpot: np.ndarray  # (s, p) complex: power in the dashpots
     slow_square: np.ndarray  # (s, p) complex: its share of the squared response
     slow_count: np.ndarray  # (s,)
-    calm: np.ndarray  # (s, m) whether a mode itself hardly changes over a period; place 0: whether any does
 
 
 def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
     """Room for `capacity` subsystems, none of them filled (modes 0)."""
     n, b, r = len(rows.stiffness), len(rows.mass), len(rows.delassus)
     m = 2 * n + 1 + 2 * b * bool(np.isfinite(rows.spring[rows.friction_rows :]).any())
-    pairs = m * (m + 2)
+    pairs = m * (m + 3)
     z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
     return Flows(
@@ -105,7 +107,7 @@ def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
         f(b, b), z(b, m), z(m), f(m), f(m), z(m), np.zeros(capacity, np.int64), z(m),
         z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
         np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 3), np.int64),
-        z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64), np.zeros((capacity, m), np.bool_),
+        z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
     )  # fmt: skip
 
 
@@ -328,10 +330,10 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
         form[s, :m, :m] = _real_form(*integral)
     flows.damped[s] = rows.dashpot[sprung].any()
     flows.uncoupled[s] = rows.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + 1
-    # such modes swing far out where they are quick to cross: the square of their sum is taken at once
+    # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
+    # is taken at once (coupling.ledger)
     calm = np.abs(rate) * rows.period < SLOW / 2
     products[2] = [np.where(np.outer(calm, calm), 0, product) for product in products[2]]
-    flows.calm[s, :m], flows.calm[s, 0] = calm, calm.any()
     listed = [(j, k, kind) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
     count = len(listed)
     for i, (j, k, kind) in enumerate(listed):
@@ -339,8 +341,9 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
         for form, product in zip(forms[1], products, strict=True):
             form[s, i] = half * product[kind][j, k]
     listed += [(j, 0, ALONE) for j in np.flatnonzero(slow_alone)]
-    flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 3)
     flows.slow_square[s, count : len(listed)] = 2 * np.where(calm, 0, response)[slow_alone]
+    listed += [(j, 0, CALM) for j in np.flatnonzero(calm)]
+    flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 3)
     flows.slow_count[s] = len(listed)
 
 

@@ -7,7 +7,7 @@ import math
 from coupling.compiled import inlined, kernel
 from coupling.events import exp_minus_line, exp_minus_one, secular
 from coupling.peaks import highest
-from coupling.state import ALONE, AWAKE, CONTACT, DIFFERENCE, EXCITATION, FLOW, PERIOD, VISCOUS
+from coupling.state import ALONE, AWAKE, CALM, CONTACT, DIFFERENCE, EXCITATION, FLOW, PERIOD, VISCOUS
 
 #: of the series for products with driven modes: what is left out is below 1e-16
 _TERMS = 11
@@ -29,9 +29,10 @@ def account(rows, flows, st, rec, work, tau):
         _dashpots(flows, st, work, s)
     _with_excitation(rows, flows, st, rec, work, s, period, tau, constant)
     for i in range(flows.slow_count[s]):
+        if flows.slow[s, i, 2] == CALM:
+            rec.square[period] += _calm_square(flows, st, s, i, tau, constant)
+            break
         _slow_pair(flows, st, rec, s, period, i, tau, constant)
-    if flows.calm[s, 0]:
-        rec.square[period] += _calm_square(flows, st, s, tau, constant)
     rec.peak[period] = highest(rows, flows, st, work, s, tau, constant, rec.peak[period])
     if rec.samples.shape[0] > 0:
         _sample(rows, flows, st, rec, s, tau, constant)
@@ -194,29 +195,28 @@ def _slow_pair(flows, st, rec, s, period, i, tau, constant):
 
 
 @kernel
-def _calm_square(flows, st, s, tau, constant):
+def _calm_square(flows, st, s, first, tau, constant):
     """Integral of (constant + x)^2 - constant^2 over [0, tau], x of modes with |rate tau| < 0.005: by Taylor series.
 
     A slow mode that crosses quickly swings out to speed / frequency: in products of amplitudes its place would be lost.
     """
     x0, x1, x2, x3, x4, x5, x6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for a in range(1, st.counters[AWAKE]):
-        j = st.awake[a]
-        if flows.calm[s, j]:
-            z, part = flows.eigenvalue[s, j] * tau, flows.response[s, j] * st.amplitude[j]
-            x0 += part.real
-            part *= z
-            x1 += part.real
-            part *= z * (1 / 2)
-            x2 += part.real
-            part *= z * (1 / 3)
-            x3 += part.real
-            part *= z * (1 / 4)
-            x4 += part.real
-            part *= z * (1 / 5)
-            x5 += part.real
-            part *= z * (1 / 6)
-            x6 += part.real
+    for i in range(first, flows.slow_count[s]):
+        j = flows.slow[s, i, 0]
+        z, part = flows.eigenvalue[s, j] * tau, flows.response[s, j] * st.amplitude[j]
+        x0 += part.real
+        part *= z
+        x1 += part.real
+        part *= z * (1 / 2)
+        x2 += part.real
+        part *= z * (1 / 3)
+        x3 += part.real
+        part *= z * (1 / 4)
+        x4 += part.real
+        part *= z * (1 / 5)
+        x5 += part.real
+        part *= z * (1 / 6)
+        x6 += part.real
     series, total = (x0, x1, x2, x3, x4, x5, x6), 0.0
     for i in range(7):
         total += 2.0 * constant * series[i] / (i + 1.0)

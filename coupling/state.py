@@ -29,7 +29,7 @@ CLOSES, OPENS, RECLOSES = np.arange(10, 13)
 
 # a pair of modes whose product hardly changes over a period: what vanishes is the sum of their eigenvalues, the same
 # with one conjugate, or one alone
-SUM, DIFFERENCE, ALONE = range(3)
+SUM, DIFFERENCE, ALONE, CALM = range(4)
 
 # what is known of an event function: a bound of its second derivative; expansions; `safe` is its first root
 BOUNDED, EXPANDED, ROOT = range(3)
