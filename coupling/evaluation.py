@@ -167,7 +167,8 @@ def _attached(
     rows: Rows, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
 ) -> float | None:
     """Share of the bodies' mass that the structure feels: Re(F / (omega^2 X)) / sum m, F all contact forces on it."""
-    if not len(rows.mass) or abs(harmonic) == 0 or len(section) <= first + 1:
+    # a structure that does not move feels no mass: its harmonic is 0, or what damping has left of the start
+    if not len(rows.mass) or abs(harmonic) <= np.sqrt(np.finfo(float).tiny) or len(section) <= first + 1:
         return None
     change = section[-1, 2] - section[first, 2]
     on_bodies = 2 / span * (change + 1j * rows.omega * momentum) - rows.inertia.sum()

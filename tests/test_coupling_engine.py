@@ -137,6 +137,14 @@ def test_undamped_structure_is_its_receptance():
     assert response.attached_mass_fraction is None
 
 
+def test_a_structure_at_rest_feels_no_mass():
+    """What damping has left of the start is less than the smallest number that holds all digits."""
+    decay = cluster(excitation={"frequency": 2414.0}, initial={"displacement": 1e-7})
+    response = simulate(decay.replace({"structure.damping_ratio": 0.2, "time.transient": 580, "time.periods": 585}))
+    assert response.status is Status.OK
+    assert response.attached_mass_fraction is None
+
+
 def test_free_decay_is_closed_form():
     """Free vibration from an initial displacement, no force: x = x0 exp(-z w t) (cos + z/sqrt(1-z^2) sin)."""
     data = scene(
