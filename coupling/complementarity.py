@@ -131,9 +131,12 @@ def _respond(problem, k, i, way):
     for p in range(count):
         df[problem.free[p]] = -way * problem.solution[p]
     for j in range(k):
-        da[j] = 0.0
+        da[j], size = 0.0, 0.0
         for l in range(k):
             da[j] += problem.matrix[j, l] * df[l]
+            size += abs(problem.matrix[j, l] * df[l])
+        if abs(da[j]) <= _ROUND_OFF * size:
+            da[j] = 0.0  # a row that FREE rows hold: it would come in and go out for ever
     for p in range(count):
         da[problem.free[p]] = 0.0
     if da[i] * way <= _DEPENDENCE * problem.matrix[i, i]:

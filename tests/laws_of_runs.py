@@ -161,7 +161,7 @@ def _part(part: tuple[str, int, int]) -> Worst | str:
     try:
         return laws_of(*part)
     except Exception as error:  # the other parts go on
-        return f"{part[0]} {part[1]}: {error}".splitlines()[0]
+        return f"{part[0]} {part[1]}: {str(error).splitlines()[:1] or type(error).__name__}"
 
 
 def main(parts: int = 14, examples: int = 250, first: int = 0) -> int:

@@ -104,3 +104,17 @@ def test_chain_with_friction_and_wall_is_redundant_and_at_rest():
     assert a == pytest.approx(np.zeros(2 * bodies), abs=1e-9)
     assert jacobian.T @ f == pytest.approx(-push)
     assert np.all(f >= lo - 1e-12) and np.all(f <= hi + 1e-12)
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_a_body_without_load_at_a_wall_that_friction_holds(seed):
+    """Two rows of friction lock a structure of two modes, bodies ride on it: one touches its wall without a force."""
+    rng = np.random.default_rng(seed)
+    rows = np.zeros((4, 4))
+    rows[1:, :2] = rng.normal(size=(3, 2))
+    rows[0, :2] = -rows[2, :2]
+    rows[[0, 1], [2, 3]] = 1 / np.sqrt(rng.uniform(0.01, 0.1, size=2))
+    b = rows[:, :2] @ rng.normal(size=2)
+    hi = np.array([np.inf, 1e-2 * rng.uniform(), 1e9, 1e9])
+    _, a, _ = solve(rows @ rows.T, b, np.r_[0.0, -hi[1:]], hi)
+    assert a[[0, 2, 3]] == pytest.approx(0.0, abs=1e-11 * np.abs(b).max())

@@ -52,7 +52,7 @@ def impacts(response):
 
 
 def hair(scene):
-    """The scene with its bodies, its structure and its excitation a hair elsewhere, and collisions that lose a hair more.
+    """The scene with bodies, structure and excitation a hair elsewhere, and collisions that lose a hair more.
 
     Where all come to rest together the start is forgotten: what differs later begins in the collisions after it.
     """

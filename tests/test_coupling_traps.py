@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from random_scenes import random_reduced, random_scene
 from stepping import Stepper
+from worlds import scene_of
 
 from coupling import state as st
 from coupling.engine import simulate
@@ -683,3 +684,25 @@ def test_a_jenkins_element_whose_point_is_held(force, tmp_path):
     )
     assert response.status == Status.OK
     assert response.energy_residual < 1e-10
+
+
+def test_a_body_at_a_wall_of_a_structure_that_friction_holds():
+    """Two friction dampers lock a structure of two modes under a body that touches its wall without a force.
+
+    The wall's acceleration is then round-off: the wall would come in and go out of the decision for ever.
+    """
+    data = {
+        "structure": {"model": "rom", "drawn": (2, 8)},
+        "excitation": {"frequency": 0.143, "force": 0.0154, "at": "one"},
+        "gravity": {"acceleration": 1.0},
+        "cavity": [{"name": "c", "gap": 0.539, "left": "left", "right": "right", "floor": "floor"}],
+        "damper": [{"cavity": "c", "mass": 0.0678, "restitution": 0.0, "position": 0.045, "velocity": -0.0152}],
+        "friction_damper": [
+            {"normal_force": 0.0342, "friction": 0.676, "at": "left"},
+            {"normal_force": 0.117, "friction": 0.2, "at": "one"},
+        ],
+        "time": {"periods": 3, "transient": 0},
+    }
+    drawn = scene_of(data)
+    for force in np.linspace(0.01, 0.02, 60):
+        assert simulate(drawn.replace({"excitation.force": force})).status == Status.OK
