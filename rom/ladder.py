@@ -185,11 +185,15 @@ def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
 
 
 def grid(model: ReducedModel, low_hz: float, high_hz: float, points: int = 17) -> np.ndarray:
-    """Frequencies over a range, with the resonances inside and the edges of their half-power band."""
-    natural = model.natural_frequencies_hz
-    inside = natural[(natural >= low_hz) & (natural <= high_hz)]
+    """Frequencies over a range, with the resonances inside that have a height, and the edges of their half-power band."""
+    natural, shapes = model.natural_frequencies_hz, model.natural[1]
+    losses = np.einsum("ij,ik,kj->j", shapes, model.damping, shapes)
+    within = (natural >= low_hz) & (natural <= high_hz)
     width = model.damping_ratio or 1e-3
-    near = np.concatenate([inside * factor for factor in (1.0 - width, 1.0, 1.0 + width)])
+    # a mode without damping has no receptance at its own frequency
+    near = np.concatenate(
+        [natural[within] * (1.0 - width), natural[within & (losses > 0.0)], natural[within] * (1.0 + width)]
+    )
     return np.unique(np.concatenate([np.linspace(low_hz, high_hz, points), near]))
 
 

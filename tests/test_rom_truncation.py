@@ -9,6 +9,7 @@ from structures import rod, truss
 
 from rom import checks, ladder
 from rom.interface import Interface, InterfaceCoordinate
+from rom.reduced import ReducedModel
 from rom.reduction import BASES, reduce
 from rom.truncation import basis_ladder, basis_model, rich_model
 
@@ -106,3 +107,11 @@ def test_natural_ladder_ends_at_the_whole_model():
     gains = row**2 / (squares - (w := 2 * np.pi * frequencies[:, None]) ** 2 + 0.02j * w * np.sqrt(squares))
     assert rungs[0].receptance == pytest.approx(np.abs(gains[:, 1:].sum(1) / gains.sum(1)).max(), rel=1e-8)
     assert ladder.rigid_errors(whole, frequencies, "a", ["a"]).max() == pytest.approx(rungs[0].receptance, rel=1e-8)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.01])
+def test_frequencies_of_comparison_hold_resonances_that_have_a_height(ratio):
+    """Without damping the receptance has no value at a natural frequency, or one that round-off makes."""
+    model = ReducedModel.from_matrices(np.eye(2), np.diag([1.0, 9.0]), {"tip": [1.0, 1.0]}, damping_ratio=ratio)
+    found = np.isin(model.natural_frequencies_hz, ladder.grid(model, 0.01, 1.0))
+    assert np.all(found == (ratio > 0.0))
