@@ -140,7 +140,9 @@ class Gravity:
         else:
             down = np.array(self.direction) / np.linalg.norm(self.direction)
             along, across = float(down @ cavity), float(np.linalg.norm(np.cross(down, cavity)))
-        return self.acceleration * along, self.acceleration * across if abs(across) > 1e-15 else 0.0  # upright is upright
+        if abs(across) < 1e-15:  # upright is upright
+            across = 0.0
+        return self.acceleration * along, self.acceleration * across
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from coupling.cavities import check_known, check_surfaces
 from coupling.inputs import InputError
 from coupling.model_file import file_stamp, reduced_model
 from coupling.scene import Prescribed, Rigid, Rom, Scene
@@ -29,11 +30,11 @@ class LinearStructure:
 
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); response: (n,) functional of the response;
     floor, left, right: (cavities, n) functionals of the cavities' surfaces; casing: (friction dampers, n) functionals
-    of what rubs on the casing; force: (n,) complex modal load and base_acceleration: (cavities,) complex acceleration of
-    the base along each cavity, both amplitudes of exp(i omega t); gravity: (cavities, 2) along and across each cavity,
-    m/s^2; displacement and velocity: (n,) initial state; table: complex displacement amplitude of the base that counts
-    as response (prescribed motion); physical: displacement per modal coordinate of a rigid structure, whatever its
-    mass; 1 for others.
+    of what rubs on the casing; force: (n,) complex modal load and base_acceleration: (cavities,) complex acceleration
+    of the base along each cavity, both amplitudes of exp(i omega t); gravity: (cavities, 2) along and across each
+    cavity, m/s^2; displacement and velocity: (n,) initial state; table: complex displacement amplitude of the base that
+    counts as response (prescribed motion); physical: displacement per modal coordinate of a rigid structure, whatever
+    its mass; 1 for others.
     """
 
     omega: float
@@ -63,7 +64,7 @@ class LinearStructure:
 class _ModalBasis:
     """Modes of a structure without bodies: squared frequencies, damping; load (n, 3) of a base acceleration.
 
-    By label: functionals, directions (zeros: unknown), residual flexibility.
+    By label: functionals, directions and normals (zeros: unknown), residual flexibility.
     """
 
     stiffness: np.ndarray
@@ -71,6 +72,7 @@ class _ModalBasis:
     base: np.ndarray
     rows: dict[str, np.ndarray]
     directions: dict[str, np.ndarray]
+    normals: dict[str, np.ndarray]
     flexibility: dict[str, float]
 
 
@@ -91,12 +93,14 @@ def linear_structure(scene: Scene) -> LinearStructure:
     at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
     response = _row(basis, at, "excitation.at")
     surfaces = np.array([_surfaces(basis, scene, index) for index in range(cavities)])
+    if isinstance(scene.structure, Rom):
+        _check_directions(basis, scene)
     left, right, floor = surfaces.reshape(cavities, 3, len(response)).swapaxes(0, 1)
     casing = [
         _row(basis, damper.at or at, f"friction_damper[{i}].at") if isinstance(scene.structure, Rom) else response
         for i, damper in enumerate(scene.friction_damper)
     ]
-    along = _directions(basis, scene)
+    along = np.reshape([basis.directions[label] for label in _floors(scene)], (-1, 3))
     base = -1j * (scene.excitation.base_acceleration or 0.0) * basis.directions[str(at)]
     force = -1j * response * _force_amplitude(scene, basis, response) - basis.base @ base
     # the initial state belongs to the rigid model, whose single mode has the functional `response`
@@ -203,38 +207,20 @@ def _gravity(scene: Scene, along: np.ndarray) -> np.ndarray:
     return np.reshape([scene.gravity.components(direction) for direction in along], (len(along), 2))
 
 
-def _directions(basis: _ModalBasis, scene: Scene) -> np.ndarray:
-    """(cavities, 3) directions of the cavities: those of their floors; zeros where unknown.
-
-    Raises InputError where base acceleration or gravity need what the reduced model does not know.
-    """
-    if isinstance(scene.structure, Rigid):
-        return np.tile(basis.directions["structure"], (len(scene.cavity), 1))
-    excitation, gravity = scene.excitation, scene.gravity
-    wanted = []
-    if excitation.base_acceleration:
-        wanted = ["excitation.base_acceleration"]
-        if not basis.base.any():
-            raise InputError(
-                f"{wanted[0]}: the reduced model does not say how a base loads it (base_load is zero); give it, or a force"
-            )
-        _check_known(basis, excitation.at, "excitation.at", wanted[0])
-    if gravity.direction is not None and gravity.acceleration:
-        wanted.append("gravity.direction")
-    floors = [cavity.labels()[2] for cavity in scene.cavity]
-    used = {damper.cavity for damper in scene.damper}
-    for index, (cavity, floor) in enumerate(zip(scene.cavity, floors, strict=True)):
-        if wanted and cavity.name in used:
-            _check_known(basis, floor, f"cavity[{index}].floor", wanted[0])
-    return np.reshape([basis.directions[str(floor)] for floor in floors], (-1, 3))
+def _floors(scene: Scene) -> list[str]:
+    """The floors' labels."""
+    rom = isinstance(scene.structure, Rom)
+    return [str(cavity.labels()[2]) if rom else "structure" for cavity in scene.cavity]
 
 
-def _check_known(basis: _ModalBasis, label: str | None, key: str, reason: str) -> None:
-    if not basis.directions[str(label)].any():
+def _check_directions(basis: _ModalBasis, scene: Scene) -> None:
+    if scene.excitation.base_acceleration and not basis.base.any():
         raise InputError(
-            f"{key}: the reduced model knows no direction of '{label}', which {reason} needs; give the interface "
-            "coordinate a direction and reduce or import again"
+            "excitation.base_acceleration: the reduced model does not say how a base loads it (its base_load is zero); "
+            "give it one, or excite by a force"
         )
+    check_known(scene, basis.directions)
+    check_surfaces(scene.cavity, basis.directions, basis.normals)
 
 
 def _surfaces(basis: _ModalBasis, scene: Scene, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -259,7 +245,7 @@ def _basis(scene: Scene) -> _ModalBasis:
         root, axis = np.sqrt(structure.mass), frozen([1.0, 0.0, 0.0])
         return _ModalBasis(
             frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
-            frozen([root * axis]), {"structure": frozen([1 / root])}, {"structure": axis}, {},
+            frozen([root * axis]), {"structure": frozen([1 / root])}, {"structure": axis}, {}, {},
         )  # fmt: skip
     assert isinstance(structure, Rom)
     return _rom_basis(structure, file_stamp(structure.file))
@@ -295,8 +281,10 @@ def modal_basis(model: ReducedModel) -> _ModalBasis:
         damping = np.diag(np.diag(damping))
     rows = {label: frozen(model.row(label) @ shapes) for label in model.interface}
     directions = dict(zip(model.interface, model.directions, strict=True))
+    unknown = np.zeros((len(model.interface), 3))
+    normals = dict(zip(model.interface, unknown if model.normals is None else model.normals, strict=True))
     residual = model.residual_flexibility
     own = np.zeros(len(model.interface)) if residual is None else np.diag(residual)
     flexibility = dict(zip(model.interface, own.tolist(), strict=True))
     base = frozen(shapes.T @ model.base_load)
-    return _ModalBasis(frozen(squares), frozen(damping), base, rows, directions, flexibility)
+    return _ModalBasis(frozen(squares), frozen(damping), base, rows, directions, normals, flexibility)

@@ -31,6 +31,8 @@ def checked(model: ReducedModel) -> dict[str, Any]:
     for name, shape in {"selection": (count, size), "directions": (count, 3), "base_load": (size, 3)}.items():
         values[name] = shaped(name, getattr(model, name), shape)
     values["directions"] = _unit(values["directions"])
+    if model.normals is not None:
+        values["normals"] = shaped("normals", model.normals, (count, 3))
     if model.residual_flexibility is not None:
         values["residual_flexibility"] = symmetric("residual_flexibility", model.residual_flexibility, count)
     if model.outputs:
