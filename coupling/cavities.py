@@ -90,4 +90,4 @@ def _angle(first: np.ndarray, second: np.ndarray) -> float:
 
 
 def _shown(vector: np.ndarray) -> str:
-    return "[" + ", ".join(f"{value + 0.0:.3g}" for value in vector) + "]"
+    return "[" + ", ".join(f"{round(value, 3) + 0.0:g}" for value in vector) + "]"

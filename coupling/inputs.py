@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
+from pydantic import BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 T = TypeVar("T")
 
@@ -26,14 +26,14 @@ NonNegative = Annotated[Real, Field(ge=0)]
 Fraction = Annotated[Real, Field(ge=0, le=1)]
 
 
-def _not_zero(direction: tuple[float, float, float]) -> tuple[float, float, float]:
-    if not any(direction):
+def _three(direction: Any) -> Any:
+    if not isinstance(direction, list | tuple) or len(direction) != 3 or not any(direction):
         raise ValueError("expected three numbers, not all zero, such as [0, 1, 0]")
     return direction
 
 
 #: a direction in space, of any length but zero
-Direction = Annotated[tuple[Real, Real, Real], AfterValidator(_not_zero)]
+Direction = Annotated[tuple[Real, Real, Real], BeforeValidator(_three)]
 
 
 class InputError(ValueError):

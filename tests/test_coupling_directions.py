@@ -5,15 +5,21 @@ cosine of both. Closed forms; events of two methods against each other.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from coupling.engine import simulate
 from coupling.inputs import InputError, validate
 from coupling.scene import Gravity, Scene
 from coupling.sweep import sweep
+from meshes.vane_cluster import SHIPPED
+from modal.matrices import Patch, SystemMatrices
 from rom.reduced import ReducedModel
+from studies.config import Case, InterfaceTable
+from studies.pipeline import assemble, interface, reduction
 
 OMEGA = 2 * math.pi
 MASS = 1.0
@@ -159,3 +165,128 @@ def test_directions_of_a_model_have_length_one():
     model = ReducedModel.from_matrices([[1.0]], [[1.0]], {"a": [1.0], "b": [1.0]}, damping_ratio=0.0,
                                        directions={"a": (0.0, 3.0, 4.0)})  # fmt: skip
     np.testing.assert_allclose(model.directions, [[0.0, 0.6, 0.8], [0.0, 0.0, 0.0]], atol=1e-15)
+
+
+def cavity(path, directions=None, normals=None, **labels):
+    """A scene with one cavity along y, whose walls and floor are coordinates of their own on the oscillator."""
+    axes = {"left": (0, 1, 0), "right": (0, 1, 0), "floor": (0, 1, 0), "y": (0, 1, 0)} | (directions or {})
+    faces = {"left": (0, 1, 0), "right": (0, -1, 0), "floor": (0, 0, 1), "y": (0, 0, 0)} | (normals or {})
+    model = ReducedModel.from_matrices(
+        [[1.0]], [[1.2 * OMEGA**2]], {label: [1.0] for label in axes}, damping_ratio=0.02, directions=axes,
+        normals=np.array(list(faces.values()), float),
+    )  # fmt: skip
+    model.save(path)
+    labels = labels or {"left": "left", "right": "right", "floor": "floor"}
+    return shaken(
+        str(path), [{}], gap=1.0, excitation={"frequency": 1.0, "force": 1.0, "at": "y"},
+        cavity=[{"name": "c0", "gap": 1.0} | labels],
+    )  # fmt: skip
+
+
+def tilted(degrees):
+    """Unit direction in the plane of x and y, from y."""
+    return (math.sin(math.radians(degrees)), math.cos(math.radians(degrees)), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("directions", "normals", "labels", "message"),
+    [
+        ({"right": (0, -1, 0)}, {}, {}, r"cavity\[0\].right: 'right' points against 'left', \[0, -1, 0\] and"),
+        ({"right": tilted(30)}, {}, {}, r"cavity\[0\].right: 'right' points at 30 degrees to 'left'"),
+        ({"left": tilted(9), "right": tilted(9)}, {}, {}, r"cavity\[0\].left: 'left' points at 9 degrees to 'floor'"),
+        (
+            dict.fromkeys(("left", "right", "floor"), (1, 0, 0)), {}, {},
+            r"cavity\[0\].left: 'left' has a direction \[1, 0, 0\] at 90 degrees .* the direction \[0, 1, 0\]",
+        ),
+        (
+            {}, {}, {"left": "right", "right": "left", "floor": "floor"},
+            r"cavity\[0\].left: along its direction \[0, 1, 0\] 'right' is the wall at the other end .*: swap",
+        ),
+        ({}, {"right": (0, 1, 0)}, {"left": "left", "right": "right"}, r"cavity\[0\].right: along its direction"),
+    ],
+)  # fmt: skip
+def test_walls_that_do_not_fit_their_cavity_are_refused(directions, normals, labels, message, tmp_path):
+    with pytest.raises(InputError, match=message):
+        simulate(cavity(tmp_path / "rom.h5", directions, normals, **labels))
+
+
+@pytest.mark.parametrize(
+    ("directions", "normals", "labels"),
+    [
+        ({}, {}, {}),
+        ({"right": tilted(3)}, {"right": tilted(183)}, {}),  # a wedge
+        ({}, dict.fromkeys(("left", "right", "floor"), (0, 0, 0)), {}),  # no facets are known
+        ({"right": (0, 0, 0)}, {}, {}),  # no direction is known
+        ({}, {}, {"floor": "floor"}),  # one surface stands for all
+        ({}, {}, {"left": "right"}),
+    ],
+)
+def test_walls_that_fit_or_are_not_known_run(directions, normals, labels, tmp_path):
+    assert simulate(cavity(tmp_path / "rom.h5", directions, normals, **labels)).status == "ok"
+
+
+CASE = f"""
+[mesh]
+file = "{SHIPPED}"
+degree = 1
+[material.default]
+young = 2e11
+poisson = 0.3
+density = 8190.0
+damping_ratio = 0.002
+[support]
+clamped = ["clamp"]
+"""
+
+
+def reduced(folder, **directions):
+    """File of the shipped cluster's reduced model with coordinates of these directions, by facet group."""
+    tables = "".join(f'[interface.{name}]\nfacets = "{name}"\ndirection = {way}\n' for name, way in directions.items())
+    path = folder / "case.toml"
+    path.write_text(CASE + tables)
+    model = reduction(assemble(Case.load(path)), 3, "craig-bampton", 0.01)
+    model.save(folder / "rom.h5")
+    return model
+
+
+def test_walls_of_the_cluster_along_their_normals(tmp_path):
+    """Both walls have the direction of y, whichever way they face, and so run; the record keeps their normals."""
+    model = reduced(tmp_path, shroud=[0, 1, 0], c1_left='"normal"', c1_right='"normal"', c1_floor=[0, 2, 0])
+    np.testing.assert_allclose(model.directions, [[0, 1, 0]] * 4, atol=1e-12)
+    again = ReducedModel.load(tmp_path / "rom.h5")
+    np.testing.assert_allclose(again.normals, [[0, 0, -1], [0, 1, 0], [0, -1, 0], [0, 0, 1]], atol=1e-12)
+    assert simulate(on_cluster(tmp_path)).status == "ok"
+
+
+def test_an_outward_normal_of_the_cluster_is_refused(tmp_path):
+    reduced(tmp_path, shroud=[0, 1, 0], c1_left=[0, 1, 0], c1_right=[0, -1, 0], c1_floor=[0, 1, 0])
+    with pytest.raises(InputError, match=r"cavity\[0\].right: 'c1_right' points against 'c1_left'"):
+        simulate(on_cluster(tmp_path))
+
+
+def test_a_direction_along_the_walls_of_the_cluster_is_refused(tmp_path):
+    reduced(tmp_path, shroud=[0, 1, 0], c1_left=[1, 0, 0], c1_right=[1, 0, 0], c1_floor=[1, 0, 0])
+    with pytest.raises(InputError, match=r"cavity\[0\].left: 'c1_left' has a direction .* \[0, 1, 0\]"):
+        simulate(on_cluster(tmp_path))
+
+
+def on_cluster(folder):
+    return shaken(
+        str(folder / "rom.h5"), [{"mass": 0.003}],
+        excitation={"frequency": 2450.0, "resonance_amplitude": 3e-5, "at": "shroud"},
+        cavity=[{"name": "c0", "gap": 3e-5, "left": "c1_left", "right": "c1_right", "floor": "c1_floor"}],
+        contact={"law": "compliant", "stiffness": 1e8},
+    )  # fmt: skip
+
+
+def test_a_group_without_a_normal_is_told(tmp_path):
+    with pytest.raises(InputError, match=r"^interface.all.direction: 'all' has no normal"):
+        path = tmp_path / "case.toml"
+        path.write_text(CASE)
+        interface(replace(Case.load(path), interface={"all": InterfaceTable("all", "normal")}), closed_matrices())
+
+
+def closed_matrices():
+    """Matrices of three nodes, whose patch "all" has no normal."""
+    unit = sparse.csr_array(np.eye(9))
+    return SystemMatrices(unit, unit, np.eye(3), np.array([]), {"all": Patch([0, 1, 2], [1.0, 1.0, 1.0])}, 0.0)
