@@ -368,6 +368,8 @@ def axis_values(values: Range | Sequence[Any]) -> list[Any]:
 def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
     """Change plain scene data at the end of `steps`, which stand in `path`. Raises InputError for an unknown place."""
     head, rest = steps[0], steps[1:]
+    if not isinstance(node, dict) and not (isinstance(node, list) and all(isinstance(entry, dict) for entry in node)):
+        raise InputError(f"scene: {path}: no table holds '{head}'; leave it out and give the whole value")
     if isinstance(node, list):
         entries, rest = _entries(node, head, steps, path)
         for entry in entries:
