@@ -101,6 +101,20 @@ def settled(scene: Scene, choices: Choices) -> Settled:
     return Settled(scene, estimate)
 
 
+def warnings_of(scene: Scene) -> tuple[str, ...]:
+    """What to know of a scene without open choices: that Newton's law, also the default, is on several modes."""
+    if not (isinstance(scene.structure, Rom) and isinstance(scene.contact, Newton) and scene.damper):
+        return ()
+    size = reduced_model(scene.structure).size
+    if size == 1:
+        return ()
+    return (
+        f"contact: Newton's law, the default, has no limit as modes are added, and the answer is that of {size} "
+        'coordinates; take law = "compliant" with a stiffness, residual = true or both, or one natural mode '
+        "(structure.modes = 1, natural = true)",
+    )
+
+
 def _shared(scene: Scene, structure: Rom) -> float:
     """Largest flexibility that two walls have in common which can be touched at once, relative to their own."""
     law = scene.contact

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from coupling.choice import settle
+from coupling.choice import settle, warnings_of
 from coupling.handover import Handover
 from coupling.response import Response
 from coupling.run import respond
@@ -27,4 +27,5 @@ def simulate(
     started = time.perf_counter()
     settled = settle(scene)
     response = respond(settled.scene, events, samples_per_period, start)
-    return replace(response, estimate=settled.estimate, wall_time_s=time.perf_counter() - started)
+    took = time.perf_counter() - started
+    return replace(response, estimate=settled.estimate, warnings=warnings_of(settled.scene), wall_time_s=took)

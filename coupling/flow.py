@@ -179,7 +179,7 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     flows.project[s, 1:m], flows.project_slip[s, 1:m] = project[:, structure], project[:, xi]
     flows.kick[s, :, 1:m] = rows.structure @ project[:, n + b : 2 * n + b].T
     own = full[n : n + b].copy()
-    own[free, 0] += rows.base / rows.omega**2
+    own[free, 0] -= (rows.inertia / rows.mass)[free] / rows.omega**2
     body = carrier @ full[:n] + own
     for c in np.unique(springs.cluster[free]):
         members = free & (springs.cluster == c)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coupling.choice import Choices, choices_of, is_open, settled
+from coupling.choice import Choices, choices_of, is_open, settled, warnings_of
 from coupling.inputs import InputError, nearest, validate
 from coupling.scene import Rom, Scene, assign, axis_values
 from coupling.structure import linear_structure
@@ -60,6 +60,7 @@ class Grid:
     base      the scene without its sweep
     choices   numbers of modes that suit all points, where they were left open
     estimate  of the model chosen, None where there was no choice
+    warnings  what to know of the first point's scene before figures are used
     along     the axis along which runs are linked, None if they are not
     """
 
@@ -69,6 +70,7 @@ class Grid:
     choices: Choices
     estimate: dict[str, Any] | None
     along: str | None
+    warnings: tuple[str, ...] = ()
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -136,7 +138,7 @@ def grid(scene: Scene) -> Grid:
     choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if leaves_open else {}
     start = settled(first, choices)
     linear_structure(start.scene)
-    return Grid(scene, axes, base, choices, start.estimate, along)
+    return Grid(scene, axes, base, choices, start.estimate, along, warnings_of(start.scene))
 
 
 def _telling(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:

@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
+from pydantic import BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 T = TypeVar("T")
 
@@ -24,6 +24,16 @@ Whole = Annotated[int, Strict()]
 Positive = Annotated[Real, Field(gt=0)]
 NonNegative = Annotated[Real, Field(ge=0)]
 Fraction = Annotated[Real, Field(ge=0, le=1)]
+
+
+def _three(direction: Any) -> Any:
+    if not isinstance(direction, list | tuple) or len(direction) != 3 or not any(direction):
+        raise ValueError("expected three numbers, not all zero, such as [0, 1, 0]")
+    return direction
+
+
+#: a direction in space, of any length but zero
+Direction = Annotated[tuple[Real, Real, Real], BeforeValidator(_three)]
 
 
 class InputError(ValueError):

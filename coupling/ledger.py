@@ -161,8 +161,27 @@ def _free_bodies(rows, flows, st, rec, work, s, period, tau, waves, flat):
         slope = work.bend[0].conjugate() + complex(0.0, rows.omega * tau) * work.gain[0].conjugate()
         momentum += drift / (rows.omega * rows.omega) * slope
     rec.momentum[period] += momentum
-    # the base accelerates all bodies alike
-    st.ledger[EXCITATION] += rows.inertia[0].imag / rows.mass[0] * momentum.imag
+    if rows.alike:
+        st.ledger[EXCITATION] += rows.inertia[0].imag / rows.mass[0] * momentum.imag
+    else:
+        st.ledger[EXCITATION] += _push(rows, flows, st, work, s, tau, flat)
+
+
+@kernel
+def _push(rows, flows, st, work, s, tau, flat):
+    """Work of the base on the polynomial part of the bodies' motion, in cavities of several directions."""
+    speed, drift = 0.0, 0.0
+    for b in range(len(rows.mass)):
+        drift += rows.inertia[b].imag * st.body_drift[b]
+        if flows.body_acceleration[s, b, b] != 0.0:
+            own = st.velocity[b]
+            for a in range(st.counters[AWAKE]):
+                j = st.awake[a]
+                own -= (flows.velocity[s, b, j] * st.amplitude[j]).real
+            speed += rows.inertia[b].imag * own
+    # integral of t exp(-i omega t), as in _free_bodies
+    slope = work.bend[0].conjugate() + complex(0.0, rows.omega * tau) * work.gain[0].conjugate()
+    return speed * flat.imag + drift / (rows.omega * rows.omega) * slope.imag
 
 
 @inlined

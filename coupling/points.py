@@ -143,9 +143,10 @@ def _linear(scene: Scene) -> tuple[float, float]:
     mass, load, found = np.eye(structure.modes), structure.force.copy(), []
     for dampers in ((), scene.damper):
         for damper in dampers:
-            floor = structure.floor[names.index(damper.cavity)]
+            cavity = names.index(damper.cavity)
+            floor = structure.floor[cavity]
             mass += damper.mass * np.outer(floor, floor)
-            load -= damper.mass * floor * structure.base_acceleration
+            load -= damper.mass * floor * structure.base_acceleration[cavity]
         dynamic = np.diag(structure.stiffness) + 1j * structure.omega * structure.damping - structure.omega**2 * mass
         found.append(float(abs(structure.response @ np.linalg.solve(dynamic, load) + structure.table)))
     return found[0], found[1]

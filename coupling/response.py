@@ -65,8 +65,9 @@ class Response:
     period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
     time, displacement, body_displacement: samples, empty if none were asked for; penetration: deepest overlap of bodies
     and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model
-    whose number of modes was chosen automatically (coupling.choice), None otherwise; final: the state at its end, with
-    which another run can begin, None for one that ended within a period or by another method than the exact one.
+    whose number of modes was chosen automatically (coupling.choice), None otherwise; warnings: what to know of the
+    scene before its figures are used; final: the state at its end, with which another run can begin, None for one that
+    ended within a period or by another method than the exact one.
     """
 
     status: Status
@@ -98,6 +99,7 @@ class Response:
     penetration: float = 0.0
     estimate: dict[str, Any] | None = None
     final: Handover | None = None
+    warnings: tuple[str, ...] = ()
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """The result as plain data, with the list of events if wanted."""
@@ -108,6 +110,7 @@ class Response:
             "wall_time_s", "periods", "transient", "counters", "penetration",
         )  # fmt: skip
         data: dict[str, Any] = {"status": self.status.value} | {name: getattr(self, name) for name in names}
+        data["warnings"] = list(self.warnings)
         if self.estimate is not None:
             data["estimate"] = self.estimate
         if events:

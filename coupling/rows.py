@@ -40,14 +40,14 @@ class Rows(NamedTuple):
     rides: np.ndarray  # (r,) whether a contact's gap is a difference of slips: no wall that moves apart from the floor
     floor: np.ndarray  # (b, n) floor functional under each body
     mass: np.ndarray  # (b,) kg
-    weight: np.ndarray  # (b,) gravity force along the cavity, N
+    weight: np.ndarray  # (b,) gravity force along the body's cavity, N
     stiffness: np.ndarray  # (n,)
     damping: np.ndarray  # (n, n)
     proportional: bool
     response: np.ndarray  # (n,)
     force: np.ndarray  # (n,) complex harmonic load on the modes
-    base: complex  # harmonic acceleration of the base
-    inertia: np.ndarray  # (b,) complex harmonic load on the bodies: the base's acceleration
+    alike: bool  # whether the base accelerates all bodies alike: their cavities have one angle to its motion
+    inertia: np.ndarray  # (b,) complex harmonic load on the bodies: the base's acceleration along their cavities
     table: complex
     omega: float
     period: float
@@ -83,7 +83,8 @@ def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray,
         if after[r] >= 0:
             j_bodies[r, after[r]] = 1.0
     mass = np.array([damper.mass for damper in scene.damper])
-    base = complex(structure.base_acceleration)
+    along, across = structure.gravity[owner].T
+    base = structure.base_acceleration[owner]
     elements = [contact.element for contact in contacts]
     rows = Rows(
         friction_rows=friction_rows,
@@ -91,7 +92,7 @@ def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray,
         bodies=j_bodies,
         delassus=j_structure @ j_structure.T + (j_bodies / mass) @ j_bodies.T,
         limit=np.array(
-            [_friction_force(scene, i) for i in range(bodies)]
+            [_friction_force(scene, i, across[i]) for i in range(bodies)]
             + [_coefficient(damper.friction) * damper.normal_force for damper in scene.friction_damper]
         ),
         spring=np.array(
@@ -107,13 +108,13 @@ def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray,
         rides=np.array([_rides(j_structure, j_bodies, friction_rows, r) for r in range(len(j_bodies))], np.bool_),
         floor=floor,
         mass=mass,
-        weight=mass * scene.gravity.tangential,
+        weight=mass * along,
         stiffness=np.array(structure.stiffness),
         damping=np.array(structure.damping),
         proportional=bool(np.count_nonzero(structure.damping - np.diag(np.diag(structure.damping))) == 0),
         response=np.array(structure.response),
         force=np.array(structure.force, complex),
-        base=base,
+        alike=bool(np.all(base == base[:1])),
         inertia=-mass * base + 0j,
         table=complex(structure.table),
         omega=structure.omega,
@@ -183,9 +184,9 @@ def _rides(structure: np.ndarray, bodies: np.ndarray, friction_rows: int, r: int
     return r >= friction_rows and np.allclose(structure[r], bodies[r] @ slips, rtol=1e-14, atol=0)
 
 
-def _friction_force(scene: Scene, index: int) -> float:
+def _friction_force(scene: Scene, index: int, gravity: float) -> float:
     damper = scene.damper[index]
-    normal = damper.mass * scene.gravity.normal if damper.normal_load is None else damper.normal_load
+    normal = damper.mass * gravity if damper.normal_load is None else damper.normal_load
     return _coefficient(damper.friction) * max(normal, 0.0)
 
 

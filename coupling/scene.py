@@ -15,6 +15,7 @@ from pydantic.dataclasses import dataclass
 
 from coupling.inputs import (
     STRICT,
+    Direction,
     Fraction,
     InputError,
     NonNegative,
@@ -96,7 +97,7 @@ class Excitation:
     """Harmonic excitation at `frequency` (Hz): one of force (N), base_acceleration (m/s^2), resonance_amplitude (m).
 
     resonance_amplitude is the displacement to which the force brings the resonance of the structure without bodies.
-    `at` is the interface label of force and response on a reduced model.
+    `at` is the interface label of force and response on a reduced model; the base moves in its direction.
     """
 
     frequency: Positive
@@ -113,21 +114,35 @@ class Excitation:
 
 @dataclass(frozen=True, config=STRICT)
 class Gravity:
-    """Gravity: 0 degrees presses the bodies on the floor, 90 degrees pulls them along the cavity to its left wall."""
+    """Gravity, by its angle to all cavities, or by its `direction` in space (of any length), which a reduced model's
+    cavities have too.
+
+    orientation_deg: 0 presses the bodies on the floor, 90 pulls them along the cavity to its left wall.
+    """
 
     acceleration: NonNegative = 9.81
     orientation_deg: Real = 0.0
+    direction: Direction | None = None
 
-    @property
-    def normal(self) -> float:
-        """Acceleration across the cavity, pressing on its floor (m/s^2)."""
-        cosine = math.cos(math.radians(self.orientation_deg))
-        return self.acceleration * cosine if abs(cosine) > 1e-15 else 0.0  # upright is upright
+    def __post_init__(self) -> None:
+        if self.direction is not None and self.orientation_deg != 0.0:
+            raise ValueError("give one of orientation_deg and direction")
 
-    @property
-    def tangential(self) -> float:
-        """Acceleration along the cavity, positive to the right (m/s^2)."""
-        return -self.acceleration * math.sin(math.radians(self.orientation_deg))
+    def components(self, cavity: np.ndarray) -> tuple[float, float]:
+        """Acceleration (m/s^2) along a cavity, positive to the right, and across it, pressing on its floor.
+
+        cavity: (3,) unit vector from its left wall to its right one; without meaning for gravity by an angle. What
+        gravity by a direction presses a body on is floor, whichever side that is.
+        """
+        if self.direction is None:
+            angle = math.radians(self.orientation_deg)
+            along, across = -math.sin(angle), math.cos(angle)
+        else:
+            down = np.array(self.direction) / np.linalg.norm(self.direction)
+            along, across = float(down @ cavity), float(np.linalg.norm(np.cross(down, cavity)))
+        if abs(across) < 1e-15:  # upright is upright
+            across = 0.0
+        return self.acceleration * along, self.acceleration * across
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -258,11 +273,9 @@ class Scene:
         self._check_structure()
 
     def _check_load(self, index: int, damper: Damper) -> None:
-        if (
-            damper.normal_load is None
-            and damper.friction > 0
-            and self.gravity.normal < -1e-12 * self.gravity.acceleration
-        ):
+        if damper.normal_load is not None or damper.friction == 0 or self.gravity.direction is not None:
+            return
+        if math.cos(math.radians(self.gravity.orientation_deg)) < -1e-12 and self.gravity.acceleration > 0:
             raise ValueError(
                 f"damper[{index}]: gravity lifts the body off the floor at gravity.orientation_deg = "
                 f"{self.gravity.orientation_deg:g}; give normal_load or turn it to -90..90"
@@ -292,6 +305,11 @@ class Scene:
                     raise ValueError(f"cavity[{index}].floor: name an interface label of the reduced model")
             if self.initial != Initial():
                 raise ValueError("initial: an initial state is for rigid structures; a reduced model starts at rest")
+        elif self.gravity.direction is not None:
+            raise ValueError(
+                "gravity.direction: a direction in space is for a reduced model, whose interface has directions; "
+                "give orientation_deg"
+            )
         elif isinstance(self.contact, Massless) or (isinstance(self.contact, Compliant) and self.contact.residual):
             raise ValueError(
                 'contact: the residual flexibility is that of a reduced model; take structure.model = "rom"'
@@ -350,6 +368,8 @@ def axis_values(values: Range | Sequence[Any]) -> list[Any]:
 def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
     """Change plain scene data at the end of `steps`, which stand in `path`. Raises InputError for an unknown place."""
     head, rest = steps[0], steps[1:]
+    if not isinstance(node, dict) and not (isinstance(node, list) and all(isinstance(entry, dict) for entry in node)):
+        raise InputError(f"scene: {path}: no table holds '{head}'; leave it out and give the whole value")
     if isinstance(node, list):
         entries, rest = _entries(node, head, steps, path)
         for entry in entries:

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from coupling.cavities import check_known, check_surfaces
 from coupling.inputs import InputError
 from coupling.model_file import file_stamp, reduced_model
 from coupling.scene import Prescribed, Rigid, Rom, Scene
@@ -29,10 +30,11 @@ class LinearStructure:
 
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); response: (n,) functional of the response;
     floor, left, right: (cavities, n) functionals of the cavities' surfaces; casing: (friction dampers, n) functionals
-    of what rubs on the casing; force: (n,) complex modal load and base_acceleration: complex acceleration of the base,
-    both amplitudes of exp(i omega t); displacement and velocity: (n,) initial state; table: complex displacement
-    amplitude of the base that counts as response (prescribed motion); physical: displacement per modal coordinate of a
-    rigid structure, whatever its mass; 1 for others.
+    of what rubs on the casing; force: (n,) complex modal load and base_acceleration: (cavities,) complex acceleration
+    of the base along each cavity, both amplitudes of exp(i omega t); gravity: (cavities, 2) along and across each
+    cavity, m/s^2; displacement and velocity: (n,) initial state; table: complex displacement amplitude of the base that
+    counts as response (prescribed motion); physical: displacement per modal coordinate of a rigid structure, whatever
+    its mass; 1 for others.
     """
 
     omega: float
@@ -44,7 +46,8 @@ class LinearStructure:
     right: np.ndarray
     casing: np.ndarray
     force: np.ndarray
-    base_acceleration: complex
+    base_acceleration: np.ndarray
+    gravity: np.ndarray
     displacement: np.ndarray
     velocity: np.ndarray
     table: complex = 0.0
@@ -59,12 +62,17 @@ class LinearStructure:
 
 @dataclass(frozen=True)
 class _ModalBasis:
-    """Modes of a structure without bodies: squared frequencies, damping; by label functionals, base loads, residual."""
+    """Modes of a structure without bodies: squared frequencies, damping; load (n, 3) of a base acceleration.
+
+    By label: functionals, directions and normals (zeros: unknown), residual flexibility.
+    """
 
     stiffness: np.ndarray
     damping: np.ndarray
+    base: np.ndarray
     rows: dict[str, np.ndarray]
-    base: dict[str, np.ndarray]
+    directions: dict[str, np.ndarray]
+    normals: dict[str, np.ndarray]
     flexibility: dict[str, float]
 
 
@@ -78,26 +86,31 @@ def linear_structure(scene: Scene) -> LinearStructure:
         flat = np.zeros(0)
         return LinearStructure(
             omega, flat, np.zeros((0, 0)), flat, none, none, none, np.zeros((0, 0)), flat.astype(complex),
-            -(omega**2) * amplitude, flat, flat, table=amplitude,
+            np.full(cavities, -(omega**2) * amplitude), _gravity(scene, np.zeros((cavities, 3))), flat, flat,
+            table=amplitude,
         )  # fmt: skip
     basis = _basis(scene)
     at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
     response = _row(basis, at, "excitation.at")
     surfaces = np.array([_surfaces(basis, scene, index) for index in range(cavities)])
+    if isinstance(scene.structure, Rom):
+        _check_directions(basis, scene)
     left, right, floor = surfaces.reshape(cavities, 3, len(response)).swapaxes(0, 1)
     casing = [
         _row(basis, damper.at or at, f"friction_damper[{i}].at") if isinstance(scene.structure, Rom) else response
         for i, damper in enumerate(scene.friction_damper)
     ]
-    base = -1j * (scene.excitation.base_acceleration or 0.0)
-    force = -1j * response * _force_amplitude(scene, basis, response) - basis.base[str(at)] * base
+    along = np.reshape([basis.directions[label] for label in _floors(scene)], (-1, 3))
+    base = -1j * (scene.excitation.base_acceleration or 0.0) * basis.directions[str(at)]
+    force = -1j * response * _force_amplitude(scene, basis, response) - basis.base @ base
     # the initial state belongs to the rigid model, whose single mode has the functional `response`
     scale = 1 / response[0] if isinstance(scene.structure, Rigid) else 0.0
     displacement = np.full(len(response), scene.initial.displacement * scale)
     velocity = np.full(len(response), scene.initial.velocity * scale)
     return LinearStructure(
         omega, basis.stiffness, basis.damping, response, floor, left, right,
-        np.reshape(casing, (len(casing), len(response))), force, base, displacement, velocity,
+        np.reshape(casing, (len(casing), len(response))), force, along @ base, _gravity(scene, along), displacement,
+        velocity,
         physical=float(response[0]) if isinstance(scene.structure, Rigid) else 1.0,
         wall_flexibility=_wall_flexibility(basis, scene),
     )  # fmt: skip
@@ -189,6 +202,27 @@ def _row(basis: _ModalBasis, label: str | None, key: str) -> np.ndarray:
         raise InputError(f"{key}: no interface label '{label}'; it has {', '.join(basis.rows)}") from None
 
 
+def _gravity(scene: Scene, along: np.ndarray) -> np.ndarray:
+    """(cavities, 2) m/s^2 along and across cavities of directions (cavities, 3)."""
+    return np.reshape([scene.gravity.components(direction) for direction in along], (len(along), 2))
+
+
+def _floors(scene: Scene) -> list[str]:
+    """The floors' labels."""
+    rom = isinstance(scene.structure, Rom)
+    return [str(cavity.labels()[2]) if rom else "structure" for cavity in scene.cavity]
+
+
+def _check_directions(basis: _ModalBasis, scene: Scene) -> None:
+    if scene.excitation.base_acceleration and not basis.base.any():
+        raise InputError(
+            "excitation.base_acceleration: the reduced model does not say how a base loads it (its base_load is zero); "
+            "give it one, or excite by a force"
+        )
+    check_known(scene, basis.directions)
+    check_surfaces(scene.cavity, basis.directions, basis.normals)
+
+
 def _surfaces(basis: _ModalBasis, scene: Scene, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     if isinstance(scene.structure, Rigid):
         return (basis.rows["structure"],) * 3
@@ -207,11 +241,11 @@ def _wall_flexibility(basis: _ModalBasis, scene: Scene) -> np.ndarray:
 def _basis(scene: Scene) -> _ModalBasis:
     structure = scene.structure
     if isinstance(structure, Rigid):
-        root = np.sqrt(structure.mass)
-        row = frozen([1 / root])
+        # its one axis is that of the base's motion and of all cavities
+        root, axis = np.sqrt(structure.mass), frozen([1.0, 0.0, 0.0])
         return _ModalBasis(
             frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
-            {"structure": row}, {"structure": frozen([root])}, {},
+            frozen([root * axis]), {"structure": frozen([1 / root])}, {"structure": axis}, {}, {},
         )  # fmt: skip
     assert isinstance(structure, Rom)
     return _rom_basis(structure, file_stamp(structure.file))
@@ -246,11 +280,11 @@ def modal_basis(model: ReducedModel) -> _ModalBasis:
     if noise < 1e-9 * np.abs(damping).max(initial=0.0):  # proportional damping: keep it exactly so
         damping = np.diag(np.diag(damping))
     rows = {label: frozen(model.row(label) @ shapes) for label in model.interface}
-    base = {
-        label: frozen(shapes.T @ model.base_load @ direction)
-        for label, direction in zip(model.interface, model.directions, strict=True)
-    }
+    directions = dict(zip(model.interface, model.directions, strict=True))
+    unknown = np.zeros((len(model.interface), 3))
+    normals = dict(zip(model.interface, unknown if model.normals is None else model.normals, strict=True))
     residual = model.residual_flexibility
     own = np.zeros(len(model.interface)) if residual is None else np.diag(residual)
     flexibility = dict(zip(model.interface, own.tolist(), strict=True))
-    return _ModalBasis(frozen(squares), frozen(damping), rows, base, flexibility)
+    base = frozen(shapes.T @ model.base_load)
+    return _ModalBasis(frozen(squares), frozen(damping), base, rows, directions, normals, flexibility)

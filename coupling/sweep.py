@@ -84,7 +84,8 @@ class Sweep:
         """Plain data: axes and units by path, measures as nested lists (nan where there is none)."""
         names = (*MEASURES, "energy_share", "status", "classification")
         estimate = self.provenance.get("estimate")
-        told = {} if estimate is None else {"estimate": estimate}
+        told = {"warnings": list(self.provenance.get("warnings", ()))}
+        told |= {} if estimate is None else {"estimate": estimate}
         axes = {path: values.tolist() for path, values in self.axes.items()}
         return (
             {"axes": axes, "units": self.units() | MEASURES, "loss": list(LOSSES)}
@@ -168,7 +169,9 @@ def _result(grid: Grid, finished: Finished, provenance: dict[str, Any]) -> Sweep
         energy_share=frozen(np.stack([columns[name] for name in LOSSES], axis=-1)),
         **{name: frozen(columns[name]) for name in MEASURES},
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
-        provenance=provenance | ({} if grid.estimate is None else {"estimate": grid.estimate}),
+        provenance=provenance
+        | ({"warnings": list(grid.warnings)} if grid.warnings else {})
+        | ({} if grid.estimate is None else {"estimate": grid.estimate}),
     )
 
 

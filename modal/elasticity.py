@@ -202,7 +202,10 @@ class Solid:
         nodes, facets = self._nodes(name), self.domain.facets.get(name)
         if facets is None:
             return Patch(nodes, np.ones(nodes.size))
-        return Patch(nodes, fenicsx.facet_weights(self.domain, self.space, facets)[nodes])
+        weights = fenicsx.facet_weights(self.domain, self.space, facets)[nodes]
+        return Patch(
+            nodes, weights, fenicsx.facet_normal(self.domain, facets) / max(weights.sum(), np.finfo(float).tiny)
+        )
 
     def _fixed(self, clamped: Mapping[str, str]) -> np.ndarray:
         fixed = [np.empty(0, dtype=np.int64)]

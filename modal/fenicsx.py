@@ -206,6 +206,18 @@ def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
     return np.array(fem.assemble_vector(compiled).array.reshape(-1, 3)[:, 0])
 
 
+def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
+    """(3,) m^2, integral of the outward unit normal over boundary facets."""
+    axis = constant(domain, [1.0, 0.0, 0.0])
+    with _quiet():
+        compiled = fem.form(ufl.inner(axis, ufl.FacetNormal(domain.mesh)) * over_facets(domain, facets))
+    found = np.empty(3)
+    for i, unit in enumerate(np.eye(3)):
+        axis.value[:] = unit
+        found[i] = fem.assemble_scalar(compiled)
+    return found
+
+
 def evaluate(expression: Any, space: Any) -> Any:
     """The function of a space that takes the values of a UFL expression at the space's own points."""
     points = space.element.interpolation_points

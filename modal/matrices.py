@@ -32,13 +32,17 @@ class Patch:
     nodes    (k,) node indices, each once
     weights  (k,) m^2, integral of the node's shape function over the facet group; ones for nodes of edges and points
              and for a bare list
+    normal   (3,) mean over the facets of the unit normal out of the material: of length one where they are plane, zero
+             where they are closed or unknown
     """
 
     nodes: np.ndarray
     weights: np.ndarray
+    normal: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         nodes, weights = store.frozen(self.nodes, np.int64), store.frozen(self.weights)
+        normal = store.frozen(self.normal)
         if nodes.ndim != 1 or nodes.size == 0 or nodes.shape != weights.shape:
             raise MatricesError(
                 f"patch: nodes {nodes.shape} and weights {weights.shape} must be lists of the same length, not empty"
@@ -48,7 +52,10 @@ class Patch:
         if not np.all(np.isfinite(weights)) or weights.sum() <= 0.0:
             raise MatricesError(f"patch: weights must be finite with a positive sum (an area), not {weights.sum()}")
         object.__setattr__(self, "nodes", nodes)
+        if normal.shape != (3,) or not np.all(np.isfinite(normal)):
+            raise MatricesError(f"patch: normal must be three numbers, not {self.normal}")
         object.__setattr__(self, "weights", weights)
+        object.__setattr__(self, "normal", normal)
 
     @property
     def area(self) -> float:
@@ -155,6 +162,7 @@ class SystemMatrices:
             "patch_offset": store.Variable(offsets, ("patch_edge",)),
             "patch_nodes": store.Variable(nodes, ("patch_entry",)),
             "patch_weights": store.Variable(weights, ("patch_entry",), "m^2"),
+            "patch_normal": store.Variable(np.reshape([patch.normal for patch in patches], (-1, 3)), ("patch", "axis")),
         }
         for name, matrix, units in (("stiffness", self.stiffness, "N/m"), ("mass", self.mass, "kg")):
             variables[name] = store.Variable(matrix.data, (f"{name}_entry",), units)
@@ -167,9 +175,10 @@ class SystemMatrices:
         """Read the record that `save` wrote. Raises modal.store.StoreError."""
         values, attributes = store.load(path, _KIND)
         offsets = values["patch_offset"]
+        normals = values.get("patch_normal", np.zeros((len(offsets) - 1, 3)))
         patches = {
-            str(label): Patch(values["patch_nodes"][start:stop], values["patch_weights"][start:stop])
-            for label, start, stop in zip(values["patch"], offsets[:-1], offsets[1:], strict=True)
+            str(label): Patch(values["patch_nodes"][start:stop], values["patch_weights"][start:stop], normal)
+            for label, start, stop, normal in zip(values["patch"], offsets[:-1], offsets[1:], normals, strict=True)
         }
         size = values["coordinates"].size
         stiffness, mass = (

@@ -98,6 +98,7 @@ def reduce(
         dict(zip(interface.labels, np.eye(len(interface.labels), basis.shape[1]), strict=True)),
         damping_ratio=matrices.damping_ratio,
         directions=dict(zip(interface.labels, interface.directions, strict=True)),
+        normals=interface.normals,
         base_load=recovery.T @ (matrices.mass @ matrices.rigid_translations()),
         fixed_interface_modes=modes,
         blocks=tuple(block.shape[1] for block in blocks),

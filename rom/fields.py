@@ -30,6 +30,9 @@ def checked(model: ReducedModel) -> dict[str, Any]:
     }
     for name, shape in {"selection": (count, size), "directions": (count, 3), "base_load": (size, 3)}.items():
         values[name] = shaped(name, getattr(model, name), shape)
+    values["directions"] = _unit(values["directions"])
+    if model.normals is not None:
+        values["normals"] = shaped("normals", model.normals, (count, 3))
     if model.residual_flexibility is not None:
         values["residual_flexibility"] = symmetric("residual_flexibility", model.residual_flexibility, count)
     if model.outputs:
@@ -75,6 +78,12 @@ def check_definite(squares: np.ndarray) -> None:
         raise ReducedModelError(
             f"stiffness: not positive semidefinite, the lowest squared angular frequency is {lowest:.3g}"
         )
+
+
+def _unit(directions: np.ndarray) -> np.ndarray:
+    """Directions (k, 3) scaled to length one, to round-off; zeros stay."""
+    lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+    return store.frozen(directions / np.where((lengths == 0.0) | np.isclose(lengths, 1.0, rtol=1e-12), 1.0, lengths))
 
 
 def shaped(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:

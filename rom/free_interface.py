@@ -67,6 +67,7 @@ def reduce_free(
         dict(zip(interface.labels, vectors.T @ basis, strict=True)),
         damping_ratio=matrices.damping_ratio,
         directions=dict(zip(interface.labels, interface.directions, strict=True)),
+        normals=interface.normals,
         base_load=recovery.T @ (matrices.mass @ matrices.rigid_translations()),
         free_modes=modes,
         blocks=tuple(block.shape[1] for block in attached),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -15,6 +15,8 @@ KINDS = ("average", "rigid", "node", "full")
 MOTIONS = ("translation", "rotation")
 # of the largest singular value: below it a functional, or a rigid motion of a patch, is a combination of the others
 _DEPENDENT = 1e-10
+# a mean normal shorter than this is that of a surface which faces everywhere
+_FLAT = 0.5
 
 
 class InterfaceError(ValueError):
@@ -74,6 +76,27 @@ def patch_motions(
     ]
 
 
+def normal_direction(matrices: SystemMatrices, facets: str) -> tuple[float, float, float]:
+    """Normal of a patch of facets, so turned that walls which face each other have one direction.
+
+    Its largest component is positive, the first of those within a tenth of the largest. Raises InterfaceError for a
+    patch without a normal, such as a node set or a closed surface.
+    """
+    normal = _normal(matrices, facets)
+    if not normal.any():
+        raise InterfaceError(f"{facets!r} has no normal: it is a node set, or curves too much; give three numbers")
+    size = np.abs(normal)
+    x, y, z = (normal * np.sign(normal[np.argmax(size > 0.9 * size.max())])).tolist()
+    return x, y, z
+
+
+def _normal(matrices: SystemMatrices, facets: str) -> np.ndarray:
+    """(3,) unit normal of a patch; zeros where it has none."""
+    normal = matrices.patch(facets).normal
+    length = np.linalg.norm(normal)
+    return normal / length if length > _FLAT else np.zeros(3)
+
+
 @dataclass(frozen=True, eq=False)
 class Interface:
     """k interface coordinates on a structure with N DOFs.
@@ -82,16 +105,19 @@ class Interface:
     vectors      (N, k) functionals: the displacements are vectors^T q
     motions      (N, n) sparse, the motions q = motions @ y that supports and rigid patches leave to the structure
     full         (m,) sorted DOFs of the patches of kind "full" that can move
+    normals      (k, 3) unit normals of the patches, out of the material; zeros where unknown
     """
 
     coordinates: tuple[InterfaceCoordinate, ...]
     vectors: np.ndarray
     motions: sparse.csr_array
-    full: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    full: np.ndarray
+    normals: np.ndarray
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coordinates", tuple(self.coordinates))
         object.__setattr__(self, "vectors", store.frozen(self.vectors))
+        object.__setattr__(self, "normals", store.frozen(self.normals))
 
     @classmethod
     def on_patches(cls, matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> Interface:
@@ -109,7 +135,8 @@ class Interface:
         vectors = np.column_stack([_functional(matrices, coordinate) for coordinate in coordinates])
         motions = _motions(matrices, {item.facets: item.label for item in coordinates if item.kind == "rigid"})
         _check_independent(labels, motions.T @ vectors)
-        return cls(tuple(coordinates), vectors, motions, _full_dofs(matrices, coordinates))
+        normals = np.array([_normal(matrices, coordinate.facets) for coordinate in coordinates])
+        return cls(tuple(coordinates), vectors, motions, _full_dofs(matrices, coordinates), normals)
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -30,6 +30,8 @@ def save(model: ReducedModel, path: str | os.PathLike[str]) -> None:
         "base_load": store.Variable(model.base_load, ("row", "axis"), "kg"),
         "natural_frequency": store.Variable(model.natural_frequencies_hz, ("mode",), "Hz"),
     }
+    if model.normals is not None:
+        variables["normals"] = store.Variable(model.normals, ("interface", "axis"))
     if model.recovery is not None and model.coordinates is not None:
         variables["recovery"] = store.Variable(model.recovery, ("dof", "column"))
         variables["coordinates"] = store.Variable(model.coordinates, ("node", "axis"), "m")
@@ -70,6 +72,7 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
         output_rows=values.get("output_rows"),
         output_residual=values.get("output_residual"),
         residual_recovery=values.get("residual_recovery"),
+        normals=values.get("normals"),
         provenance=json.loads(attributes["provenance"]),
         recovery=values.get("recovery"),
         coordinates=values.get("coordinates"),

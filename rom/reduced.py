@@ -31,6 +31,8 @@ class ReducedModel:
     interface                 k labels, each once
     selection                 (k, n) the displacement of interface coordinate j is selection[j] @ q, m
     directions                (k, 3) unit directions of these displacements; zeros when unknown
+    normals                   (k, 3) unit normals, out of the material, of the facets they belong to; zeros where
+                              unknown, None: all unknown
     base_load                 (n, 3) kg, T^T M r, r the unit translation along x, y, z: a base acceleration a (3,) loads
                               the model with -base_load @ a, and q is then relative to the base; zeros when unknown
     damping_ratio             of every mode, if C was made from one; None for any other C
@@ -69,6 +71,7 @@ class ReducedModel:
     recovery: np.ndarray | None = None
     coordinates: np.ndarray | None = None
     residual_recovery: np.ndarray | None = None
+    normals: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name, value in checked(self).items():

@@ -7,7 +7,7 @@ import os
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,8 +51,7 @@ def modal(arguments: Namespace) -> None:
         save_vtk(analysis.modes, variables["coordinates"].values, variables["cell"].values, cell_type, arguments.vtk)
     result = analysis.to_json()
     _write_json(arguments.json, result)
-    for warning in analysis.warnings:
-        print(f"vanedamp: {arguments.input}: warning: {warning}", file=sys.stderr)
+    _warn(arguments.input, analysis.warnings)
     if arguments.json != "-":
         tell_modes(result)
 
@@ -164,7 +163,7 @@ def run(arguments: Namespace) -> None:
     if arguments.output:
         response.save(arguments.output, {"versions": versions(), "scene": scene.to_dict()})
     result = response.to_json(events=arguments.events)
-    _tell_choice(arguments.input, response.estimate)
+    _tell_choice(arguments.input, response.estimate, response.warnings)
     _write_json(arguments.json, result)
     if arguments.json != "-":
         for name, value in result.items():
@@ -191,7 +190,7 @@ def sweep(arguments: Namespace) -> None:
     # processes are slow to start: a bad grid or the checkpoint of another sweep is told before
     points, provenance = grid(scene), {"versions": versions()}
     resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
-    _tell_choice(arguments.input, points.estimate)
+    _tell_choice(arguments.input, points.estimate, points.warnings)
     with workers(arguments.workers) as pool, progress("sweep") as report:
         started = time.perf_counter()
         result = run_sweep(points, pool, report, checkpoint, provenance)
@@ -279,10 +278,16 @@ def _folder(arguments: Namespace) -> Path:
     return folder
 
 
-def _tell_choice(source: str, estimate: Mapping[str, Any] | None) -> None:
-    """What was chosen automatically is said, with its reason, wherever the results go."""
+def _tell_choice(source: str, estimate: Mapping[str, Any] | None, warnings: Sequence[str]) -> None:
+    """What was chosen automatically is said, with its reason, and warnings, wherever the results go."""
     if estimate is not None:
         print(f"vanedamp: {source}: structure.modes: {estimate['sentence']}", file=sys.stderr)
+    _warn(source, warnings)
+
+
+def _warn(source: str, warnings: Sequence[str]) -> None:
+    for warning in warnings:
+        print(f"vanedamp: {source}: warning: {warning}", file=sys.stderr)
 
 
 def _load_scene(path: str) -> Scene:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
-from coupling.inputs import STRICT, InputError, NonNegative, Real, Whole, nearest, read_toml, validate
+from coupling.inputs import STRICT, Direction, InputError, NonNegative, Real, Whole, nearest, read_toml, validate
 from meshes import benchmarks, vane_cluster
 from meshes.benchmarks import Block
 from meshes.vane_cluster import VaneCluster
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 Positive = Annotated[Real, Field(gt=0)]
 Ratio = Annotated[Real, Field(ge=0, lt=1)]
 Degree = Annotated[Whole, Field(ge=1, le=3)]
-Direction = tuple[Real, Real, Real]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -197,8 +196,6 @@ class ModesTable:
             raise ValueError("give one of count and max_frequency")
         if self.min_frequency and not self.min_frequency < (self.max_frequency or 0.0):
             raise ValueError("min_frequency: expected a max_frequency above it, the two ends of a range")
-        if not any(self.direction):
-            raise ValueError("direction: expected three numbers, not all zero, such as [0, 1, 0]")
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -206,16 +203,14 @@ class InterfaceTable:
     """One interface coordinate: the displacement of a group along a direction, or its rotation about it.
 
     `facets` names a facet group, or else a group of edges or points (a node set), whose average is that of its nodes.
+    The direction of a cavity's walls and floor is that from its left wall to its right one; "normal" takes the facets'
+    own (rom.interface.normal_direction).
     """
 
     facets: str
-    direction: Direction
+    direction: Annotated[Direction | Literal["normal"], Field(union_mode="left_to_right")]
     kind: Literal["average", "rigid", "node", "full"] = "average"
     motion: Literal["translation", "rotation"] = "translation"
-
-    def __post_init__(self) -> None:
-        if not any(self.direction):
-            raise ValueError("direction: expected three numbers, not all zero, such as [0, 1, 0]")
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from coupling.inputs import STRICT, InputError, Real, Whole, nearest, read_toml, validate
+from coupling.inputs import STRICT, Direction, InputError, Real, Whole, nearest, read_toml, validate
 from rom.external import NAMED, Findings, external_model, read_matrices
 from rom.reduced import ReducedModel
 from studies.provenance import versions
@@ -41,7 +41,7 @@ class CoordinateTable:
 
     coordinate: Annotated[Whole, Field(ge=0)] | None = None
     row: tuple[Real, ...] | None = None
-    direction: tuple[Real, Real, Real] | None = None
+    direction: Direction | None = None
 
     def __post_init__(self) -> None:
         if (self.coordinate is None) == (self.row is None):

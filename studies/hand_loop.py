@@ -44,7 +44,8 @@ class ImpactOscillator(NamedTuple):
     def of(cls, scene: Scene) -> ImpactOscillator:
         """The oscillator of a scene with a rigid structure and one body without friction and gravity."""
         structure, (damper,), (cavity,) = scene.structure, scene.damper, scene.cavity
-        assert isinstance(structure, Rigid) and damper.friction == 0 and scene.gravity.tangential == 0
+        along = scene.gravity.acceleration * scene.gravity.orientation_deg
+        assert isinstance(structure, Rigid) and damper.friction == 0 and along == 0
         return cls(
             structure.mass, structure.viscous, structure.stiffness, excitation_force(scene),
             2 * math.pi * scene.excitation.frequency, damper.mass, cavity.gap, damper.restitution,

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from coupling.inputs import InputError
 from modal.calibrate import RigidModel, fatigue_amplitude, rigid_model
 from modal.correlation import mode_like
 from modal.eigen import Modes, factorize, solve_modes
@@ -23,13 +24,13 @@ from modal.matrices import SystemMatrices
 from modal.participation import ParticipationError, effective_masses, first_bending
 from modal.store import Variable
 from modal.stress import HotSpot, hot_spot
-from rom.interface import Interface, InterfaceCoordinate
+from rom.interface import Interface, InterfaceCoordinate, InterfaceError, normal_direction
 from rom.ladder import LadderError, choose, grid, rigid_errors
 from rom.recovery import with_stresses
 from rom.reduced import ReducedModel
 from rom.truncation import basis_ladder, basis_model, rich_model
 from studies.calibration_tables import CalibrationTable
-from studies.config import Case, MeshFile
+from studies.config import Case, InterfaceTable, MeshFile
 from studies.provenance import versions
 
 _PLAUSIBLE_HZ = (1.0, 1e6)
@@ -81,8 +82,20 @@ def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
 def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
     """The case's interface coordinates on its matrices, all of them or those named."""
     tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
-    coordinates = [InterfaceCoordinate(label, t.facets, t.direction, t.kind, t.motion) for label, t in tables.items()]
+    coordinates = [
+        InterfaceCoordinate(label, table.facets, _direction(label, table, matrices), table.kind, table.motion)
+        for label, table in tables.items()
+    ]
     return Interface.on_patches(matrices, coordinates)
+
+
+def _direction(label: str, table: InterfaceTable, matrices: SystemMatrices) -> tuple[float, float, float]:
+    if table.direction != "normal":
+        return table.direction
+    try:
+        return normal_direction(matrices, table.facets)
+    except InterfaceError as error:
+        raise InputError(f"interface.{label}.direction: {error}") from None
 
 
 @dataclass(frozen=True, eq=False)

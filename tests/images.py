@@ -139,9 +139,7 @@ def hairs(data: dict) -> list[dict]:
 
 def turned(angle: complex) -> Callable[[Rows], Rows]:
     """Rows whose excitation is turned by a complex phase."""
-    return lambda rows: rows._replace(
-        force=rows.force * angle, inertia=rows.inertia * angle, table=rows.table * angle, base=rows.base * angle
-    )
+    return lambda rows: rows._replace(force=rows.force * angle, inertia=rows.inertia * angle, table=rows.table * angle)
 
 
 def mirrored(data: dict) -> tuple[dict, Callable]:

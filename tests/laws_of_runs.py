@@ -66,7 +66,7 @@ def check_laws(data, longest=None):
             check_walls(scene, response)
     worst = check_events(scene, longest)
     # at an impact all gaps up to SIMULTANEOUS close at once: that carries bodies as far against their weight
-    weight = scene.gravity.tangential * sum(damper.mass for damper in scene.damper)
+    weight = scene.gravity.components(np.zeros(3))[0] * sum(damper.mass for damper in scene.damper)
     jumps = len(impacts(response)) * abs(weight) * SIMULTANEOUS * max(cavity.gap for cavity in scene.cavity)
     worst.note("ledger", response.energy_residual, LEDGER + jumps / max(largest, np.finfo(float).tiny))
     return worst

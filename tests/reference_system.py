@@ -70,13 +70,13 @@ class System:
         gravity = scene.gravity
         self.m = np.array([damper.mass for damper in scene.damper])
         loads = [
-            damper.mass * gravity.normal if damper.normal_load is None else damper.normal_load
+            damper.mass * gravity.components(np.zeros(3))[1] if damper.normal_load is None else damper.normal_load
             for damper in scene.damper
         ]
         self.friction = np.array(
             [damper.friction * max(load, 0.0) / unit for damper, load in zip(scene.damper, loads, strict=True)]
         )
-        self.weight = np.full(len(self.m), gravity.tangential / unit)
+        self.weight = np.full(len(self.m), gravity.components(np.zeros(3))[0] / unit)
         self.r0 = np.array([damper.position for damper in scene.damper]) / self.length
         self.rd0 = np.array([damper.velocity for damper in scene.damper]) / (self.length * self.omega)
 

@@ -52,7 +52,8 @@ def system(seed, modes, bodies, labels, proportional=False):
         right=right,
         casing=np.zeros((0, modes)),
         force=-1j * rng.uniform(-1.0, 1.0, modes),
-        base_acceleration=-0.4j,
+        base_acceleration=-0.4j * np.cos(np.arange(cavities)),
+        gravity=np.array([scene.gravity.components(np.zeros(3))] * cavities),
         displacement=np.zeros(modes),
         velocity=np.zeros(modes),
     )

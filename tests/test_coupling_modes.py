@@ -49,8 +49,8 @@ def bar(modes, hanger, masses, restitution, damping, stiffness=1e7):
     bodies = [{"cavity": "c", "mass": mass, "restitution": restitution} for mass in masses]
     structure = LinearStructure(
         omega=100 * np.pi, stiffness=omegas**2, damping=matrix, response=shapes, floor=shapes[None], left=shapes[None],
-        right=shapes[None], casing=np.zeros((0, modes)), force=-1j * shapes, base_acceleration=0j,
-        displacement=np.zeros(modes), velocity=np.zeros(modes),
+        right=shapes[None], casing=np.zeros((0, modes)), force=-1j * shapes, base_acceleration=np.zeros(1, complex),
+        gravity=np.zeros((1, 2)), displacement=np.zeros(modes), velocity=np.zeros(modes),
     )  # fmt: skip
     return rows_of(case.replace({"damper": bodies}), structure)[0]
 

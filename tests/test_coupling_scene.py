@@ -79,6 +79,8 @@ def test_replace_by_dotted_path():
         scene.replace({"excitations.frequency": 1.0})
     with pytest.raises(InputError, match=r"excitation.frequenc: unknown key; did you mean 'frequency'"):
         scene.replace({"excitation.frequenc": 1.0})
+    with pytest.raises(InputError, match=r"excitation.frequency.0: no table holds '0'; leave it out"):
+        scene.replace({"excitation.frequency.0": 1.0})
 
 
 def test_sweep_is_the_product_of_its_axes():

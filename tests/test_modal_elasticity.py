@@ -39,6 +39,12 @@ def test_patch_weights_integrate_linear_functions(block):
     assert centroid == pytest.approx([0.3 / 3 * (0.2 + 2 * 0.1) / (0.2 + 0.1), 0.0, 0.1], abs=1e-12)
 
 
+def test_patch_normals_point_out_of_the_material(block):
+    assert block.patches["top"].normal == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
+    assert block.patches["bottom"].normal == pytest.approx([0.0, 0.0, -1.0], abs=1e-12)
+    assert block.patches["root"].normal == pytest.approx([-1.0, 0.0, 0.0], abs=1e-12)
+
+
 def test_rigid_motions_have_no_strain(block):
     spin = np.array([[0.0, -3.0, 2.0], [3.0, 0.0, -1.0], [-2.0, 1.0, 0.0]])
     for motion in (*block.rigid_translations().T, displacement(block, spin)):

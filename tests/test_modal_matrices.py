@@ -47,7 +47,7 @@ def test_patch_average_weighs_by_area():
     assert functional @ displacement == pytest.approx((3 * 4.0 + 1 * 7.0) / 4, rel=1e-14)
 
 
-@pytest.mark.parametrize("patches", [{}, {"tip": Patch([2], [0.5]), "both": Patch([2, 1], [1.0, 3.0])}])
+@pytest.mark.parametrize("patches", [{}, {"tip": Patch([2], [0.5], [0, 1, 0]), "both": Patch([2, 1], [1.0, 3.0])}])
 def test_round_trip(tmp_path, patches):
     matrices = springs(patches=patches)
     matrices.save(tmp_path / "matrices.h5")
@@ -60,6 +60,7 @@ def test_round_trip(tmp_path, patches):
     for label in patches:
         assert np.array_equal(again.patches[label].nodes, patches[label].nodes)
         assert np.array_equal(again.patches[label].weights, patches[label].weights)
+        assert np.array_equal(again.patches[label].normal, patches[label].normal)
     assert again.damping_ratio == matrices.damping_ratio
     assert again.provenance == matrices.provenance
 
@@ -93,6 +94,11 @@ def test_refuses_what_does_not_fit(changes, message):
 def test_refuses_a_patch_without_area(nodes, weights, message):
     with pytest.raises(MatricesError, match=message):
         Patch(nodes, weights)
+
+
+def test_refuses_a_normal_that_is_none():
+    with pytest.raises(MatricesError, match="normal must be three numbers"):
+        Patch([0], [1.0], [0.0, 1.0])
 
 
 def test_unknown_patch_and_direction_name_the_remedy():

@@ -145,6 +145,7 @@ def test_arrays_are_read_only_copies():
         ({"interface": {"end": [0, 1]}, "directions": {}}, r"row of 'end': expected shape \(3,\)"),
         ({"interface": {}, "directions": {}}, "interface: empty"),
         ({"interface": {"end": [0, 0, 0]}}, "the row of 'end' is zero"),
+        ({"normals": np.zeros((3, 3))}, r"normals: expected shape \(2, 3\)"),
         ({"directions": {"top": [0, 1, 0]}}, "directions: no interface coordinate 'top'; there are: middle, end"),
         ({"base_load": np.zeros(3)}, r"base_load: expected shape \(3, 3\)"),
         ({"damping_ratio": 1.0}, "damping_ratio: expected 0 <= ratio < 1"),

@@ -332,6 +332,28 @@ def test_bad_reduced_models(command, folder, rom, capfd):
         assert all(text in error for text in ["rom.toml", *told])
 
 
+@pytest.mark.parametrize("command", ["run", "sweep"])
+@pytest.mark.parametrize(
+    ("tables", "modes", "told"),
+    [
+        ("", "", True),
+        ('[contact]\nlaw = "newton"\n', "", True),
+        ('[contact]\nlaw = "compliant"\nstiffness = 1e6\n', "", False),
+        ("", "\nmodes = 1\nnatural = true", False),
+    ],
+)
+def test_newtons_law_on_several_modes_is_told(command, tables, modes, told, folder, rom, capfd):
+    """It does not converge with their number (docs/reduction.md), and it is what a scene without [contact] has."""
+    text = ROM_SCENE.replace('"{file}"', f'"{rom}"{modes}').replace("{at}", "tip")
+    (folder / "rom.toml").write_text(tables + text)
+    assert main([command, "rom.toml", "-o", "out.h5", "--json", "out.json"]) == 0
+    warnings = json.loads((folder / "out.json").read_text())["warnings"]
+    errors = [line for line in capfd.readouterr().err.splitlines() if "warning" in line]
+    assert errors == [f"vanedamp: rom.toml: warning: {warning}" for warning in warnings]
+    assert len(warnings) == told
+    assert all("contact: Newton's law" in warning and 'law = "compliant"' in warning for warning in warnings)
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

@@ -26,6 +26,7 @@ facets = "c1_floor"
 direction = [0, 1, 0]
 """
 BLOCK = cases.BLOCK.split("[support]")[0]
+THREE = "expected three numbers, not all zero, such as"
 
 
 def load(text, tmp_path):
@@ -134,6 +135,9 @@ def test_open_choice_of_the_response_is_refused(tmp_path):
             "interface.c1.kind: should be 'average', 'rigid', 'node' or 'full'",
         ),
         ('facets = "c1_floor"\n', "", "interface.c1.facets: missing"),
+        ('c1_floor"\ndirection = [0, 1, 0]', 'c1_floor"\ndirection = [0, 0, 0]', f"interface.c1.direction: {THREE}"),
+        ('c1_floor"\ndirection = [0, 1, 0]', "c1_floor\"\ndirection = 'along'", f"interface.c1.direction: {THREE}"),
+        ("count = 10\ndirection = [0, 1, 0]", "count = 10\ndirection = [0, 1]", f"modes.direction: {THREE}"),
         ('["clamp"]', '"clamp"', "support.clamped: expected a list of facet groups"),
         ('["clamp"]', '{clamp = "w"}', "support.clamped: clamp: expected components out of 'xyz', not 'w'"),
         ("degree = 2", "degree = 4", "mesh.degree: should be less than or equal to 3"),
