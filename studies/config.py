@@ -182,7 +182,8 @@ class Support:
 class ModesTable:
     """Which modes are computed (the first `count`, or all from `min_frequency` to `max_frequency` Hz) and which is the
     first bending: the one with most effective mass along `direction`, or the one most like the first shape of the file
-    `shape`. `at` names the interface coordinate of the rigid model."""
+    `shape`. `at` names the interface coordinate of the rigid model. Modes whose frequencies agree within `pair_tolerance`
+    (relative) are one multiple mode, turned so that one of them has all the motion of that coordinate."""
 
     count: Annotated[Whole, Field(ge=1)] | None = None
     max_frequency: Positive | None = None
@@ -191,6 +192,7 @@ class ModesTable:
     damping_ratio: Ratio | None = None
     at: str | None = None
     shape: str | None = None
+    pair_tolerance: Annotated[Real, Field(ge=0, le=0.1)] = 1e-3
 
     def __post_init__(self) -> None:
         if self.count is not None and self.max_frequency is not None:

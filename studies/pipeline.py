@@ -19,7 +19,8 @@ from modal.eigen import Modes, factorize, solve_modes
 from modal.elasticity import Solid
 from modal.exchange import read_shapes
 from modal.imports import convert
-from modal.matrices import SystemMatrices
+from modal.matrices import SystemMatrices, unit_direction
+from modal.multiple import rivals, turned
 from modal.participation import ParticipationError, effective_masses, first_bending
 from modal.store import Variable
 from modal.stress import HotSpot, hot_spot
@@ -33,6 +34,8 @@ from studies.config import Case, MeshFile
 from studies.provenance import versions
 
 _PLAUSIBLE_HZ = (1.0, 1e6)
+# a mode so near the first bending, relative, that moves its point with such a share of its compliance, is told
+_NEAR, _NOTABLE = 0.02, 0.01
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
 
@@ -167,14 +170,16 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     """Modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
-    modes = solve_modes(matrices, case.modes.count or 10, case.modes.max_frequency, case.modes.min_frequency)
+    label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
+    if label is not None:
+        functional = _functional(case, matrices, label)
+    modes = _modes(case, matrices, functional)
     bending, warnings = _first_bending(case, modes, matrices)
     if not case.modes.min_frequency:
         warnings += _unit_slip(modes)
     table = case.calibration or CalibrationTable()
-    label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
-    if label is not None and bending is not None:
-        functional = _functional(case, matrices, label)
+    if label is not None and functional is not None and bending is not None:
+        warnings += _rivals(modes, bending, functional, label)
         rigid = rigid_model(modes, bending, functional, label, case.damping_ratio)
         strengths = case.strengths(structure.solid.domain.volumes)
         if strengths:
@@ -184,6 +189,32 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         structure, modes, effective_masses(modes, matrices), bending, rigid, functional, amplitude, spot, table.share,
         warnings, time.perf_counter() - started,
     )  # fmt: skip
+
+
+def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) -> Modes:
+    """The case's modes, multiple ones turned to the response coordinate, or else to the direction of the bending."""
+    table, size = case.modes, matrices.free.size
+    count = table.count or 10
+    # one more, so that the last of them is not half of a pair
+    more = count + 1 if count < size else count
+    modes = solve_modes(matrices, more, table.max_frequency, table.min_frequency)
+    inertia = matrices.mass @ (matrices.movable_translations() @ unit_direction(table.direction))
+    guides = [inertia] if functional is None else [functional, inertia]
+    modes = turned(modes, matrices, guides, table.pair_tolerance)
+    return modes if table.max_frequency is not None else modes.first(count)
+
+
+def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> tuple[str, ...]:
+    """A warning when another mode moves the response coordinate at nearly the same frequency."""
+    near = rivals(modes, bending, functional, _NEAR, _NOTABLE)
+    if not near.size:
+        return ()
+    listed = ", ".join(f"{modes.frequencies_hz[index]:.6g}" for index in near)
+    return (
+        f"modes: beside the first bending ({modes.frequencies_hz[bending]:.6g} Hz), {listed} Hz moves {label!r}, too: "
+        "one mode is no model there. Take a reduced one; or, if the mesh alone splits a pair of equal frequencies, "
+        "refine it or raise [modes] pair_tolerance",
+    )
 
 
 def bending_mode(case: Case, modes: Modes, matrices: SystemMatrices) -> int:
