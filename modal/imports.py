@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from modal import abaqus, nastran
 from modal.msh import MeshError
 from modal.store import replacing
 
@@ -30,6 +30,8 @@ _CORNERS = {"tetra": 4, "hexahedron": 8}
 # a dolfinx geometry knows no 20-node brick; its edges are taken straight
 _VOLUMES = {"tetra": "tetra", "tetra10": "tetra10", "hexahedron": "hexahedron", "hexahedron20": "hexahedron"}
 _SHELLS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+# what meshio passes over in these files changes the mesh
+_READERS = {".inp": abaqus.read, ".bdf": nastran.read, ".nas": nastran.read, ".fem": nastran.read}
 _FACET_KINDS = {"tetra": "triangle", "tetra10": "triangle6", "hexahedron": "quad"}
 
 
@@ -88,12 +90,13 @@ def _read(path: Path) -> _Source:
     if not path.is_file():
         raise MeshError(f"{path}: no such mesh file")
     try:
-        mesh = meshio.read(path)
+        mesh = _READERS.get(path.suffix.lower(), meshio.read)(path)
+    except MeshError:
+        raise
     except (Exception, SystemExit) as error:  # its readers raise what they stumble over
-        raise MeshError(f"{path}: meshio cannot read this mesh ({error or type(error).__name__})") from error
+        told = " ".join(str(error).split()) or type(error).__name__
+        raise MeshError(f"{path}: this mesh cannot be read ({told})") from error
     sets = {name: [np.asarray(part, dtype=int) for part in parts] for name, parts in mesh.cell_sets.items()}
-    if path.suffix.lower() == ".inp":
-        sets |= _abaqus_element_sets(path, mesh)
     sets |= _property_sets(mesh)
     volume = [index for index, block in enumerate(mesh.cells) if block.type in _VOLUMES]
     solids = {block.type for block in mesh.cells if block.dim == 3}
@@ -128,20 +131,6 @@ def _shell_sets(mesh: Any, sets: dict[str, list[np.ndarray]]) -> dict[str, set[t
             if block.type in _SHELLS and parts[index].size:
                 found.setdefault(name, set()).update(_keys(block.data[parts[index]], _SHELLS[block.type]))
     return found
-
-
-def _abaqus_element_sets(path: Path, mesh: Any) -> dict[str, list[np.ndarray]]:
-    """Sets named in *ELEMENT lines: meshio counts the names, which goes wrong where a block has none."""
-    headers = re.findall(r"^\*ELEMENT\s*,([^\n]*)", path.read_text(errors="replace"), re.IGNORECASE | re.MULTILINE)
-    if len(headers) != len(mesh.cells):
-        raise MeshError(f"{path}: {len(headers)} *ELEMENT blocks, meshio reads {len(mesh.cells)}; write one plain file")
-    sets: dict[str, list[np.ndarray]] = {}
-    for index, header in enumerate(headers):
-        named = re.search(r"ELSET\s*=\s*([^,\s]+)", header, re.IGNORECASE)
-        if named:
-            parts = sets.setdefault(named[1], [np.empty(0, dtype=int) for _ in headers])
-            parts[index] = np.arange(len(mesh.cells[index].data))
-    return sets
 
 
 def _property_sets(mesh: Any) -> dict[str, list[np.ndarray]]:

@@ -26,7 +26,7 @@ def turned(modes: Modes, matrices: SystemMatrices, guides: Sequence[np.ndarray],
     motions, at zero frequency, are left as they are.
     """
     shapes, eigenvalues = modes.shapes.copy(), modes.angular_frequencies**2
-    changed = []
+    changed: list[int] = []
     for group in _groups(modes.frequencies_hz, tolerance):
         basis = _basis(shapes[group], guides)
         shapes[group] = basis @ shapes[group]

@@ -182,8 +182,8 @@ class Support:
 class ModesTable:
     """Which modes are computed (the first `count`, or all from `min_frequency` to `max_frequency` Hz) and which is the
     first bending: the one with most effective mass along `direction`, or the one most like the first shape of the file
-    `shape`. `at` names the interface coordinate of the rigid model. Modes whose frequencies agree within `pair_tolerance`
-    (relative) are one multiple mode, turned so that one of them has all the motion of that coordinate."""
+    `shape`. `at` names the interface coordinate of the rigid model. Modes whose frequencies agree within
+    `pair_tolerance` (relative) are one multiple mode, turned so that one has all the motion of that coordinate."""
 
     count: Annotated[Whole, Field(ge=1)] | None = None
     max_frequency: Positive | None = None
