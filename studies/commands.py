@@ -70,6 +70,8 @@ def calibrate(arguments: Namespace) -> None:
         found.save(arguments.output)
     result = found.to_json()
     _write_json(arguments.json, result)
+    for warning in found.warnings:
+        print(f"vanedamp: {arguments.input}: warning: {warning}", file=sys.stderr)
     if arguments.json != "-":
         tell_calibration(result)
 
