@@ -14,6 +14,7 @@ from coupling.inputs import STRICT, InputError, NonNegative, Real, Whole, neares
 from meshes import benchmarks, vane_cluster
 from meshes.benchmarks import Block
 from meshes.vane_cluster import VaneCluster
+from modal.units import absurdity
 from studies.calibration_tables import CalibrationTable
 
 if TYPE_CHECKING:
@@ -29,16 +30,12 @@ Direction = tuple[Real, Real, Real]
 class MeshFile:
     """A mesh, and the polynomial degree of the displacements on it.
 
-    A gmsh file (.msh) in metres, or a file of another program (.inp, .bdf ...) with `scale` metres a unit of length.
+    A gmsh file (.msh) or one of another program (.inp, .bdf ...); `scale` metres are its unit of length.
     """
 
     file: str
     degree: Degree = 2
     scale: Positive = 1.0
-
-    def __post_init__(self) -> None:
-        if not self.foreign and self.scale != 1.0:
-            raise ValueError("scale: a gmsh mesh is in metres; scale it in gmsh")
 
     @property
     def foreign(self) -> bool:
@@ -240,14 +237,19 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """The case in a TOML file; a mesh file is taken relative to it. Raises InputError."""
+        """The case in a TOML file; a mesh file is taken relative to it. Raises InputError, for absurd units too."""
         data = read_toml(path)
         mesh = data.get("mesh")
         if isinstance(mesh, dict):
             _check_mesh(mesh, path)
         for keys in _FILES:
             _find_file(data, keys, path)
-        return validate(cls, data, str(path))
+        case = validate(cls, data, str(path))
+        for group, table in case.material.items():
+            absurd = absurdity(table.young, table.density)
+            if absurd is not None:
+                raise InputError(f"{path}: material.{group}.{absurd}; give young in Pa and density in kg/m^3")
+        return case
 
     @property
     def damping_ratio(self) -> float:

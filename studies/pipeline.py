@@ -24,6 +24,7 @@ from modal.multiple import rivals, turned
 from modal.participation import ParticipationError, effective_masses, first_bending
 from modal.store import Variable
 from modal.stress import HotSpot, hot_spot
+from modal.units import doubts
 from rom.interface import Interface, InterfaceCoordinate
 from rom.ladder import LadderError, choose, grid, rigid_errors
 from rom.recovery import with_stresses
@@ -33,7 +34,6 @@ from studies.calibration_tables import CalibrationTable
 from studies.config import Case, MeshFile
 from studies.provenance import versions
 
-_PLAUSIBLE_HZ = (1.0, 1e6)
 # a mode so near the first bending, relative, that moves its point with such a share of its compliance, is told
 _NEAR, _NOTABLE = 0.02, 0.01
 # modes at which the search for enough of them starts and gives up
@@ -53,7 +53,8 @@ def assemble(case: Case) -> Structure:
     """Mesh, groups, matrices. Raises the errors of the modal package, and InputError for unknown groups."""
     label = case.response_label  # an open choice is refused before the work
     with _mesh(case) as path:
-        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports)
+        scale = case.mesh.scale if isinstance(case.mesh, MeshFile) else 1.0
+        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports, scale)
         domain = solid.domain
         case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
         matrices = solid.assemble(case.support.clamped, case.damping_ratio)
@@ -72,7 +73,7 @@ def _mesh(case: Case) -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as folder:
         if isinstance(mesh, MeshFile):
             target = Path(folder) / f"{Path(mesh.file).stem}.msh"
-            yield convert(mesh.file, target, set(case.material) - {"default"}, case.facet_groups, mesh.scale)
+            yield convert(mesh.file, target, set(case.material) - {"default"}, case.facet_groups)
         else:
             yield mesh.build(Path(folder) / f"{mesh.generator}.msh")
 
@@ -175,8 +176,9 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         functional = _functional(case, matrices, label)
     modes = _modes(case, matrices, functional)
     bending, warnings = _first_bending(case, modes, matrices)
-    if not case.modes.min_frequency:
-        warnings += _unit_slip(modes)
+    straining = modes.frequencies_hz[modes.frequencies_hz > 0.0]
+    lowest = float(straining[0]) if straining.size and not case.modes.min_frequency else None
+    warnings += unit_doubts(structure, lowest)
     table = case.calibration or CalibrationTable()
     if label is not None and functional is not None and bending is not None:
         warnings += _rivals(modes, bending, functional, label)
@@ -243,14 +245,12 @@ def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[
     return None, (f"modes: no first bending and no rigid model: {why}",)
 
 
-def _unit_slip(modes: Modes) -> tuple[str, ...]:
-    """A warning when the first straining mode is where wrong units put it."""
-    first = next((frequency for frequency in modes.frequencies_hz if frequency > 0.0), 1.0)
-    if _PLAUSIBLE_HZ[0] <= first <= _PLAUSIBLE_HZ[1]:
-        return ()
-    return (
-        f"modes: the first frequency is {first:.4g} Hz; check the units: mesh in m, young in Pa, density in kg/m^3",
-    )
+def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[str, ...]:
+    """A warning when sizes, masses, sound speeds or the first straining frequency hint at wrong units."""
+    matrices = structure.matrices
+    materials = {name: (table.young, table.density) for name, table in structure.case.material.items()}
+    found = doubts(materials, float(np.ptp(matrices.coordinates, axis=0).max()), matrices.total_mass, first_hz)
+    return tuple(f"units: {told}" for told in found)
 
 
 def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:
