@@ -249,6 +249,8 @@ def _prepare_groups() -> None:
         gmsh.model.addPhysicalGroup(3, rest, name=_UNNAMED)
     msh.check_disjoint(2, "facet")
     msh.check_disjoint(3, "volume")
+    msh.check_points()
+    msh.check_twice()
     msh.check_volumes()
     msh.check_connected()
     msh.drop_strays()

@@ -7,7 +7,9 @@ element edges whose nodes are all in it. meshio is an optional dependency.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import io
 import os
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
@@ -17,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from modal import abaqus, nastran
-from modal.msh import MeshError
+from modal.msh import MeshError, same_rows
 from modal.store import replacing
 
 # corners of the faces of a cell, and of a quadratic one the nodes between them (VTK's order)
@@ -89,13 +91,20 @@ def _read(path: Path) -> _Source:
         raise MeshError(f"{path}: meshes of other programs need meshio: pip install meshio") from error
     if not path.is_file():
         raise MeshError(f"{path}: no such mesh file")
+    said = io.StringIO()  # meshio says why and ends the program
     try:
-        mesh = _READERS.get(path.suffix.lower(), meshio.read)(path)
+        with contextlib.redirect_stderr(said):
+            mesh = _READERS.get(path.suffix.lower(), meshio.read)(path)
     except MeshError:
         raise
     except (Exception, SystemExit) as error:  # its readers raise what they stumble over
-        told = " ".join(str(error).split()) or type(error).__name__
+        why = said.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__} {error}"
+        told = " ".join(why.split())
         raise MeshError(f"{path}: this mesh cannot be read ({told})") from error
+    points = np.asarray(mesh.points, dtype=float)
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        raise MeshError(f"{path}: the coordinates of node {bad[0] + 1} (in the file's order) are not finite")
     sets = {name: [np.asarray(part, dtype=int) for part in parts] for name, parts in mesh.cell_sets.items()}
     sets |= _property_sets(mesh)
     volume = [index for index, block in enumerate(mesh.cells) if block.type in _VOLUMES]
@@ -108,13 +117,19 @@ def _read(path: Path) -> _Source:
     width = 10 if kind == "tetra10" else _CORNERS[kind]
     starts = np.cumsum([0, *(len(mesh.cells[index].data) for index in volume)])
     cells = np.concatenate([np.asarray(mesh.cells[index].data)[:, :width] for index in volume])
+    pair = same_rows(np.sort(cells[:, : _CORNERS[kind.removesuffix("10")]], axis=1))
+    if pair is not None:
+        raise MeshError(
+            f"{path}: volume elements {pair[0] + 1} and {pair[1] + 1} (in the file's order) have the same nodes; "
+            "remove one of them"
+        )
     members = {
         name: np.concatenate([start + parts[index] for index, start in zip(volume, starts, strict=False)])
         for name, parts in sets.items()
     }
     return _Source(
         path=path,
-        points=np.asarray(mesh.points, dtype=float),
+        points=points,
         kind=kind,
         cells=cells,
         cell_sets=_kept(members),

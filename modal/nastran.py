@@ -52,11 +52,32 @@ def read(path: Path) -> Any:
         for why, names in _REFUSED.items():
             if re.fullmatch(names, card.name):
                 raise MeshError(f"{path}: line {card.line}: {card.name} {why}")
-    mesh = importlib.import_module("meshio").read(path)
     systems = _Systems(path, cards)
+    _check_elements(path, cards, systems)
+    mesh = importlib.import_module("meshio").read(path)
     if systems.named:
         mesh.points = np.array([systems.place(int(label)) for label in mesh.points_id]).reshape(-1, 3)
     return mesh
+
+
+def _check_elements(path: Path, cards: list[_Card], systems: _Systems) -> None:
+    """Refuse elements of one number, and nodes that are not there."""
+    seen: set[int] = set()
+    for card in cards:
+        if not re.fullmatch(r"C(TETRA|HEXA|PENTA|PYRAM?|TRIA\w+|QUAD\w+)", card.name):
+            continue
+        try:
+            label = card.whole(1)
+            nodes = [int(word) for word in card.fields[2:] if word.isdecimal()]
+        except ValueError as error:
+            raise MeshError(f"{path}: line {card.line}: {card.name}: {error}") from error
+        if label in seen:
+            raise MeshError(f"{path}: line {card.line}: {card.name}: element {label} is given twice")
+        seen.add(label)
+        if not card.name.startswith(("CTRIA", "CQUAD")):  # theirs end in angles and thicknesses
+            missing = [node for node in nodes if node not in systems.grids]
+            if missing:
+                raise MeshError(f"{path}: line {card.line}: {card.name}: there is no grid point {missing[0]}")
 
 
 class _Systems:
@@ -68,14 +89,16 @@ class _Systems:
         self.places: dict[int, np.ndarray] = {}
         self.pending: list[int] = []
         self.given: dict[int, tuple[_Card, int]] = {}
-        self.grids = {}
+        self.grids: dict[int, _Card] = {}
         default = 0
         for card in cards:
             try:
                 if card.name == "GRDSET":
                     default = card.whole(2)
                 elif card.name == "GRID":
-                    self.grids[card.whole(1)] = card
+                    known = self.grids.setdefault(card.whole(1), card)
+                    if known.fields != card.fields:
+                        raise ValueError(f"grid point {card.whole(1)} is given twice, at different places")
                 elif re.fullmatch(r"CORD[12][RCS]", card.name):
                     # two systems fit on one CORD1 card
                     second = card.name[4] == "1" and len(card.fields) > 4 and card.fields[4]

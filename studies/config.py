@@ -40,7 +40,7 @@ class MeshFile:
     @property
     def foreign(self) -> bool:
         """Whether another program than gmsh wrote it."""
-        return not self.file.endswith(".msh")
+        return not self.file.lower().endswith(".msh")
 
 
 @dataclass(frozen=True, config=STRICT)

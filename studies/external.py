@@ -13,25 +13,28 @@ from scipy import linalg
 
 from coupling.inputs import STRICT, InputError, Real, Whole, nearest, read_toml, validate
 from modal.units import model_doubts
-from rom.external import NAMED, Findings, external_model, read_matrices
+from rom.external import Findings, external_model, read_matrices
 from rom.reduced import ReducedModel
 from studies.provenance import versions
+
+Name = Annotated[str, Field(min_length=1)]
 
 
 @dataclass(frozen=True, config=STRICT)
 class MatricesTable:
-    """Where the matrices are: names in one `file` (npz, OP4), or files of their own (Matrix Market, npy).
+    """Where the matrices are: names in one `file` (npz, OP4), or files of their own (Matrix Market, npy,
+    scipy's save_npz).
 
     damping is a matrix too; or else damping_ratio is that of every mode. base_load: (n, 3) T^T M r. mass_scale: kg a
     unit of mass, with seconds: 1e3 for matrices in t, N and mm. It multiplies the stiffness and the damping, too.
     """
 
-    mass: str
-    stiffness: str
-    file: str | None = None
-    damping: str | None = None
+    mass: Name
+    stiffness: Name
+    file: Name | None = None
+    damping: Name | None = None
     damping_ratio: Annotated[Real, Field(ge=0, lt=1)] | None = None
-    base_load: str | None = None
+    base_load: Name | None = None
     mass_scale: Annotated[Real, Field(gt=0)] = 1.0
 
     def __post_init__(self) -> None:
@@ -104,8 +107,14 @@ def _doubts(model: ReducedModel) -> tuple[str, ...]:
 def _matrix(key: str, name: str, found: dict[str, np.ndarray], folder: Path) -> np.ndarray:
     if name.lower() in found:
         return found[name.lower()]
+    if "" in found:
+        raise InputError("matrices.file: holds one matrix without a name; name the file as mass or stiffness instead")
     if found and not Path(name).suffix:
         raise InputError(f"{key}: no matrix {name!r} in the file; {nearest(name.lower(), list(found))}")
-    if Path(name).suffix in ("", *NAMED):
-        raise InputError(f"{key}: {name!r} is the name of a matrix: name its file in matrices.file, or a .mtx here")
-    return read_matrices(folder / name)[""]
+    alone = {} if Path(name).suffix == "" else read_matrices(folder / name)
+    if "" not in alone:
+        raise InputError(
+            f"{key}: {name!r} is the name of a matrix, or of a file of several: name the file in matrices.file and the "
+            "matrix here; or here a file of one matrix (.mtx, .npy, scipy's save_npz)"
+        )
+    return alone[""]
