@@ -120,7 +120,7 @@ def test_bad_files(tmp_path, monkeypatch, capsys):
     for table, message in (
         ('file = "m.npz"\nmass = "M"\nstiffness = "KK"\ndamping_ratio = 0.1', "matrices.stiffness: no matrix 'KK'"),
         ('file = "m.npz"\nmass = "M"\nstiffness = "K"', "give one of damping (a matrix) and damping_ratio"),
-        ('mass = "M"\nstiffness = "K"\ndamping_ratio = 0.1', "name its file in matrices.file"),
+        ('mass = "M"\nstiffness = "K"\ndamping_ratio = 0.1', "name the file in matrices.file"),
     ):
         (tmp_path / "external.toml").write_text(TOML.format(matrices=table))
         assert main(["import", "external.toml", "-o", "rom.h5"]) == 2
