@@ -15,7 +15,7 @@ from modal import petsc, store
 from modal.matrices import SystemMatrices
 from modal.petsc import Factorization, SolverError
 
-__all__ = ["Factorization", "Modes", "SolverError", "count_below", "factorize", "solve_modes"]
+__all__ = ["Factorization", "Modes", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes"]
 
 _KIND = "modes"
 # of the lowest straining eigenvalue: below every elastic mode, far enough from the rigid ones to factorise safely
@@ -55,6 +55,10 @@ class Modes:
 
     def __len__(self) -> int:
         return len(self.frequencies_hz)
+
+    def first(self, count: int) -> Modes:
+        """The first so many of the modes."""
+        return Modes(self.frequencies_hz[:count], self.shapes[:count], self.residuals[:count], self.provenance)
 
     @property
     def angular_frequencies(self) -> np.ndarray:
@@ -108,7 +112,7 @@ def solve_modes(
     residuals /= (eigenvalues - floor) * np.linalg.norm(inertia, axis=1)
     round_off = np.finfo(float).eps * np.einsum("ij,ij->i", np.abs(vectors), np.abs(vectors) @ abs(pencil.stiffness))
     eigenvalues = np.where(eigenvalues > round_off, eigenvalues, 0.0)
-    signs = _signs(vectors, inertia @ matrices.movable_translations()[free])
+    signs = shape_signs(vectors, inertia @ matrices.movable_translations()[free])
     shapes = np.zeros((len(eigenvalues), matrices.size))
     shapes[:, free] = signs[:, None] * vectors
     return Modes(np.sqrt(eigenvalues) / (2.0 * np.pi), shapes, residuals, matrices.provenance)
@@ -225,8 +229,11 @@ def _straining_eigenvalue(matrices: SystemMatrices) -> float:
     return float(values[values > 1e-6 * values[-1]][0])
 
 
-def _signs(vectors: np.ndarray, factors: np.ndarray) -> np.ndarray:
-    """(m,) +-1 that fix the direction of shapes, whatever the solver's start vector was."""
+def shape_signs(vectors: np.ndarray, factors: np.ndarray) -> np.ndarray:
+    """(m,) +-1 that fix the direction of shapes (m, N), whatever the solver's start vector was.
+
+    factors: (m, 3) participation factors of the shapes along x, y and z.
+    """
     signs = np.empty(len(vectors))
     for index, (vector, factor) in enumerate(zip(vectors, factors, strict=True)):
         # a mode that barely couples to a translation has a factor of noise

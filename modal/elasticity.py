@@ -77,6 +77,7 @@ class Solid:
     materials  volume group -> Material; the key "default" serves every group that is not named
     degree     of the displacements, 1 to 3; 2 is right for bending
     elastic    facet group -> ElasticSupport
+    scale      metres a unit of length of the file
 
     Elements may be curved (of geometric order 2). Raises modal.msh.MeshError for the mesh and ElasticityError for the
     rest.
@@ -88,10 +89,14 @@ class Solid:
         materials: Mapping[str, Material],
         degree: int = 2,
         elastic: Mapping[str, ElasticSupport] | None = None,
+        scale: float = 1.0,
     ) -> None:
+        if not (math.isfinite(scale) and scale > 0.0):
+            raise ElasticityError(f"scale: expected a positive number of metres a unit of length, not {scale}")
         if degree not in (1, 2, 3):
             raise ElasticityError(f"degree: expected 1, 2 or 3, not {degree}")
-        self.domain = fenicsx.read(mesh)
+        self.domain = fenicsx.read(mesh, scale)
+        self.scale = scale
         self.degree = degree
         self.materials = _by_group(materials, self.domain)
         self.elastic = dict(elastic or {})
@@ -126,6 +131,7 @@ class Solid:
             provenance={
                 "mesh": os.path.basename(self.domain.path),
                 "mesh_sha256": self.domain.sha256,
+                "scale": self.scale,
                 "degree": self.degree,
                 "materials": {name: asdict(material) for name, material in self.materials.items()},
                 "clamped": dict(clamped),

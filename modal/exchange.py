@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import importlib
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from modal.frf import Frf, FrfError
 from modal.store import replacing, write_csv
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".bunv")
+#: what the two columns of a response in a CSV may be
+COLUMNS = ("real-imaginary", "magnitude-degrees", "magnitude-radians")
 _PLACE = ("x", "y", "z", "dx", "dy", "dz")
 # specific data types of UFF 58, record 9
 _QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
@@ -58,24 +61,77 @@ def write_shapes(shapes: MeasuredShapes, path: str | os.PathLike[str]) -> None:
     write_csv(target, [*_PLACE, *names], rows)
 
 
-def read_frf(path: str | os.PathLike[str], quantity: str = "receptance") -> Frf:
+def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns: str | None = None) -> Frf:
     """A frequency response from a CSV or universal file (dataset 58, function type 4).
 
-    CSV: columns frequency (Hz), then real and imaginary part of every response (no header, or one line of words);
-    `quantity` says what they are. A universal file says itself. Raises ExchangeError.
+    CSV: the frequency (Hz), then two columns for every response; `quantity` says what they are. A universal file says
+    itself.
+
+    columns  one of COLUMNS; left out: as the words of the header line tell (real, imag; magnitude, phase in deg or
+             rad), or else real and imaginary parts. Columns that look like magnitude and phase, without a word that
+             says so, are refused
+
+    Raises ExchangeError.
     """
     file = _existing(path)
     if file.suffix.lower() in _UNIVERSAL:
         return _frf_of_universal(file)
-    rows = _numbers(file)
+    header, rows = _numbers(file)
     if rows.shape[1] < 3 or rows.shape[1] % 2 == 0:
         raise ExchangeError(
-            f"{file}: expected the columns frequency, real part, imaginary part (and more pairs), not {rows.shape[1]}"
+            f"{file}: expected the columns frequency, real part, imaginary part (or magnitude and phase; and more "
+            f"pairs), not {rows.shape[1]}"
         )
     try:
-        return Frf(rows[:, 0], (rows[:, 1::2] + 1j * rows[:, 2::2]).T, quantity)
-    except FrfError as error:
+        first, second = rows[:, 1::2].T, rows[:, 2::2].T
+        frf = Frf(rows[:, 0], first + 1j * second, quantity)
+        kind = _columns(columns, header, first, second)
+        if kind == "real-imaginary":
+            return frf
+        angle = np.radians(second) if kind == "magnitude-degrees" else second
+        return Frf(rows[:, 0], first * np.exp(1j * angle), quantity)
+    except (ExchangeError, FrfError) as error:
         raise ExchangeError(f"{file}: {error}") from error
+
+
+def _columns(given: str | None, header: Sequence[str], first: np.ndarray, second: np.ndarray) -> str:
+    """Which of COLUMNS the pairs (k, n) of a CSV are."""
+    if given is not None and given not in COLUMNS:
+        raise ExchangeError(f"columns: expected one of {', '.join(COLUMNS)}, not {given!r}")
+    told = given or _told(header, second)
+    if told is None:
+        one_sign = np.all(first > 0.0, axis=1) | np.all(first < 0.0, axis=1)
+        turns = (np.abs(second).max(axis=1) <= 361.0) & (np.ptp(second, axis=1) > 0.1)
+        if np.any(one_sign & turns):
+            raise ExchangeError(
+                "columns: a response's first column keeps its sign, its second one looks like a phase; say what they "
+                f"are by a header line or by columns = one of {', '.join(COLUMNS)}"
+            )
+        told = "real-imaginary"
+    if told != "real-imaginary" and np.any(first < 0.0):
+        raise ExchangeError("columns: a magnitude is negative; expected linear magnitudes, not decibels")
+    return told
+
+
+def _told(header: Sequence[str], second: np.ndarray) -> str | None:
+    """What the words of a header line say of the first pair of columns; None where they say nothing."""
+    if len(header) < 3:
+        return None
+    one, other = header[1].lower(), header[2].lower()
+    if re.search(r"\bdb\b|_db|decibel", one):
+        raise ExchangeError(f"columns: {header[1]!r}: expected linear magnitudes, not decibels")
+    if re.search(r"phase|\barg|angle", other):
+        if re.search(r"deg|\u00b0", other):
+            return "magnitude-degrees"
+        if "rad" in other:
+            return "magnitude-radians"
+        if np.abs(second).max() > 2.02 * np.pi:
+            return "magnitude-degrees"
+        raise ExchangeError(
+            f"columns: {header[2]!r}: in degrees or radians? Say so there, or by columns = magnitude-degrees or "
+            "magnitude-radians"
+        )
+    return "real-imaginary" if re.match(r"re", one) and re.match(r"im", other) else None
 
 
 def write_frf(frf: Frf, path: str | os.PathLike[str]) -> None:
@@ -119,18 +175,18 @@ def _shapes_of_csv(file: Path) -> MeasuredShapes:
     )
 
 
-def _numbers(file: Path) -> np.ndarray:
-    """The rows of numbers of a CSV file, without a header line."""
-    rows = _table(file)
+def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
+    """The words of a header line, if there is one, and the rows of numbers of a CSV file."""
+    rows, header = _table(file), []
     if rows and np.isnan(_number(rows[0][0])):
-        rows = rows[1:]
+        header, rows = [word.strip() for word in rows[0]], rows[1:]
     try:
         values = np.array([[float(word) for word in row] for row in rows])
     except ValueError as error:
         raise ExchangeError(f"{file}: expected rows of numbers, all of the same length ({error})") from error
     if values.ndim != 2:
         raise ExchangeError(f"{file}: holds no rows of numbers")
-    return values
+    return header, values
 
 
 def _table(file: Path) -> list[list[str]]:

@@ -93,8 +93,8 @@ def versions() -> dict[str, str]:
     return {"dolfinx": dolfinx.__version__, "petsc4py": petsc4py.__version__, "gmsh": gmsh.__version__}
 
 
-def read(path: str | os.PathLike[str]) -> Domain:
-    """Read a gmsh mesh.
+def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
+    """Read a gmsh mesh, `scale` metres its unit of length.
 
     Raises MeshError: no file, not a mesh, no or mixed volume elements, inverted elements, loose parts, overlapping
     groups.
@@ -111,6 +111,7 @@ def read(path: str | os.PathLike[str]) -> Domain:
         with _quiet():
             # three fields up to 0.9, more after them since
             mesh, cells, facets = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=3)[:3]
+    mesh.geometry.x[:] *= scale
     try:
         edges, points = _lower_groups(mesh, lines, nodes)
     except MeshError as error:
@@ -260,6 +261,8 @@ def _prepare_groups() -> None:
         gmsh.model.addPhysicalGroup(3, rest, name=_UNNAMED)
     msh.check_disjoint(2, "facet")
     msh.check_disjoint(3, "volume")
+    msh.check_points()
+    msh.check_twice()
     msh.check_volumes()
     msh.check_connected()
     msh.drop_strays()

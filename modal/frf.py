@@ -15,6 +15,9 @@ QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}
 _UNCERTAIN = 0.5
 # share of the line spacing: in a narrower half-power bandwidth not two lines see a mode rise to half of its peak
 _NARROW = 0.5
+# root mean square of the error over that of the response: where more is missed the fit is not of this response. Noise
+# of a tenth of the peak over forty bandwidths leaves 0.41
+_MISFIT = 0.5
 # highest probability that noise explains a mode
 _CHANCE = 1e-4
 
@@ -54,6 +57,13 @@ class Frf:
             raise FrfError(f"labels: {len(labels)} labels for {len(values)} responses")
         for name, value in (("frequencies_hz", frequencies), ("values", values), ("labels", labels)):
             object.__setattr__(self, name, value)
+
+    def peak_hz(self, low: float = 0.0, high: float = np.inf) -> float:
+        """Frequency of the largest value of any response between two frequencies, Hz; nan where there is no line."""
+        inside = (self.frequencies_hz >= low) & (self.frequencies_hz <= high)
+        if not inside.any():
+            return float("nan")
+        return float(self.frequencies_hz[inside][np.argmax(np.abs(self.values[:, inside]).max(axis=0))])
 
     def band(self, low: float, high: float) -> Frf:
         """The part between two frequencies, Hz. Raises FrfError when it holds fewer than two lines."""
@@ -96,9 +106,10 @@ def identify(frf: Frf, count: int = 1) -> Poles:
     the poles alone, their residues eliminated (Golub and Pereyra 1973), which is unbiased under noise. Unlike a circle
     fit it separates modes that overlap. Poles stay conjugate, which scipy's AAA (1.15 or newer) does not provide.
 
-    A pole is a mode when it lies in the band, its half-power bandwidth 2 zeta f is at least half the spacing of the
-    lines around it, its damping ratio is determined to better than half of it, and the fit is better than one with a
-    mode less by more than noise would make it: noise passes with a probability below 1e-4 (`Rational.chance`).
+    A pole is a mode when the band holds its half-power points, its half-power bandwidth 2 zeta f is at least half the
+    spacing of the lines around it, its damping ratio is determined to better than half of it, the fit's error is less
+    than half of the response, in the band and around the pole, and the fit is better than one with a mode less by more
+    than noise would make it: noise passes with a probability below 1e-4 (`Rational.chance`).
 
     Raises FrfError for too few lines, and for poles that are no modes of the band.
     """
@@ -131,6 +142,7 @@ def identify(frf: Frf, count: int = 1) -> Poles:
             f"count: {count} poles fit the band {_span(frf)} hardly better than {count - 1}: noise does as well with a "
             f"probability of up to {min(chance, 1.0):.2g}; one of them is no mode of the band; ask for fewer modes"
         )
+    _check_misfit(result, frf)
     return result
 
 
@@ -157,22 +169,43 @@ def _span(frf: Frf) -> str:
 def _check(poles: Poles, frf: Frf) -> None:
     """Refuse what is no damped mode of the band or what its lines do not resolve."""
     axis = frf.frequencies_hz
+    span = _span(frf)
     for frequency, ratio, (_, deviation) in zip(
         poles.frequencies_hz, poles.damping_ratios, poles.deviations, strict=True
     ):
         pole = f"count: a fitted pole at {frequency:.6g} Hz with the damping ratio {ratio:.3g} +- {deviation:.2g}"
         if not (axis[0] <= frequency <= axis[-1] and ratio < 0.5):
-            raise FrfError(f"{pole} is no mode of the band {_span(frf)}; ask for fewer modes or another band")
+            raise FrfError(f"{pole} is no mode of the band {span}; ask for fewer modes or another band")
+        if not (axis[0] <= (1.0 - ratio) * frequency and (1.0 + ratio) * frequency <= axis[-1]):
+            raise FrfError(
+                f"{pole} is no mode of the band {span}, which does not hold its half-power points, "
+                f"{(1.0 - ratio) * frequency:.6g} and {(1.0 + ratio) * frequency:.6g} Hz; widen or move the band"
+            )
         after = int(np.clip(np.searchsorted(axis, frequency), 1, axis.size - 1))
         spacing = axis[after] - axis[after - 1]
         if 2.0 * ratio * frequency < _NARROW * spacing:
             raise FrfError(
-                f"{pole} is no mode of the band {_span(frf)} that its lines resolve: half-power bandwidth "
+                f"{pole} is no mode of the band {span} that its lines resolve: half-power bandwidth "
                 f"{2.0 * ratio * frequency:.2g} Hz, line spacing {spacing:.3g} Hz; ask for fewer modes or measure "
                 "finer lines"
             )
         if not deviation < _UNCERTAIN * ratio:
             raise FrfError(
-                f"{pole} is no mode of the band {_span(frf)} that its lines determine; ask for fewer modes or another "
-                "band"
+                f"{pole} is no mode of the band {span} that its lines determine; ask for fewer modes or another band"
             )
+
+
+def _check_misfit(poles: Poles, frf: Frf) -> None:
+    """Refuse a fit that misses the response as a whole or around one of its poles."""
+    missed = {f"the band {_span(frf)}": poles.misfit}
+    for frequency, ratio in zip(poles.frequencies_hz, poles.damping_ratios, strict=True):
+        # wide enough for one line of those that the least bandwidth allows
+        near = np.abs(frf.frequencies_hz - frequency) <= 2.0 * ratio * frequency
+        error = np.linalg.norm((poles.fitted - frf.values)[:, near])
+        missed[f"the peak at {frequency:.6g} Hz"] = float(error / np.linalg.norm(frf.values[:, near]))
+    where, worst = max(missed.items(), key=lambda item: item[1])
+    if not worst < _MISFIT:
+        raise FrfError(
+            f"values: the fit misses the response in {where} by {worst:.0%} of it, at most {_MISFIT:.0%} is taken; "
+            "check what the columns are, narrow the band around the peak, or ask for more modes"
+        )

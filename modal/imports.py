@@ -7,9 +7,10 @@ element edges whose nodes are all in it. meshio is an optional dependency.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import io
 import os
-import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from modal.msh import MeshError
+from modal import abaqus, nastran
+from modal.msh import MeshError, same_rows
 from modal.store import replacing
 
 # corners of the faces of a cell, and of a quadratic one the nodes between them (VTK's order)
@@ -30,6 +32,8 @@ _CORNERS = {"tetra": 4, "hexahedron": 8}
 # a dolfinx geometry knows no 20-node brick; its edges are taken straight
 _VOLUMES = {"tetra": "tetra", "tetra10": "tetra10", "hexahedron": "hexahedron", "hexahedron20": "hexahedron"}
 _SHELLS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+# what meshio passes over in these files changes the mesh
+_READERS = {".inp": abaqus.read, ".bdf": nastran.read, ".nas": nastran.read, ".fem": nastran.read}
 _FACET_KINDS = {"tetra": "triangle", "tetra10": "triangle6", "hexahedron": "quad"}
 
 
@@ -87,13 +91,21 @@ def _read(path: Path) -> _Source:
         raise MeshError(f"{path}: meshes of other programs need meshio: pip install meshio") from error
     if not path.is_file():
         raise MeshError(f"{path}: no such mesh file")
+    said = io.StringIO()  # meshio says why and ends the program
     try:
-        mesh = meshio.read(path)
+        with contextlib.redirect_stderr(said):
+            mesh = _READERS.get(path.suffix.lower(), meshio.read)(path)
+    except MeshError:
+        raise
     except (Exception, SystemExit) as error:  # its readers raise what they stumble over
-        raise MeshError(f"{path}: meshio cannot read this mesh ({error or type(error).__name__})") from error
+        why = said.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__} {error}"
+        told = " ".join(why.split())
+        raise MeshError(f"{path}: this mesh cannot be read ({told})") from error
+    points = np.asarray(mesh.points, dtype=float)
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        raise MeshError(f"{path}: the coordinates of node {bad[0] + 1} (in the file's order) are not finite")
     sets = {name: [np.asarray(part, dtype=int) for part in parts] for name, parts in mesh.cell_sets.items()}
-    if path.suffix.lower() == ".inp":
-        sets |= _abaqus_element_sets(path, mesh)
     sets |= _property_sets(mesh)
     volume = [index for index, block in enumerate(mesh.cells) if block.type in _VOLUMES]
     solids = {block.type for block in mesh.cells if block.dim == 3}
@@ -105,13 +117,19 @@ def _read(path: Path) -> _Source:
     width = 10 if kind == "tetra10" else _CORNERS[kind]
     starts = np.cumsum([0, *(len(mesh.cells[index].data) for index in volume)])
     cells = np.concatenate([np.asarray(mesh.cells[index].data)[:, :width] for index in volume])
+    pair = same_rows(np.sort(cells[:, : _CORNERS[kind.removesuffix("10")]], axis=1))
+    if pair is not None:
+        raise MeshError(
+            f"{path}: volume elements {pair[0] + 1} and {pair[1] + 1} (in the file's order) have the same nodes; "
+            "remove one of them"
+        )
     members = {
         name: np.concatenate([start + parts[index] for index, start in zip(volume, starts, strict=False)])
         for name, parts in sets.items()
     }
     return _Source(
         path=path,
-        points=np.asarray(mesh.points, dtype=float),
+        points=points,
         kind=kind,
         cells=cells,
         cell_sets=_kept(members),
@@ -128,20 +146,6 @@ def _shell_sets(mesh: Any, sets: dict[str, list[np.ndarray]]) -> dict[str, set[t
             if block.type in _SHELLS and parts[index].size:
                 found.setdefault(name, set()).update(_keys(block.data[parts[index]], _SHELLS[block.type]))
     return found
-
-
-def _abaqus_element_sets(path: Path, mesh: Any) -> dict[str, list[np.ndarray]]:
-    """Sets named in *ELEMENT lines: meshio counts the names, which goes wrong where a block has none."""
-    headers = re.findall(r"^\*ELEMENT\s*,([^\n]*)", path.read_text(errors="replace"), re.IGNORECASE | re.MULTILINE)
-    if len(headers) != len(mesh.cells):
-        raise MeshError(f"{path}: {len(headers)} *ELEMENT blocks, meshio reads {len(mesh.cells)}; write one plain file")
-    sets: dict[str, list[np.ndarray]] = {}
-    for index, header in enumerate(headers):
-        named = re.search(r"ELSET\s*=\s*([^,\s]+)", header, re.IGNORECASE)
-        if named:
-            parts = sets.setdefault(named[1], [np.empty(0, dtype=int) for _ in headers])
-            parts[index] = np.arange(len(mesh.cells[index].data))
-    return sets
 
 
 def _property_sets(mesh: Any) -> dict[str, list[np.ndarray]]:

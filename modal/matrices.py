@@ -217,6 +217,10 @@ def patch_average(matrices: SystemMatrices, patch_label: str, direction: Sequenc
 
 def _symmetric(name: str, matrix: Any, size: int) -> sparse.csr_array:
     """A canonical read-only CSR copy of a symmetric matrix."""
+    if np.iscomplexobj(matrix):
+        raise MatricesError(
+            f"{name}: complex; expected a real matrix, the damping as damping_ratio (half a loss factor)"
+        )
     copy = sparse.csr_array(matrix, dtype=float, copy=True)
     if copy.shape != (size, size):
         raise MatricesError(

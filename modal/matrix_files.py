@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,8 @@ def read_matrices(
     sets: str | os.PathLike[str] | None = None,
     fixed: Mapping[str, str] | None = None,
     damping_ratio: float = 0.0,
+    scale: float = 1.0,
+    mass_scale: float = 1.0,
 ) -> SystemMatrices:
     """Matrices of another code.
 
@@ -34,6 +37,8 @@ def read_matrices(
     nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels
     sets             CSV: set, node and perhaps weight (area, m^2); every set becomes a patch
     fixed            sets that are held, with their components: {"root": "xyz"}
+    scale            metres a unit of length of the nodes: 1e-3 for mm
+    mass_scale       kg a unit of mass, with seconds: 1e3 for matrices in t, N and mm. It multiplies the stiffness, too
 
     Raises MatricesError, with the file, for shapes that do not fit, one triangle alone, unknown nodes or sets.
     """
@@ -44,11 +49,14 @@ def read_matrices(
         if name not in patches:
             raise MatricesError(f"{sets}: no set {name!r} to hold; there are: {', '.join(sorted(patches)) or 'none'}")
         held += [3 * patches[name].nodes + _component(sets, component) for component in components]
-    return _system(stiffness, mass, coordinates, np.concatenate(held), patches, damping_ratio)
+    system = _system(stiffness, mass, coordinates, np.concatenate(held), patches, damping_ratio)
+    return _scaled(system, scale, mass_scale)
 
 
-def read_folder(folder: str | os.PathLike[str], damping_ratio: float = 0.0) -> SystemMatrices:
-    """What `write_folder` wrote, or another code in its place. Raises MatricesError."""
+def read_folder(
+    folder: str | os.PathLike[str], damping_ratio: float = 0.0, scale: float = 1.0, mass_scale: float = 1.0
+) -> SystemMatrices:
+    """What `write_folder` wrote, or another code in its place; scales as of `read_matrices`. Raises MatricesError."""
     home = Path(folder)
     labels, coordinates = _nodes(home / "nodes.csv")
     patches = _patches(home / "sets.csv", labels) if (home / "sets.csv").is_file() else {}
@@ -62,7 +70,21 @@ def read_folder(folder: str | os.PathLike[str], damping_ratio: float = 0.0) -> S
         ]
         fixed = np.array(held, dtype=int)
     found = {name: _either(home, name) for name in ("stiffness", "mass")}
-    return _system(found["stiffness"], found["mass"], coordinates, fixed, patches, damping_ratio)
+    return _scaled(
+        _system(found["stiffness"], found["mass"], coordinates, fixed, patches, damping_ratio), scale, mass_scale
+    )
+
+
+def _scaled(system: SystemMatrices, scale: float, mass_scale: float) -> SystemMatrices:
+    for name, value in (("scale", scale), ("mass_scale", mass_scale)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise MatricesError(f"{name}: expected a positive number, not {value}")
+    return replace(
+        system,
+        stiffness=mass_scale * system.stiffness,
+        mass=mass_scale * system.mass,
+        coordinates=scale * system.coordinates,
+    )
 
 
 def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> None:

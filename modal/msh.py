@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -54,13 +55,20 @@ def merge(path: Path) -> None:
     gmsh.logger.start()
     try:
         gmsh.merge(str(path))
-        complaints = [line for line in gmsh.logger.get() if line.startswith("Error")]
+        log = gmsh.logger.get()
     except Exception as error:  # gmsh raises nothing narrower
         raise MeshError(f"{path}: gmsh cannot read this mesh ({error})") from error
     finally:
         gmsh.logger.stop()
+    complaints = [line for line in log if line.startswith("Error")]
     if complaints:
         raise MeshError(f"{path}: gmsh cannot read this mesh ({complaints[0]})")
+    told = [found for found in (re.fullmatch(r"Info: (\d+) elements?", line) for line in log) if found]
+    labels = gmsh.model.mesh.getElements()[1]
+    kept = np.unique(np.concatenate(labels)).size if labels else 0
+    if told and kept < int(told[-1][1]):
+        lost = int(told[-1][1]) - kept
+        raise MeshError(f"{path}: {lost} element numbers are given twice, of which gmsh keeps one; number them anew")
 
 
 def groups(dimension: int) -> dict[str, int]:
@@ -127,6 +135,33 @@ def check_disjoint(dimension: int, kind: str) -> None:
                     f"{kind} groups {names[first]!r} and {name!r} share {shared} elements; "
                     f"make the groups disjoint, an element can carry one label only"
                 )
+
+
+def check_points() -> None:
+    """Raise MeshError for a node of the current model whose coordinates are not finite."""
+    labels, points, _ = gmsh.model.mesh.getNodes()
+    bad = ~np.isfinite(points.reshape(-1, 3)).all(axis=1)
+    if bad.any():
+        raise MeshError(f"node {labels[bad][0]}: its coordinates are not finite; mesh again")
+
+
+def check_twice() -> None:
+    """Raise MeshError for two volume elements of the current model on the same nodes: the body would count twice."""
+    for kind, labels, nodes in zip(*gmsh.model.mesh.getElements(3), strict=True):
+        corners = gmsh.model.mesh.getElementProperties(kind)[5]
+        rows = np.sort(np.asarray(nodes).reshape(len(labels), -1)[:, :corners], axis=1)
+        pair = same_rows(rows)
+        if pair is not None:
+            raise MeshError(f"elements {labels[pair[0]]} and {labels[pair[1]]} have the same nodes; remove one of them")
+
+
+def same_rows(rows: np.ndarray) -> tuple[int, int] | None:
+    """Two equal rows of (n, k); None where all differ."""
+    _, place, counts = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
+    if counts.size == 0 or counts.max() == 1:
+        return None
+    first, second = np.flatnonzero(place.ravel() == np.argmax(counts))[:2]
+    return int(first), int(second)
 
 
 def check_volumes() -> None:

@@ -172,11 +172,23 @@ def _record(path: str | os.PathLike[str], kind: str, file: h5py.File) -> tuple[d
         found = file.attrs.get("kind")
         if found != kind:
             raise StoreError(f"{path}: holds {found or 'no record of ours'}, expected {kind}")
-        version = int(file.attrs["schema_version"])
+        version = int(file.attrs.get("schema_version", 0))
         if version > SCHEMA_VERSION:
             raise StoreError(f"{path}: schema version {version} is newer than {SCHEMA_VERSION}; update vanedamp")
-        attributes = {name: _plain(value) for name, value in file.attrs.items()}
-        return {name: _read(item) for name, item in file.items() if isinstance(item, h5py.Dataset)}, attributes
+        attributes = _Fields(path, {name: _plain(value) for name, value in file.attrs.items()})
+        variables = {name: _read(item) for name, item in file.items() if isinstance(item, h5py.Dataset)}
+        return _Fields(path, variables), attributes
+
+
+class _Fields(dict[str, Any]):
+    """What a record holds by name; what it lacks is told with its file."""
+
+    def __init__(self, path: str | os.PathLike[str], values: Mapping[str, Any]) -> None:
+        super().__init__(values)
+        self._path = path
+
+    def __missing__(self, name: str) -> Any:
+        raise StoreError(f"{self._path}: holds no {name!r}; the record is not whole, write it anew")
 
 
 def frozen(array: Any, dtype: Any = float) -> np.ndarray:

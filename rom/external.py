@@ -46,9 +46,10 @@ class Findings:
 
 
 def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Dense matrices by name (lower case) of an .npz or .op4 file; of .mtx or .npy the one, named "".
+    """Dense matrices by name (lower case) of an .npz or .op4 file; the one of .mtx, .npy or scipy's save_npz is "".
 
-    Raises ExternalError for a missing, damaged or unknown file, and for OP4 without the package pyyeti.
+    What a file holds beside numbers is left out. Raises ExternalError for a missing, damaged or unknown file, and for
+    OP4 without the package pyyeti.
     """
     file = Path(path)
     if file.suffix not in NAMED + SINGLE:
@@ -61,7 +62,8 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
         raise
     except Exception as error:  # every format has exceptions of its own
         raise ExternalError(f"{path}: cannot be read ({error})") from error
-    return {name.lower(): np.array(_dense(matrix), dtype=float) for name, matrix in found.items()}
+    dense = {name.lower(): np.asarray(_dense(matrix)) for name, matrix in found.items()}
+    return {name: matrix for name, matrix in dense.items() if matrix.dtype.kind in "biufc"}
 
 
 def external_model(
@@ -82,7 +84,15 @@ def external_model(
     beyond the digits of a text file, and ReducedModelError for what does not fit together.
     """
     matrices = {"mass": mass, "stiffness": stiffness} | ({} if damping is None else {"damping": damping})
-    matrices = {name: np.array(matrix, dtype=float) for name, matrix in matrices.items()}
+    given = matrices | ({} if base_load is None else {"base_load": base_load})
+    for name, matrix in given.items():
+        if np.iscomplexobj(matrix) and np.any(np.imag(matrix)):
+            raise ExternalError(
+                f"{name}: complex; give real matrices, and damping or damping_ratio (structural damping K (1 + i eta): "
+                "eta / 2)"
+            )
+    matrices = {name: np.array(np.real(matrix), dtype=float) for name, matrix in matrices.items()}
+    base_load = None if base_load is None else np.real(base_load)
     for name, matrix in matrices.items():
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape != matrices["mass"].shape:
             raise ExternalError(f"{name}: shape {matrix.shape}; expected square matrices of one size")
@@ -151,6 +161,8 @@ def _dense(matrix: Any) -> Any:
 
 def _npz(path: str) -> dict[str, Any]:
     with np.load(path, allow_pickle=False) as data:
+        if {"format", "shape", "data"} <= set(data.files):
+            return {"": sparse.load_npz(path)}
         return {name: data[name] for name in data.files}
 
 

@@ -60,6 +60,11 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
     """The fields of the model whose record `save` wrote. Raises modal.store.StoreError."""
     values, attributes = store.load(path, _KIND)
     fields = {name: values[name] for name in ("mass", "damping", "stiffness", "selection", "directions", "base_load")}
+    for name, field in fields.items():
+        if np.iscomplexobj(field):
+            raise store.StoreError(f"{path}: {name}: expected real numbers, not complex ones")
+        if not np.all(np.isfinite(field)):
+            raise store.StoreError(f"{path}: {name}: holds entries that are not finite")
     return dict(
         **fields,
         interface=tuple(values["interface"]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,17 +14,21 @@ from scipy import sparse
 from coupling.inputs import InputError
 from modal.calibrate import RigidModel, rigid_model
 from modal.exchange import read_frf, read_shapes
-from modal.frf import Poles, identify
+from modal.frf import Frf, FrfError, Poles, identify
 from modal.store import Variable, save
 from modal.stress import HotSpot
 from modal.tuning import Tuning, tune
-from studies.calibration_tables import CalibrationTable, DampingTable, TuneTable, check_vary, parts_by_name
+from studies.calibration_tables import CalibrationTable, TuneTable, check_vary, parts_by_name
 from studies.config import Case, MaterialTable
 from studies.pipeline import ModalAnalysis, Structure, assemble, modal_analysis
 from studies.provenance import versions
 
 # a pole farther from the computed mode than this share of its frequency belongs to another one
 _NEAR = 0.1
+# from these on, relative, a warning: distance of the pole from the computed mode, error of the fit
+_OFF, _MISSED = 0.02, 0.1
+# around the computed mode, relative: where a larger peak outside the band may be its own
+_AROUND = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +39,7 @@ class Calibration:
     rigid     the first bending at the response coordinate, with the calibrated damping ratio
     tuning    None where nothing was tuned
     poles     of the measured response; None where the damping ratio is the case's; `pole` is the one used
+    warnings  what to look at: those of the analysis, and a response that does not look like the first bending's
     """
 
     case: Case
@@ -42,6 +48,7 @@ class Calibration:
     tuning: Tuning | None
     poles: Poles | None
     pole: int | None
+    warnings: tuple[str, ...]
     wall_time_s: float
 
     @property
@@ -60,6 +67,7 @@ class Calibration:
             "damping": self._damping(),
             "excitation": self._excitation(),
             "tuning": None if self.tuning is None else _told(self.tuning, self.case),
+            "warnings": list(self.warnings),
             "wall_time_s": self.wall_time_s,
         }
 
@@ -126,15 +134,19 @@ def calibrate(case: Case) -> Calibration:
     analysis = modal_analysis(structure)
     if analysis.first_bending is None or analysis.functional is None:
         raise InputError("; ".join(analysis.warnings))
-    poles, pole, ratio = None, None, case.damping_ratio
+    poles, pole, ratio, warnings = None, None, case.damping_ratio, analysis.warnings
     frequency = float(analysis.modes.frequencies_hz[analysis.first_bending])
     if table.damping is not None:
-        poles = _poles(table.damping, frequency)
+        frf = read_frf(table.damping.frf, table.damping.quantity, table.damping.columns)
+        band = table.damping.band or (0.95 * frequency, 1.05 * frequency)
+        poles = _poles(frf, band, table.damping.modes, frequency)
         pole = poles.nearest(frequency)
         ratio = float(poles.damping_ratios[pole])
-        _check_near(float(poles.frequencies_hz[pole]), frequency)
+        found = float(poles.frequencies_hz[pole])
+        _check_near(found, frequency)
+        warnings += tuple(f"calibration.damping: {told}" for told in _doubts(frf, band, poles.misfit, found, frequency))
     rigid = rigid_model(analysis.modes, analysis.first_bending, analysis.functional, case.response_label, ratio)
-    return Calibration(structure.case, analysis, rigid, tuning, poles, pole, time.perf_counter() - started)
+    return Calibration(structure.case, analysis, rigid, tuning, poles, pole, warnings, time.perf_counter() - started)
 
 
 def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> Case:
@@ -170,9 +182,36 @@ def _tuned(structure: Structure, table: TuneTable) -> Tuning:
     return tune(structure.matrices, varied, table.frequencies, measured, table.modes, starts=table.starts)
 
 
-def _poles(table: DampingTable, frequency: float) -> Poles:
-    low, high = table.band or (0.95 * frequency, 1.05 * frequency)
-    return identify(read_frf(table.frf, table.quantity).band(low, high), table.modes)
+def _poles(frf: Frf, band: tuple[float, float], count: int, frequency: float) -> Poles:
+    """The modes of the band. A refusal tells where the response's peak lies beside the computed mode."""
+    try:
+        return identify(frf.band(*band), count)
+    except FrfError as error:
+        peak = frf.peak_hz()
+        raise InputError(
+            f"calibration.damping: {error} (the response is largest at {peak:.6g} Hz, the first bending lies at "
+            f"{frequency:.6g} Hz)"
+        ) from error
+
+
+def _doubts(frf: Frf, band: tuple[float, float], misfit: float, found: float, computed: float) -> Iterator[str]:
+    """What is odd about the mode that was found in a band of a response."""
+    if abs(found / computed - 1.0) > _OFF:
+        yield (
+            f"the response's mode lies at {found:.6g} Hz, {found / computed - 1.0:+.1%} off the computed first bending "
+            f"({computed:.6g} Hz); tune the stiffness to measured frequencies"
+        )
+    if misfit > _MISSED:
+        yield (
+            f"the fit misses the response by {misfit:.0%} of it; check quantity and columns, narrow the band, or ask "
+            "for more modes"
+        )
+    peak = frf.peak_hz((1.0 - _AROUND) * computed, (1.0 + _AROUND) * computed)
+    if not band[0] <= peak <= band[1]:
+        yield (
+            f"the response is larger at {peak:.6g} Hz, outside the band {band[0]:.6g} to {band[1]:.6g} Hz; check that "
+            "the band holds the first bending"
+        )
 
 
 def _check_near(found: float, computed: float) -> None:

@@ -18,11 +18,13 @@ if TYPE_CHECKING:
 class DampingTable:
     """A frequency response (CSV: Hz, real, imaginary ...; or UFF 58) that gives the damping ratio of the first bending.
 
-    quantity  what a CSV holds; band in Hz, left out: 5 % to either side of the mode; modes in that band
+    quantity  what a CSV holds, and columns how: left out, its header tells; band in Hz, left out: 5 % to either side of
+    the mode; modes in that band
     """
 
     frf: str
     quantity: Literal["receptance", "mobility", "accelerance"] = "receptance"
+    columns: Literal["real-imaginary", "magnitude-degrees", "magnitude-radians"] | None = None
     band: tuple[Positive, Positive] | None = None
     modes: Annotated[Whole, Field(ge=1)] = 1
 

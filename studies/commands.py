@@ -7,7 +7,7 @@ import os
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,6 +69,7 @@ def calibrate(arguments: Namespace) -> None:
         found.save(arguments.output)
     result = found.to_json()
     _write_json(arguments.json, result)
+    _warn(arguments.input, found.warnings)
     if arguments.json != "-":
         tell_calibration(result)
 
@@ -97,7 +98,7 @@ def reduce(arguments: Namespace) -> None:
     case = Case.load(arguments.input)
     if not case.interface:
         raise InputError("interface: missing; a reduction needs at least one [interface.<label>] table")
-    from studies.pipeline import assemble, reduction, with_hot_spots
+    from studies.pipeline import assemble, reduction, unit_doubts, with_hot_spots
 
     started = time.perf_counter()
     structure = assemble(case)
@@ -119,9 +120,11 @@ def reduce(arguments: Namespace) -> None:
         "interface": list(model.interface),
         "outputs": list(model.outputs),
         "estimate": estimate,
+        "warnings": list(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))),
         "wall_time_s": time.perf_counter() - started,
     }
     _write_json(arguments.json, result)
+    _warn(arguments.input, result["warnings"])
     if arguments.json != "-":
         kind = "natural" if model.free_modes else "fixed-interface"
         print(f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}")
@@ -134,15 +137,17 @@ def import_model(arguments: Namespace) -> None:
     from studies.external import External
 
     _check_outputs(arguments)
-    model, findings = External.load(arguments.input)
+    model, findings, warnings = External.load(arguments.input)
     if arguments.output:
         model.save(arguments.output)
     result = {
         "frequency_hz": model.natural_frequencies_hz.tolist(),
         "interface": list(model.interface),
         "checks": asdict(findings),
+        "warnings": list(warnings),
     }
     _write_json(arguments.json, result)
+    _warn(arguments.input, warnings)
     if arguments.json != "-":
         print(f"{model.size} coordinates; interface: {', '.join(model.interface)}")
         print("frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8]))
@@ -278,14 +283,14 @@ def _folder(arguments: Namespace) -> Path:
     return folder
 
 
-def _tell_choice(source: str, estimate: Mapping[str, Any] | None, warnings: Sequence[str]) -> None:
+def _tell_choice(source: str, estimate: Mapping[str, Any] | None, warnings: Iterable[str]) -> None:
     """What was chosen automatically is said, with its reason, and warnings, wherever the results go."""
     if estimate is not None:
         print(f"vanedamp: {source}: structure.modes: {estimate['sentence']}", file=sys.stderr)
     _warn(source, warnings)
 
 
-def _warn(source: str, warnings: Sequence[str]) -> None:
+def _warn(source: str, warnings: Iterable[str]) -> None:
     for warning in warnings:
         print(f"vanedamp: {source}: warning: {warning}", file=sys.stderr)
 

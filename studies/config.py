@@ -14,6 +14,7 @@ from coupling.inputs import STRICT, Direction, InputError, NonNegative, Real, Wh
 from meshes import benchmarks, vane_cluster
 from meshes.benchmarks import Block
 from meshes.vane_cluster import VaneCluster
+from modal.units import absurdity
 from studies.calibration_tables import CalibrationTable
 
 if TYPE_CHECKING:
@@ -28,21 +29,17 @@ Degree = Annotated[Whole, Field(ge=1, le=3)]
 class MeshFile:
     """A mesh, and the polynomial degree of the displacements on it.
 
-    A gmsh file (.msh) in metres, or a file of another program (.inp, .bdf ...) with `scale` metres a unit of length.
+    A gmsh file (.msh) or one of another program (.inp, .bdf ...); `scale` metres are its unit of length.
     """
 
     file: str
     degree: Degree = 2
     scale: Positive = 1.0
 
-    def __post_init__(self) -> None:
-        if not self.foreign and self.scale != 1.0:
-            raise ValueError("scale: a gmsh mesh is in metres; scale it in gmsh")
-
     @property
     def foreign(self) -> bool:
         """Whether another program than gmsh wrote it."""
-        return not self.file.endswith(".msh")
+        return not self.file.lower().endswith(".msh")
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -181,7 +178,8 @@ class Support:
 class ModesTable:
     """Which modes are computed (the first `count`, or all from `min_frequency` to `max_frequency` Hz) and which is the
     first bending: the one with most effective mass along `direction`, or the one most like the first shape of the file
-    `shape`. `at` names the interface coordinate of the rigid model."""
+    `shape`. `at` names the interface coordinate of the rigid model. Modes whose frequencies agree within
+    `pair_tolerance` (relative) are one multiple mode, turned so that one has all the motion of that coordinate."""
 
     count: Annotated[Whole, Field(ge=1)] | None = None
     max_frequency: Positive | None = None
@@ -190,6 +188,7 @@ class ModesTable:
     damping_ratio: Ratio | None = None
     at: str | None = None
     shape: str | None = None
+    pair_tolerance: Annotated[Real, Field(ge=0, le=0.1)] = 1e-3
 
     def __post_init__(self) -> None:
         if self.count is not None and self.max_frequency is not None:
@@ -233,14 +232,19 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """The case in a TOML file; a mesh file is taken relative to it. Raises InputError."""
+        """The case in a TOML file; a mesh file is taken relative to it. Raises InputError, for absurd units too."""
         data = read_toml(path)
         mesh = data.get("mesh")
         if isinstance(mesh, dict):
             _check_mesh(mesh, path)
         for keys in _FILES:
             _find_file(data, keys, path)
-        return validate(cls, data, str(path))
+        case = validate(cls, data, str(path))
+        for group, table in case.material.items():
+            absurd = absurdity(table.young, table.density)
+            if absurd is not None:
+                raise InputError(f"{path}: material.{group}.{absurd}; give young in Pa and density in kg/m^3")
+        return case
 
     @property
     def damping_ratio(self) -> float:

@@ -9,26 +9,33 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
+from scipy import linalg
 
 from coupling.inputs import STRICT, Direction, InputError, Real, Whole, nearest, read_toml, validate
-from rom.external import NAMED, Findings, external_model, read_matrices
+from modal.units import model_doubts
+from rom.external import Findings, external_model, read_matrices
 from rom.reduced import ReducedModel
 from studies.provenance import versions
+
+Name = Annotated[str, Field(min_length=1)]
 
 
 @dataclass(frozen=True, config=STRICT)
 class MatricesTable:
-    """Where the matrices are: names in one `file` (npz, OP4), or files of their own (Matrix Market, npy).
+    """Where the matrices are: names in one `file` (npz, OP4), or files of their own (Matrix Market, npy,
+    scipy's save_npz).
 
-    damping is a matrix too; or else damping_ratio is that of every mode. base_load: (n, 3) T^T M r.
+    damping is a matrix too; or else damping_ratio is that of every mode. base_load: (n, 3) T^T M r. mass_scale: kg a
+    unit of mass, with seconds: 1e3 for matrices in t, N and mm. It multiplies the stiffness and the damping, too.
     """
 
-    mass: str
-    stiffness: str
-    file: str | None = None
-    damping: str | None = None
+    mass: Name
+    stiffness: Name
+    file: Name | None = None
+    damping: Name | None = None
     damping_ratio: Annotated[Real, Field(ge=0, lt=1)] | None = None
-    base_load: str | None = None
+    base_load: Name | None = None
+    mass_scale: Annotated[Real, Field(gt=0)] = 1.0
 
     def __post_init__(self) -> None:
         if (self.damping is None) == (self.damping_ratio is None):
@@ -57,8 +64,8 @@ class External:
     name: str = field(default="")
 
     @classmethod
-    def load(cls, path: str | Path) -> tuple[ReducedModel, Findings]:
-        """The checked model that a file describes; the files it names are relative to it.
+    def load(cls, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
+        """The checked model that a file describes, with warnings; the files it names are relative to it.
 
         Raises InputError, rom.external.ExternalError and rom.reduced.ReducedModelError.
         """
@@ -67,25 +74,47 @@ class External:
         folder = Path(path).parent
         found = {} if table.file is None else read_matrices(folder / table.file)
         names = {key: getattr(table, key) for key in ("mass", "stiffness", "damping", "base_load")}
-        matrices = {key: _matrix(f"matrices.{key}", name, found, folder) for key, name in names.items() if name}
+        matrices = {
+            key: table.mass_scale * _matrix(f"matrices.{key}", name, found, folder)
+            for key, name in names.items()
+            if name
+        }
         damping, base_load = matrices.pop("damping", None), matrices.pop("base_load", None)
         interface: dict[str, int | np.ndarray] = {
             label: int(item.coordinate or 0) if item.row is None else np.array(item.row)
             for label, item in external.interface.items()
         }
         directions = {label: item.direction for label, item in external.interface.items() if item.direction}
-        return external_model(
+        model, findings = external_model(
             matrices["mass"], matrices["stiffness"], interface, damping=damping, damping_ratio=table.damping_ratio,
             directions=directions, base_load=base_load,
             provenance={"source": str(external.name or Path(path).name), "matrices": names, "versions": versions()},
         )  # fmt: skip
+        return model, findings, _doubts(model)
+
+
+def _doubts(model: ReducedModel) -> tuple[str, ...]:
+    """A warning when mass or frequency of the first straining mode hint at wrong units."""
+    first = model.rigid_modes
+    if first == model.size:
+        return ()
+    eigenvalue, shape = linalg.eigh(model.stiffness, model.mass, subset_by_index=[first, first])
+    most = float(np.max((model.selection @ shape) ** 2))
+    frequency = float(np.sqrt(eigenvalue[0])) / (2.0 * np.pi)
+    return tuple(f"units: {told}" for told in model_doubts(1.0 / most if most else np.inf, frequency))
 
 
 def _matrix(key: str, name: str, found: dict[str, np.ndarray], folder: Path) -> np.ndarray:
     if name.lower() in found:
         return found[name.lower()]
+    if "" in found:
+        raise InputError("matrices.file: holds one matrix without a name; name the file as mass or stiffness instead")
     if found and not Path(name).suffix:
         raise InputError(f"{key}: no matrix {name!r} in the file; {nearest(name.lower(), list(found))}")
-    if Path(name).suffix in ("", *NAMED):
-        raise InputError(f"{key}: {name!r} is the name of a matrix: name its file in matrices.file, or a .mtx here")
-    return read_matrices(folder / name)[""]
+    alone = {} if Path(name).suffix == "" else read_matrices(folder / name)
+    if "" not in alone:
+        raise InputError(
+            f"{key}: {name!r} is the name of a matrix, or of a file of several: name the file in matrices.file and the "
+            "matrix here; or here a file of one matrix (.mtx, .npy, scipy's save_npz)"
+        )
+    return alone[""]

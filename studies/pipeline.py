@@ -20,10 +20,12 @@ from modal.eigen import Modes, factorize, solve_modes
 from modal.elasticity import Solid
 from modal.exchange import read_shapes
 from modal.imports import convert
-from modal.matrices import SystemMatrices
+from modal.matrices import SystemMatrices, unit_direction
+from modal.multiple import rivals, turned
 from modal.participation import ParticipationError, effective_masses, first_bending
 from modal.store import Variable
 from modal.stress import HotSpot, hot_spot
+from modal.units import doubts
 from rom.interface import Interface, InterfaceCoordinate, InterfaceError, normal_direction
 from rom.ladder import LadderError, choose, grid, rigid_errors
 from rom.recovery import with_stresses
@@ -33,7 +35,8 @@ from studies.calibration_tables import CalibrationTable
 from studies.config import Case, InterfaceTable, MeshFile
 from studies.provenance import versions
 
-_PLAUSIBLE_HZ = (1.0, 1e6)
+# a mode so near the first bending, relative, that moves its point with such a share of its compliance, is told
+_NEAR, _NOTABLE = 0.02, 0.01
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
 
@@ -51,7 +54,8 @@ def assemble(case: Case) -> Structure:
     """Mesh, groups, matrices. Raises the errors of the modal package, and InputError for unknown groups."""
     label = case.response_label  # an open choice is refused before the work
     with _mesh(case) as path:
-        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports)
+        scale = case.mesh.scale if isinstance(case.mesh, MeshFile) else 1.0
+        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports, scale)
         domain = solid.domain
         case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
         matrices = solid.assemble(case.support.clamped, case.damping_ratio)
@@ -70,7 +74,7 @@ def _mesh(case: Case) -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as folder:
         if isinstance(mesh, MeshFile):
             target = Path(folder) / f"{Path(mesh.file).stem}.msh"
-            yield convert(mesh.file, target, set(case.material) - {"default"}, case.facet_groups, mesh.scale)
+            yield convert(mesh.file, target, set(case.material) - {"default"}, case.facet_groups)
         else:
             yield mesh.build(Path(folder) / f"{mesh.generator}.msh")
 
@@ -180,14 +184,17 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     """Modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
-    modes = solve_modes(matrices, case.modes.count or 10, case.modes.max_frequency, case.modes.min_frequency)
-    bending, warnings = _first_bending(case, modes, matrices)
-    if not case.modes.min_frequency:
-        warnings += _unit_slip(modes)
-    table = case.calibration or CalibrationTable()
     label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
-    if label is not None and bending is not None:
+    if label is not None:
         functional = _functional(case, matrices, label)
+    modes = _modes(case, matrices, functional)
+    bending, warnings = _first_bending(case, modes, matrices)
+    straining = modes.frequencies_hz[modes.frequencies_hz > 0.0]
+    lowest = float(straining[0]) if straining.size and not case.modes.min_frequency else None
+    warnings += unit_doubts(structure, lowest)
+    table = case.calibration or CalibrationTable()
+    if label is not None and functional is not None and bending is not None:
+        warnings += _rivals(modes, bending, functional, label)
         rigid = rigid_model(modes, bending, functional, label, case.damping_ratio)
         strengths = case.strengths(structure.solid.domain.volumes)
         if strengths:
@@ -197,6 +204,32 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         structure, modes, effective_masses(modes, matrices), bending, rigid, functional, amplitude, spot, table.share,
         warnings, time.perf_counter() - started,
     )  # fmt: skip
+
+
+def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) -> Modes:
+    """The case's modes, multiple ones turned to the response coordinate, or else to the direction of the bending."""
+    table, size = case.modes, matrices.free.size
+    count = table.count or 10
+    # one more, so that the last of them is not half of a pair
+    more = count + 1 if count < size else count
+    modes = solve_modes(matrices, more, table.max_frequency, table.min_frequency)
+    inertia = matrices.mass @ (matrices.movable_translations() @ unit_direction(table.direction))
+    guides = [inertia] if functional is None else [functional, inertia]
+    modes = turned(modes, matrices, guides, table.pair_tolerance)
+    return modes if table.max_frequency is not None else modes.first(count)
+
+
+def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> tuple[str, ...]:
+    """A warning when another mode moves the response coordinate at nearly the same frequency."""
+    near = rivals(modes, bending, functional, _NEAR, _NOTABLE)
+    if not near.size:
+        return ()
+    listed = ", ".join(f"{modes.frequencies_hz[index]:.6g}" for index in near)
+    return (
+        f"modes: beside the first bending ({modes.frequencies_hz[bending]:.6g} Hz), {listed} Hz moves {label!r}, too: "
+        "one mode is no model there. Take a reduced one; or, if the mesh alone splits a pair of equal frequencies, "
+        "refine it or raise [modes] pair_tolerance",
+    )
 
 
 def bending_mode(case: Case, modes: Modes, matrices: SystemMatrices) -> int:
@@ -225,14 +258,12 @@ def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[
     return None, (f"modes: no first bending and no rigid model: {why}",)
 
 
-def _unit_slip(modes: Modes) -> tuple[str, ...]:
-    """A warning when the first straining mode is where wrong units put it."""
-    first = next((frequency for frequency in modes.frequencies_hz if frequency > 0.0), 1.0)
-    if _PLAUSIBLE_HZ[0] <= first <= _PLAUSIBLE_HZ[1]:
-        return ()
-    return (
-        f"modes: the first frequency is {first:.4g} Hz; check the units: mesh in m, young in Pa, density in kg/m^3",
-    )
+def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[str, ...]:
+    """A warning when sizes, masses, sound speeds or the first straining frequency hint at wrong units."""
+    matrices = structure.matrices
+    materials = {name: (table.young, table.density) for name, table in structure.case.material.items()}
+    found = doubts(materials, float(np.ptp(matrices.coordinates, axis=0).max()), matrices.total_mass, first_hz)
+    return tuple(f"units: {told}" for told in found)
 
 
 def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:

@@ -97,3 +97,56 @@ def test_universal_files_hold_axes_alone(tmp_path):
         write_shapes(shapes(axes=False), tmp_path / "shapes.unv")
     with pytest.raises(ExchangeError, match="no such file"):
         read_shapes(tmp_path / "none.csv")
+
+
+def polar(folder, header, degrees, scale=1.0):
+    """A resonance at 150 Hz as magnitude and phase, and its values."""
+    frequencies = np.linspace(100.0, 200.0, 201)
+    values = scale / (150.0**2 - frequencies**2 + 3j * frequencies)
+    angle = np.angle(values, deg=degrees)
+    rows = "".join(f"{f!r},{abs(h)!r},{a!r}\n" for f, h, a in zip(frequencies, values, angle, strict=True))
+    (folder / "polar.csv").write_text(header + rows)
+    return values
+
+
+@pytest.mark.parametrize(
+    ("header", "columns", "degrees"),
+    [
+        ("Frequency (Hz),Magnitude (m/N),Phase (deg)\n", None, True),
+        ("f,|H|,phase [rad]\n", None, False),
+        # beyond two pi a phase is in degrees
+        ("f,mag,phase\n", None, True),
+        ("", "magnitude-degrees", True),
+        ("f,mag,phase\n", "magnitude-radians", False),
+    ],
+)
+def test_magnitude_and_phase(tmp_path, header, columns, degrees):
+    values = polar(tmp_path, header, degrees)
+    read = read_frf(tmp_path / "polar.csv", columns=columns).values[0]
+    assert read == pytest.approx(values, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("header", "columns", "degrees", "told"),
+    [
+        ("", None, True, "columns: a response's first column keeps its sign, its second one looks like a phase"),
+        ("f,one,two\n", None, False, "columns: a response's first column keeps its sign"),
+        ("f,mag,phase\n", None, False, "columns: 'phase': in degrees or radians"),
+        ("f,mag (dB),phase (deg)\n", None, True, "expected linear magnitudes, not decibels"),
+        ("", "polar", True, "columns: expected one of real-imaginary, magnitude-degrees, magnitude-radians"),
+    ],
+)
+def test_columns_that_may_be_magnitude_and_phase_are_refused(tmp_path, header, columns, degrees, told):
+    polar(tmp_path, header, degrees)
+    with pytest.raises(ExchangeError, match=told) as refused:
+        read_frf(tmp_path / "polar.csv", columns=columns)
+    assert str(refused.value).startswith(str(tmp_path / "polar.csv"))
+
+
+def test_a_negative_magnitude_is_refused(tmp_path):
+    (tmp_path / "polar.csv").write_text("1,-60,0\n2,-40,-90\n3,-60,-180\n")
+    with pytest.raises(ExchangeError, match="a magnitude is negative; expected linear magnitudes, not decibels"):
+        read_frf(tmp_path / "polar.csv", columns="magnitude-degrees")
+    with pytest.raises(ExchangeError, match="keeps its sign"):
+        read_frf(tmp_path / "polar.csv")
+    assert read_frf(tmp_path / "polar.csv", columns="real-imaginary").values[0, 0] == -60.0

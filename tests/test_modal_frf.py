@@ -149,3 +149,42 @@ def test_refuses_a_mode_between_two_lines():
     for values in (clean, clean + disturbance, spike + noise(np.random.default_rng(1), AXIS.shape, "complex")):
         with pytest.raises(FrfError, match=r"its lines resolve: half-power bandwidth .* Hz, line spacing 0\.625 Hz"):
             identify(Frf(AXIS, values))
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+@pytest.mark.parametrize("spoiled", ["radians", "degrees", "decibels", "magnitude"])
+def test_what_is_no_frequency_response_gives_no_damping(quantity, spoiled):
+    """Magnitudes and phases taken as real and imaginary parts, without their unit so that both have the same size."""
+    clean = response(AXIS, PAIR[:1], quantity)
+    size, angle = np.abs(clean) / np.abs(clean).max(), np.angle(clean)
+    values = {
+        "radians": 1e-6 * size + 1j * angle, "degrees": size + 1j * np.degrees(angle),
+        "decibels": 20.0 * np.log10(size) + 1j * np.degrees(angle), "magnitude": size + 0j,
+    }[spoiled]  # fmt: skip
+    with pytest.raises(FrfError, match=r"no mode of the band|misses the response"):
+        identify(Frf(AXIS, values, quantity))
+
+
+def test_the_band_holds_the_peak():
+    """A mode of 10 % damping has half-power points 240 Hz to either side."""
+    wide = response(AXIS, [(2450.0, 0.1, 1.0)])
+    assert identify(Frf(AXIS, wide)).damping_ratios == pytest.approx([0.1], rel=1e-6)
+    with pytest.raises(
+        FrfError, match=r"does not hold its half-power points, 2205 and 2695 Hz; widen or move the band"
+    ):
+        identify(Frf(AXIS, wide).band(2300.0, 2600.0))
+
+
+def test_a_fit_that_misses_half_of_the_response_is_refused():
+    """One of two modes of equal height is fitted: the other half is left."""
+    modes = [(2350.0, 0.002, 1.0), (2550.0, 0.002, 1.0)]
+    with pytest.raises(FrfError, match=r"values: the fit misses the response in the (band|peak) .* Hz by \d+% of it"):
+        identify(Frf(AXIS, response(AXIS, modes)), 1)
+    assert identify(Frf(AXIS, response(AXIS, modes)), 2).misfit < 1e-9
+
+
+def test_the_peak_between_two_frequencies():
+    frf = Frf(AXIS, response(AXIS, PAIR))
+    assert frf.peak_hz() == pytest.approx(2414.0, abs=0.7)
+    assert frf.peak_hz(2520.0, 2700.0) == pytest.approx(2530.0, abs=3.0)
+    assert np.isnan(frf.peak_hz(1.0, 2.0))

@@ -162,7 +162,7 @@ def test_what_cannot_be_taken_is_told(tmp_path):
     for name, text, message in [
         ("none.inp", None, "no such mesh file"),
         ("empty.inp", "nothing\n", "volume elements: none; expected one kind"),
-        ("bad.bdf", "GRID\n", "meshio cannot read this mesh"),
+        ("bad.bdf", "GRID\n", "this mesh cannot be read"),
         ("flat.inp", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*ELEMENT,TYPE=S3\n1,1,2,3\n", "volume elements: none"),
         (
             "wedge.inp",

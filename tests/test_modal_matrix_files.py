@@ -1,5 +1,7 @@
 """Matrices of other codes come in with their nodes and sets, and go out again; what does not fit is told."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import io, sparse
@@ -85,3 +87,18 @@ def test_unknown_sets_cannot_be_held(folder):
     files = [folder / name for name in ("stiffness.mtx", "mass.mtx", "nodes.csv", "sets.csv")]
     with pytest.raises(MatricesError, match="no set 'foot' to hold; there are: a, b, c, held"):
         read_matrices(*files, {"foot": "xyz"})
+
+
+def test_matrices_in_tonnes_and_millimetres(tmp_path):
+    """t, N and mm: a thousandth of kg and of N/m, a thousand of m; the frequencies are the same."""
+    given = truss()
+    small = replace(
+        given, stiffness=1e-3 * given.stiffness, mass=1e-3 * given.mass, coordinates=1e3 * given.coordinates
+    )
+    write_folder(small, tmp_path)
+    again = read_folder(tmp_path, scale=1e-3, mass_scale=1e3)
+    assert again.total_mass == pytest.approx(given.total_mass, rel=1e-12)
+    assert again.coordinates == pytest.approx(given.coordinates, rel=1e-12)
+    assert solve_modes(again, 3).frequencies_hz == pytest.approx(solve_modes(given, 3).frequencies_hz, rel=1e-9)
+    with pytest.raises(MatricesError, match="mass_scale: expected a positive number, not 0"):
+        read_folder(tmp_path, mass_scale=0.0)

@@ -120,9 +120,26 @@ def test_bad_files(tmp_path, monkeypatch, capsys):
     for table, message in (
         ('file = "m.npz"\nmass = "M"\nstiffness = "KK"\ndamping_ratio = 0.1', "matrices.stiffness: no matrix 'KK'"),
         ('file = "m.npz"\nmass = "M"\nstiffness = "K"', "give one of damping (a matrix) and damping_ratio"),
-        ('mass = "M"\nstiffness = "K"\ndamping_ratio = 0.1', "name its file in matrices.file"),
+        ('mass = "M"\nstiffness = "K"\ndamping_ratio = 0.1', "name the file in matrices.file"),
     ):
         (tmp_path / "external.toml").write_text(TOML.format(matrices=table))
         assert main(["import", "external.toml", "-o", "rom.h5"]) == 2
         assert message in capsys.readouterr().err
     assert not (tmp_path / "rom.h5").exists()
+
+
+def test_a_model_in_tonnes_and_millimetres_is_told(tmp_path, monkeypatch, capsys):
+    """A mass of 148 g at 2414 Hz, in t and N/mm."""
+    monkeypatch.chdir(tmp_path)
+    mass, omega = 0.148e-3, 2.0 * np.pi * 2414.0
+    np.savez(tmp_path / "m.npz", M=np.diag([mass, 5.0]), K=np.diag([mass * omega**2, 5e12]))
+    table = '[matrices]\nfile = "m.npz"\nmass = "M"\nstiffness = "K"\ndamping_ratio = 0.002\n'
+    for scale, told in (("", True), ("mass_scale = 1e3\n", False)):
+        (tmp_path / "external.toml").write_text(f"{table}{scale}[interface.x]\ncoordinate = 0\n")
+        assert main(["import", "external.toml", "-o", "rom.h5", "--json", "-"]) == 0
+        captured = capsys.readouterr()
+        result = json.loads(captured.out)
+        assert result["frequency_hz"][0] == pytest.approx(2414.0, rel=1e-9)
+        assert ("effective mass of 0.000148 kg at the interface" in captured.err) == told
+        assert len(result["warnings"]) == told
+    assert ReducedModel.load("rom.h5").mass[0, 0] == pytest.approx(0.148, rel=1e-12)

@@ -136,6 +136,73 @@ def test_the_first_bending_can_be_named_by_its_shape(measured, capsys):
     assert json.loads(capsys.readouterr().out)["first_bending"] == 2
 
 
+def polar_of(folder, name, header):
+    """The response as magnitude and phase in degrees."""
+    frequencies, real, imaginary = np.loadtxt(folder / "tip.csv", delimiter=",", skiprows=1).T
+    values = real + 1j * imaginary
+    table = np.column_stack([frequencies, np.abs(values), np.angle(values, deg=True)])
+    np.savetxt(folder / name, table, delimiter=",", header=header, comments="", fmt="%.17g")
+
+
+def test_magnitude_and_phase_give_the_same_damping(measured, result, capsys):
+    folder, _ = measured
+    polar_of(folder, "polar.csv", "f,magnitude,phase (deg)")
+    (folder / "polar.toml").write_text((folder / "case.toml").read_text().replace("tip.csv", "polar.csv"))
+    assert main(["calibrate", str(folder / "polar.toml"), "--json", "-"]) == 0
+    damping = json.loads(capsys.readouterr().out)["damping"]
+    # rounded to 17 digits
+    assert damping["ratio"] == pytest.approx(result["damping"]["ratio"], rel=1e-9)
+
+
+def calibrated(folder, capfd, old, new):
+    """Exit, result and what was told of a case without tuning, whose modulus is 8 % too high."""
+    text = CASE.format(young=1.08 * YOUNG, springs=SPRINGS) + TABLE[: TABLE.index("[calibration.tune]")]
+    assert text.count(old) == 1
+    (folder / "off.toml").write_text(text.replace(old, new))
+    status = main(["calibrate", str(folder / "off.toml"), "--json", "-"])
+    captured = capfd.readouterr()
+    return status, (json.loads(captured.out) if status == 0 else None), captured.err
+
+
+def test_a_peak_off_the_models_is_told(measured, capfd):
+    folder, modes = measured
+    true = modes.frequencies_hz[0]
+    low, high = 0.9 * true, 1.1 * true
+    status, result, error = calibrated(folder, capfd, "quantity", f"band = [{low}, {high}]\nquantity")
+    assert status == 0
+    assert f"the response's mode lies at {result['damping']['frequency_hz']:.6g} Hz, " in result["warnings"][0]
+    assert result["warnings"][0] in error
+    assert result["damping"]["ratio"] == pytest.approx(RATIO, rel=0.01)
+
+
+def test_a_band_without_the_peak_is_refused_with_the_peak(measured, capfd):
+    folder, modes = measured
+    true = modes.frequencies_hz[0]
+    status, _, error = calibrated(folder, capfd, "quantity", f"band = [{0.85 * true}, {0.95 * true}]\nquantity")
+    assert status == BAD_INPUT
+    assert f"(the response is largest at {true:.2f}"[:-4] in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        (lambda f: 0.0 * f, "values: all are zero; a response without motion has no modes"),
+        (lambda f: np.where(f > f[5], np.nan, f), "values: expected finite frequencies and values"),
+        (lambda f: 1.0 + 0.0 * f, "of the band"),
+    ],
+)
+def test_responses_without_a_mode_end_in_one_line(measured, capfd, values, told):
+    folder, _ = measured
+    frequencies = np.loadtxt(folder / "tip.csv", delimiter=",", skiprows=1)[:, 0]
+    table = np.column_stack([frequencies, values(frequencies), 0.0 * frequencies])
+    np.savetxt(folder / "odd.csv", table, delimiter=",", header="f,real,imag", comments="")
+    status, _, error = calibrated(folder, capfd, "tip.csv", "odd.csv")
+    assert status == BAD_INPUT
+    assert told in error
+    assert error.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [

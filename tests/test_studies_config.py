@@ -84,7 +84,7 @@ def test_damping_of_the_modes_overrides_the_material(tmp_path):
 
 
 def test_least_fatigue_strength_counts(tmp_path):
-    second = "[material.airfoils]\nyoung = 1e11\npoisson = 0.3\ndensity = 1\nfatigue_strength = 3e8\n[support]"
+    second = "[material.airfoils]\nyoung = 1e11\npoisson = 0.3\ndensity = 1000\nfatigue_strength = 3e8\n[support]"
     text = changed("[support]", second, changed("density = 8190.0", "density = 8190.0\nfatigue_strength = 4e8"))
     assert load(text, tmp_path).fatigue_strength == 3e8
 

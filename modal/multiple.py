@@ -1,0 +1,88 @@
+"""Modes of one frequency: any orthonormal mixture of their shapes is as good, so that the question chooses it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from modal.eigen import Modes, shape_signs
+from modal.matrices import SystemMatrices
+
+# below this share of what its size allows, a component along a guide is round-off
+_NOISE = 1e-6
+
+
+def turned(modes: Modes, matrices: SystemMatrices, guides: Sequence[np.ndarray], tolerance: float) -> Modes:
+    """The modes, those of (nearly) one frequency turned into the directions of functionals.
+
+    guides     functionals (N,) in order of precedence. Of the modes of a group, the first takes all that the group has
+               of the first guide, and the others none of it; the second takes the rest of the second guide, and so on
+    tolerance  modes belong to a group up to this relative distance from its lowest frequency; a mesh splits pairs that
+               are exact in the structure by its own error
+
+    Turned shapes stay mass-orthonormal; their frequencies are Rayleigh quotients, within the group's, so that the order
+    by frequency holds within the tolerance alone. Their residuals show what distance the group's frequencies had. Rigid
+    motions, at zero frequency, are left as they are.
+    """
+    shapes, eigenvalues = modes.shapes.copy(), modes.angular_frequencies**2
+    changed: list[int] = []
+    for group in _groups(modes.frequencies_hz, tolerance):
+        basis = _basis(shapes[group], guides)
+        shapes[group] = basis @ shapes[group]
+        eigenvalues[group] = basis**2 @ eigenvalues[group]
+        changed.extend(range(group.start, group.stop))
+    if not changed:
+        return modes
+    rows, own = shapes[changed], eigenvalues[changed]
+    rows = shape_signs(rows, rows @ matrices.mass @ matrices.movable_translations())[:, None] * rows
+    shapes[changed] = rows
+    residuals, free = modes.residuals.copy(), matrices.free
+    inertia = own[:, None] * (rows @ matrices.mass)[:, free]
+    residuals[changed] = np.linalg.norm((rows @ matrices.stiffness)[:, free] - inertia, axis=1)
+    residuals[changed] /= np.linalg.norm(inertia, axis=1)
+    return Modes(np.sqrt(eigenvalues) / (2.0 * np.pi), shapes, residuals, modes.provenance)
+
+
+def rivals(modes: Modes, mode: int, functional: np.ndarray, within: float, share: float) -> np.ndarray:
+    """Indices of the other modes that move a functional (N,) beside a mode.
+
+    Those whose frequency lies within a relative distance of the mode's, and whose modal compliance at the functional,
+    (w^T phi)^2, is at least a share of the mode's.
+    """
+    frequency, seen = modes.frequencies_hz[mode], (modes.shapes @ functional) ** 2
+    near = np.abs(modes.frequencies_hz - frequency) <= within * frequency
+    near[mode] = False
+    return np.flatnonzero(near & (seen >= share * seen[mode]))
+
+
+def _groups(frequencies: np.ndarray, tolerance: float) -> list[slice]:
+    """Runs of at least two frequencies, each run within the tolerance of its first one."""
+    found, start = [], 0
+    while start < len(frequencies):
+        stop = start + 1
+        while stop < len(frequencies) and frequencies[stop] <= (1.0 + tolerance) * frequencies[start]:
+            stop += 1
+        if stop - start > 1 and frequencies[start] > 0.0:
+            found.append(slice(start, stop))
+        start = stop
+    return found
+
+
+def _basis(shapes: np.ndarray, guides: Sequence[np.ndarray]) -> np.ndarray:
+    """(k, k) orthogonal, rows along the guides' components in the span of shapes (k, N), then along the shapes."""
+    size = np.abs(shapes).max()
+    components = [shapes @ guide for guide in guides]
+    told = [
+        seen / np.linalg.norm(seen)
+        for seen, guide in zip(components, guides, strict=True)
+        if np.linalg.norm(seen) > _NOISE * size * np.abs(guide).sum()
+    ]
+    rows: list[np.ndarray] = []
+    for vector in (*told, *np.eye(len(shapes))):
+        rest = vector - sum((row @ vector) * row for row in rows)
+        # twice: what is left of a vector close to the others' span is orthogonal to them to round-off
+        rest = rest - sum((row @ rest) * row for row in rows)
+        if len(rows) < len(shapes) and np.linalg.norm(rest) > _NOISE:
+            rows.append(rest / np.linalg.norm(rest))
+    return np.array(rows)

@@ -1,0 +1,77 @@
+"""Units by what they make of a structure: sizes, masses, sound speeds and frequencies that no part has.
+
+The bounds are wide: from a small blade to a machine part of some metres, from rubber to ceramics. What lies outside is
+a slip of units, as a rule: millimetres, tonnes and MPa belong together; here it is metres, kilograms and Pa.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+#: m, kg, m/s and Hz: largest extent, mass, sqrt(E/rho) and first natural frequency of what is plausible
+SIZES, MASSES, SPEEDS, FREQUENCIES = (3e-3, 3.0), (1e-4, 1e4), (50.0, 2e4), (1.0, 1e6)
+#: no solid has a modulus (Pa), density (kg/m^3) or sound speed (m/s) outside these
+_MODULI, _DENSITIES, _FASTEST, _SLOWEST = (1.0, 2e12), (0.1, 3e4), 1e5, 1.0
+#: kg, effective masses of a reduced model's first mode at its interface
+_MODEL_MASSES = (1e-3, 1e5)
+
+
+def absurdity(young: float, density: float) -> str | None:
+    """What is impossible about a solid of a Young's modulus (Pa) and a density (kg/m^3); None where nothing is."""
+    speed = math.sqrt(young / density)
+    if not _DENSITIES[0] <= density <= _DENSITIES[1]:
+        slip = f"; {1e12 * density:.4g} kg/m^3, if this is in t/mm^3" if 1e-11 < density < 1e-7 else ""
+        return f"density: no solid has {density:.4g} kg/m^3{slip}"
+    if not _MODULI[0] <= young <= _MODULI[1]:
+        return f"young: no solid has {young:.4g} Pa"
+    if speed > _FASTEST:
+        slip = f"; {1e3 * density:.4g} kg/m^3, if the density is in g/cm^3" if 0.5 < density < 25.0 else ""
+        return f"density: sound would travel at {speed:.3g} m/s{slip}"
+    if speed < _SLOWEST:
+        slip = f"; {1e9 * young:.4g} Pa, if the modulus is in GPa" if young < 1e4 else ""
+        return f"young: sound would travel at {speed:.3g} m/s{slip}"
+    return None
+
+
+def doubts(
+    materials: Mapping[str, tuple[float, float]], size: float, mass: float, first_hz: float | None
+) -> tuple[str, ...]:
+    """What is implausible about a structure, with the slip of units that it looks like; one line, or none.
+
+    materials  group -> Young's modulus (Pa) and density (kg/m^3)
+    size       m, largest extent along an axis
+    mass       kg
+    first_hz   first straining natural frequency; None where there is none
+    """
+    found = []
+    for group, (young, density) in materials.items():
+        speed = math.sqrt(young / density)
+        if _outside(speed, SPEEDS):
+            slip = f", as when young is in MPa (then {1e6 * young:.3g} Pa)" if young < 1e7 else ""
+            found.append(f"sound travels at {speed:.3g} m/s in {group!r}{slip}")
+    if _outside(size, SIZES):
+        slip = "; of a mesh in millimetres, set mesh.scale = 1e-3" if size > SIZES[1] else ""
+        found.append(f"the mesh measures {size:.3g} m{slip}")
+    if _outside(mass, MASSES):
+        found.append(f"the mass is {mass:.3g} kg")
+    if first_hz is not None and _outside(first_hz, FREQUENCIES):
+        found.append(f"the first frequency is {first_hz:.4g} Hz")
+    if not found:
+        return ()
+    return (f"{'; '.join(found)}; check the units: mesh in m, young in Pa, density in kg/m^3",)
+
+
+def model_doubts(effective_mass: float, first_hz: float) -> tuple[str, ...]:
+    """The same of a reduced model: the smallest effective mass (kg) of its first straining mode at the interface."""
+    found = []
+    if math.isfinite(effective_mass) and _outside(effective_mass, _MODEL_MASSES):
+        slip = "; of a model in t and mm, set matrices.mass_scale = 1e3" if effective_mass < _MODEL_MASSES[0] else ""
+        found.append(f"the first mode has an effective mass of {effective_mass:.3g} kg at the interface{slip}")
+    if _outside(first_hz, FREQUENCIES):
+        found.append(f"the first frequency is {first_hz:.4g} Hz")
+    return (f"{'; '.join(found)}; check the units: mass in kg, stiffness in N/m",) if found else ()
+
+
+def _outside(value: float, bounds: tuple[float, float]) -> bool:
+    return not bounds[0] <= value <= bounds[1]

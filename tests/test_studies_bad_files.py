@@ -1,0 +1,171 @@
+"""Files of other programs that are damaged, or hold what is no structure, end in one line that names them."""
+
+import h5py
+import numpy as np
+import pytest
+from cases import BLOCK
+from scipy import io, sparse
+
+from modal.matrices import MatricesError, SystemMatrices
+from rom.reduced import ReducedModel
+from studies.cli import BAD_INPUT, main
+
+STIFFNESS, MASS = np.diag([4e6, 9e6]), np.eye(2)
+NAMES = 'mass = "m"\nstiffness = "k"\ndamping_ratio = 0.1'
+FILES = 'mass = "m.npz"\nstiffness = "{}"\ndamping_ratio = 0.1'
+
+
+def refused(arguments, capfd):
+    """The one line that a refusal writes."""
+    assert main(arguments) == BAD_INPUT
+    error = capfd.readouterr().err
+    assert error.count("\n") == 1
+    return error
+
+
+def table(text):
+    return f"[matrices]\n{text}\n[interface.x]\ncoordinate = 0\n"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Matrices in every kind of file."""
+    monkeypatch.chdir(tmp_path)
+    sparse.save_npz("m.npz", sparse.csr_matrix(MASS))
+    sparse.save_npz("k.npz", sparse.csr_matrix(STIFFNESS))
+    io.mmwrite("complex.mtx", sparse.coo_matrix((1.0 + 0.02j) * STIFFNESS))
+    np.savez("complex.npz", m=MASS, k=(1.0 + 0.02j) * STIFFNESS)
+    np.savez("real.npz", m=MASS, k=STIFFNESS + 0j, title=np.array("a model"))
+    return tmp_path
+
+
+def test_sparse_matrices_of_scipy_are_read(folder, capfd):
+    (folder / "model.toml").write_text(table(FILES.format("k.npz")))
+    assert main(["import", "model.toml", "-o", "rom.h5"]) == 0
+    assert ReducedModel.load("rom.h5").stiffness.tolist() == STIFFNESS.tolist()
+
+
+def test_what_is_no_matrix_is_passed_over(folder, capfd):
+    """A title among the arrays, and complex numbers that are real."""
+    (folder / "model.toml").write_text(table(f'file = "real.npz"\n{NAMES}'))
+    assert main(["import", "model.toml", "-o", "rom.h5"]) == 0
+    assert ReducedModel.load("rom.h5").stiffness.tolist() == STIFFNESS.tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            f'file = "k.npz"\n{NAMES}',
+            "matrices.file: holds one matrix without a name; name the file as mass or stiffness",
+        ),
+        (FILES.format("real.npz"), "matrices.stiffness: 'real.npz' is the name of a matrix, or of a file of several"),
+        (f'file = "complex.npz"\n{NAMES}', "stiffness: complex; give real matrices, and damping or damping_ratio"),
+        (FILES.format("complex.mtx"), "stiffness: complex; give real matrices"),
+        (f'file = "real.npz"\n{NAMES}'.replace('"m"', '"title"'), "matrices.mass: no matrix 'title' in the file"),
+        ('file = "real.npz"\nstiffness = "k"\ndamping_ratio = 0.1', "matrices.mass: missing"),
+        (f'file = "real.npz"\n{NAMES}'.replace('"m"', '""'), "matrices.mass: String should have at least 1 character"),
+    ],
+)
+def test_matrices_that_are_refused(folder, text, told, capfd):
+    (folder / "model.toml").write_text(table(text))
+    assert f"model.toml: {told}" in refused(["import", "model.toml", "-o", "rom.h5"], capfd)
+    assert not (folder / "rom.h5").exists()
+
+
+def test_complex_system_matrices_are_refused():
+    with pytest.raises(MatricesError, match="stiffness: complex; expected a real matrix"):
+        SystemMatrices((1.0 + 0.1j) * np.eye(3), np.eye(3), np.zeros((1, 3)), [], {}, 0.0)
+
+
+def _replaced(name, values):
+    def change(file):
+        del file[name]
+        if values is not None:
+            file[name] = values
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (_replaced("mass", None), "holds no 'mass'; the record is not whole"),
+        (_replaced("mass", np.full((2, 2), np.nan)), "mass: holds entries that are not finite"),
+        (_replaced("stiffness", (1.0 + 0.1j) * STIFFNESS), "stiffness: expected real numbers, not complex ones"),
+        (lambda file: file.attrs.__delitem__("provenance"), "holds no 'provenance'"),
+    ],
+)
+def test_records_that_are_not_whole(folder, change, told, capfd):
+    ReducedModel.from_matrices(MASS, STIFFNESS, {"x": [1.0, 0.0]}, damping_ratio=0.1).save("rom.h5")
+    with h5py.File("rom.h5", "r+") as file:
+        change(file)
+    (folder / "scene.toml").write_text(
+        '[structure]\nmodel = "rom"\nfile = "rom.h5"\n[excitation]\nfrequency = 300.0\nforce = 1.0\nat = "x"\n'
+        "[time]\nperiods = 10\ntransient = 5\n"
+    )
+    assert f"rom.h5: {told}" in refused(["run", "scene.toml"], capfd)
+    assert f"rom.h5: {told}" in refused(["report", "rom.h5", "-o", "report.html"], capfd)
+
+
+HEADER = '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 1 "root"\n2 2 "tip"\n$EndPhysicalNames\n'
+NODES = "$Nodes\n5\n1 0 0 0\n2 .1 0 0\n3 0 .1 0\n4 0 0 .1\n5 .1 .1 .1\n$EndNodes\n"
+ELEMENTS = ["1 2 2 1 1 1 2 3", "2 2 2 2 2 2 3 5", "3 4 2 0 1 1 2 3 4", "4 4 2 0 1 2 3 4 5"]
+MESH = HEADER + NODES + "$Elements\n4\n" + "\n".join(ELEMENTS) + "\n$EndElements\n"
+DECK = (
+    "*NODE\n1,0,0,0\n2,.1,0,0\n3,0,.1,0\n4,0,0,.1\n5,.1,.1,.1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n2,2,3,4,5\n"
+    "*NSET,NSET=root\n1,2,3\n*NSET,NSET=tip\n2,3,5\n"
+)
+BULK = (
+    "BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,2,,.1,0.,0.\nGRID,3,,0.,.1,0.\nGRID,4,,0.,0.,.1\nGRID,5,,.1,.1,.1\n"
+    "CTETRA,1,1,1,2,3,4\nCTETRA,2,1,2,3,4,5\nCTRIA3,11,11,1,2,3\nCTRIA3,12,12,2,3,5\nENDDATA\n"
+)
+
+
+def case_of(folder, name, text):
+    """A case on a mesh in a file of that name."""
+    (folder / name).write_text(text)
+    start, stop = BLOCK.index("generator"), BLOCK.index("[material")
+    case = BLOCK[:start] + f'file = "{name}"\n' + BLOCK[stop:]
+    if name.endswith("bdf"):
+        case = case.replace('"root"', '"11"').replace('"tip"', '"12"')
+    (folder / "case.toml").write_text(case)
+    return ["modal", "case.toml"]
+
+
+@pytest.mark.parametrize(("name", "text"), [("m.msh", MESH), ("m.MSH", MESH), ("m.INP", DECK), ("m.bdf", BULK)])
+def test_two_tetrahedra_pass(folder, name, text, capfd):
+    """The meshes that the next test spoils; capitals in the name change nothing."""
+    assert main(case_of(folder, name, text)) == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "old", "new", "told"),
+    [
+        ("m.msh", MESH, "5 .1 .1 .1", "5 .1 nan .1", "node 5: its coordinates are not finite"),
+        ("m.msh", MESH, "4 4 2 0 1 2", "3 4 2 0 1 2", "1 element numbers are given twice, of which gmsh keeps one"),
+        (
+            "m.msh", MESH, "$Elements\n4\n", f"$Elements\n5\n{ELEMENTS[3].replace('4', '9', 1)}\n",
+            "have the same nodes; remove one of them",
+        ),
+        ("m.msh", MESH, "$MeshFormat", "$MESHFORMAT", "not a gmsh mesh (a .msh file starts with $MeshFormat)"),
+        ("m.inp", DECK, "2,2,3,4,5", "1,2,3,4,5", "line 9: *ELEMENT 1: the element is given twice"),
+        ("m.inp", DECK, "2,2,3,4,5", "2,2,3,4,5\n3,5,4,3,2", "volume elements 2 and 3 (in the file's order)"),
+        ("m.bdf", BULK, "GRID,5,,.1", "GRID,5,,nan", "the coordinates of node 5 (in the file's order) are not finite"),
+        ("m.bdf", BULK, "CTETRA,2", "CTETRA,1", "line 8: CTETRA: element 1 is given twice"),
+        ("m.bdf", BULK, "2,3,4,5", "2,3,4,9", "line 8: CTETRA: there is no grid point 9"),
+        ("m.bdf", BULK, "GRID,5", "GRID,4,,0.,0.,.2\nGRID,5", "line 6: GRID: grid point 4 is given twice"),
+        ("m.bdf", BULK, "ENDDATA\n", "", "this mesh cannot be read (Error: Couldn't read file"),
+    ],
+)  # fmt: skip
+def test_meshes_that_are_refused(folder, name, text, old, new, told, capfd):
+    pytest.importorskip("meshio")
+    assert text.count(old) == 1
+    error = refused(case_of(folder, name, text.replace(old, new)), capfd)
+    assert f"case.toml: {name}: " in error
+    assert told in error
+
+
+def test_tables_in_capitals_are_told(folder, capfd):
+    (folder / "case.toml").write_text(BLOCK.replace("[mesh]", "[MESH]"))
+    assert "case.toml: MESH: unknown key; known: calibration," in refused(["modal", "case.toml"], capfd)
