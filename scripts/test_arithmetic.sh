@@ -15,8 +15,8 @@ declare -A settings=(
     [haswell]="OPENBLAS_CORETYPE=Haswell"
     [skylakex]="OPENBLAS_CORETYPE=SkylakeX"
     # compiled code is cached by processor, not by these settings: each has a cache of its own
-    [generic]="NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=.cache/numba-generic"
-    [noavx]="NUMBA_ENABLE_AVX=0 NUMBA_CACHE_DIR=.cache/numba-noavx"
+    [generic]="NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$PWD/.cache/numba-generic"
+    [noavx]="NUMBA_ENABLE_AVX=0 NUMBA_CACHE_DIR=$PWD/.cache/numba-noavx"
 )
 
 names=() arguments=()
