@@ -190,6 +190,7 @@ def sweep(arguments: Namespace) -> None:
     from coupling.checkpoint import Checkpoint, clear
     from coupling.grid import grid
     from coupling.sweep import sweep as run_sweep
+    from studies.forced_response import forced_responses
     from studies.provenance import versions
 
     # processes are slow to start: a bad grid or the checkpoint of another sweep is told before
@@ -204,7 +205,8 @@ def sweep(arguments: Namespace) -> None:
     took = time.perf_counter() - started
     # times are told, and not kept in the result, which is the same however it came about
     told = {"points_resumed": resumed, "wall_time_s": took, "points_per_second": (points.size - resumed) / took}
-    _write_json(arguments.json, result.to_json() | told)
+    headlines = [response.to_json() for response in forced_responses(result)] if arguments.json else []
+    _write_json(arguments.json, result.to_json() | told | {"headlines": headlines})
     if checkpoint is not None:
         clear(checkpoint)
         clear_leftovers(arguments.output)

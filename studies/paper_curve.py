@@ -8,7 +8,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from coupling.sweep import Sweep
-from studies.forced_response import UNTOUCHED, ForcedResponse, forced_responses
+from studies.forced_response import ForcedResponse, forced_responses
+from studies.headline import UNTOUCHED
 
 #: standard deviation of the smoothing, in points: frequencies are denser where the curves are steeper
 _SMOOTHING = 1.5
@@ -88,7 +89,7 @@ class Curve:
 
 
 def curves(sweep: Sweep, name: str) -> list[Curve]:
-    """A curve for every combination of the axes before the last, which is the frequency; without points that failed."""
+    """A curve for every combination of the axes before the last, which is the frequency; without points not ok."""
     responses = forced_responses(sweep, name)
     count = len(responses[0].x)
     confidence, classification = (
