@@ -124,8 +124,7 @@ def grid(scene: Scene) -> Grid:
         raise InputError(
             'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
         )
-    base = replace(scene, sweep={})
-    points = Points(base, {})
+    points = Points(replace(scene, sweep={}), {})
     first, linked, leaves_open = None, False, False
     for values in _telling(axes):
         made = points.raw(values)
@@ -135,10 +134,20 @@ def grid(scene: Scene) -> Grid:
         _check_method(made)
     assert first is not None
     along = _along(scene, axes) if linked else None
+    base = _with_range(points.base, axes)
+    points = Points(base, {})
     choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if leaves_open else {}
     start = settled(first, choices)
     linear_structure(start.scene)
     return Grid(scene, axes, base, choices, start.estimate, along, warnings_of(start.scene))
+
+
+def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
+    """The scene whose level is that of one resonance for all of the swept frequencies."""
+    swept = axes.get(FREQUENCY)
+    if swept is None or not _ordered(swept) or scene.excitation.resonance_near is not None:
+        return scene
+    return replace(scene, excitation=replace(scene.excitation, resonance_near=(float(min(swept)), float(max(swept)))))
 
 
 def _telling(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:

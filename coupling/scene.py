@@ -96,7 +96,9 @@ class Initial:
 class Excitation:
     """Harmonic excitation at `frequency` (Hz): one of force (N), base_acceleration (m/s^2), resonance_amplitude (m).
 
-    resonance_amplitude is the displacement to which the force brings the resonance of the structure without bodies.
+    resonance_amplitude is the displacement to which the force brings a resonance of the structure without bodies: of a
+    model with several, the one that responds most within `resonance_near`, a frequency or [lowest, highest] (Hz);
+    default: the excitation's frequency, or the range over which it is swept.
     `at` is the interface label of force and response on a reduced model; the base moves in its direction.
     """
 
@@ -104,12 +106,22 @@ class Excitation:
     force: NonNegative | None = None
     base_acceleration: NonNegative | None = None
     resonance_amplitude: Positive | None = None
+    resonance_near: Positive | tuple[Positive, Positive] | None = None
     at: str | None = None
 
     def __post_init__(self) -> None:
         given = [self.force, self.base_acceleration, self.resonance_amplitude]
         if sum(value is not None for value in given) > 1:
             raise ValueError("give at most one of force, base_acceleration and resonance_amplitude")
+        low, high = self.resonance_range
+        if low > high:
+            raise ValueError(f"resonance_near: expected [lowest, highest], not [{low:g}, {high:g}]")
+
+    @property
+    def resonance_range(self) -> tuple[float, float]:
+        """Lowest and highest frequency, Hz, near which the resonance of resonance_amplitude is sought."""
+        near = self.frequency if self.resonance_near is None else self.resonance_near
+        return near if isinstance(near, tuple) else (near, near)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -18,7 +18,7 @@ from coupling.engine import simulate
 from coupling.grid import FREQUENCY, Grid, PointList, Points
 from coupling.grid import grid as grid_of
 from coupling.inputs import InputError, validate
-from coupling.linear import linear_responses
+from coupling.linear import LinearPeak, linear_responses
 from coupling.points import COLUMNS, LOSSES, MEASURES, TEXTS, Block, Finished, Task, broken, run_points, tasks_of
 from coupling.scene import Scene
 from modal.store import Variable, frozen, load, save
@@ -202,12 +202,17 @@ def _peaks(grid: Grid) -> dict[str, np.ndarray]:
     for values in itertools.product(*others.values()):
         try:
             scene = points.scene({**dict(zip(others, values, strict=True)), FREQUENCY: low})
-            undamped, fixed = (response.peak(low, high) for response in linear_responses(scene))
-            found.append([undamped.amplitude, undamped.frequency, undamped.width, fixed.amplitude, fixed.frequency])
+            found.append(tops(*(response.peak(low, high) for response in linear_responses(scene))))
         except InputError:  # told as the status of its points
-            found.append([np.nan] * len(PEAKS))
+            found.append(dict.fromkeys(PEAKS, np.nan))
     shape = tuple(len(values) for values in others.values())
-    return {name: frozen(np.reshape(column, shape)) for name, column in zip(PEAKS, np.transpose(found), strict=True)}
+    return {name: frozen(np.reshape([item[name] for item in found], shape)) for name in PEAKS}
+
+
+def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:
+    """Tops of both linear curves by the names of PEAKS."""
+    values = (undamped.amplitude, undamped.frequency, undamped.width, fixed.amplitude, fixed.frequency)
+    return dict(zip(PEAKS, values, strict=True))
 
 
 def warm_up() -> None:
