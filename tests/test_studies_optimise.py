@@ -228,7 +228,7 @@ def test_command(tmp_path, capsys, monkeypatch):
     [
         (lambda data: data.pop("optimise"), "optimise: missing"),
         (lambda data: data["optimise"].pop("band"), "optimise.band: missing"),
-        (lambda data: data["optimise"].update(band={"start": 2430.0, "stop": 2380.0, "num": 3}), "frequencies that rise"),
+        (lambda data: data["optimise"].update(band={"start": 2430.0, "stop": 2380.0, "num": 3}), "frequencies that ri"),
         (lambda data: data["optimise"].update(band=[2400.0, 2400.0]), "rise, not 2400 Hz after 2400 Hz"),
         (lambda data: data["optimise"].update(band=[]), "optimise.band"),
         (lambda data: data["optimise"]["variables"].update(gap_ratio=[2.0, 1.0]), "gap_ratio: expected [lowest, high"),
