@@ -1,4 +1,4 @@
-"""What a scene leaves open about its reduced model, settled: how many modes it needs.
+"""What a scene leaves open, settled: how many modes of a reduced model it needs, how long its transient is.
 
 `modes = "auto"` takes the fewest natural modes whose estimated error stays within the tolerance (rom.ladder): of the
 receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus that of the
@@ -26,6 +26,7 @@ from coupling.laws import Compliant, Massless, Newton
 from coupling.model_file import reduced_model
 from coupling.scene import Rom, Scene
 from coupling.sensitivity import sensitivity
+from coupling.transient import timed
 from rom.collision import Collision, pulse
 from rom.ladder import Choice, choose, grid, natural_ladder, rigid_errors
 from rom.reduced import ReducedModel
@@ -87,9 +88,9 @@ def settled(scene: Scene, choices: Choices) -> Settled:
     """The scene with the choice that was made for it."""
     structure, choice = scene.structure, choices.get(_group(scene))
     if not isinstance(structure, Rom):
-        return Settled(scene, None)
+        return Settled(timed(scene), None)
     if choice is None:
-        return Settled(scene, _warning(_shared(scene, structure)))
+        return Settled(timed(scene), _warning(_shared(scene, structure)))
     structure = replace(structure, modes=choice.chosen.modes, natural=True, attached=choice.chosen.attached)
     scene = replace(scene, structure=structure)
     contacts = _collisions(scene, reduced_model(structure))
@@ -98,7 +99,7 @@ def settled(scene: Scene, choices: Choices) -> Settled:
     warning = _warning(_shared(scene, structure))
     if warning is not None:
         estimate |= warning | {"sentence": f"{choice.sentence}; {warning['sentence']}"}
-    return Settled(scene, estimate)
+    return Settled(timed(scene), estimate)
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
