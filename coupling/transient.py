@@ -10,16 +10,15 @@ from bisect import bisect_left
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import linregress
 
 from coupling.scene import Prescribed, Scene
 from coupling.structure import LinearStructure, linear_structure
 
 #: longest transient that is taken without being asked for, in periods
 LIMIT = 10_000
-#: batches of a window with impacts, and how many standard errors their slope is worth before it is a drift: one window
-#: in ten thousand without a drift has as much
-_BATCHES, _CERTAIN = 10, 7.0
+#: batches of each half of a window with impacts, their fewest periods, and standard errors beyond which the halves'
+#: means differ: of windows of chaotic responses without a transient, 7 in 1000 do
+_BATCHES, _SHORTEST, _CERTAIN = 10, 25, 5.0
 
 
 def left_over(structure: LinearStructure, periods: float) -> float:
@@ -66,8 +65,8 @@ def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray) -> bool:
 
     It was where the structure alone leaves less than `time.tolerance`. Otherwise bodies may have ended it, which the
     peaks tell. Without impacts the motion is linear but for friction: peaks that spread or, extrapolated with the
-    slowest decay, are off by more than the tolerance belong to a transient. With impacts peaks spread anyway: their
-    mean must not drift by more than the tolerance over the evaluated periods.
+    slowest decay, are off by more than the tolerance belong to a transient. With impacts peaks spread anyway: from 500
+    periods on, the means of both halves must agree within the tolerance or the scatter.
     """
     structure, tolerance = linear_structure(scene), scene.time.tolerance
     if left_over(structure, scene.time.dropped) <= tolerance or not peaks.any():
@@ -82,9 +81,12 @@ def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray) -> bool:
 
 
 def _drifts(peaks: np.ndarray, tolerance: float) -> bool:
-    size = len(peaks) // _BATCHES
-    if size < 2:
-        return False  # too few to tell
-    means = peaks[-size * _BATCHES :].reshape(_BATCHES, size).mean(axis=1)
-    line = linregress(np.arange(_BATCHES), means)
-    return bool(_BATCHES * abs(line.slope) > tolerance * means.mean() and abs(line.slope) > _CERTAIN * line.stderr)
+    """Whether the means of both halves differ by more than the tolerance and what the second half's batches explain."""
+    half = len(peaks) // 2
+    size = half // _BATCHES
+    if size < _SHORTEST:
+        return False
+    late = peaks[-size * _BATCHES :].reshape(_BATCHES, size).mean(axis=1)
+    apart = abs(peaks[:half].mean() - peaks[half:].mean())
+    error = np.sqrt(2 / _BATCHES) * late.std(ddof=1)
+    return bool(apart > tolerance * peaks.mean() and apart > _CERTAIN * error)
