@@ -102,10 +102,8 @@ def judge(trial: Trial, name: str, periods: int) -> list[Verdict]:
 def chosen_for(trial: Trial, tolerance: float) -> dict[str, Any]:
     """The estimate of the model that is chosen for a trial's band and a tolerance."""
     scene = trial.scene.replace({"structure.tolerance": tolerance})
-    (estimate, *_) = [item.estimate for item in settle_all([
-        scene.replace({"excitation.frequency": frequency, "excitation.resonance_near": [min(trial.band), max(trial.band)]})
-        for frequency in trial.band
-    ])]  # fmt: skip
+    scene = scene.replace({"excitation.resonance_near": [min(trial.band), max(trial.band)]})
+    estimate = settle_all([scene.replace({"excitation.frequency": frequency}) for frequency in trial.band])[0].estimate
     assert estimate is not None
     return estimate
 

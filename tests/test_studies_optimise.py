@@ -26,7 +26,7 @@ def study(folder, change=lambda data: None, quick=True):
     """The example, with a tiny budget."""
     data = tomllib.loads(EXAMPLE.read_text())
     if quick:
-        data["time"] = {"periods": 60, "transient": 40}
+        data["time"] = {"periods": 60, "transient": 0}
         data["optimise"] |= {"evaluations": 10, "samples": 3, "map": {"mass_ratio": 3, "gap_ratio": 2}}
         data["optimise"]["band"] = {"start": 2380.0, "stop": 2430.0, "num": 3}
     change(data)
