@@ -1,4 +1,4 @@
-"""What a scene leaves open about its reduced model, settled: how many modes it needs.
+"""What a scene leaves open, settled: how many modes of a reduced model it needs, how long its transient is.
 
 `modes = "auto"` takes the fewest natural modes whose estimated error stays within the tolerance (rom.ladder): of the
 receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus that of the
@@ -26,6 +26,8 @@ from coupling.laws import Compliant, Massless, Newton
 from coupling.model_file import reduced_model
 from coupling.scene import Rom, Scene
 from coupling.sensitivity import sensitivity
+from coupling.structure import excitation_force
+from coupling.transient import timed
 from rom.collision import Collision, pulse
 from rom.ladder import Choice, choose, grid, natural_ladder, rigid_errors
 from rom.reduced import ReducedModel
@@ -37,6 +39,11 @@ _IMPACTS = 2.0
 _SHARED = 0.1
 #: what the sensitivity of the one-mode model is short of that of a richer one, at most, by experience
 _CAUTION = 5.0
+#: resonances in the range that are tried, share of the highest from which on they count, and places on the way from
+#: loose (0) to glued bodies (1)
+_RESONANCES, _SEEN, _PLACES = 4, 0.03, (0.0, 0.5, 1.0)
+#: scenes of a sweep that are tried, of those that differ in more than their frequency
+_SCENES = 4
 #: between a single collision and the response, in which collisions meet the waves of those before
 _SAFETY = 1.5
 _NEWTON = "; of the forced response alone: Newton's impacts have no limit as modes grow, compliant contacts have"
@@ -87,9 +94,9 @@ def settled(scene: Scene, choices: Choices) -> Settled:
     """The scene with the choice that was made for it."""
     structure, choice = scene.structure, choices.get(_group(scene))
     if not isinstance(structure, Rom):
-        return Settled(scene, None)
+        return Settled(timed(scene), None)
     if choice is None:
-        return Settled(scene, _warning(_shared(scene, structure)))
+        return Settled(timed(scene), _warning(_shared(scene, structure)))
     structure = replace(structure, modes=choice.chosen.modes, natural=True, attached=choice.chosen.attached)
     scene = replace(scene, structure=structure)
     contacts = _collisions(scene, reduced_model(structure))
@@ -98,7 +105,7 @@ def settled(scene: Scene, choices: Choices) -> Settled:
     warning = _warning(_shared(scene, structure))
     if warning is not None:
         estimate |= warning | {"sentence": f"{choice.sentence}; {warning['sentence']}"}
-    return Settled(scene, estimate)
+    return Settled(timed(scene), estimate)
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
@@ -172,7 +179,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
         return list(dict.fromkeys(item for scene in scenes for item in _collisions(scene, smaller)))
 
     share = min(1.0, _IMPACTS * max(_influence(scene, model, frequencies) for scene in scenes))
-    share = _SAFETY * min(share, _CAUTION * _sensitivity(scenes, model))
+    share = _SAFETY * min(share, _CAUTION * _sensitivity(scenes, model, frequencies))
     rigid = float(rigid_errors(model, frequencies, at, labels, [at]).max())
     choices = []
     for attached in (False, True):
@@ -191,36 +198,73 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
 def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
     """How much the bodies can change the response: between loose and glued to their floors, relative to the larger."""
     at = str(scene.excitation.at)
+    loose, glued = (item.frf(frequencies, at, at) for item in (model, _glued(scene, model)))
+    return float((np.abs(glued - loose) / np.maximum(np.abs(loose), np.abs(glued))).max())
+
+
+def _glued(scene: Scene, model: ReducedModel) -> ReducedModel:
+    """The model with every body glued to its cavity's floor."""
     floors = {cavity.name: cavity.labels()[2] for cavity in scene.cavity}
     mass = np.array(model.mass)
     for damper in scene.damper:
         row = model.row(str(floors[damper.cavity]))
         mass += damper.mass * np.outer(row, row)
-    loose, glued = (item.frf(frequencies, at, at) for item in (model, replace(model, mass=mass)))
-    return float((np.abs(glued - loose) / np.maximum(np.abs(loose), np.abs(glued))).max())
+    return replace(model, mass=mass)
 
 
-def _sensitivity(scenes: Sequence[Scene], model: ReducedModel) -> float:
-    """Of the first scene with collisions and those that differ in frequency alone; 1 where it cannot be told."""
+def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.ndarray) -> float:
+    """The largest over collisions, of scenes that differ in more than their frequency; 1 where none can be told."""
     squares, shapes = spectrum(model.mass, model.stiffness)
-    least = max(1, model.rigid_modes)
-    for scene in scenes:
+    apart = list({_but_for_frequency(scene): scene for scene in scenes}.values())
+    worst, met = 0.0, False
+    for scene in (apart[place] for place in np.unique(np.linspace(0, len(apart) - 1, _SCENES).astype(int))):
         smaller = model if not _needs_residual(scene) or _yields(model) else model.massless(model.size - 1)
-        undamped = _undamped(scene, model)
-        for collision in _collisions(scene, smaller)[:1]:
+        collisions = list(dict.fromkeys(_collisions(scene, smaller)))
+        if not collisions:
+            continue
+        met = True
+        trials, modes = _trials(scene, model, frequencies)
+        undamped = _undamped(scene, model, frequencies)
+        if not undamped > 0.0:
+            return 1.0
+        for collision in collisions:
             row = (model.row(collision.label) @ shapes)[: smaller.size]
-            felt = pulse(squares[: smaller.size], row, collision, scene.excitation.frequency)
-            alike = [item for item in scenes if replace(item, excitation=scene.excitation) == scene]
-            return sensitivity(alike, collision, float(row[0]), felt, least, undamped) if undamped > 0.0 else 1.0
-    return 1.0
+            felt = pulse(squares[: smaller.size], row, collision, float(np.median(trials)))
+            worst = max(worst, sensitivity(scene, trials, collision, float(row[0]), felt, modes, undamped))
+    return worst if met else 1.0
 
 
-def _undamped(scene: Scene, model: ReducedModel) -> float:
-    """Amplitude of the highest resonance without bodies, m; 0 where no force drives it."""
-    if scene.excitation.resonance_amplitude is not None:
-        return scene.excitation.resonance_amplitude
+def _but_for_frequency(scene: Scene) -> tuple[Any, ...]:
+    """What tells scenes of one model apart, other than their frequency."""
+    drive = replace(scene.excitation, frequency=1.0)
+    return (drive, scene.cavity, scene.damper, scene.friction_damper, scene.gravity, scene.contact)
+
+
+def _trials(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> tuple[list[float], int]:
+    """Frequencies at which bodies collide if they do anywhere in the range, Hz, and the natural modes that this takes.
+
+    The highest resonances in the range, from that of the loose to that of the glued bodies, between which a damped peak
+    lies; without one, the ends and the middle of the range.
+    """
+    at, low, high = str(scene.excitation.at), float(frequencies[0]), float(frequencies[-1])
+    loose = model.natural_frequencies_hz
+    glued = _glued(scene, model).natural_frequencies_hz
+    inside = [k for k in range(model.rigid_modes, len(loose)) if loose[k] >= low and glued[k] <= high]
+    heights = np.abs(model.frf(loose, at, at))
+    chosen = sorted(inside, key=lambda k: -heights[k])[:_RESONANCES]
+    chosen = [k for k in chosen if heights[k] > _SEEN * heights[chosen[0]]]
+    if not chosen:
+        return [low, 0.5 * (low + high), high], max(1, model.rigid_modes)
+    places = [loose[k] + share * (glued[k] - loose[k]) for k in chosen for share in _PLACES]
+    return [float(np.clip(place, low, high)) for place in places], max(chosen) + 1
+
+
+def _undamped(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
+    """Largest amplitude without bodies in the range, m; 0 where no force drives it."""
+    assert isinstance(scene.structure, Rom)
+    force = excitation_force(replace(scene, structure=replace(scene.structure, modes=None)))
     at = str(scene.excitation.at)
-    return float(np.abs(model.frf(model.natural_frequencies_hz, at, at)).max()) * (scene.excitation.force or 0.0)
+    return force * float(np.abs(model.frf(frequencies, at, at)).max())
 
 
 def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:

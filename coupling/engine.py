@@ -18,7 +18,7 @@ from coupling.scene import Scene
 def simulate(
     scene: Scene, events: bool = False, samples_per_period: int = 0, start: Handover | None = None
 ) -> Response:
-    """Run a scene from time zero over `scene.time.periods` excitation periods.
+    """Run a scene from time zero over `scene.time.simulated` excitation periods.
 
     events: keep the list of events; samples_per_period: keep that many equidistant samples of each period; start: the
     state that another run has left (`Response.final`), in place of the scene's initial one; for the exact engine.

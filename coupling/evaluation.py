@@ -18,6 +18,7 @@ from coupling.rows import Rows
 from coupling.scene import Scene
 from coupling.state import Records
 from coupling.statistics import mean_confidence, transient_length
+from coupling.transient import outlasted
 
 #: periods between two looks at whether the response is steady
 _CHUNK = 100
@@ -56,10 +57,15 @@ class Outcome:
 def run_scene(run: Run, scene: Scene) -> tuple[Status, int]:
     """Run all periods, or until the mean amplitude is known well enough. Returns status and length of the transient."""
     if scene.time.steady != "auto":
-        return run.advance_to(scene.time.periods), scene.time.dropped
+        ended, dropped = run.advance_to(scene.time.simulated), scene.time.dropped
+        records = run.outcome().records
+        window = slice(dropped, scene.time.simulated)
+        if ended is Status.OK and dropped and not outlasted(scene, records.peak[window], records.impacts[window]):
+            ended = Status.NOT_STEADY
+        return ended, dropped
     status, dropped = Status.NOT_STEADY, scene.time.dropped
-    for periods in range(_CHUNK, scene.time.periods + _CHUNK, _CHUNK):
-        ended = run.advance_to(min(periods, scene.time.periods))
+    for periods in range(_CHUNK, scene.time.simulated + _CHUNK, _CHUNK):
+        ended = run.advance_to(min(periods, scene.time.simulated))
         if ended is not Status.OK:
             return ended, dropped
         outcome = run.outcome()
@@ -90,7 +96,7 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(rows, records))
     if not balance <= run.open_ledger and status in (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN):
         status = Status.ENERGY
-    samples = len(records.samples) // scene.time.periods
+    samples = len(records.samples) // scene.time.simulated
     return Response(
         status=status,
         frequency=scene.excitation.frequency,

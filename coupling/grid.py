@@ -15,7 +15,7 @@ from coupling.inputs import InputError, nearest, validate
 from coupling.scene import Rom, Scene, assign, axis_values
 from coupling.structure import linear_structure
 
-_FREQUENCY = "excitation.frequency"
+FREQUENCY = "excitation.frequency"
 _DIRECTION, _ALONG = "continuation.direction", "continuation.along"
 #: what cannot change from one run to the next: their states would not fit
 _FIXED = ("structure.model", "structure.file", "structure.modes", "structure.natural", "structure.tolerance")
@@ -124,8 +124,7 @@ def grid(scene: Scene) -> Grid:
         raise InputError(
             'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
         )
-    base = replace(scene, sweep={})
-    points = Points(base, {})
+    points = Points(replace(scene, sweep={}), {})
     first, linked, leaves_open = None, False, False
     for values in _telling(axes):
         made = points.raw(values)
@@ -135,20 +134,30 @@ def grid(scene: Scene) -> Grid:
         _check_method(made)
     assert first is not None
     along = _along(scene, axes) if linked else None
+    base = _with_range(points.base, axes)
+    points = Points(base, {})
     choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if leaves_open else {}
     start = settled(first, choices)
     linear_structure(start.scene)
     return Grid(scene, axes, base, choices, start.estimate, along, warnings_of(start.scene))
 
 
+def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
+    """The scene whose level is that of one resonance for all of the swept frequencies."""
+    swept = axes.get(FREQUENCY)
+    if swept is None or not _ordered(swept) or scene.excitation.resonance_near is not None:
+        return scene
+    return replace(scene, excitation=replace(scene.excitation, resonance_near=(float(min(swept)), float(max(swept)))))
+
+
 def _telling(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
     """Points that tell whether all are scenes: a frequency is good or bad whatever the other values are."""
     first = {path: values[0] for path, values in axes.items()}
-    others = {path: values for path, values in axes.items() if path != _FREQUENCY}
+    others = {path: values for path, values in axes.items() if path != FREQUENCY}
     for values in itertools.product(*others.values()):
         yield first | dict(zip(others, values, strict=True))
-    for frequency in axes.get(_FREQUENCY, ()):
-        yield first | {_FREQUENCY: frequency}
+    for frequency in axes.get(FREQUENCY, ()):
+        yield first | {FREQUENCY: frequency}
 
 
 def _check_method(scene: Scene) -> None:
@@ -164,9 +173,9 @@ def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:
     along = scene.continuation.along
     if along is None:
         numeric = [path for path, values in axes.items() if _ordered(values)]
-        if _FREQUENCY not in axes and len(numeric) != 1:
+        if FREQUENCY not in axes and len(numeric) != 1:
             raise InputError(f"continuation.along: name the axis of the sweep, one of {', '.join(numeric) or 'none'}")
-        along = _FREQUENCY if _FREQUENCY in axes else numeric[0]
+        along = FREQUENCY if FREQUENCY in axes else numeric[0]
     if along not in axes:
         raise InputError(f"continuation.along: the sweep has no axis '{along}'; {nearest(along, list(axes))}")
     if not _ordered(axes[along]):

@@ -23,7 +23,7 @@ class Recorder:
     def __init__(self, scene: Scene, unforced: Unforced, events: bool, samples: int) -> None:
         u, rows = unforced, unforced.rows
         self.unforced, self.rows, self.keep = u, rows, events
-        self.records = st.new_records(rows, scene.time.periods, samples)
+        self.records = st.new_records(rows, scene.time.simulated, samples)
         self.each, self.steps = samples, scene.solver.steps
         self.count = _PUSH + u.r
         self.functionals = _functionals(u)

@@ -12,9 +12,9 @@ import numpy as np
 from coupling.engine import simulate
 from coupling.grid import Grid, PointList, Points
 from coupling.handover import Handover
+from coupling.linear import linear_responses
 from coupling.response import Response
 from coupling.scene import Scene
-from coupling.structure import linear_structure
 
 #: measures of a run and their units, each an array over the grid
 MEASURES = {
@@ -136,20 +136,10 @@ def _shares(response: Response) -> np.ndarray:
     return losses / total if total > 0 else np.full(len(LOSSES), np.nan)
 
 
-def _linear(scene: Scene) -> tuple[float, float]:
+def _linear(scene: Scene) -> list[float]:
     """Amplitude of the response without bodies, and with every body glued to its cavity's floor, m."""
-    structure = linear_structure(scene)
-    names = [cavity.name for cavity in scene.cavity]
-    mass, load, found = np.eye(structure.modes), structure.force.copy(), []
-    for dampers in ((), scene.damper):
-        for damper in dampers:
-            cavity = names.index(damper.cavity)
-            floor = structure.floor[cavity]
-            mass += damper.mass * np.outer(floor, floor)
-            load -= damper.mass * floor * structure.base_acceleration[cavity]
-        dynamic = np.diag(structure.stiffness) + 1j * structure.omega * structure.damping - structure.omega**2 * mass
-        found.append(float(abs(structure.response @ np.linalg.solve(dynamic, load) + structure.table)))
-    return found[0], found[1]
+    frequency = np.array([scene.excitation.frequency])
+    return [float(response.amplitude(frequency)[0]) for response in linear_responses(scene)]
 
 
 def tasks_of(grid: Grid | PointList, finished: Finished, most: int) -> Iterator[tuple[Task, Sequence[int]]]:

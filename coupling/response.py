@@ -21,8 +21,9 @@ class Status(StrEnum):
     grew beyond all bounds; ENERGY: the ledger is open by more than the method's bound, its figures are not to be used.
     ILL_CONDITIONED: while some contacts are closed, modes are critically damped to round-off or masses and stiffnesses
     so far apart that doubles cannot resolve the motion; change a damping, a mass or a stiffness.
-    NOT_STEADY: no end of the transient in sight; UNCERTAIN: the mean's confidence interval is still too wide. The other
-    troubles mean that the figures cover only the periods that were completed.
+    NOT_STEADY: no end of the transient in sight, or `time.transient` is too short for it; UNCERTAIN: the mean's
+    confidence interval is still too wide. The other troubles mean that the figures cover only the periods that were
+    completed.
     """
 
     OK = "ok"

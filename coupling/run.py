@@ -103,7 +103,7 @@ class EngineRun:
         self.state = st.new_state(self.rows, modes, displacement, velocity)
         self.state.coordinates[:] = coordinates
         self.channels = st.new_channels(self.rows, modes)
-        self.records = st.new_records(self.rows, scene.time.periods, samples_per_period)
+        self.records = st.new_records(self.rows, scene.time.simulated, samples_per_period)
         self.scratch = st.new_scratch(self.rows, modes)
 
     def begin(self, max_events: int) -> int:

@@ -96,7 +96,9 @@ class Initial:
 class Excitation:
     """Harmonic excitation at `frequency` (Hz): one of force (N), base_acceleration (m/s^2), resonance_amplitude (m).
 
-    resonance_amplitude is the displacement to which the force brings the resonance of the structure without bodies.
+    resonance_amplitude is the displacement to which the force brings a resonance of the structure without bodies: of a
+    model with several, the one that responds most within `resonance_near`, a frequency or [lowest, highest] (Hz);
+    default: the excitation's frequency, or the range over which it is swept.
     `at` is the interface label of force and response on a reduced model; the base moves in its direction.
     """
 
@@ -104,12 +106,22 @@ class Excitation:
     force: NonNegative | None = None
     base_acceleration: NonNegative | None = None
     resonance_amplitude: Positive | None = None
+    resonance_near: Positive | tuple[Positive, Positive] | None = None
     at: str | None = None
 
     def __post_init__(self) -> None:
         given = [self.force, self.base_acceleration, self.resonance_amplitude]
         if sum(value is not None for value in given) > 1:
             raise ValueError("give at most one of force, base_acceleration and resonance_amplitude")
+        low, high = self.resonance_range
+        if low > high:
+            raise ValueError(f"resonance_near: expected [lowest, highest], not [{low:g}, {high:g}]")
+
+    @property
+    def resonance_range(self) -> tuple[float, float]:
+        """Lowest and highest frequency, Hz, near which the resonance of resonance_amplitude is sought."""
+        near = self.frequency if self.resonance_near is None else self.resonance_near
+        return near if isinstance(near, tuple) else (near, near)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -192,11 +204,13 @@ class FrictionDamper:
 class Time:
     """Excitation periods simulated, and how many of the first are left out of the evaluation.
 
+    Neither given: 1500 and 1000, or a longer transient where the structure's damping leaves more than `tolerance` of
+    the steady response (coupling.transient). transient = 0 evaluates the motion from the start, whatever it is.
     steady = "auto" instead drops the transient by a statistical rule and ends the run, within `periods`, once the 95 %
     confidence interval of the mean amplitude is narrower than `tolerance` of it on either side.
     """
 
-    periods: Annotated[Whole, Field(gt=0)] = 1500
+    periods: Annotated[Whole, Field(gt=0)] | None = None
     transient: Annotated[Whole, Field(ge=0)] | None = None
     steady: Literal["auto"] | None = None
     tolerance: Annotated[Real, Field(gt=0, lt=1)] = 0.01
@@ -204,13 +218,18 @@ class Time:
     def __post_init__(self) -> None:
         if self.steady is not None and self.transient is not None:
             raise ValueError("give one of transient and steady")
-        if self.transient is not None and self.transient >= self.periods:
-            raise ValueError(f"transient ({self.transient}) must be less than periods ({self.periods})")
+        if self.transient is not None and self.transient >= self.simulated:
+            raise ValueError(f"transient ({self.transient}) must be less than periods ({self.simulated})")
+
+    @property
+    def simulated(self) -> int:
+        """Periods simulated, at most: 1500 if nothing was said."""
+        return 1500 if self.periods is None else self.periods
 
     @property
     def dropped(self) -> int:
         """Periods left out of the evaluation unless the state tells: two thirds if nothing was said."""
-        return self.periods * 2 // 3 if self.transient is None else self.transient
+        return self.simulated * 2 // 3 if self.transient is None else self.transient
 
 
 @dataclass(frozen=True, config=STRICT)

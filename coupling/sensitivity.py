@@ -1,4 +1,4 @@
-"""How much a response depends on its collisions: short runs of the one-mode model with other pulses.
+"""How much a response depends on its collisions: short runs of a model of few modes with other pulses.
 
 A body in a narrow cavity goes with its walls whatever its collisions are like; one that rattles does not. The runs tell
 which, at the price of some hundred periods of the cheapest model.
@@ -10,8 +10,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from coupling.laws import Compliant
 from coupling.run import respond
 from coupling.scene import Rom, Scene, Time
@@ -20,31 +18,39 @@ from rom.collision import Collision, Pulse
 
 # of the impulse and of the duration; a softer spring takes its square root longer
 _LESS, _LONGER = 0.8, 2.0
-_PERIODS, _TRANSIENT, _FREQUENCIES = 450, 150, 3
+_PERIODS, _TRANSIENT = 450, 150
 _PLASTIC = 0.05
 
 
 def sensitivity(
-    scenes: Sequence[Scene], collision: Collision, wall: float, pulse: Pulse, modes: int, undamped: float
+    scene: Scene,
+    frequencies: Sequence[float],
+    collision: Collision,
+    wall: float,
+    pulse: Pulse,
+    modes: int,
+    undamped: float,
 ) -> float:
-    """Change of the mean amplitude, in units of the undamped peak (m), for a relative change of a collision's pulse.
+    """Change of the mean amplitude, in units of the undamped one (m), for a relative change of all collisions' pulses.
 
-    The largest of up to three of the scenes, which differ in frequency, with `modes` natural modes, as few as there can
-    be. wall: the first mode's entry of the wall's functional; pulse: that of the collision on the whole model.
+    The largest over the frequencies (Hz), with `modes` natural modes, as few as the motion there takes. wall: the first
+    mode's entry of the wall's functional; pulse: that of the collision on the whole model.
     """
     reduced = 1.0 / (wall**2 + 1.0 / collision.mass)
     growth = min(max(abs(pulse.transform) / reduced, 1.0 + _PLASTIC), 2.0)  # 1 + restitution
     spring = reduced * (math.pi / pulse.duration) ** 2
     weaker = max(_LESS * growth, 1.0 + _PLASTIC / 2)
-    ordered = sorted(scenes, key=lambda scene: scene.excitation.frequency)
-    places = np.unique(np.linspace(0, len(ordered) - 1, _FREQUENCIES).astype(int))
     worst = 0.0
-    for scene in (ordered[place] for place in places):
-        as_it_is = _amplitude(scene, modes, growth - 1.0, spring)
-        less = abs(_amplitude(scene, modes, weaker - 1.0, spring) - as_it_is) / (1.0 - weaker / growth)
+    for frequency in frequencies:
+        driven = replace(
+            scene,
+            excitation=replace(scene.excitation, frequency=frequency, resonance_near=scene.excitation.resonance_range),
+        )
+        as_it_is = _amplitude(driven, modes, growth - 1.0, spring)
+        less = abs(_amplitude(driven, modes, weaker - 1.0, spring) - as_it_is) / (1.0 - weaker / growth)
         # a pulse acts in its middle, so that twice the duration is half of it late
-        late = math.pi * scene.excitation.frequency * pulse.duration * (_LONGER - 1.0)
-        later = abs(_amplitude(scene, modes, growth - 1.0, spring / _LONGER**2) - as_it_is) / late
+        late = math.pi * frequency * pulse.duration * (_LONGER - 1.0)
+        later = abs(_amplitude(driven, modes, growth - 1.0, spring / _LONGER**2) - as_it_is) / late
         worst = max(worst, less, later) if math.isfinite(less + later) else math.inf
     return worst / undamped
 

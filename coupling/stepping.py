@@ -50,7 +50,7 @@ class SteppedRun:
         self.system, self.motion = sy.start(
             system, self.rows, displacement, velocity, structure.displacement, structure.velocity
         )
-        self.records = new_records(self.rows, scene.time.periods, samples_per_period)
+        self.records = new_records(self.rows, scene.time.simulated, samples_per_period)
         self.log = np.zeros((_LOG if events else 0, 6))
         self.chunks: list[np.ndarray] = []
         self.march = _march(scene, self)

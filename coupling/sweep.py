@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,9 +15,10 @@ import numpy as np
 
 from coupling.checkpoint import Checkpoint
 from coupling.engine import simulate
-from coupling.grid import Grid, PointList
+from coupling.grid import FREQUENCY, Grid, PointList, Points
 from coupling.grid import grid as grid_of
-from coupling.inputs import validate
+from coupling.inputs import InputError, validate
+from coupling.linear import LinearPeak, linear_responses
 from coupling.points import COLUMNS, LOSSES, MEASURES, TEXTS, Block, Finished, Task, broken, run_points, tasks_of
 from coupling.scene import Scene
 from modal.store import Variable, frozen, load, save
@@ -27,6 +29,11 @@ _UNITS = {
     "base_acceleration": "m/s^2", "acceleration": "m/s^2", "resonance_amplitude": "m", "displacement_amplitude": "m",
     "position": "m", "displacement": "m", "velocity": "m/s", "normal_load": "N", "normal_force": "N",
     "orientation_deg": "degree",
+}  # fmt: skip
+#: tops of the linear curves over the swept frequencies and their units, each an array over the other axes
+PEAKS = {
+    "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
+    "fixed_peak": "m", "fixed_peak_frequency": "Hz",
 }  # fmt: skip
 # few enough points that workers end together, and that a killed sweep loses little
 _MOST_PER_TASK = 16
@@ -50,6 +57,9 @@ class Sweep:
     attached_mass_fraction  share of the bodies' mass that the structure feels; nan without bodies or motion
     energy_share          (*grid, 4) share of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another coupling.response.Status, or "error: ..." for a run that broke, without measures
+    peaks                 by the names of PEAKS: tops of `undamped` and `fixed` from the lowest to the highest
+                          frequency, between the points as well, their frequencies, and the half-power width of the
+                          undamped one, over the axes other than the frequency; empty for a sweep at one frequency
     A point of the grid is the same whoever ran it, and whenever: no time is taken.
     provenance            versions and whatever else the caller knows (JSON-able)
     """
@@ -69,6 +79,7 @@ class Sweep:
     energy_residual: np.ndarray
     status: np.ndarray
     classification: np.ndarray
+    peaks: Mapping[str, np.ndarray] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -88,9 +99,11 @@ class Sweep:
         told |= {} if estimate is None else {"estimate": estimate}
         axes = {path: values.tolist() for path, values in self.axes.items()}
         return (
-            {"axes": axes, "units": self.units() | MEASURES, "loss": list(LOSSES)}
+            {"axes": axes, "units": self.units() | MEASURES | {name: PEAKS[name] for name in self.peaks}}
+            | {"loss": list(LOSSES)}
             | told
             | {name: getattr(self, name).tolist() for name in names}
+            | {name: values.tolist() for name, values in self.peaks.items()}
         )
 
     def save(self, path: str | Path) -> None:
@@ -102,6 +115,8 @@ class Sweep:
         variables["energy_share"] = Variable(self.energy_share, (*dims, "loss"))
         for name, unit in (MEASURES | {"status": "1", "classification": "1"}).items():
             variables[name] = Variable(getattr(self, name), dims, unit)
+        others = tuple(_dimension(axis) for axis in self.axes if axis != FREQUENCY)
+        variables |= {name: Variable(values, others, PEAKS[name]) for name, values in self.peaks.items()}
         attributes = {
             "axes": list(self.axes),
             "scene": self.scene.to_dict(),
@@ -119,6 +134,7 @@ class Sweep:
             axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
             **{name: frozen(values[name]) for name in (*MEASURES, "energy_share")},
             **{name: frozen(values[name], object) for name in ("status", "classification")},
+            peaks={name: frozen(values[name]) for name in PEAKS if name in values},
             provenance=json.loads(attributes["provenance"]),
         )
 
@@ -169,10 +185,34 @@ def _result(grid: Grid, finished: Finished, provenance: dict[str, Any]) -> Sweep
         energy_share=frozen(np.stack([columns[name] for name in LOSSES], axis=-1)),
         **{name: frozen(columns[name]) for name in MEASURES},
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
+        peaks=_peaks(grid),
         provenance=provenance
         | ({"warnings": list(grid.warnings)} if grid.warnings else {})
         | ({} if grid.estimate is None else {"estimate": grid.estimate}),
     )
+
+
+def _peaks(grid: Grid) -> dict[str, np.ndarray]:
+    """Tops of the linear curves over the swept frequencies; nan at a combination of the other axes that is no scene."""
+    others = {path: values for path, values in grid.axes.items() if path != FREQUENCY}
+    if len(set(grid.axes.get(FREQUENCY, ()))) < 2:
+        return {}
+    low, high = min(grid.axes[FREQUENCY]), max(grid.axes[FREQUENCY])
+    points, found = Points(grid.base, grid.choices), []
+    for values in itertools.product(*others.values()):
+        try:
+            scene = points.scene({**dict(zip(others, values, strict=True)), FREQUENCY: low})
+            found.append(tops(*(response.peak(low, high) for response in linear_responses(scene))))
+        except InputError:  # told as the status of its points
+            found.append(dict.fromkeys(PEAKS, np.nan))
+    shape = tuple(len(values) for values in others.values())
+    return {name: frozen(np.reshape([item[name] for item in found], shape)) for name in PEAKS}
+
+
+def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:
+    """Tops of both linear curves by the names of PEAKS."""
+    values = (undamped.amplitude, undamped.frequency, undamped.width, fixed.amplitude, fixed.frequency)
+    return dict(zip(PEAKS, values, strict=True))
 
 
 def warm_up() -> None:

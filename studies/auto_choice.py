@@ -81,9 +81,7 @@ def judge(trial: Trial, name: str, periods: int) -> list[Verdict]:
     scenes = [trial.scene.replace({"excitation.frequency": frequency}) for frequency in trial.frequencies]
     chosen: dict[float, dict[str, Any]] = {}
     for tolerance in TOLERANCES:
-        settled = settle_all([scene.replace({"structure.tolerance": tolerance}) for scene in scenes])
-        assert settled[0].estimate is not None
-        chosen[tolerance] = settled[0].estimate
+        chosen[tolerance] = chosen_for(trial, tolerance)
     kinds = _kinds(chosen.values())
     deviations, confidences = errors(scenes, kinds, trial.undamped, periods)
     costs = _costs(scenes[len(scenes) // 2], kinds)
@@ -99,6 +97,15 @@ def judge(trial: Trial, name: str, periods: int) -> list[Verdict]:
             )
         )  # fmt: skip
     return found
+
+
+def chosen_for(trial: Trial, tolerance: float) -> dict[str, Any]:
+    """The estimate of the model that is chosen for a trial's band and a tolerance."""
+    scene = trial.scene.replace({"structure.tolerance": tolerance})
+    scene = scene.replace({"excitation.resonance_near": [min(trial.band), max(trial.band)]})
+    estimate = settle_all([scene.replace({"excitation.frequency": frequency}) for frequency in trial.band])[0].estimate
+    assert estimate is not None
+    return estimate
 
 
 def shown(kind: Kind) -> str:

@@ -7,7 +7,9 @@ contact's frequency, which soft contacts feel.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,18 +27,24 @@ _ROD_MODES, _BEAM_ELEMENTS, _CLUSTER_MODES = 40, 8, 12
 _MASS, _GAP, _CONTACT, _RESTITUTION, _FRICTION = (0.005, 0.05), (0.2, 1.0), (3.0, 30.0), (0.5, 0.95), (0.1, 0.5)
 #: gravity in the unit of the undamped peak's acceleration: 9.81 m/s^2 on the cluster
 _GRAVITY = 1e-3
+#: a wide band, of the first frequency, and its points besides those at the damped peak
+_WIDE, _POINTS = (0.83, 1.04), 8
 #: places between the resonance with loose (0) and with fixed bodies (1), where the damped peak lies
 PLACES = (0.2, 0.5, 0.8)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A scene without its frequency: structure's name, scene, its frequencies (Hz), contact over first frequency."""
+    """A scene without its frequency: structure's name, scene, its frequencies (Hz), contact over first frequency.
+
+    band: frequencies (Hz) for which a model is chosen, among them those at which its error is measured.
+    """
 
     structure: str
     scene: Scene
     frequencies: tuple[float, ...]
     contact_ratio: float
+    band: tuple[float, ...]
 
     @property
     def undamped(self) -> float:
@@ -47,13 +55,18 @@ class Trial:
 
 
 def trials(folder: Path, seed: int, counts: dict[str, int]) -> list[Trial]:
-    """So many scenes of each structure ("cluster", "rod", "beam"); its reduced model is left in the folder."""
+    """So many scenes of each structure ("cluster", "rod", "beam", "span"); its reduced model is left in the folder.
+
+    A second word after the structure: "pair", two bodies in the cavity; "cavities", one in each of two (the span's);
+    "wide", a band far beyond the damped peak.
+    """
     generator = np.random.default_rng(seed)
     found = []
     for name, count in counts.items():
-        file = folder / f"auto_{name}.h5"
+        structure = name.split()[0]
+        file = folder / f"auto_{structure}.h5"
         if not file.exists():
-            _MODELS[name]().save(file)
+            _MODELS[structure]().save(file)
         found += [_trial(name, file, generator) for _ in range(count)]
     return found
 
@@ -70,8 +83,8 @@ def rod_model() -> ReducedModel:
     )
 
 
-def beam_model() -> ReducedModel:
-    """Clamped unit beam in bending, of cubic elements (Euler and Bernoulli)."""
+def beam_model(*others: int) -> ReducedModel:
+    """Clamped unit beam in bending, of cubic elements (Euler and Bernoulli); "tip", and "node <k>" of other nodes."""
     h = 1.0 / _BEAM_ELEMENTS
     stiffness = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]) / h**3
     mass = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) * h / 420.0
@@ -81,8 +94,8 @@ def beam_model() -> ReducedModel:
     for element in range(_BEAM_ELEMENTS):
         place = slice(2 * element, 2 * element + 4)
         whole[:, place, place] += np.array([mass, stiffness]) * np.outer(turn, turn)
-    row = np.eye(size - 2)[size - 4]
-    return ReducedModel.from_matrices(whole[0, 2:, 2:], whole[1, 2:, 2:], {"tip": row}, damping_ratio=0.005)
+    rows = {"tip": np.eye(size - 2)[size - 4]} | {f"node {k}": np.eye(size - 2)[2 * k - 2] for k in others}
+    return ReducedModel.from_matrices(whole[0, 2:, 2:], whole[1, 2:, 2:], rows, damping_ratio=0.005)
 
 
 def _cluster() -> ReducedModel:
@@ -91,13 +104,20 @@ def _cluster() -> ReducedModel:
     return cluster_model(1, _CLUSTER_MODES)
 
 
-_MODELS = {"cluster": _cluster, "rod": rod_model, "beam": beam_model}
-_LABELS = {"cluster": ("shroud", "c1_floor"), "rod": ("tip", "tip"), "beam": ("tip", "tip")}
+_MODELS: dict[str, Callable[[], ReducedModel]] = {
+    "cluster": _cluster, "rod": rod_model, "beam": beam_model, "span": partial(beam_model, _BEAM_ELEMENTS // 2)
+}  # fmt: skip
+#: response and floors
+_LABELS = {
+    "cluster": ("shroud", "c1_floor"), "rod": ("tip", "tip"), "beam": ("tip", "tip"),
+    "span": ("tip", "tip", f"node {_BEAM_ELEMENTS // 2}"),
+}  # fmt: skip
 
 
 def _trial(name: str, file: Path, generator: np.random.Generator) -> Trial:
     model = ReducedModel.load(file)
-    at, floor = _LABELS[name]
+    structure, _, kind = name.partition(" ")
+    at, floor, *others = _LABELS[structure]
     first, rigid = float(model.natural_frequencies_hz[0]), model.massless(1)
     modal, wall = (1.0 / float(rigid.row(label)[0] ** 2) for label in (at, floor))
     mass = modal * _spread(generator, _MASS)
@@ -116,9 +136,21 @@ def _trial(name: str, file: Path, generator: np.random.Generator) -> Trial:
         "damper": [body],
         "contact": {"law": "compliant", "stiffness": stiffness, "residual": bool(generator.random() < 0.5)},
     }
-    fixed = first / math.sqrt(1.0 + mass / wall)
+    attached = mass / wall
+    if kind == "pair":
+        data["damper"] = [body | {"position": -0.25 * gap}, body | {"mass": 0.5 * mass, "position": 0.25 * gap}]
+        attached *= 1.5
+    if kind == "cavities":
+        data["cavity"].append({"name": "c2", "gap": _AMPLITUDE * _spread(generator, _GAP), "floor": others[0]})
+        second = modal * _spread(generator, _MASS)
+        data["damper"].append(body | {"cavity": "c2", "mass": second})
+        attached += second * float(rigid.row(others[0])[0] ** 2)
+    fixed = first / math.sqrt(1.0 + attached)
     frequencies = tuple(first + place * (fixed - first) for place in PLACES)
-    return Trial(name, validate(Scene, data, "scene"), frequencies, ratio)
+    band = frequencies
+    if kind == "wide":
+        band = tuple(sorted([*frequencies, *(first * np.linspace(*_WIDE, _POINTS)).tolist()]))
+    return Trial(name, validate(Scene, data, "scene"), frequencies, ratio, band)
 
 
 def _spread(generator: np.random.Generator, limits: tuple[float, float]) -> float:

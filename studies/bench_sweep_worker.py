@@ -25,7 +25,7 @@ from studies.workers import workers
 
 #: the calibrated cluster of the demonstration
 _MASS, _STIFFNESS, _AMPLITUDE = 0.148, 3.4e7, 3.0e-5
-PERIODS, TRANSIENT = 200, 100
+PERIODS, TRANSIENT = 200, 0
 
 
 class _Use(NamedTuple):

@@ -167,7 +167,7 @@ def run(arguments: Namespace) -> None:
     response = simulate(scene, events=arguments.events, samples_per_period=arguments.samples)
     if arguments.output:
         response.save(arguments.output, {"versions": versions(), "scene": scene.to_dict()})
-    result = response.to_json(events=arguments.events)
+    result = response.to_json(events=arguments.events) | _tell_resonance(arguments.input, scene)
     _tell_choice(arguments.input, response.estimate, response.warnings)
     _write_json(arguments.json, result)
     if arguments.json != "-":
@@ -190,12 +190,14 @@ def sweep(arguments: Namespace) -> None:
     from coupling.checkpoint import Checkpoint, clear
     from coupling.grid import grid
     from coupling.sweep import sweep as run_sweep
+    from studies.forced_response import forced_responses
     from studies.provenance import versions
 
     # processes are slow to start: a bad grid or the checkpoint of another sweep is told before
     points, provenance = grid(scene), {"versions": versions()}
     resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
     _tell_choice(arguments.input, points.estimate, points.warnings)
+    resonance = _tell_resonance(arguments.input, points.base)
     with workers(arguments.workers) as pool, progress("sweep") as report:
         started = time.perf_counter()
         result = run_sweep(points, pool, report, checkpoint, provenance)
@@ -204,7 +206,8 @@ def sweep(arguments: Namespace) -> None:
     took = time.perf_counter() - started
     # times are told, and not kept in the result, which is the same however it came about
     told = {"points_resumed": resumed, "wall_time_s": took, "points_per_second": (points.size - resumed) / took}
-    _write_json(arguments.json, result.to_json() | told)
+    headlines = [response.to_json() for response in forced_responses(result)] if arguments.json else []
+    _write_json(arguments.json, result.to_json() | told | resonance | {"headlines": headlines})
     if checkpoint is not None:
         clear(checkpoint)
         clear_leftovers(arguments.output)
@@ -221,6 +224,7 @@ def optimise(arguments: Namespace) -> None:
     from studies.provenance import versions
 
     study = Study.load(arguments.input)
+    _tell_resonance(arguments.input, study.scene)
     with workers(arguments.workers) as pool, progress("optimise") as report:
         found = search(study, pool, report, {"versions": versions()})
     if arguments.output:
@@ -293,6 +297,27 @@ def _tell_choice(source: str, estimate: Mapping[str, Any] | None, warnings: Iter
 def _warn(source: str, warnings: Iterable[str]) -> None:
     for warning in warnings:
         print(f"vanedamp: {source}: warning: {warning}", file=sys.stderr)
+
+
+def _tell_resonance(source: str, scene: Scene) -> dict[str, Any]:
+    """Which resonance `resonance_amplitude` is that of is said where there are several; `resonance` of the results."""
+    from coupling.scene import Rom
+    from coupling.structure import chosen_resonance
+
+    level = scene.excitation.resonance_amplitude
+    if level is None:
+        return {}
+    if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+        scene = replace(scene, structure=replace(scene.structure, modes=None))
+    found = chosen_resonance(scene)
+    force = level / found.flexibility
+    if found.modes > 1:
+        print(
+            f"vanedamp: {source}: excitation.resonance_amplitude: of the resonance at {found.frequency:.6g} Hz (mode "
+            f"{found.mode + 1}), force {force:.4g} N; resonance_near names another",
+            file=sys.stderr,
+        )
+    return {"resonance": {"frequency": found.frequency, "mode": found.mode, "force": force}}
 
 
 def _load_scene(path: str) -> Scene:

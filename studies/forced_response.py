@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from coupling.grid import FREQUENCY
 from coupling.scene import Prescribed, Rigid, Rom, Scene
 from coupling.sweep import Sweep
 from modal.store import frozen
-
-FREQUENCY = "excitation.frequency"
-_LEVEL = "excitation.resonance_amplitude"
-#: a damped response within this share of the undamped one has not been touched by the bodies
-UNTOUCHED = 0.01
+from studies.headline import Headline, headline, reference_of, shown
 
 
 @dataclass(frozen=True, eq=False)
 class ForcedResponse:
-    """Curves along an axis of a sweep, each of shape (n,); displacements in m.
+    """Curves along an axis of a sweep, each of shape (n,); displacements in m, nan where a point is not ok.
 
-    reference          the largest undamped amplitude: what amplitudes are divided by in charts
+    reference          what amplitudes are divided by in charts: the undamped maximum over the range
+    undamped, fixed    linear amplitudes at the points, of all that have any
     damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks
     energy_share       (n, 4) of viscous, friction, impact and contact loss
-    trouble            number of points whose status is not ok
+    headline           what the curve comes to
     source             the file it comes from
     """
 
@@ -42,20 +39,20 @@ class ForcedResponse:
     attached_mass_fraction: np.ndarray
     impacts_per_period: np.ndarray
     energy_share: np.ndarray
-    trouble: int
+    headline: Headline
     source: str = ""
 
-    def peak(self, curve: str) -> tuple[Any, float]:
-        """Position on the axis and height, relative to the reference, of the top of a curve; nan if all failed."""
-        values = getattr(self, curve)
-        top = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
-        return self.x[top], float(values[top] / self.reference)
-
     @property
-    def onset(self) -> Any:
-        """The first point at which the bodies change the mean response by more than 1 %; None if they never do."""
-        touched = np.flatnonzero(np.abs(self.damped_mean - self.undamped) > UNTOUCHED * self.undamped)
-        return self.x[touched[0]] if touched.size else None
+    def sentence(self) -> str:
+        """The headline for people."""
+        told = self.headline.sentence(self.axis, self.units, self.x[0], self.x[-1])
+        return f"{self.name}: {told}"
+
+    def to_json(self) -> dict[str, Any]:
+        """The headline as plain data: what the curve is of, its range, its figures and the sentence."""
+        ends = [value.item() if isinstance(value, np.generic) else value for value in (self.x[0], self.x[-1])]
+        told = {"name": self.name, "axis": self.axis, "range": ends}
+        return told | self.headline.to_json() | {"sentence": self.sentence}
 
 
 def model_name(scene: Scene) -> str:
@@ -90,35 +87,38 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
 
 
 def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> ForcedResponse:
-    curves = {
-        "undamped": sweep.amplitude_undamped, "fixed": sweep.amplitude_fixed, "damped_max": sweep.amplitude_max,
-        "damped_mean": sweep.amplitude_mean, "attached_mass_fraction": sweep.attached_mass_fraction,
-        "impacts_per_period": sweep.impacts_per_period, "energy_share": sweep.energy_share,
+    ok = sweep.status[point] == "ok"
+    damped = {
+        "damped_max": sweep.amplitude_max, "damped_mean": sweep.amplitude_mean, "impacts_per_period":
+        sweep.impacts_per_period, "attached_mass_fraction": sweep.attached_mass_fraction,
     }  # fmt: skip
-    cut = {key: frozen(values[point]) for key, values in curves.items()}
+    cut: dict[str, Any] = {key: frozen(np.where(ok, values[point], np.nan)) for key, values in damped.items()}
+    x = sweep.axes[axis][point[list(sweep.axes).index(axis)]]
+    undamped, fixed = frozen(sweep.amplitude_undamped[point]), frozen(sweep.amplitude_fixed[point])
+    tops = peaks_of(sweep, point) if axis == FREQUENCY else {}
     return ForcedResponse(
         name=name,
         axis=axis,
         units=sweep.units()[axis],
-        x=sweep.axes[axis][point[list(sweep.axes).index(axis)]],
-        reference=reference_amplitude(sweep, point),
-        trouble=int(np.count_nonzero(sweep.status[point] != "ok")),
-        source="",
+        x=x,
+        reference=reference_of(undamped, tops),
+        undamped=undamped,
+        fixed=fixed,
+        energy_share=frozen(np.where(ok[:, None], sweep.energy_share[point], np.nan)),
+        headline=headline(
+            x, cut["damped_mean"], cut["damped_max"], cut["attached_mass_fraction"], undamped, fixed, tops,
+            axis == FREQUENCY,
+        ),
         **cut,
-    )
+    )  # fmt: skip
 
 
-def reference_amplitude(sweep: Sweep, point: tuple[Any, ...] = ()) -> float:
-    """The undamped maximum that amplitudes of a sweep or a part of it are related to, m; nan without excitation."""
-    resonance = sweep.scene.excitation.resonance_amplitude
-    if resonance is None or _LEVEL in sweep.axes:
-        resonance = float(np.nan_to_num(sweep.amplitude_undamped[point]).max())
-    return resonance or math.nan
-
-
-def shown(value: Any) -> str:
-    """A value of an axis in a few digits; text as it is."""
-    return str(value) if isinstance(value, str) else f"{value:.6g}"
+def peaks_of(sweep: Sweep, point: tuple[Any, ...]) -> dict[str, Any]:
+    """Tops of the linear curves of a part of a sweep, by the names of coupling.sweep.PEAKS."""
+    if not sweep.peaks:
+        return {}
+    along = list(sweep.axes).index(FREQUENCY)
+    return {name: values[point[:along] + point[along + 1 :]] for name, values in sweep.peaks.items()}
 
 
 def for_people(units: str) -> tuple[float, str]:

@@ -14,7 +14,9 @@ from modal.store import Variable, frozen, load, save
 from studies.optimise_study import Design
 
 _KIND = "optimisation"
-_PLAIN = ("mass", "amplitude", "scenes", "trouble", "wall_time_s", "sentence")
+_PLAIN = (
+    "mass", "amplitude", "reference", "resonance_frequency", "scenes", "trouble", "wall_time_s", "sentence",
+)  # fmt: skip
 _ARRAYS = {
     "map_mass_ratio": (("map_mass_ratio",), "1"), "map_gap_ratio": (("map_gap_ratio",), "1"),
     "map_amplitude": (("map_mass_ratio", "map_gap_ratio"), "1"),
@@ -27,7 +29,7 @@ _ARRAYS = {
 
 @dataclass(frozen=True)
 class Optimum:
-    """A design with its amplitude in the band over the undamped maximum X: as designed, and within the tolerances."""
+    """A design with its amplitude in the band over the undamped one there: as designed, and within the tolerances."""
 
     design: Design
     amplitude: float
@@ -35,7 +37,7 @@ class Optimum:
 
     @property
     def reduction(self) -> float:
-        """What is taken from the undamped maximum, as designed."""
+        """What is taken from the undamped amplitude, as designed."""
         return 1.0 - self.amplitude
 
     @property
@@ -59,15 +61,19 @@ class Optimum:
 
 @dataclass(frozen=True, eq=False)
 class Optimisation:
-    """What an optimisation found. Amplitudes are those in the band (worst or mean, as the study says) over X.
+    """What an optimisation found. Amplitudes are those in the band (worst or mean, as the study says) over `reference`.
 
     study              the [optimise] table and the scene, as plain data
     mass, amplitude    kg of the structure and m of X: what mass ratio and gap ratio refer to
+    reference          m, undamped amplitude in the band: its maximum, at the points or between them, or its mean
+    resonance_frequency  Hz of the resonance that X and mass are of
     nominal, robust    the best design as it is, and the best within the tolerances
     map_*              axes (a,), (b,) and amplitudes (a, b) of designs as they are, with the bodies of `nominal`
     history_*          designs (h, 3) in the order in which they were tried, their amplitudes (h,), and whether these
                        are amplitudes within the tolerances (1) or as designed (0)
-    frequency          (f,) Hz of the band; undamped, nominal_response, robust_response: (f,) amplitudes over X
+    frequency          (f,) Hz of the band; undamped, nominal_response, robust_response: (f,) amplitudes, nan
+                       where a run is not ok
+    headlines          of these responses (studies.headline.Headline), by "nominal" and "robust"
     scenes, trouble    how many runs it took, and how many of them have another status than ok
     wall_time_s        s
     sentence           the answer in words
@@ -76,6 +82,8 @@ class Optimisation:
     study: Mapping[str, Any]
     mass: float
     amplitude: float
+    reference: float
+    resonance_frequency: float
     nominal: Optimum
     robust: Optimum
     map_mass_ratio: np.ndarray
@@ -92,12 +100,13 @@ class Optimisation:
     trouble: int
     wall_time_s: float
     sentence: str
+    headlines: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, arrays as nested lists."""
         arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
-        return self._plain() | {"study": dict(self.study)} | arrays
+        return self._plain() | {"study": dict(self.study), "headlines": dict(self.headlines)} | arrays
 
     def _plain(self) -> dict[str, Any]:
         optima = {"nominal": self.nominal.to_json(), "robust": self.robust.to_json()}
@@ -107,7 +116,8 @@ class Optimisation:
         """Write HDF5 that xarray opens. Raises modal.store.StoreError."""
         variables = {name: Variable(getattr(self, name), dims, unit) for name, (dims, unit) in _ARRAYS.items()}
         variables["variable"] = Variable(np.array(Design._fields, object), ("variable",))
-        save(path, _KIND, variables, self._plain() | {"study": dict(self.study), "provenance": dict(self.provenance)})
+        tables = {name: dict(getattr(self, name)) for name in ("study", "headlines", "provenance")}
+        save(path, _KIND, variables, self._plain() | tables)
 
     @classmethod
     def load(cls, path: str | Path) -> Optimisation:
@@ -120,5 +130,6 @@ class Optimisation:
             nominal=Optimum.of(json.loads(attributes["nominal"])),
             robust=Optimum.of(json.loads(attributes["robust"])),
             study=json.loads(attributes["study"]),
+            headlines=json.loads(attributes["headlines"]),
             provenance=json.loads(attributes["provenance"]),
         )

@@ -19,8 +19,9 @@ from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
 from coupling.points import COLUMNS
-from coupling.sweep import run_list
-from modal.store import frozen
+from coupling.sweep import run_list, tops
+from modal.store import finite, frozen
+from studies.headline import Headline, headline
 from studies.optimisation import Optimisation, Optimum
 from studies.optimise_study import Design, Study
 
@@ -55,12 +56,18 @@ def optimise(
     )]  # fmt: skip
     designs = [Design(float(m), float(g), nominal.design.bodies) for m in axes[0] for g in axes[1]]
     amplitudes = trial.nominal(designs).reshape(len(axes[0]), len(axes[1]))
-    curves = [trial.response(optimum.design) for optimum in (nominal, robust)]
+    responses = {name: trial.response(item.design) for name, item in (("nominal", nominal), ("robust", robust))}
+    headlines = {
+        name: trial.headline(item.design, responses[name][0])
+        for name, item in (("nominal", nominal), ("robust", robust))
+    }
     took = time.perf_counter() - started
     return Optimisation(
         study={"optimise": _plain(asdict(table)), "scene": study.scene.to_dict()},
         mass=study.mass,
         amplitude=study.amplitude,
+        reference=study.reference,
+        resonance_frequency=study.resonance.frequency,
         nominal=nominal,
         robust=robust,
         map_mass_ratio=frozen(axes[0]),
@@ -70,13 +77,14 @@ def optimise(
         history_amplitude=frozen([amplitude for _, amplitude, _ in trial.history]),
         history_robust=frozen([robust for _, _, robust in trial.history]),
         frequency=frozen(table.frequencies),
-        undamped=frozen(curves[0][1]),
-        nominal_response=frozen(curves[0][0]),
-        robust_response=frozen(curves[1][0]),
+        undamped=frozen(responses["nominal"][1]),
+        nominal_response=frozen(responses["nominal"][0]),
+        robust_response=frozen(responses["robust"][0]),
+        headlines={name: _of_band(found) for name, found in headlines.items()},
         scenes=trial.scenes,
         trouble=trial.trouble,
         wall_time_s=took,
-        sentence=_sentence(study, nominal, robust, trial.scenes, took),
+        sentence=_sentence(study, nominal, robust, headlines, trial.scenes, took),
         provenance=dict(provenance or {}),
     )
 
@@ -126,9 +134,19 @@ class _Trial:
         return Optimum(design, float(found[0][0]), float(found[1][0]))
 
     def response(self, design: Design) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes (f,) over X of a design and without bodies."""
+        """Amplitudes (f,) over the reference of a design, nan where its run is not ok, and without bodies."""
         damped, undamped = self._run([design], self.sample[:1])
         return damped[0, 0], undamped[0, 0]
+
+    def headline(self, design: Design, damped: np.ndarray) -> Headline:
+        """The headline of a design's amplitudes (f,) over the reference."""
+        frequencies, known = self.study.table.frequencies, self.study.reference * damped
+        undamped, fixed = self.study.linear(design, self.sample[0])
+        band = float(frequencies[0]), float(frequencies[-1])
+        return headline(
+            frequencies, known, known, np.full(len(known), np.nan), undamped.amplitude(frequencies),
+            fixed.amplitude(frequencies), tops(undamped.peak(*band), fixed.peak(*band)), along_frequency=True,
+        )  # fmt: skip
 
     def search(self, judge: Callable[[Sequence[Design]], np.ndarray], first: np.ndarray | None) -> Design:
         """The best design by differential evolution, from a first generation or from a Latin hypercube."""
@@ -168,16 +186,21 @@ class _Trial:
         return Design(chosen["mass_ratio"], chosen["gap_ratio"], round(chosen["bodies"]))
 
     def _judge(self, designs: Sequence[Design], sample: Sequence[_Deviation]) -> np.ndarray:
-        table, (damped, _) = self.study.table, self._run(designs, sample)
+        table, (damped, undamped) = self.study.table, self._run(designs, sample)
+        # a run that is not ok has damped nothing
+        damped = np.where(np.isnan(damped), np.fmax(undamped, 1.0), damped)
         band = damped.max(axis=2) if table.over_band == "worst" else damped.mean(axis=2)
         return np.asarray(band.max(axis=1) if table.over_tolerances == "worst" else band.mean(axis=1))
 
     def _run(self, designs: Sequence[Design], sample: Sequence[_Deviation]) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes (d, s, f) over the undamped maximum at the same level, with the bodies and without."""
+        """Amplitudes (d, s, f) over the reference at the same level, with the bodies and without.
+
+        nan with the bodies where a run is not ok, and without them where it is no scene.
+        """
         table = self.study.table
         shape = (len(designs), len(sample), len(table.frequencies))
         damped, undamped = np.zeros(shape), np.zeros(shape)
-        levels = self.study.amplitude * np.array([1 + deviation["excitation"] for deviation in sample])[:, None]
+        levels = self.study.reference * np.array([1 + deviation["excitation"] for deviation in sample])[:, None]
         for count in sorted({design.bodies for design in designs}):
             places = [place for place, design in enumerate(designs) if design.bodies == count]
             points = [
@@ -185,15 +208,17 @@ class _Trial:
                 for place in places for deviation in sample for frequency in table.frequencies
             ]  # fmt: skip
             finished = run_list(self.study.with_bodies(count), points, self._executor)
-            self.trouble += int((finished.text("status") != "ok").sum())
+            ok = finished.text("status") == "ok"
+            self.trouble += int(np.count_nonzero(~ok))
             for name, amplitudes in ((table.measure, damped), ("amplitude_undamped", undamped)):
-                values = finished.values[:, COLUMNS.index(name)].reshape(len(places), *shape[1:])
-                amplitudes[places] = values / levels
+                values = finished.values[:, COLUMNS.index(name)]
+                if amplitudes is damped:
+                    values = np.where(ok, values, np.nan)
+                amplitudes[places] = values.reshape(len(places), *shape[1:]) / levels
         self.scenes += math.prod(shape)
         if self._progress is not None:
             self._progress(self.scenes, max(self._expected, self.scenes))
-        # a run that broke has damped nothing
-        return np.where(np.isnan(damped), np.maximum(undamped, 1.0), damped), undamped
+        return damped, undamped
 
 
 def _plain(data: Any) -> Any:
@@ -203,17 +228,38 @@ def _plain(data: Any) -> Any:
     return [_plain(value) for value in data] if isinstance(data, list | tuple) else data
 
 
-def _sentence(study: Study, nominal: Optimum, robust: Optimum, scenes: int, took: float) -> str:
+_KEYS = (
+    "damped_peak", "damped_peak_at", "peak_ratio", "undamped_peak", "undamped_peak_at", "fixed_peak", "fixed_peak_at",
+    "peak_at_edge", "undamped_at_edge", "fixed_at_edge", "spacing", "half_power_width", "too_coarse", "points",
+    "points_left_out",
+)  # fmt: skip
+
+
+def _of_band(found: Headline) -> dict[str, Any]:
+    """What a headline says of the measure in the band."""
+    data: dict[str, Any] = finite(found.to_json())
+    return {key: data[key] for key in _KEYS}
+
+
+def _sentence(
+    study: Study, nominal: Optimum, robust: Optimum, headlines: Mapping[str, Headline], scenes: int, took: float
+) -> str:
     table = study.table
-    of = "worst" if table.over_band == "worst" else "mean"
-    text = f"{_told(nominal.design, study)} takes {nominal.reduction:.0%} of the undamped maximum ({of} in the band)"
+    if table.over_band == "mean":
+        of = "the undamped mean in the band"
+    elif headlines["nominal"].undamped_at_edge:
+        of = f"the highest undamped amplitude in the band, {study.reference:.3g} m"
+    else:
+        of = "the undamped maximum (worst in the band)"
+    text = f"{_told(nominal.design, study)} takes {nominal.reduction:.0%} of {of}"
     if asdict(table.tolerances) != _NONE:
         kind = "at worst" if table.over_tolerances == "worst" else "in the mean"
         text += (
             f", {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: {_told(robust.design, study)} "
             f"takes {robust.reduction:.0%}, {robust.reduction_tolerances:.0%} {kind}"
         )
-    return f"{text}. {scenes} scenes in {took:.0f} s."
+    remarks = dict.fromkeys(remark for found in headlines.values() for remark in found.remarks)
+    return f"{'; '.join([text, *remarks])}. {scenes} scenes in {took:.0f} s."
 
 
 def _told(design: Design, study: Study) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import asdict, field, fields, replace
 from pathlib import Path
@@ -13,8 +14,9 @@ from pydantic.dataclasses import dataclass
 
 from coupling.grid import Points
 from coupling.inputs import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml, validate
+from coupling.linear import LinearResponse, linear_responses
 from coupling.scene import Damper, Prescribed, Range, Rom, Scene, axis_values
-from coupling.structure import excitation_force, largest_resonance, linear_structure
+from coupling.structure import Resonance, chosen_resonance, excitation_force, linear_structure
 
 
 def _bounds(value: Any) -> Any:
@@ -85,6 +87,11 @@ class Optimise:
     evaluations: Annotated[Whole, Field(ge=5)] = 150
     seed: Annotated[Whole, Field(ge=0)] = 1
 
+    def __post_init__(self) -> None:
+        for before, after in itertools.pairwise(self.frequencies.tolist()):
+            if after <= before:
+                raise ValueError(f"band: expected frequencies that rise, not {after:g} Hz after {before:g} Hz")
+
     @property
     def frequencies(self) -> np.ndarray:
         """Excitation frequencies, Hz."""
@@ -105,12 +112,23 @@ class _File:
 
 
 class Study(NamedTuple):
-    """A scene, its [optimise] table, and what designs are measured in: the structure's mass (kg) and X (m)."""
+    """A scene, its [optimise] table, and what designs are measured in.
+
+    resonance: whose modal mass (kg) mass ratios refer to; amplitude: its undamped amplitude X (m), to which gap ratios
+    refer; reference: the undamped amplitude in the band (m), its maximum or its mean as `over_band` says, to which
+    damped amplitudes refer.
+    """
 
     scene: Scene
     table: Optimise
-    mass: float
+    resonance: Resonance
     amplitude: float
+    reference: float
+
+    @property
+    def mass(self) -> float:
+        """Modal mass of the structure, kg."""
+        return self.resonance.mass
 
     @classmethod
     def load(cls, path: str | Path) -> Study:
@@ -119,15 +137,21 @@ class Study(NamedTuple):
         if "optimise" not in data:
             raise InputError(f"{path}: optimise: missing; say what is best in an [optimise] table (docs/sweeps.md)")
         table = validate(_File, {"optimise": data.pop("optimise")}, str(path)).optimise
+        band = table.frequencies.tolist()
         scene = Scene.of(data, path)
+        if scene.excitation.resonance_near is None:
+            scene = replace(scene, excitation=replace(scene.excitation, resonance_near=(band[0], band[-1])))
         try:
             _check(scene)
-            force, (flexibility, mass) = excitation_force(scene), largest_resonance(scene)
+            force, resonance = excitation_force(scene), chosen_resonance(scene)
+            undamped = linear_responses(scene)[0]
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         if force == 0.0:
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
-        study = cls(replace(scene, sweep={}), table, mass, force * flexibility)
+        worst = table.over_band == "worst"
+        reference = undamped.peak(band[0], band[-1]).amplitude if worst else undamped.amplitude(band).mean()
+        study = cls(replace(scene, sweep={}), table, resonance, force * resonance.flexibility, float(reference))
         try:
             study._check_corners()
         except InputError as error:
@@ -154,6 +178,11 @@ class Study(NamedTuple):
             for place in cavities
         )
         return replace(self.scene, damper=bodies)
+
+    def linear(self, design: Design, deviation: Mapping[str, float]) -> tuple[LinearResponse, LinearResponse]:
+        """Without bodies, and with those of a design glued to their floors."""
+        point = self.point(design, deviation, float(self.table.frequencies[0]))
+        return linear_responses(Points(self.with_bodies(design.bodies), {}).scene(point))
 
     def point(self, design: Design, deviation: Mapping[str, float], frequency: float) -> dict[str, Any]:
         """What a design, off by a deviation of the tolerances, changes in the scene with its number of bodies."""

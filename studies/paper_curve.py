@@ -8,7 +8,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from coupling.sweep import Sweep
-from studies.forced_response import UNTOUCHED, ForcedResponse, forced_responses
+from studies.forced_response import ForcedResponse, forced_responses
+from studies.headline import UNTOUCHED
 
 #: standard deviation of the smoothing, in points: frequencies are denser where the curves are steeper
 _SMOOTHING = 1.5
@@ -29,7 +30,10 @@ class Peak:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Arrays (n,) over ascending frequencies (Hz); amplitudes relative to the undamped maximum.
+    """Arrays (n,) over ascending frequencies (Hz); amplitudes relative to the undamped maximum X.
+
+    X (m, `reference`) is the resonance's, as the paper has it, whether or not the frequencies reach it; where the scene
+    names no level of a resonance, the undamped maximum over the frequencies.
 
     largest, mean, confidence  absolute maxima, means of the periods' peaks, half widths of their 95 % confidence
                                intervals (0 where there are too few periods)
@@ -88,20 +92,23 @@ class Curve:
 
 
 def curves(sweep: Sweep, name: str) -> list[Curve]:
-    """A curve for every combination of the axes before the last, which is the frequency; without points that failed."""
+    """A curve for every combination of the axes before the last, which is the frequency; without points not ok."""
     responses = forced_responses(sweep, name)
     count = len(responses[0].x)
     confidence, classification = (
         values.reshape(-1, count) for values in (sweep.amplitude_mean_confidence, sweep.classification)
     )
-    return [_curve(*parts) for parts in zip(responses, confidence, classification, strict=True)]
+    unit = sweep.scene.excitation.resonance_amplitude
+    return [
+        _curve(*parts, unit or parts[0].reference) for parts in zip(responses, confidence, classification, strict=True)
+    ]
 
 
-def _curve(response: ForcedResponse, confidence: np.ndarray, classification: np.ndarray) -> Curve:
+def _curve(response: ForcedResponse, confidence: np.ndarray, classification: np.ndarray, unit: float) -> Curve:
     done = np.isfinite(response.damped_mean)
 
     def relative(values: np.ndarray) -> np.ndarray:
-        return np.nan_to_num(values[done] / response.reference)
+        return np.nan_to_num(values[done] / unit)
 
     return Curve(
         name=response.name,
@@ -114,5 +121,5 @@ def _curve(response: ForcedResponse, confidence: np.ndarray, classification: np.
         attached=response.attached_mass_fraction[done],
         impacts=response.impacts_per_period[done],
         periodic=classification[done] != "non-periodic",
-        reference=response.reference,
+        reference=unit,
     )

@@ -25,12 +25,13 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
 from scipy.linalg import eigh
 
+from coupling.grid import FREQUENCY
 from coupling.inputs import STRICT, InputError, Positive, Whole, read_toml, validate
 from coupling.model_file import reduced_model
 from coupling.scene import Rom, Scene
 from modal.store import load, replacing
 from rom.reduced import ReducedModel
-from studies.forced_response import FREQUENCY, resonance_grid
+from studies.forced_response import resonance_grid
 
 FOLDER = Path(__file__).with_name("paper_scenes")
 _QUANTITY = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?) ([a-z_]+)")

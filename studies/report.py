@@ -20,7 +20,8 @@ from modal.store import digest, replacing
 from rom.reduced import ReducedModel
 from studies import figures
 from studies.charts import Chart, chart, dressed
-from studies.forced_response import ForcedResponse, forced_responses, model_name, shown
+from studies.forced_response import ForcedResponse, forced_responses, model_name
+from studies.headline import shown
 from studies.history import History, history_figure
 from studies.mode_figure import mode_figure, mode_rows, small_surface
 from studies.optimisation import Optimisation
@@ -199,15 +200,10 @@ def _optimisation(number: int, file: str, found: Optimisation) -> dict[str, Any]
 
 
 def _key_figures(response: ForcedResponse) -> dict[str, Any]:
-    curves = ("undamped", "fixed", "damped_max", "damped_mean")
-    peaks = {curve: response.peak(curve) for curve in curves}
-    return peaks | {
+    return {
         "name": response.name,
-        "reference": response.reference,
-        "onset": response.onset,
+        "headline": response.headline,
         "impacts": float(np.nan_to_num(response.impacts_per_period).max()),
-        "points": len(response.x),
-        "trouble": response.trouble,
     }
 
 

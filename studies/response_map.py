@@ -9,9 +9,11 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from coupling.grid import FREQUENCY
 from coupling.sweep import Sweep
 from studies.charts import axis_title, dressed
-from studies.forced_response import FREQUENCY, for_people, quantity, reference_amplitude
+from studies.forced_response import for_people, quantity
+from studies.headline import reference_of
 
 _FEWEST = 4  # values of the second axis that make a map
 _MOST_PANELS = 6
@@ -25,7 +27,8 @@ def map_axes(sweep: Sweep) -> tuple[str, str] | None:
 
 
 def map_figure(sweep: Sweep) -> go.Figure:
-    """Mean amplitude relative to the undamped maximum over two axes; a panel for every value of the others."""
+    """Mean amplitude relative to the undamped maximum, without points that are not ok; a panel for every combination of
+    the other axes."""
     panels = list(_panels(sweep))[:_MOST_PANELS]
     columns = min(len(panels), 2)
     figure = make_subplots(
@@ -59,7 +62,10 @@ def _panels(sweep: Sweep) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndar
     """Name, values of the two axes and relative amplitudes (up, across), for every combination of the others."""
     axes = map_axes(sweep)
     assert axes is not None
-    paths, units, reference = list(sweep.axes), sweep.units(), reference_amplitude(sweep)
+    paths, units = list(sweep.axes), sweep.units()
+    tops = {name: np.nanmax(values, initial=0.0) for name, values in sweep.peaks.items()}
+    relative = np.where(sweep.status == "ok", sweep.amplitude_mean, np.nan)
+    relative = relative / reference_of(sweep.amplitude_undamped, tops)
     across, up = (paths.index(path) for path in axes)
     order = [np.argsort(sweep.axes[path], kind="stable") for path in axes]
     others = [index for index in range(len(paths)) if index not in (across, up)]
@@ -67,7 +73,7 @@ def _panels(sweep: Sweep) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndar
         point: list[int | slice] = [slice(None)] * len(paths)
         for index, value in zip(others, combination, strict=True):
             point[index] = value
-        values = sweep.amplitude_mean[tuple(point)] / reference
+        values = relative[tuple(point)]
         values = (values if up < across else values.T)[np.ix_(order[1], order[0])]
         name = ", ".join(
             f"{paths[i].split('.', 1)[-1]} = {quantity(sweep.axes[paths[i]][j], units[paths[i]])}"

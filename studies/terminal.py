@@ -25,14 +25,10 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
 def tell_sweep(result: Any) -> None:
     """Print what a sweep found."""
-    from studies.forced_response import forced_responses, shown
+    from studies.forced_response import forced_responses
 
     for response in forced_responses(result):
-        place, height = response.peak("damped_mean")
-        print(
-            f"{response.name}: damped peak (mean) {height:.3f} of the undamped maximum {response.reference:.4g} m, "
-            f"at {response.axis} = {shown(place)} {response.units}".removesuffix(" 1")
-        )
+        print(response.sentence)
     bad = [status for status in result.status.ravel() if status != "ok"]
     if bad:
         print(f"{len(bad)} of {result.status.size} points are not ok, such as: {bad[0]}")

@@ -160,7 +160,7 @@ class Stepper:
         if change is not None:
             change(self.run)
         self.budget = scene.solver.max_events
-        self.periods = scene.time.periods
+        self.periods = scene.time.simulated
         self.code = self.run.begin(self.budget)
 
     def steps(self) -> Iterator[Step]:

@@ -19,7 +19,7 @@ DATA = {
     "excitation": {"frequency": RESONANCE, "resonance_amplitude": 1e-3},
     "cavity": [{"name": "c1", "gap": 5e-4}],
     "damper": [{"cavity": "c1", "mass": 0.05, "friction": 0.3, "restitution": 0.6}],
-    "time": {"periods": 30, "transient": 10},
+    "time": {"periods": 90, "transient": 80},
     "sweep": {
         "cavity.c1.gap": [5e-4, 2e-4],
         "excitation.frequency": {"start": 0.97 * RESONANCE, "stop": 1.02 * RESONANCE, "num": 6},

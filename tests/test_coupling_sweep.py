@@ -116,7 +116,7 @@ def test_any_key_is_an_axis(tmp_path):
     """Words, whole numbers, tables of lists by name and by index."""
     cavities = [{"name": "c1", "gap": 5e-4}, {"name": "c2", "gap": 1e-4}]
     axes = {
-        "damper.cavity": ["c1", "c2"], "time.periods": [30, 40], "cavity.c2.gap": [1e-4, 2e-4], "cavity.0.gap": [5e-4]
+        "damper.cavity": ["c1", "c2"], "time.periods": [90, 100], "cavity.c2.gap": [1e-4, 2e-4], "cavity.0.gap": [5e-4]
     }  # fmt: skip
     found = sweep(scene(cavity=cavities, sweep=axes))
     for place in np.ndindex(found.shape):

@@ -7,7 +7,6 @@ adds what the models cost.
 import numpy as np
 import pytest
 
-from coupling.choice import settle_all
 from studies import auto_choice
 from studies.auto_scenes import SEED, beam_model, rod_model, trials
 
@@ -22,11 +21,8 @@ def test_models_of_rod_and_beam():
 
 def kept(trial, tolerance, periods):
     """(estimated, true error, its confidence, coordinates) of the choice for a tolerance."""
-    scenes = [
-        trial.scene.replace({"excitation.frequency": frequency, "structure.tolerance": tolerance})
-        for frequency in trial.frequencies
-    ]
-    estimate = settle_all(scenes)[0].estimate
+    scenes = [trial.scene.replace({"excitation.frequency": frequency}) for frequency in trial.frequencies]
+    estimate = auto_choice.chosen_for(trial, tolerance)
     kinds = [(estimate["modes"], estimate["attached"]), (estimate["ladder"][-1]["modes"], False)]
     deviations, confidences = auto_choice.errors(scenes, kinds, trial.undamped, periods)
     return estimate["error"], deviations[0], confidences[0], estimate["size"]

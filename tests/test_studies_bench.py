@@ -101,7 +101,7 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     assert max(one["error"][name] for name in ("engine", "plain loop", "lean loop", "complete loop")) < 1e-11
     assert one["error"]["engine"] < one["error"]["solve_ivp 1e-11"] < one["error"]["solve_ivp 1e-05"]
     for entry in result["modes"]["uses"].values():
-        assert entry["status"] == ["ok", "ok"]
+        assert set(entry["status"]) <= {"ok", "not_steady"}  # windows of 40 periods
         assert all(0 <= awake <= count for awake, count in zip(entry["awake"], (1, 6), strict=True))
     assert result["bodies"]["counts"] == [1, 2, 4, 8]
     assert set(result["costs"]["timed"]) == {"search", "account", "rest"}

@@ -18,19 +18,21 @@ STRUCTURE = Structure(MASS, MASS * (2 * math.pi * FREQUENCY) ** 2, RATIO, FREQUE
 def shows_impact_mistuning(response, first, fixed, peak):
     """The claims on a damped curve: onset, height of the peak, and the fall towards the fixed curve above it."""
     lowest, highest = peak
-    assert lowest < response.peak("damped_mean")[1] < highest
-    assert response.peak("undamped")[0] == pytest.approx(first, rel=1e-9)
-    assert response.peak("fixed")[0] == pytest.approx(fixed, rel=1e-9)
-    assert response.peak("undamped")[1] == pytest.approx(1.0, rel=1e-3)
-    assert response.onset / first == pytest.approx(0.977, abs=0.003)
-    below = response.x < response.onset
+    found = response.headline
+    assert lowest < found.peak_ratio < highest
+    # tops lie zeta^2 below the natural frequencies
+    assert found.undamped_peak_at == pytest.approx(first, rel=1e-5)
+    assert found.fixed_peak_at == pytest.approx(fixed, rel=1e-5)
+    assert found.remarks == []
+    assert found.onset / first == pytest.approx(0.977, abs=0.003)
+    below = response.x < found.onset
     assert below.sum() > 5
     np.testing.assert_allclose(response.damped_mean[below], response.undamped[below], rtol=0.01)
     np.testing.assert_allclose(response.damped_max[below], response.undamped[below], rtol=0.01)
     between = (response.x >= fixed) & (response.x <= first)
     assert np.all(response.damped_mean[between] < 1.02 * response.fixed[between])
     # at the old resonance a tenth is left
-    assert response.damped_mean[response.x == response.peak("undamped")[0]][0] < 0.12 * response.reference
+    assert response.damped_mean[np.argmax(response.undamped)] < 0.12 * response.reference
 
 
 def test_rigid_model_shows_impact_mistuning():
@@ -38,7 +40,6 @@ def test_rigid_model_shows_impact_mistuning():
     frequencies = scene.to_dict()["sweep"]["excitation.frequency"]
     half = scene.replace({"cavity.c1.gap": AMPLITUDE / 2, "sweep": {"excitation.frequency": frequencies}})
     (response,) = forced_responses(sweep(half))
-    assert response.trouble == 0
     shows_impact_mistuning(response, FREQUENCY, FREQUENCY / math.sqrt(1.02), peak=(0.35, 0.6))
 
 
@@ -58,7 +59,7 @@ def test_demo_leaves_every_file_of_the_pipeline(tmp_path, capfd):
         assert set(result.status.ravel()) == {"ok"}
         assert result.energy_residual.max() < 1e-8
         response = forced_responses(result)[index]
-        first = response.peak("undamped")[0]
+        first = response.headline.undamped_peak_at
         assert first == pytest.approx(2412.0, rel=1e-3)
-        shows_impact_mistuning(response, first, response.peak("fixed")[0], (0.35, 0.6))
-        assert response.peak("fixed")[0] / first == pytest.approx(1 / math.sqrt(1.02), rel=1e-3)
+        shows_impact_mistuning(response, first, response.headline.fixed_peak_at, (0.35, 0.6))
+        assert response.headline.fixed_peak_at / first == pytest.approx(1 / math.sqrt(1.02), rel=1e-3)

@@ -1,14 +1,22 @@
 """Forced responses read from sweeps, and grids that see narrow peaks."""
 
 import dataclasses
+import json
+import math
 
 import numpy as np
 import pytest
+import tomli_w
+import xarray
 
 from coupling.inputs import validate
 from coupling.scene import Scene
 from coupling.sweep import LOSSES, MEASURES, Sweep
-from studies.forced_response import forced_responses, model_name, resonance_grid, shown
+from coupling.sweep import sweep as run_sweep
+from modal.store import finite
+from studies.cli import main
+from studies.forced_response import forced_responses, model_name, resonance_grid
+from studies.headline import shown
 
 DATA = {
     "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
@@ -35,16 +43,17 @@ def test_curve_along_the_frequency():
     assert response.name == "rigid model"
     assert response.units == "Hz"
     assert response.reference == 2.0
-    assert response.peak("undamped") == (3.0, 1.0)
-    assert response.peak("damped_mean") == (3.0, 0.5)
-    assert response.onset == 3.0
-    assert response.trouble == 0
+    found = response.headline
+    assert (found.undamped_peak_at, found.undamped_peak) == (3.0, 2.0)
+    assert (found.damped_peak_at, found.peak_ratio) == (3.0, 0.5)
+    assert found.onset == 3.0
+    assert found.points_left_out == 0
 
 
 def test_onset_is_none_when_the_bodies_do_nothing():
     curve = np.array([1.0, 2.0])
     sweep = made({"excitation.frequency": [1.0, 2.0]}, amplitude_undamped=curve, amplitude_mean=1.005 * curve)
-    assert forced_responses(sweep)[0].onset is None
+    assert forced_responses(sweep)[0].headline.onset is None
 
 
 def test_points_are_put_in_order():
@@ -75,13 +84,18 @@ def test_longest_axis_of_numbers_without_a_frequency():
     assert [(response.axis, len(response.x)) for response in responses] == [("gravity.orientation_deg", 2)] * 3
 
 
-def test_failed_points_are_counted_and_passed_over():
-    status = np.array(["ok", "error: x", "event_budget"], object)
-    curve = np.array([1.0, np.nan, 0.5])
-    sweep = made({"excitation.frequency": [1.0, 2.0, 3.0]}, status=status, amplitude_mean=curve)
-    (response,) = forced_responses(sweep)
-    assert response.trouble == 2
-    assert response.peak("damped_mean") == (1.0, 0.5)
+def test_points_that_are_not_ok_are_counted_and_left_out():
+    status = np.array(["ok", "error: x", "event_budget", "ok"], object)
+    undamped, curve = np.array([1.0, 2.0, 1.5, 0.5]), np.array([0.8, np.nan, 1.4, 0.6])
+    axes = {"excitation.frequency": [1.0, 2.0, 3.0, 4.0]}
+    (response,) = forced_responses(made(axes, status=status, amplitude_mean=curve, amplitude_undamped=undamped))
+    assert response.headline.points_left_out == 2
+    assert (response.headline.damped_peak_at, response.headline.peak_ratio) == (1.0, 0.4)
+    assert "2 of 4 points are left out" in response.sentence
+    status[:] = "event_budget"
+    (response,) = forced_responses(made(axes, status=status, amplitude_mean=curve, amplitude_undamped=undamped))
+    assert math.isnan(response.headline.peak_ratio)
+    assert response.sentence == "rigid model: no damped peak: 4 of 4 points are not ok"
 
 
 def test_names_of_the_models():
@@ -99,6 +113,109 @@ def test_names_of_the_models():
         model_name(validate(Scene, DATA | {"structure": table, "excitation": excitation}, "x")) == "prescribed motion"
     )
     assert model_name(dataclasses.replace(base, sweep={})) == "rigid model"
+
+
+FIRST, ZETA, MASS, ADDED, TOP = 1919.0, 0.002, 0.148, 0.003, 3e-5
+
+
+def scene(start, stop, num, **changes):
+    """A body near the structure's resonance at 1919 Hz, swept over frequencies."""
+    stiffness = MASS * (2 * math.pi * FIRST) ** 2
+    data = {
+        "structure": {"model": "rigid", "mass": MASS, "stiffness": stiffness, "damping_ratio": ZETA},
+        "excitation": {"frequency": FIRST, "resonance_amplitude": TOP},
+        "cavity": [{"name": "c1", "gap": 1.5e-5}],
+        "damper": [{"cavity": "c1", "mass": ADDED, "friction": 0.4, "restitution": 0.7}],
+        "time": {"periods": 700, "transient": 500},
+        "sweep": {"excitation.frequency": {"start": start, "stop": stop, "num": num}},
+    }
+    return validate(Scene, data | changes, "scene")
+
+
+def magnification(frequency, damping=ZETA):
+    """Amplitude of a mode over its static one."""
+    ratio = frequency / FIRST
+    return 1 / math.hypot(1 - ratio**2, 2 * damping * ratio)
+
+
+def test_range_beside_the_resonance():
+    """The undamped amplitude at the edge of the range is what a response of the range is compared with."""
+    result = run_sweep(scene(1700.0, 1850.0, 4))
+    (response,) = forced_responses(result)
+    found = response.headline
+    largest = 1 / (2 * ZETA * math.sqrt(1 - ZETA**2))
+    assert found.undamped_peak == pytest.approx(TOP * magnification(1850.0) / largest, rel=1e-9)
+    assert found.undamped_at_edge and found.peak_at_edge and not found.too_coarse
+    assert found.peak_ratio == pytest.approx(1.0, abs=0.02)  # the walls are out of reach
+    assert "of the undamped maximum" not in response.sentence
+    assert "highest undamped amplitude 1.697e-06 m from 1700 to 1850 Hz" in response.sentence
+    assert "no undamped resonance lies within the range" in response.sentence
+
+
+def test_tops_between_the_points():
+    """Few points: the linear tops are those of the closed forms all the same, and the headline says too coarse."""
+    result = run_sweep(scene(1800.0, 2000.0, 5))
+    (response,) = forced_responses(result)
+    found, glued = response.headline, MASS + ADDED
+    assert found.undamped_peak == pytest.approx(TOP, rel=1e-9)
+    assert found.undamped_peak_at == pytest.approx(FIRST * math.sqrt(1 - 2 * ZETA**2), rel=1e-8)
+    zeta = ZETA * math.sqrt(MASS / glued)
+    height = 2 * ZETA * math.sqrt(1 - ZETA**2) * TOP / (2 * zeta * math.sqrt(1 - zeta**2))
+    assert found.fixed_peak == pytest.approx(height, rel=1e-9)
+    assert found.fixed_peak_at == pytest.approx(FIRST * math.sqrt(MASS / glued * (1 - 2 * zeta**2)), rel=1e-8)
+    assert found.half_power_width == pytest.approx(2 * ZETA * FIRST, rel=1e-9)
+    assert found.spacing == pytest.approx(50.0) and found.too_coarse
+    assert "points 50 Hz apart are too coarse for a resonance 7.68 Hz wide" in response.sentence
+
+
+def test_fine_range_over_the_resonance_has_no_remark():
+    (response,) = forced_responses(run_sweep(scene(1850.0, 1950.0, 21)))
+    assert response.headline.remarks == []
+    assert "of the undamped maximum 3e-05 m, at excitation.frequency" in response.sentence
+
+
+def test_no_bound_without_damping():
+    structure = {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.0}
+    data = scene(15.0, 17.0, 3, structure=structure, excitation={"frequency": 15.0, "force": 1e-3})
+    (response,) = forced_responses(run_sweep(data.replace({"time": {"periods": 4, "transient": 0}})))
+    assert response.headline.undamped_peak == math.inf
+    assert math.isnan(response.headline.peak_ratio)
+    assert response.sentence.startswith("rigid model: damped peak (mean) ")
+    assert "the undamped one has no bound" in response.sentence
+    assert math.isfinite(response.reference)
+
+
+def test_other_axes_have_tops_of_their_own():
+    """Over masses of the structure and levels; an axis without frequencies is compared at its points."""
+    data = scene(1800.0, 2000.0, 3)
+    axes = {"structure.mass": [MASS, 1.1 * MASS], **data.to_dict()["sweep"]}
+    result = run_sweep(data.replace({"sweep": axes, "time": {"periods": 4, "transient": 0}}))
+    found = [response.headline for response in forced_responses(result)]
+    assert found[1].undamped_peak_at == pytest.approx(found[0].undamped_peak_at / math.sqrt(1.1), rel=1e-6)
+    gaps = data.replace({"sweep": {"cavity.c1.gap": [1e-5, 2e-5, 3e-5]}, "time": {"periods": 4, "transient": 0}})
+    result = run_sweep(gaps)
+    (response,) = forced_responses(result)
+    assert result.peaks == {}
+    assert response.headline.undamped_peak == result.amplitude_undamped.max()
+    assert not response.headline.peak_at_edge and math.isnan(response.headline.spacing)
+    assert "from 1e-05 to 3e-05 m, at cavity.c1.gap" in response.sentence
+
+
+def test_command_writes_the_headline(tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps(scene(1700.0, 1850.0, 4).to_dict()))
+    files = ["-o", str(tmp_path / "s.h5"), "--json", str(tmp_path / "s.json"), "--workers", "1"]
+    assert main(["sweep", str(path), *files]) == 0
+    data = json.loads((tmp_path / "s.json").read_text())
+    (told,) = data["headlines"]
+    assert told["peak_at_edge"] is True and told["undamped_at_edge"] is True
+    assert told["points_left_out"] == 0 and told["range"] == [1700.0, 1850.0]
+    assert told["sentence"] in capsys.readouterr().out
+    with xarray.open_dataset(tmp_path / "s.h5", engine="h5netcdf") as file:
+        assert float(file.undamped_peak) == told["undamped_peak"] == data["undamped_peak"]
+        assert file.undamped_peak_frequency.attrs["units"] == "Hz"
+    (again,) = forced_responses(Sweep.load(tmp_path / "s.h5"))
+    assert finite(again.to_json()) == told
 
 
 def test_shown():

@@ -26,7 +26,7 @@ def study(folder, change=lambda data: None, quick=True):
     """The example, with a tiny budget."""
     data = tomllib.loads(EXAMPLE.read_text())
     if quick:
-        data["time"] = {"periods": 60, "transient": 40}
+        data["time"] = {"periods": 60, "transient": 0}
         data["optimise"] |= {"evaluations": 10, "samples": 3, "map": {"mass_ratio": 3, "gap_ratio": 2}}
         data["optimise"]["band"] = {"start": 2380.0, "stop": 2430.0, "num": 3}
     change(data)
@@ -147,6 +147,63 @@ def test_one_value_is_held(tmp_path):
     assert record.robust == record.nominal
 
 
+def undamped_at(frequency):
+    """Closed form of the example's undamped amplitude, m."""
+    ratio = frequency / (np.sqrt(3.4e7 / 0.148) / (2 * np.pi))
+    return 3e-5 * 2 * 0.002 * np.sqrt(1 - 0.002**2) / abs(1 - ratio**2 + 2j * 0.002 * ratio)
+
+
+def alone(data):
+    data["optimise"]["variables"] = {"mass_ratio": 0.02, "gap_ratio": 0.5, "bodies": 1}
+    data["optimise"]["map"] = {"mass_ratio": 2, "gap_ratio": 2}
+    data["optimise"].pop("tolerances")
+
+
+def test_a_band_far_from_the_resonance_gains_nothing(tmp_path):
+    """Damped and undamped amplitudes of the same band: the walls are out of reach, so nothing is taken."""
+
+    def far(data):
+        alone(data)
+        data["optimise"]["band"] = {"start": 1700.0, "stop": 1850.0, "num": 3}
+        data["time"] = {"periods": 450, "transient": 400}
+
+    record = optimise(Study.load(study(tmp_path, far)))
+    assert record.reference == pytest.approx(undamped_at(1850.0), rel=1e-9)
+    assert record.amplitude == pytest.approx(3e-5)  # the gap's unit is the resonance's amplitude all the same
+    assert abs(record.nominal.reduction) < 0.02
+    assert record.headlines["nominal"]["undamped_at_edge"] and record.headlines["nominal"]["peak_at_edge"]
+    assert "of the highest undamped amplitude in the band" in record.sentence
+    assert "no undamped resonance lies within the range" in record.sentence
+
+
+def test_mean_over_mean(tmp_path):
+    def mean(data):
+        alone(data)
+        data["optimise"]["over_band"] = "mean"
+
+    record = optimise(Study.load(study(tmp_path, mean)))
+    band = [2380.0, 2405.0, 2430.0]
+    assert record.reference == pytest.approx(np.mean([undamped_at(frequency) for frequency in band]), rel=1e-9)
+    assert record.nominal.amplitude == pytest.approx(record.nominal_response.mean(), rel=1e-9)
+    assert "of the undamped mean in the band" in record.sentence
+    # 25 Hz of a resonance of 9.6 Hz
+    assert record.headlines["nominal"]["too_coarse"]
+    assert "points 25 Hz apart are too coarse for a resonance 9.65 Hz wide" in record.sentence
+
+
+def test_runs_that_are_not_ok_count_as_undamped(tmp_path):
+    def broken(data):
+        alone(data)
+        data["solver"] = {"max_events": 20}
+
+    record = optimise(Study.load(study(tmp_path, broken)))
+    assert record.trouble == record.scenes
+    assert record.nominal.reduction == 0.0
+    assert np.all(np.isnan(record.nominal_response))
+    assert record.headlines["nominal"]["points_left_out"] == 3
+    assert "3 of 3 points are left out" in record.sentence
+
+
 def test_figure(found):
     figure = optimisation_figure(found[0])
     assert [trace.type for trace in figure.data] == ["contour", "scatter", "scatter"]
@@ -171,6 +228,9 @@ def test_command(tmp_path, capsys, monkeypatch):
     [
         (lambda data: data.pop("optimise"), "optimise: missing"),
         (lambda data: data["optimise"].pop("band"), "optimise.band: missing"),
+        (lambda data: data["optimise"].update(band={"start": 2430.0, "stop": 2380.0, "num": 3}), "frequencies that ri"),
+        (lambda data: data["optimise"].update(band=[2400.0, 2400.0]), "rise, not 2400 Hz after 2400 Hz"),
+        (lambda data: data["optimise"].update(band=[]), "optimise.band"),
         (lambda data: data["optimise"]["variables"].update(gap_ratio=[2.0, 1.0]), "gap_ratio: expected [lowest, high"),
         (lambda data: data["optimise"]["variables"].update(gap=1.0), "optimise.variables.gap: unknown key"),
         (lambda data: data["optimise"]["tolerances"].update(orientation_deg=100.0), "gravity lifts the body"),

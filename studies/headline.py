@@ -1,0 +1,190 @@
+"""What a damped curve comes to, like beside like: its top over that of the undamped curve in the same range.
+
+The linear curves are known between the points of a sweep, the damped one at its points alone; so the headline says how
+many of these are left out, whether the top lies at an edge of the range, and whether the points are too coarse.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from coupling.grid import FREQUENCY
+
+#: a damped response within this share of the undamped one has not been touched by the bodies
+UNTOUCHED = 0.01
+
+
+class _Top(NamedTuple):
+    """Highest value of a curve, m, its place on the axis, and whether that is an edge of a range of frequencies."""
+
+    height: float
+    at: Any
+    at_edge: bool
+
+
+@dataclass(frozen=True)
+class Headline:
+    """The figures of a damped curve; nan or None where there is none.
+
+    damped_peak, damped_maximum  m, highest mean of the periods' peaks, and highest absolute maximum
+    damped_peak_at               its place on the axis
+    undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all glued over the same range
+    attached_mass_fraction       at the damped peak
+    onset                        first place where the bodies change the mean by more than 1 %
+    peak_at_edge, undamped_at_edge, fixed_at_edge   whether a top lies at an edge of the frequencies: no resonance's
+    spacing, half_power_width    Hz, widest step beside the tops that are resonances, and width of the undamped one
+    points, points_left_out      of the curve, and how many of them are not ok
+    """
+
+    damped_peak: float
+    damped_peak_at: Any
+    damped_maximum: float
+    undamped_peak: float
+    undamped_peak_at: Any
+    fixed_peak: float
+    fixed_peak_at: Any
+    attached_mass_fraction: float
+    onset: Any
+    peak_at_edge: bool
+    undamped_at_edge: bool
+    fixed_at_edge: bool
+    spacing: float
+    half_power_width: float
+    points: int
+    points_left_out: int
+
+    def relative(self, height: float) -> float:
+        """An amplitude, m, over the undamped maximum; nan where that has no bound or is none."""
+        return height / self.undamped_peak if 0.0 < self.undamped_peak < math.inf else math.nan
+
+    @property
+    def peak_ratio(self) -> float:
+        """The damped peak over the undamped one."""
+        return self.relative(self.damped_peak)
+
+    @property
+    def too_coarse(self) -> bool:
+        """Whether a step beside a resonance is wider than the resonance: a top may hide there."""
+        return self.spacing > self.half_power_width > 0.0
+
+    @property
+    def remarks(self) -> list[str]:
+        """What keeps the ratio from being that of two resonance peaks."""
+        found = []
+        if self.undamped_at_edge:
+            found.append("no undamped resonance lies within the range")
+        if self.peak_at_edge:
+            found.append("the damped peak lies at an edge of the range, and may be higher beyond it")
+        if self.too_coarse:
+            found.append(
+                f"points {self.spacing:.3g} Hz apart are too coarse for a resonance {self.half_power_width:.3g} Hz wide"
+            )
+        if self.points_left_out:
+            found.append(f"{self.points_left_out} of {self.points} points are left out, which are not ok")
+        return found
+
+    def sentence(self, axis: str, units: str, low: Any, high: Any) -> str:
+        """The headline for people; low, high: the range along the axis."""
+        unit = "" if units == "1" else f" {units}"
+        if not math.isfinite(self.damped_peak):
+            return f"no damped peak: {self.points_left_out} of {self.points} points are not ok"
+        at = f"{axis} = {shown(self.damped_peak_at)}{unit}"
+        if not math.isfinite(self.peak_ratio):
+            text = f"damped peak (mean) {self.damped_peak:.4g} m, at {at}; the undamped one has no bound"
+        elif self.undamped_at_edge or axis != FREQUENCY:
+            text = (
+                f"highest damped mean {self.peak_ratio:.3f} of the highest undamped amplitude {self.undamped_peak:.4g} "
+                f"m from {shown(low)} to {shown(high)}{unit}, at {at}"
+            )
+        else:
+            text = (
+                f"damped peak (mean) {self.peak_ratio:.3f} of the undamped maximum {self.undamped_peak:.4g} m, at {at}"
+            )
+        return "; ".join([text, *self.remarks])
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self) | {"peak_ratio": self.peak_ratio, "too_coarse": self.too_coarse}
+
+
+def shown(value: Any) -> str:
+    """A value of an axis in a few digits; text as it is."""
+    return str(value) if isinstance(value, str) else f"{value:.6g}"
+
+
+def headline(
+    x: np.ndarray,
+    damped_mean: np.ndarray,
+    damped_max: np.ndarray,
+    attached: np.ndarray,
+    undamped: np.ndarray,
+    fixed: np.ndarray,
+    peaks: Mapping[str, float],
+    along_frequency: bool,
+) -> Headline:
+    """The headline of damped curves (n,) over ascending x (n,), which are nan at points that are not ok.
+
+    undamped, fixed: linear curves (n,) at the points; peaks: of them between the points, by the names of
+    coupling.sweep.PEAKS, where they are known.
+    """
+    ok = np.isfinite(damped_mean)
+    free = _linear_top("undamped", x, undamped, peaks, along_frequency)
+    glued = _linear_top("fixed", x, fixed, peaks, along_frequency)
+    top = _top(x[ok], damped_mean[ok], along_frequency)
+    touched = np.flatnonzero(np.abs(damped_mean - undamped) > UNTOUCHED * undamped)
+    resonances = [item.at for item in (free, glued, top) if along_frequency and ok.any() and not item.at_edge]
+    return Headline(
+        damped_peak=top.height,
+        damped_peak_at=top.at,
+        damped_maximum=_top(x[ok], damped_max[ok], along_frequency).height,
+        undamped_peak=free.height,
+        undamped_peak_at=free.at,
+        fixed_peak=glued.height,
+        fixed_peak_at=glued.at,
+        attached_mass_fraction=float(attached[ok][np.argmax(damped_mean[ok])]) if ok.any() else math.nan,
+        onset=_plain(x[touched[0]]) if touched.size else None,
+        peak_at_edge=top.at_edge,
+        undamped_at_edge=free.at_edge,
+        fixed_at_edge=glued.at_edge,
+        spacing=max((_step(x[ok], place) for place in resonances), default=math.nan),
+        half_power_width=float(peaks.get("half_power_width", math.nan)),
+        points=len(x),
+        points_left_out=int(np.count_nonzero(~ok)),
+    )
+
+
+def reference_of(undamped: np.ndarray, peaks: Mapping[str, float]) -> float:
+    """What charts divide amplitudes by, m: the undamped maximum, or where that has no bound, that of the points."""
+    known = float(peaks.get("undamped_peak", math.nan))
+    return known if 0.0 < known < math.inf else float(np.nan_to_num(undamped).max(initial=0.0)) or math.nan
+
+
+def _linear_top(name: str, x: np.ndarray, curve: np.ndarray, peaks: Mapping[str, float], along_frequency: bool) -> _Top:
+    if f"{name}_peak" not in peaks:
+        return _top(x, np.nan_to_num(curve), along_frequency)
+    height, at = float(peaks[f"{name}_peak"]), float(peaks[f"{name}_peak_frequency"])
+    return _Top(height, at, at in (x[0], x[-1]))
+
+
+def _top(x: np.ndarray, curve: np.ndarray, along_frequency: bool) -> _Top:
+    if not len(x):
+        return _Top(math.nan, None, False)
+    place = int(np.argmax(curve))
+    return _Top(float(curve[place]), _plain(x[place]), along_frequency and place in (0, len(x) - 1))
+
+
+def _step(x: np.ndarray, place: float) -> float:
+    """The widest step of ascending points (n,) that a place lies in; beyond them, its distance."""
+    if not x[0] <= place <= x[-1]:
+        return float(np.abs(x - place).min())
+    left, right = np.searchsorted(x, place, "left"), np.searchsorted(x, place, "right")
+    return float(np.diff(x[max(left - 1, 0) : right + 1]).max(initial=0.0))
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,137 @@
+"""The structure's transient: how long it is, the default that suits it, and runs that were too short for it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from coupling.choice import settle
+from coupling.engine import simulate
+from coupling.inputs import validate
+from coupling.scene import Scene
+from coupling.structure import linear_structure
+from coupling.sweep import sweep
+from coupling.transient import LIMIT, left_over, outlasted
+from rom.reduced import ReducedModel
+
+FIRST, TOP = 100.0, 1e-3
+OUT_OF_REACH, BETWEEN = 1.0, 1e-3
+
+
+def scene(zeta, frequency=FIRST, gap=OUT_OF_REACH, **changes):
+    """A mode at resonance with a body without friction."""
+    data = {
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": (2 * np.pi * FIRST) ** 2, "damping_ratio": zeta},
+        "excitation": {"frequency": frequency, "force": 2 * zeta * (2 * np.pi * FIRST) ** 2 * TOP},
+        "cavity": [{"name": "c", "gap": gap}],
+        "damper": [{"cavity": "c", "mass": 0.02, "restitution": 0.6}],
+    }
+    return validate(Scene, data | changes, "scene")
+
+
+@pytest.mark.parametrize("zeta", [1e-4, 1e-3, 0.02])
+@pytest.mark.parametrize("periods", [0, 10, 1000])
+def test_one_mode_at_resonance(zeta, periods):
+    structure = linear_structure(scene(zeta))
+    assert left_over(structure, periods) == pytest.approx(math.exp(-2 * math.pi * zeta * periods), rel=1e-9)
+
+
+def test_overdamped_mode_goes_by_its_slower_part():
+    structure = linear_structure(scene(2.0))
+    slower = 2 * math.pi * (2.0 - math.sqrt(3.0))
+    assert left_over(structure, 3) / left_over(structure, 2) == pytest.approx(math.exp(-slower), rel=1e-9)
+
+
+def test_modes_count_as_they_are_excited(tmp_path):
+    """A mode that the force does not drive has no transient, however little it is damped."""
+    squares = (2 * np.pi * np.array([50.0, FIRST])) ** 2
+    model = ReducedModel.from_matrices(
+        np.eye(2), np.diag(squares), {"tip": [0.0, 1.0]}, damping=np.diag([1e-6, 1.0]),
+    )  # fmt: skip
+    model.save(tmp_path / "rom.h5")
+    data = scene(0.1).to_dict() | {
+        "structure": {"model": "rom", "file": str(tmp_path / "rom.h5")},
+        "excitation": {"frequency": FIRST, "force": 1.0, "at": "tip"},
+        "cavity": [], "damper": [],
+    }  # fmt: skip
+    structure = linear_structure(validate(Scene, data, "x"))
+    assert left_over(structure, 100) == pytest.approx(math.exp(-0.5 * 100 / FIRST), rel=1e-9)
+
+
+def test_nothing_excited_has_no_transient():
+    assert left_over(linear_structure(scene(0.0, excitation={"frequency": FIRST})), 1) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("zeta", "transient"), [(0.02, 1000), (0.002, 1000), (2e-4, math.ceil(math.log(100) / 4e-4 / math.pi))]
+)
+def test_default_suits_the_damping(zeta, transient):
+    response = simulate(scene(zeta))
+    assert (response.transient, response.periods) == (transient, transient + 500)
+    assert response.status == "ok"
+    # what is left at the window's start, and less in its mean
+    assert response.amplitude_mean == pytest.approx(TOP, rel=0.01)
+
+
+def test_default_where_no_length_would_do():
+    """With next to no damping the default stays; the run tells that it was too short."""
+    assert settle(scene(1e-6)).scene.time == scene(1e-6).time
+    assert left_over(linear_structure(scene(1e-6)), LIMIT) > 0.01
+    response = simulate(scene(1e-6))
+    assert (response.periods, response.transient, response.status) == (1500, 1000, "not_steady")
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        {"periods": 1500},
+        {"periods": 1500, "transient": 1400},
+        {"periods": 1010, "transient": 1000},
+        {"periods": 9, "transient": 8},
+    ],
+)
+def test_too_short_a_transient_of_the_user(time):
+    response = simulate(scene(2e-4, time=time))
+    assert response.status == "not_steady"
+    assert response.periods == time["periods"]
+    assert response.amplitude_mean < 0.9 * TOP
+
+
+def test_beats_beside_the_resonance():
+    """Peaks swell and fade without a trend."""
+    short = scene(2e-4, frequency=0.97 * FIRST, time={"periods": 600, "transient": 300})
+    assert simulate(short).status == "not_steady"
+    assert simulate(short.replace({"time": {"periods": 4300, "transient": 4000}})).status == "ok"
+
+
+def test_from_the_start_is_what_was_asked_for():
+    assert simulate(scene(2e-4, time={"periods": 50, "transient": 0})).status == "ok"
+
+
+def test_bodies_may_end_the_transient_sooner():
+    """Impacts take more than the damping: after 2000 periods the mean is that of a long run, not after 400."""
+    long = simulate(scene(2e-4, gap=BETWEEN, time={"periods": 9000, "transient": 6000}))
+    assert long.status == "ok" and long.impacts_per_period > 0.5
+    short = simulate(scene(2e-4, gap=BETWEEN, time={"periods": 3500, "transient": 2000}))
+    assert left_over(linear_structure(scene(2e-4)), 2000) > 0.05
+    assert short.status == "ok"
+    # confidence intervals are 2 % wide each
+    assert short.amplitude_mean == pytest.approx(long.amplitude_mean, rel=0.05)
+    shorter = simulate(scene(2e-4, gap=BETWEEN, time={"periods": 1500, "transient": 400}))
+    assert shorter.status == "not_steady"
+    assert shorter.amplitude_mean > 1.2 * long.amplitude_mean
+
+
+def test_a_mean_that_drifts_among_impacts():
+    """Peaks with noise: a drift of 20 % over the window is seen, noise alone is not taken for one."""
+    noise = np.random.default_rng(1).uniform(-0.03, 0.03, 500)
+    given, impacts = scene(2e-4, time={"periods": 600, "transient": 100}), np.ones(500)
+    assert outlasted(given, 1.0 + noise, impacts)
+    assert not outlasted(given, 1.0 + noise + np.linspace(0.0, 0.2, 500), impacts)
+    # where the structure alone has forgotten its start, nothing is asked
+    assert outlasted(scene(0.02, time={"periods": 600, "transient": 100}), 1.0 + np.linspace(0.0, 1.0, 500), impacts)
+
+
+def test_every_point_of_a_sweep_has_its_own():
+    swept = scene(0.002).replace({"sweep": {"structure.damping_ratio": [0.002, 2e-4, 1e-6]}})
+    assert sweep(swept).status.tolist() == ["ok", "ok", "not_steady"]
