@@ -8,7 +8,7 @@ import pytest
 from cases import DAMPED_BLOCK
 from structures import rod
 
-from coupling.choice import settle
+from coupling.choice import settle, settle_all
 from coupling.engine import simulate
 from coupling.inputs import InputError, validate
 from coupling.rows import rows_of
@@ -153,6 +153,29 @@ def test_sweep_has_one_model(file):
     result = sweep(made)
     assert set(result.status) == {"ok"}
     assert json.loads(json.dumps(result.to_json()["estimate"]))["modes"] >= 1
+
+
+def test_a_wide_band_sees_the_collisions_of_the_narrow_one(file):
+    """Between the ends and the middle of the band lies the resonance, where alone the walls are in reach."""
+    law = {"law": "compliant", "stiffness": 50.0}
+    made = scene(file, contact=law, structure__modes="auto", structure__tolerance=0.05, damper__restitution=0.7,
+                 cavity__gap=0.5, excitation__force=None, excitation__resonance_amplitude=0.6)  # fmt: skip
+    counts = []
+    for band in ([0.244, 0.247, 0.25], [0.2, 0.21, 0.22, 0.247, 0.25, 0.26, 0.27]):
+        swept = [made.replace({"excitation.frequency": frequency}) for frequency in band]
+        counts.append(settle_all(swept)[0].estimate["modes"])
+    assert counts[0] > 1
+    assert counts[1] >= counts[0]
+
+
+def test_gaps_of_a_sweep_are_tried_apart(file):
+    """A first gap out of reach does not hide the collisions of a second one."""
+    law = {"law": "compliant", "stiffness": 50.0}
+    made = scene(file, contact=law, structure__modes="auto", structure__tolerance=0.05, damper__restitution=0.7,
+                 excitation__force=None, excitation__resonance_amplitude=0.6, excitation__frequency=0.247)  # fmt: skip
+    alone = settle(made).estimate["modes"]
+    both = settle_all([made.replace({"cavity.c.gap": gap}) for gap in (50.0, 0.5)])[0].estimate["modes"]
+    assert both >= alone > 1
 
 
 def test_what_does_not_fit(file):
