@@ -162,7 +162,8 @@ def test_a_wide_band_sees_the_collisions_of_the_narrow_one(tmp_path):
     model.save(tmp_path / "beam.h5")
     first, law = float(model.natural_frequencies_hz[0]), {"law": "compliant", "stiffness": 300.0}
     made = scene(str(tmp_path / "beam.h5"), contact=law, structure__modes="auto", damper__restitution=0.7,
-                 damper__mass=0.01, cavity__gap=0.6, excitation__force=None, excitation__resonance_amplitude=1.0)  # fmt: skip
+                 damper__mass=0.01, cavity__gap=0.6, excitation__force=None,
+                 excitation__resonance_amplitude=1.0)  # fmt: skip
     counts = []
     for band in ([0.97, 0.985, 1.0], [0.83, 0.86, 0.89, 0.92, 0.975, 0.99, 1.02, 1.05]):
         swept = [made.replace({"excitation.frequency": share * first}) for share in band]
