@@ -10,7 +10,7 @@ from pathlib import Path
 import gmsh
 
 from meshes.parameters import ParameterError
-from modal import msh, store
+from modal import msh
 
 _FACES = ("root", "tip", "left", "right", "bottom", "top")
 
@@ -62,10 +62,7 @@ def build(block: Block, path: str | os.PathLike[str]) -> Path:
         gmsh.option.setNumber("Mesh.ElementOrder", block.order)
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.renumberNodes()
-        gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
-        with store.replacing(path) as temporary:
-            gmsh.write(str(temporary))
-    return Path(path)
+        return msh.write(path)
 
 
 def _solid(block: Block) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 
 from meshes.cluster_geometry import facets, solids
 from meshes.parameters import ParameterError
-from modal import msh, store
+from modal import msh
 
 __all__ = ["SHIPPED", "ParameterError", "VaneCluster", "build"]
 
@@ -228,7 +228,4 @@ def build(parameters: VaneCluster, path: str | os.PathLike[str]) -> Path:
             gmsh.model.mesh.optimize("HighOrder")
         gmsh.model.mesh.renumberNodes()
         msh.check_disjoint(2, "facet")
-        gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
-        with store.replacing(path) as temporary:
-            gmsh.write(str(temporary))
-    return Path(path)
+        return msh.write(path)
