@@ -355,6 +355,12 @@ class Scene:
             structure["file"] = str(Path(path).parent / structure["file"])
         return validate(cls, data, str(path))
 
+    @property
+    def files(self) -> list[str]:
+        """The reduced models that the scene and its sweep name."""
+        swept = axis_values(self.sweep["structure.file"]) if "structure.file" in self.sweep else []
+        return [*([self.structure.file] if isinstance(self.structure, Rom) else []), *map(str, swept)]
+
     def to_dict(self) -> dict[str, Any]:
         """Plain nested data as in the file, without what is None."""
         data: dict[str, Any] = TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)

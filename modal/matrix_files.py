@@ -18,6 +18,8 @@ from scipy import io, sparse
 from modal.matrices import MatricesError, Patch, SystemMatrices
 from modal.store import replacing, write_csv
 
+#: what `write_folder` writes
+FILES = ("stiffness.mtx", "mass.mtx", "nodes.csv", "sets.csv", "fixed.csv")
 _COMPONENTS = "xyz"
 
 

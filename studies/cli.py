@@ -11,10 +11,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from studies.interrupts import swallowed_interrupts_again
+
 _PACKAGES = ("modal", "rom", "coupling", "meshes", "studies")
 _ROOT = Path(__file__).resolve().parent.parent
 BAD_INPUT = 2
 _INTERRUPTED = 130
+#: packages that come with the system, and how to get them
+_SYSTEM = ("dolfinx", "petsc4py", "slepc4py", "ufl", "basix", "ffcx", "mpi4py")
+_FINITE_ELEMENTS = "apt install python3-dolfinx, or conda's environment.yml (CONTRIBUTING.md)"
+#: names of packages that are not those of their modules
+_ON_PYPI = {"vtkmodules": "vtk", "yaml": "pyyaml"}
 
 
 class _Parser(argparse.ArgumentParser):
@@ -25,16 +32,22 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line. Returns the exit status: 0, or 2 for bad input, told in one line on standard error.
+    """Run the command line. Returns the exit status: 0; 2 for bad input, or for files, memory or packages that are not
+    to be had, told in one line on standard error; 130 when interrupted.
 
     Under mpirun the first rank runs it, and the others help with the factorisations.
     """
-    if not _under_mpi() or _stranger() is not None:
-        return _main(argv)
-    from modal.petsc import ranks
+    try:
+        with swallowed_interrupts_again():
+            if not _under_mpi() or _stranger() is not None:
+                return _main(argv)
+            from modal.petsc import ranks
 
-    with ranks() as first:
-        return _main(argv) if first else 0
+            with ranks() as first:
+                return _main(argv) if first else 0
+    except KeyboardInterrupt:
+        print("vanedamp: interrupted", file=sys.stderr)
+        return _INTERRUPTED
 
 
 def _main(argv: Sequence[str] | None) -> int:
@@ -45,19 +58,34 @@ def _main(argv: Sequence[str] | None) -> int:
             f"the package `modal` at {stranger} is not the one of vanedamp (PyPI has another of that name); "
             "uninstall it with `pip uninstall modal`, then install vanedamp again"
         )
-    from studies import commands  # what each command needs is loaded when it is wanted
-
     try:
+        from studies import commands  # what each command needs is loaded when it is wanted
+
         getattr(commands, "import_model" if arguments.command == "import" else arguments.command)(arguments)
-    except ValueError as error:
-        # bad input has error classes of our own; any other ValueError is a fault of the program
-        if type(error).__module__.split(".")[0] not in _PACKAGES:
+        sys.stdout.flush()
+    except BrokenPipeError:  # nobody reads on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except (ValueError, OSError, ImportError, MemoryError) as error:
+        told = _told(error)
+        if told is None:
             raise
-        return _refuse(_located(str(error), getattr(arguments, "input", None)))
-    except KeyboardInterrupt:
-        print("vanedamp: interrupted", file=sys.stderr)
-        return _INTERRUPTED
+        return _refuse(_located(told, getattr(arguments, "input", None)))
     return 0
+
+
+def _told(error: Exception) -> str | None:
+    """What to say about bad input and about what the machine lacks; None for a fault of the program."""
+    if isinstance(error, OSError):
+        return f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error)
+    if isinstance(error, MemoryError):
+        return f"not enough memory ({error or 'none left'}); make it smaller: the mesh, the model or the sweep"
+    if isinstance(error, ImportError):
+        package = (error.name or "").split(".")[0]
+        remedy = _FINITE_ELEMENTS if package in _SYSTEM else f"pip install {_ON_PYPI.get(package, package)}"
+        return None if package in ("", *_PACKAGES) else f"needs {package}, which cannot be loaded ({error}): {remedy}"
+    # bad input has error classes of our own; any other ValueError is a fault of the program
+    return str(error) if type(error).__module__.split(".")[0] in _PACKAGES else None
 
 
 def _refuse(message: str) -> int:

@@ -247,6 +247,16 @@ class Case:
         return case
 
     @property
+    def files(self) -> list[str]:
+        """The files that the case names: mesh and measurements."""
+        tables = self.calibration or CalibrationTable()
+        named = [
+            self.mesh.file if isinstance(self.mesh, MeshFile) else None, self.modes.shape,
+            tables.damping and tables.damping.frf, tables.tune and tables.tune.shapes,
+        ]  # fmt: skip
+        return [file for file in named if file is not None]
+
+    @property
     def damping_ratio(self) -> float:
         """Modal damping ratio of every mode; zero when the file names none."""
         if self.modes.damping_ratio is not None:
