@@ -53,9 +53,10 @@ def _compile(function: Callable[..., Any], **options: bool) -> Any:
     try:
         compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)  # type: ignore[call-overload]
     except RuntimeError as error:  # numba has found no folder that it can write to
+        folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
         raise CacheError(
-            f"no folder for compiled functions can be written to, neither NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}) "  # type: ignore[attr-defined]
-            f"nor {Path(__file__).with_name('__pycache__')} nor the user's cache: set NUMBA_CACHE_DIR to one that can"
+            f"compiled functions have no folder that can be written to, of {folders} and the user's cache: "
+            "set NUMBA_CACHE_DIR to one"
         ) from error
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
         return compiled

@@ -67,17 +67,18 @@ def _main(argv: Sequence[str] | None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except (ValueError, OSError, ImportError, MemoryError) as error:
-        told = _told(error)
+        told = _told(error, getattr(arguments, "input", None))
         if told is None:
             raise
-        return _refuse(_located(told, getattr(arguments, "input", None)))
+        return _refuse(told)
     return 0
 
 
-def _told(error: Exception) -> str | None:
-    """What to say about bad input and about what the machine lacks; None for a fault of the program."""
+def _told(error: Exception, file: str | None) -> str | None:
+    """What to say about bad input (in a file) and about what the machine lacks; None for a fault of the program."""
     if isinstance(error, OSError):
-        return f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error)
+        where = error.filename or "standard output, or another file"
+        return f"{where}: {error.strerror}" if error.strerror else str(error)
     if isinstance(error, MemoryError):
         return f"not enough memory ({error or 'none left'}); make it smaller: the mesh, the model or the sweep"
     if isinstance(error, ImportError):
@@ -85,7 +86,7 @@ def _told(error: Exception) -> str | None:
         remedy = _FINITE_ELEMENTS if package in _SYSTEM else f"pip install {_ON_PYPI.get(package, package)}"
         return None if package in ("", *_PACKAGES) else f"needs {package}, which cannot be loaded ({error}): {remedy}"
     # bad input has error classes of our own; any other ValueError is a fault of the program
-    return str(error) if type(error).__module__.split(".")[0] in _PACKAGES else None
+    return _located(str(error), file) if type(error).__module__.split(".")[0] in _PACKAGES else None
 
 
 def _refuse(message: str) -> int:

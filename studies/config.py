@@ -249,12 +249,10 @@ class Case:
     @property
     def files(self) -> list[str]:
         """The files that the case names: mesh and measurements."""
-        tables = self.calibration or CalibrationTable()
-        named = [
-            self.mesh.file if isinstance(self.mesh, MeshFile) else None, self.modes.shape,
-            tables.damping and tables.damping.frf, tables.tune and tables.tune.shapes,
-        ]  # fmt: skip
-        return [file for file in named if file is not None]
+        mesh = self.mesh.file if isinstance(self.mesh, MeshFile) else None
+        damping = self.calibration.damping.frf if self.calibration and self.calibration.damping else None
+        tune = self.calibration.tune.shapes if self.calibration and self.calibration.tune else None
+        return [file for file in (mesh, self.modes.shape, damping, tune) if file is not None]
 
     @property
     def damping_ratio(self) -> float:
