@@ -334,6 +334,11 @@ def _load_scene(arguments: Namespace) -> Scene:
     keep(arguments, scene.files)
     if isinstance(scene.structure, Rom) and not Path(scene.structure.file).is_file():
         raise InputError(f"structure.file: no such file {scene.structure.file}; `vanedamp reduce` writes one")
+    if not scene.moved:
+        raise InputError(
+            "excitation: nothing moves the structure; give force, base_acceleration or resonance_amplitude, or an "
+            "[initial] state"
+        )
     return scene
 
 

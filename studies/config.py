@@ -341,14 +341,21 @@ def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
             raise InputError(
                 f"{path}: mesh.generator: no generator {generator!r}; {_known(str(generator), GENERATORS)}"
             )
-        known = ["generator", "degree", *(item.name for item in fields(GENERATORS[str(generator)]))]
+        known = ["generator", "degree", *_names(GENERATORS[str(generator)])]
     for key in mesh:
+        owners = [f'generator = "{name}"' for name, record in GENERATORS.items() if key in _names(record)]
+        if key not in known and generator is None and owners:
+            raise InputError(f"{path}: mesh.{key}: belongs to {' or '.join(owners)}, not to a file")
         if key not in known:
             raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, known)}")
     if isinstance(file, str):
         mesh["file"] = str(Path(path).parent / file)
         if not Path(mesh["file"]).is_file():
             raise InputError(f"{path}: mesh.file: no such file {mesh['file']}; `vanedamp mesh` writes one")
+
+
+def _names(record: Any) -> list[str]:
+    return [item.name for item in fields(record)]
 
 
 def _check_group(key: str, group: str, known: Mapping[str, list[str]]) -> None:
