@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 T = TypeVar("T")
 
@@ -21,8 +21,18 @@ _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 _NO_TABLE = ("dataclass_type", "dict_type", "mapping_type", "model_attributes_type")
 _NO_LIST = ("tuple_type", "list_type")
 
+#: no quantity in SI units is larger, or smaller and yet not zero; their products and squares are numbers, too
+_LARGEST = 1e30
+
+
+def _plausible(value: float) -> float:
+    if abs(value) > _LARGEST or 0.0 < abs(value) < 1.0 / _LARGEST:
+        raise ValueError(f"expected 0, or a number between {1.0 / _LARGEST:g} and {_LARGEST:g} in SI units")
+    return value
+
+
 # numbers are numbers: no text, no booleans
-Real = Annotated[float, Strict()]
+Real = Annotated[float, Strict(), AfterValidator(_plausible)]
 Whole = Annotated[int, Strict()]
 Positive = Annotated[Real, Field(gt=0)]
 NonNegative = Annotated[Real, Field(ge=0)]

@@ -381,8 +381,16 @@ class Scene:
     @property
     def files(self) -> list[str]:
         """The reduced models that the scene and its sweep name."""
-        swept = axis_values(self.sweep["structure.file"]) if "structure.file" in self.sweep else []
-        return [*([self.structure.file] if isinstance(self.structure, Rom) else []), *map(str, swept)]
+        swept = self.sweep.get("structure.file", ())
+        return [
+            *([self.structure.file] if isinstance(self.structure, Rom) else []),
+            *(() if isinstance(swept, Range) else map(str, swept)),
+        ]
+
+    @property
+    def points(self) -> int:
+        """Points of the grid of its sweep."""
+        return math.prod(axis.num if isinstance(axis, Range) else len(axis) for axis in self.sweep.values())
 
     @property
     def moved(self) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import gmsh
 
-from meshes.parameters import ParameterError
+from meshes.parameters import ParameterError, check_elements, check_size
 from modal import msh
 
 _FACES = ("root", "tip", "left", "right", "bottom", "top")
@@ -47,6 +47,11 @@ class Block:
             raise ParameterError(f"divisions: expected three counts of at least 1, not {self.divisions}")
         if self.hexahedra and self.element_size is not None:
             raise ParameterError("hexahedra: an unstructured mesh is of tetrahedra; leave out element_size")
+        if self.element_size is None:
+            check_elements(math.prod(self.divisions) * (1 if self.hexahedra else 6), "divisions")
+        else:
+            width = 0.5 * (self.width + (self.tip_width or self.width))
+            check_size(self.element_size, self.length * width * self.thickness)
 
 
 def build(block: Block, path: str | os.PathLike[str]) -> Path:

@@ -16,7 +16,7 @@ import gmsh
 import numpy as np
 
 from meshes.cluster_geometry import facets, solids
-from meshes.parameters import ParameterError
+from meshes.parameters import ParameterError, check_size
 from modal import msh
 
 __all__ = ["SHIPPED", "ParameterError", "VaneCluster", "build"]
@@ -84,6 +84,9 @@ class VaneCluster:
             self._check_cavities()
         if any(self.damper_size):
             self._check_damper()
+        sector = 0.5 * math.radians(self.sector_deg) * self.axial_length
+        inner = sector * (self.platform_radius**2 - self.inner_radius**2)
+        check_size(self.element_size, inner + sector * (self.outer_radius**2 - self.casing_radius**2))
 
     @property
     def sector_deg(self) -> float:

@@ -17,6 +17,8 @@ _PACKAGES = ("modal", "rom", "coupling", "meshes", "studies")
 _ROOT = Path(__file__).resolve().parent.parent
 BAD_INPUT = 2
 _INTERRUPTED = 130
+#: hot spots are 2 % of the structure's size apart, and each is six outputs of the model
+_MOST_SPOTS = 1000
 #: packages that come with the system, and how to get them
 _SYSTEM = ("dolfinx", "petsc4py", "slepc4py", "ufl", "basix", "ffcx", "mpi4py")
 _FINITE_ELEMENTS = "apt install python3-dolfinx, or conda's environment.yml (CONTRIBUTING.md)"
@@ -174,7 +176,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
 
     reduce.add_argument(
-        "--hot-spots", type=_count, default=0, metavar="N",
+        "--hot-spots", type=_spots, default=0, metavar="N",
         help="keep the stresses at the N most stressed places of the first mode as outputs",
     )  # fmt: skip
 
@@ -230,6 +232,12 @@ def _parser() -> argparse.ArgumentParser:
 def _count(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"expected a count, not {text!r}")
+    return int(text)
+
+
+def _spots(text: str) -> int:
+    if _count(text) > _MOST_SPOTS:
+        raise argparse.ArgumentTypeError(f"expected at most {_MOST_SPOTS}, not {text}")
     return int(text)
 
 

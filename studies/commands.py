@@ -173,7 +173,10 @@ def run(arguments: Namespace) -> None:
     check_outputs(arguments)
     scene = _load_scene(arguments)
     from coupling.engine import simulate
+    from studies.effort import check_run
     from studies.provenance import versions
+
+    check_run(scene, arguments.samples)
 
     response = simulate(scene, events=arguments.events, samples_per_period=arguments.samples)
     if arguments.output:
@@ -201,9 +204,11 @@ def sweep(arguments: Namespace) -> None:
     from coupling.checkpoint import Checkpoint, clear
     from coupling.grid import grid
     from coupling.sweep import sweep as run_sweep
+    from studies.effort import check_sweep
     from studies.forced_response import forced_responses
     from studies.provenance import versions
 
+    check_sweep(scene, arguments.workers)
     # processes are slow to start: a bad grid or the checkpoint of another sweep is told before
     points, provenance = grid(scene), {"versions": versions()}
     resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
@@ -230,12 +235,14 @@ def sweep(arguments: Namespace) -> None:
 def optimise(arguments: Namespace) -> None:
     """Mass, gap and number of bodies that reduce most, as designed and within tolerances."""
     check_outputs(arguments)
+    from studies.effort import check_optimise
     from studies.optimise import optimise as search
     from studies.optimise_study import Study
     from studies.provenance import versions
 
     study = Study.load(arguments.input)
     keep(arguments, study.scene.files)
+    check_optimise(study, arguments.workers)
     _tell_resonance(arguments.input, study.scene)
     with workers(arguments.workers) as pool, progress("optimise") as report:
         found = search(study, pool, report, {"versions": versions()})

@@ -10,12 +10,13 @@ from typing import Any
 
 #: what takes the place of a value
 NUMBERS: tuple[Any, ...] = (
-    float("nan"), float("inf"), -float("inf"), -1.0, 0.0, -0.0, 1e-300, 1e-12, 1e12, 1e300, 5e-324, -1, 0, 1, 2, 3, 10**9,
-    10**30,
+    float("nan"), float("inf"), -float("inf"), -1.0, 0.0, -0.0, 1e-300, 1e-12, 1e12, 1e300, 5e-324, -1, 0, 1, 2, 3,
+    10**9, 10**30,
 )  # fmt: skip
 WRONG: tuple[Any, ...] = (
-    *NUMBERS, True, False, "", "1", "nan", "auto", "a.b", "a\0b", "x" * 5000, "\N{GREEK SMALL LETTER MU}m", "/", "..", [], [[]],
-    [1.0], [1.0, 2.0], [0.0, 0.0, 0.0], ["x"], [{}], {}, {"": 1.0}, {"a": 1.0}, datetime.date(2020, 1, 1), datetime.time(1),
+    *NUMBERS, True, False, "", "1", "nan", "auto", "a.b", "a\0b", "x" * 5000, "\N{GREEK SMALL LETTER MU}m", "/", "..",
+    [], [[]], [1.0], [1.0, 2.0], [0.0, 0.0, 0.0], ["x"], [{}], {}, {"": 1.0}, {"a": 1.0}, datetime.date(2020, 1, 1),
+    datetime.time(1),
 )  # fmt: skip
 
 SCENE = {
