@@ -12,6 +12,8 @@ import gmsh
 from meshes.parameters import ParameterError, check_elements, check_size
 from modal import msh
 
+#: ratio of lengths; gmsh takes for one what is nearer than 1e-8 of a model's size
+_SLENDEREST = 1e5
 _FACES = ("root", "tip", "left", "right", "bottom", "top")
 
 
@@ -43,6 +45,11 @@ class Block:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise ParameterError(f"{name}: expected a positive number of metres, not {value}")
+        lengths = [self.length, self.width, self.thickness, self.tip_width or self.width]
+        if max(lengths) > _SLENDEREST * min(lengths):
+            raise ParameterError(
+                f"length: {max(lengths):g} m beside {min(lengths):g} m is more than gmsh can tell apart"
+            )
         if len(self.divisions) != 3 or any(count < 1 for count in self.divisions):
             raise ParameterError(f"divisions: expected three counts of at least 1, not {self.divisions}")
         if self.hexahedra and self.element_size is not None:

@@ -22,7 +22,7 @@ class MeshError(ValueError):
 
 @contextlib.contextmanager
 def session(name: str) -> Iterator[None]:
-    """A silent gmsh session with one new model of that name; finalised even on errors.
+    """A silent gmsh session with one new model of that name; finalised even on errors. Raises MeshError for gmsh's own.
 
     Inside a session of the caller's own, only the model is added and removed again.
     """
@@ -38,6 +38,11 @@ def session(name: str) -> Iterator[None]:
     try:
         gmsh.model.add(name)
         yield
+    except Exception as error:
+        if type(error) is not Exception:
+            raise
+        # gmsh raises nothing narrower
+        raise MeshError(f"{name}: gmsh cannot make this mesh ({error}); check its lengths, in m") from error
     finally:
         if nested:
             gmsh.model.remove()
