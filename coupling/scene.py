@@ -402,7 +402,8 @@ class Scene:
             or any(value is not None for value in given)
             or self.initial != Initial()
             or any(damper.velocity for damper in self.damper)
-            or self.gravity.tangential != 0.0
+            or self.gravity.orientation_deg != 0.0
+            or self.gravity.direction is not None
             or not swept.isdisjoint({"structure", "excitation", "initial", "damper", "gravity"})
         )
 
@@ -437,8 +438,8 @@ def axis_values(values: Range | Sequence[Any]) -> list[Any]:
 
 def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
     """Change plain scene data at the end of `steps`, which stand in `path`. Raises InputError for an unknown place."""
-    if not steps or not isinstance(node, dict | list):
-        raise InputError(f"scene: {path}: names " + ("a table, not a value" if not steps else "something in a value"))
+    if not steps:
+        raise InputError(f"scene: {path}: names a table, not a value")
     head, rest = steps[0], steps[1:]
     if not isinstance(node, dict) and not (isinstance(node, list) and all(isinstance(entry, dict) for entry in node)):
         raise InputError(f"scene: {path}: no table holds '{head}'; leave it out and give the whole value")

@@ -21,7 +21,7 @@ MOST_POINTS, MOST_BYTES, MOST_SECONDS = 1_000_000, 8e9, 30 * 86400.0
 
 def check_run(scene: Scene, samples: int = 0) -> None:
     """Refuse a run whose records fill the memory, or that takes a month. Raises InputError."""
-    periods, channels = scene.time.periods, 2 * (1 + len(scene.damper) + len(scene.friction_damper))
+    periods, channels = scene.time.simulated, 2 * (1 + len(scene.damper) + len(scene.friction_damper))
     sampled = _SAMPLE * samples * channels * periods
     for key, name, needed in (("time.periods", "periods", _RECORD * periods), ("--samples", "samples", sampled)):
         if needed > MOST_BYTES:
@@ -42,7 +42,7 @@ def check_sweep(scene: Scene, workers: int | None) -> None:
             f"at most {MOST_POINTS}: take fewer values an axis, or several sweeps"
         )
     check_run(scene)
-    _check_time("sweep", f"{points} points of {scene.time.periods} periods on {count} workers", seconds)
+    _check_time("sweep", f"{points} points of {scene.time.simulated} periods on {count} workers", seconds)
 
 
 def check_optimise(study: Study, workers: int | None) -> None:
@@ -58,7 +58,7 @@ def _seconds(scene: Scene) -> float:
     """Processor time of a run."""
     solver = scene.solver
     step = {"exact": 0.0, "solve_ivp": 1e-3}.get(solver.method, _STEP) * (solver.substeps or 1)
-    return _RUN + scene.time.periods * (_PERIOD + step * solver.steps)
+    return _RUN + scene.time.simulated * (_PERIOD + step * solver.steps)
 
 
 def _check_time(key: str, what: str, seconds: float) -> None:

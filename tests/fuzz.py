@@ -38,7 +38,7 @@ SCENE = {
 }
 ROM_SCENE = {
     "structure": {"model": "rom", "file": "rom.h5", "modes": 1, "natural": True, "tolerance": 0.01},
-    "excitation": {"frequency": 15.9, "base_acceleration": 1.0, "at": "tip"},
+    "excitation": {"frequency": 15.9, "force": 1.0, "at": "tip"},
     "cavity": [{"name": "c1", "gap": 2e-4, "left": "tip", "right": "tip", "floor": "top"}],
     "damper": [{"cavity": "c1", "mass": 0.05, "friction": 0.3, "restitution": 0.6}],
     "friction_damper": [{"normal_force": 0.1, "friction": 0.3, "at": "top"}],
