@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from coupling.handover import Handover
 from coupling.inputs import InputError
 from coupling.points import Block, Finished, Task
-from coupling.scene import Rom, Scene, axis_values
+from coupling.scene import Scene
 from modal.store import StoreError, Variable, clear_leftovers, digest, load, save
 
 _KIND = "sweep-checkpoint"
@@ -107,10 +107,4 @@ def clear(path: str | Path) -> None:
 
 def _models(scene: Scene) -> dict[str, str]:
     """Digest of every reduced model that the sweep names, by its file."""
-    files = [scene.structure.file] if isinstance(scene.structure, Rom) else []
-    files += [str(file) for file in _axis(scene, "structure.file")]
-    return {file: digest(file) for file in files if Path(file).is_file()}
-
-
-def _axis(scene: Scene, path: str) -> Sequence[Any]:
-    return axis_values(scene.sweep[path]) if path in scene.sweep else ()
+    return {file: digest(file) for file in scene.files if Path(file).is_file()}

@@ -24,6 +24,10 @@ ZERO = np.int64(0)
 _MARKS = ("@entry", "@kernel", "@inlined")
 
 
+class CacheError(ValueError):
+    """Compiled functions have no folder to be kept in: every process would compile them again, for a minute."""
+
+
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function of the engine that Python calls."""
     return _compile(function, no_cfunc_wrapper=True)
@@ -46,7 +50,14 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def _compile(function: Callable[..., Any], **options: bool) -> Any:
-    compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)  # type: ignore[call-overload]
+    try:
+        compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)  # type: ignore[call-overload]
+    except RuntimeError as error:  # numba has found no folder that it can write to
+        folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
+        raise CacheError(
+            f"compiled functions have no folder that can be written to, of {folders} and the user's cache: "
+            "set NUMBA_CACHE_DIR to one"
+        ) from error
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
         return compiled
     # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls

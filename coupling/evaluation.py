@@ -56,18 +56,14 @@ class Outcome:
 
 def run_scene(run: Run, scene: Scene) -> tuple[Status, int]:
     """Run all periods, or until the mean amplitude is known well enough. Returns status and length of the transient."""
-    if scene.time.steady != "auto":
-        ended, dropped = run.advance_to(scene.time.simulated), scene.time.dropped
-        records = run.outcome().records
-        window = slice(dropped, scene.time.simulated)
-        if ended is Status.OK and dropped and not outlasted(scene, records.peak[window], records.impacts[window]):
-            ended = Status.NOT_STEADY
-        return ended, dropped
     status, dropped = Status.NOT_STEADY, scene.time.dropped
     for periods in range(_CHUNK, scene.time.simulated + _CHUNK, _CHUNK):
+        # compiled functions hear of no interrupt before they return
         ended = run.advance_to(min(periods, scene.time.simulated))
         if ended is not Status.OK:
             return ended, dropped
+        if scene.time.steady != "auto":
+            continue
         outcome = run.outcome()
         peaks = outcome.records.peak[: outcome.periods]
         transient = transient_length(peaks)
@@ -78,6 +74,10 @@ def run_scene(run: Run, scene: Scene) -> tuple[Status, int]:
         if confidence is not None and confidence <= scene.time.tolerance * peaks[transient:].mean():
             return Status.OK, transient
         status, dropped = Status.UNCERTAIN, transient
+    if scene.time.steady != "auto":
+        records, window = run.outcome().records, slice(dropped, scene.time.simulated)
+        steady = not dropped or outlasted(scene, records.peak[window], records.impacts[window])
+        status = Status.OK if steady else Status.NOT_STEADY
     return status, dropped
 
 

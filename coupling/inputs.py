@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 T = TypeVar("T")
 
@@ -17,9 +18,21 @@ T = TypeVar("T")
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+_NO_TABLE = ("dataclass_type", "dict_type", "mapping_type", "model_attributes_type")
+_NO_LIST = ("tuple_type", "list_type")
+
+#: no quantity in SI units is larger, or smaller and yet not zero; their products and squares are numbers, too
+_LARGEST = 1e30
+
+
+def _plausible(value: float) -> float:
+    if abs(value) > _LARGEST or 0.0 < abs(value) < 1.0 / _LARGEST:
+        raise ValueError(f"expected 0, or a number between {1.0 / _LARGEST:g} and {_LARGEST:g} in SI units")
+    return value
+
 
 # numbers are numbers: no text, no booleans
-Real = Annotated[float, Strict()]
+Real = Annotated[float, Strict(), AfterValidator(_plausible)]
 Whole = Annotated[int, Strict()]
 Positive = Annotated[Real, Field(gt=0)]
 NonNegative = Annotated[Real, Field(ge=0)]
@@ -41,15 +54,17 @@ class InputError(ValueError):
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The tables of a TOML file. Raises InputError if it is missing or not TOML."""
+    """The tables of a TOML file, UTF-8 with or without its mark. Raises InputError if it is missing or not TOML."""
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML: nested too deeply") from None
 
 
 def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
@@ -79,19 +94,40 @@ def _explain(adapter: TypeAdapter[Any], error: Any, data: Any) -> str:
     path = _path_in_data(error["loc"], data, names_absent_key="argument" in kind or "missing" in kind)
     key = _dotted(path)
     if kind in _UNKNOWN:
-        # a key of another variant of the table is known, and yet no help
-        known = [name for name in _known_keys(adapter.json_schema(), error["loc"][:-1]) if name != path[-1]]
-        return f"{key}: unknown key; {nearest(str(path[-1]), known)}"
+        return f"{key}: {_unknown(adapter.json_schema(), error['loc'], str(path[-1]))}"
     if kind in ("missing", "missing_argument"):
         return f"{key}: missing; it is required here"
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         tag = error["ctx"]["discriminator"].strip("'")
         expected = error["ctx"].get("expected_tags") or ", ".join(_tags(adapter.json_schema(), error["loc"], tag))
         return f"{key}.{tag}: must be one of {expected}"
-    message = error["msg"].removeprefix("Value error, ").removeprefix("Input ")
     value = error["input"]
-    shown = f" (got {value!r})" if isinstance(value, str | int | float | bool) else ""
+    if kind in _NO_TABLE:
+        heading = f"[{key}]" if path and isinstance(path[-1], str) else f"[[{_dotted(path[:-1])}]]"
+        return f"{key}: expected a table, headed {heading}"
+    if kind in _NO_LIST and isinstance(value, Mapping) and len(path) == 1:
+        return f"{key}: expected a list of tables, each headed [[{key}]], not [{key}]"
+    message = error["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    shown = f" (got {reprlib.repr(value)})" if isinstance(value, str | int | float | bool) else ""
     return f"{key}: {message}{shown}" if key else message
+
+
+def _unknown(schema: dict[str, Any], location: tuple[Any, ...], name: str) -> str:
+    """What to say about a key that a table does not have: whose it is, or which it may be."""
+    variants = _nodes(schema, location[:-1])
+    # of several variants of a table the one at hand is a step of the location, by the value that tells them apart
+    own = [node for node in variants if location[-2:-1] and location[-2] in _constants(node).values()] or variants
+    owners = [pair for node in variants if name in node.get("properties", {}) for pair in _constants(node).items()]
+    if owners:
+        (tag, mine), *_ = _constants(own[0]).items()
+        others = " or ".join(f'{tag} = "{value}"' for tag, value in owners)
+        return f'belongs to {others}, not to {tag} = "{mine}"'
+    return f"unknown key; {nearest(name, sorted({key for node in own for key in node.get('properties', {})}))}"
+
+
+def _constants(node: dict[str, Any]) -> dict[str, str]:
+    """The keys of a table that hold one value only: those tell variants apart."""
+    return {name: item["const"] for name, item in node.get("properties", {}).items() if "const" in item}
 
 
 def _path_in_data(location: tuple[Any, ...], data: Any, names_absent_key: bool) -> list[Any]:
@@ -112,10 +148,6 @@ def _dotted(path: list[Any]) -> str:
     for step in path:
         text += f"[{step}]" if isinstance(step, int) else (f".{step}" if text else str(step))
     return text
-
-
-def _known_keys(schema: dict[str, Any], location: tuple[Any, ...]) -> list[str]:
-    return sorted({name for node in _nodes(schema, location) for name in node.get("properties", {})})
 
 
 def _tags(schema: dict[str, Any], location: tuple[Any, ...], tag: str) -> list[str]:

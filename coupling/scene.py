@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, TypeAdapter
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from coupling.inputs import (
@@ -157,11 +157,18 @@ class Gravity:
         return self.acceleration * along, self.acceleration * across
 
 
+def _addressable(name: str) -> str:
+    """A name that a dotted path such as cavity.c1.gap can hold, and tell from an index and from a key."""
+    if not name or "." in name or name.isdecimal() or name in ("name", "gap", "left", "right", "floor"):
+        raise ValueError("expected a word that is no number and no key and has no dot, such as 'c1'")
+    return name
+
+
 @dataclass(frozen=True, config=STRICT)
 class Cavity:
     """A cavity with total free travel `gap` (m). On a reduced model left, right and floor name interface labels."""
 
-    name: str
+    name: Annotated[str, AfterValidator(_addressable)]
     gap: Positive
     left: str | None = None
     right: str | None = None
@@ -241,6 +248,24 @@ class Range:
     num: Annotated[Whole, Field(gt=0)]
 
 
+def _several(axis: Any) -> Any:
+    if not isinstance(axis, Mapping | list | tuple | Range):
+        raise ValueError("a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}")
+    return axis
+
+
+def _form(axis: Any) -> str:
+    return "list" if isinstance(axis, list | tuple) else "range"
+
+
+#: the values of one axis of a sweep
+Axis = Annotated[
+    Annotated[Range, Tag("range")] | Annotated[tuple[Real | Whole | str, ...], Field(min_length=1), Tag("list")],
+    Discriminator(_form),
+    BeforeValidator(_several),
+]
+
+
 @dataclass(frozen=True, config=STRICT)
 class Continuation:
     """How the runs of a sweep begin: each from its own initial state ("independent"), or from its neighbour's last one.
@@ -268,9 +293,7 @@ class Scene:
     time: Time = field(default_factory=Time)
     solver: Solver = field(default_factory=Solver)
     continuation: Continuation = field(default_factory=Continuation)
-    sweep: dict[str, Range | Annotated[tuple[Real | Whole | str, ...], Field(min_length=1)]] = field(
-        default_factory=dict
-    )
+    sweep: dict[str, Axis] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         names = [cavity.name for cavity in self.cavity]
@@ -355,6 +378,35 @@ class Scene:
             structure["file"] = str(Path(path).parent / structure["file"])
         return validate(cls, data, str(path))
 
+    @property
+    def files(self) -> list[str]:
+        """The reduced models that the scene and its sweep name."""
+        swept = self.sweep.get("structure.file", ())
+        return [
+            *([self.structure.file] if isinstance(self.structure, Rom) else []),
+            *(() if isinstance(swept, Range) else map(str, swept)),
+        ]
+
+    @property
+    def points(self) -> int:
+        """Points of the grid of its sweep."""
+        return math.prod(axis.num if isinstance(axis, Range) else len(axis) for axis in self.sweep.values())
+
+    @property
+    def moved(self) -> bool:
+        """Whether anything is said that moves the structure or the bodies, here or in an axis of the sweep."""
+        given = self.excitation.force, self.excitation.base_acceleration, self.excitation.resonance_amplitude
+        swept = {path.split(".")[0] for path in self.sweep if path != "excitation.frequency"}
+        return (
+            isinstance(self.structure, Prescribed)
+            or any(value is not None for value in given)
+            or self.initial != Initial()
+            or any(damper.velocity for damper in self.damper)
+            or self.gravity.orientation_deg != 0.0
+            or self.gravity.direction is not None
+            or not swept.isdisjoint({"structure", "excitation", "initial", "damper", "gravity"})
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Plain nested data as in the file, without what is None."""
         data: dict[str, Any] = TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
@@ -386,6 +438,8 @@ def axis_values(values: Range | Sequence[Any]) -> list[Any]:
 
 def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
     """Change plain scene data at the end of `steps`, which stand in `path`. Raises InputError for an unknown place."""
+    if not steps:
+        raise InputError(f"scene: {path}: names a table, not a value")
     head, rest = steps[0], steps[1:]
     if not isinstance(node, dict) and not (isinstance(node, list) and all(isinstance(entry, dict) for entry in node)):
         raise InputError(f"scene: {path}: no table holds '{head}'; leave it out and give the whole value")
@@ -402,7 +456,7 @@ def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
 
 
 def _entries(nodes: list[Any], head: str, steps: list[str], path: str) -> tuple[list[Any], list[str]]:
-    if head.isdigit():
+    if head.isdecimal():
         if int(head) >= len(nodes):
             raise InputError(f"scene: {path}: there are only {len(nodes)} entries, counted from 0")
         return [nodes[int(head)]], steps[1:]

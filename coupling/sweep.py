@@ -168,12 +168,22 @@ def sweep(
     return _result(grid, finished, provenance)
 
 
-def run_list(base: Scene, points: Sequence[Mapping[str, Any]], executor: Executor | None = None) -> Finished:
-    """Runs of scenes that differ from `base` in some values, by their paths; all points name the same paths."""
+def run_list(
+    base: Scene,
+    points: Sequence[Mapping[str, Any]],
+    executor: Executor | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Finished:
+    """Runs of scenes that differ from `base` in some values, by their paths; all points name the same paths.
+
+    progress: called with the number of points done.
+    """
     listed = PointList(base, points)
     finished = Finished(listed.size)
     for task, rest, block in _run(listed, finished, executor):
         finished.add(task, block, bool(rest))
+        if progress is not None:
+            progress(finished.count)
     return finished
 
 

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import gmsh
 
-from meshes.parameters import ParameterError
-from modal import msh, store
+from meshes.parameters import ParameterError, check_elements, check_size
+from modal import msh
 
+#: ratio of lengths; gmsh takes for one what is nearer than 1e-8 of a model's size
+_SLENDEREST = 1e5
 _FACES = ("root", "tip", "left", "right", "bottom", "top")
 
 
@@ -43,10 +45,20 @@ class Block:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise ParameterError(f"{name}: expected a positive number of metres, not {value}")
+        lengths = [self.length, self.width, self.thickness, self.tip_width or self.width]
+        if max(lengths) > _SLENDEREST * min(lengths):
+            raise ParameterError(
+                f"length: {max(lengths):g} m beside {min(lengths):g} m is more than gmsh can tell apart"
+            )
         if len(self.divisions) != 3 or any(count < 1 for count in self.divisions):
             raise ParameterError(f"divisions: expected three counts of at least 1, not {self.divisions}")
         if self.hexahedra and self.element_size is not None:
             raise ParameterError("hexahedra: an unstructured mesh is of tetrahedra; leave out element_size")
+        if self.element_size is None:
+            check_elements(math.prod(self.divisions) * (1 if self.hexahedra else 6), "divisions")
+        else:
+            width = 0.5 * (self.width + (self.tip_width or self.width))
+            check_size(self.element_size, self.length * width * self.thickness)
 
 
 def build(block: Block, path: str | os.PathLike[str]) -> Path:
@@ -62,10 +74,7 @@ def build(block: Block, path: str | os.PathLike[str]) -> Path:
         gmsh.option.setNumber("Mesh.ElementOrder", block.order)
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.renumberNodes()
-        gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
-        with store.replacing(path) as temporary:
-            gmsh.write(str(temporary))
-    return Path(path)
+        return msh.write(path)
 
 
 def _solid(block: Block) -> int:

@@ -16,8 +16,8 @@ import gmsh
 import numpy as np
 
 from meshes.cluster_geometry import facets, solids
-from meshes.parameters import ParameterError
-from modal import msh, store
+from meshes.parameters import ParameterError, check_size
+from modal import msh
 
 __all__ = ["SHIPPED", "ParameterError", "VaneCluster", "build"]
 
@@ -84,6 +84,9 @@ class VaneCluster:
             self._check_cavities()
         if any(self.damper_size):
             self._check_damper()
+        sector = 0.5 * math.radians(self.sector_deg) * self.axial_length
+        inner = sector * (self.platform_radius**2 - self.inner_radius**2)
+        check_size(self.element_size, inner + sector * (self.outer_radius**2 - self.casing_radius**2))
 
     @property
     def sector_deg(self) -> float:
@@ -228,7 +231,4 @@ def build(parameters: VaneCluster, path: str | os.PathLike[str]) -> Path:
             gmsh.model.mesh.optimize("HighOrder")
         gmsh.model.mesh.renumberNodes()
         msh.check_disjoint(2, "facet")
-        gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
-        with store.replacing(path) as temporary:
-            gmsh.write(str(temporary))
-    return Path(path)
+        return msh.write(path)

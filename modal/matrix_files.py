@@ -18,6 +18,8 @@ from scipy import io, sparse
 from modal.matrices import MatricesError, Patch, SystemMatrices
 from modal.store import replacing, write_csv
 
+#: what `write_folder` writes
+FILES = ("stiffness.mtx", "mass.mtx", "nodes.csv", "sets.csv", "fixed.csv")
 _COMPONENTS = "xyz"
 
 
@@ -94,8 +96,8 @@ def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> No
     for name, matrix in (("stiffness", matrices.stiffness), ("mass", matrices.mass)):
         # round-off of the assembly differs above and below the diagonal; a symmetric file holds one of them
         whole = sparse.coo_matrix(0.5 * (matrix + matrix.T))
-        with replacing(home / f"{name}.mtx") as temporary:
-            io.mmwrite(str(temporary), whole, symmetry="symmetric", precision=17)
+        with replacing(home / f"{name}.mtx") as temporary, temporary.open("wb") as stream:
+            io.mmwrite(stream, whole, symmetry="symmetric", precision=17)
     nodes = [[index, *xyz] for index, xyz in enumerate(matrices.coordinates.tolist(), 1)]
     write_csv(home / "nodes.csv", ("node", "x", "y", "z"), nodes)
     entries = [

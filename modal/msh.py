@@ -13,6 +13,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from modal.store import replacing
+
 
 class MeshError(ValueError):
     """A mesh that cannot be read or does not hold what is asked of it; the message names file, group and remedy."""
@@ -20,7 +22,7 @@ class MeshError(ValueError):
 
 @contextlib.contextmanager
 def session(name: str) -> Iterator[None]:
-    """A silent gmsh session with one new model of that name; finalised even on errors.
+    """A silent gmsh session with one new model of that name; finalised even on errors. Raises MeshError for gmsh's own.
 
     Inside a session of the caller's own, only the model is added and removed again.
     """
@@ -36,6 +38,11 @@ def session(name: str) -> Iterator[None]:
     try:
         gmsh.model.add(name)
         yield
+    except Exception as error:
+        if type(error) is not Exception:
+            raise
+        # gmsh raises nothing narrower
+        raise MeshError(f"{name}: gmsh cannot make this mesh ({error}); check its lengths, in m") from error
     finally:
         if nested:
             gmsh.model.remove()
@@ -69,6 +76,18 @@ def merge(path: Path) -> None:
     if told and kept < int(told[-1][1]):
         lost = int(told[-1][1]) - kept
         raise MeshError(f"{path}: {lost} element numbers are given twice, of which gmsh keeps one; number them anew")
+
+
+def write(path: str | os.PathLike[str]) -> Path:
+    """Write the current model as gmsh 4.1 text. Returns the path. Raises StoreError when it cannot be written."""
+    gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+    with replacing(path) as temporary:
+        gmsh.write(str(temporary))
+        with temporary.open("rb") as file:
+            file.seek(-min(64, file.seek(0, os.SEEK_END)), os.SEEK_END)
+            if not file.read().rpartition(b"\n$")[2].startswith(b"End"):
+                raise OSError("gmsh wrote a part of it; is the disk full?")  # and says nothing
+    return Path(path)
 
 
 def groups(dimension: int) -> dict[str, int]:

@@ -14,6 +14,8 @@ import io
 import json
 import math
 import os
+import shutil
+import stat
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -24,9 +26,12 @@ import numpy as np
 
 SCHEMA_VERSION = 1
 
+#: where links stand for the files that processes have open
+_OPEN_FILES = Path("/proc")
+
 
 class StoreError(ValueError):
-    """A record file that cannot be read: missing, damaged, of another kind or of a newer schema."""
+    """A file that cannot be read (missing, damaged, of another kind, of a newer schema) or cannot be written."""
 
 
 class Variable(NamedTuple):
@@ -42,22 +47,59 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` on success, remove it on any failure.
 
     A killed or failing writer thus leaves the old file or none, never half a file. The temporary file keeps the suffix.
+    A link stays one, and the file that it leads to is replaced. What is no regular file (a device, a pipe) gets the
+    content once it is complete. Raises StoreError when it cannot be written: a full disk, no permission, no folder.
+    """
+    try:
+        target = destination(path)
+        if target is None:
+            with tempfile.TemporaryDirectory() as folder:
+                yield (content := Path(folder, Path(path).name))
+                with content.open("rb") as source, open(path, "wb") as stream:
+                    shutil.copyfileobj(source, stream)
+            return
+        if not target.parent.is_dir():
+            raise StoreError(f"{path}: the folder {target.parent} does not exist; create it first")
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+        os.close(handle)
+        temporary = Path(name)
+        try:
+            yield temporary
+            _sync(temporary)
+            mask = os.umask(0)
+            os.umask(mask)
+            temporary.chmod(0o666 & ~mask)
+            os.replace(temporary, target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def destination(path: str | os.PathLike[str]) -> Path | None:
+    """The regular file that a path names, there or not yet, past all links; None for a device, a pipe, an open file.
+
+    Raises OSError for links that lead round in a circle.
     """
     target = Path(path)
-    if not target.parent.is_dir():
-        raise StoreError(f"{target}: the folder {target.parent} does not exist; create it first")
-    handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
-    os.close(handle)
-    temporary = Path(name)
+    with contextlib.suppress(FileNotFoundError):
+        if not stat.S_ISREG(os.stat(target).st_mode):
+            return None
+    while target.is_symlink():
+        if _OPEN_FILES in target.parent.resolve().parents:
+            return None  # such as /dev/stdout: to replace it would leave the writer of the open file without one
+        target = target.parent / os.readlink(target)
+    return target
+
+
+def _sync(path: Path) -> None:
+    """Force a file to the disk: its new name must not reach it before the content."""
+    handle = os.open(path, os.O_RDONLY)
     try:
-        yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        os.replace(temporary, target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
@@ -137,18 +179,15 @@ def save(
             for axis, dimension in enumerate(variable.dims):
                 if name != dimension:
                     file[name].dims[axis].attach_scale(file[dimension])
-    try:
-        with replacing(path) as temporary, temporary.open("wb") as stream:
-            stream.write(image.getbuffer())
-            stream.flush()
-            os.fsync(stream.fileno())  # the new name must not reach the disk before the content
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be written ({error.strerror})") from error
+    with replacing(path) as temporary:
+        temporary.write_bytes(image.getbuffer())
 
 
 def clear_leftovers(path: str | os.PathLike[str]) -> None:
     """Remove the temporary files that killed writers of `path` have left beside it."""
-    target = Path(path)
+    target = destination(path)
+    if target is None:
+        return
     for file in target.parent.glob(f".{glob.escape(target.stem)}-{'?' * 8}{glob.escape(target.suffix)}"):
         file.unlink(missing_ok=True)
 

@@ -255,6 +255,8 @@ class _Problem:
 
 
 def _check_rank(jacobian: np.ndarray, problem: _Problem) -> None:
+    if not np.all(np.isfinite(jacobian)):
+        raise TuningError("modes: a target belongs to a rigid mode, which no stiffness changes; choose others")
     names = list(problem.parts)
     largest = np.abs(jacobian).max(axis=0)
     if largest.min() < _ALIKE:

@@ -11,10 +11,19 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from studies.interrupts import swallowed_interrupts_again
+
 _PACKAGES = ("modal", "rom", "coupling", "meshes", "studies")
 _ROOT = Path(__file__).resolve().parent.parent
 BAD_INPUT = 2
 _INTERRUPTED = 130
+#: hot spots are 2 % of the structure's size apart, and each is six outputs of the model
+_MOST_SPOTS = 1000
+#: packages that come with the system, and how to get them
+_SYSTEM = ("dolfinx", "petsc4py", "slepc4py", "ufl", "basix", "ffcx", "mpi4py")
+_FINITE_ELEMENTS = "apt install python3-dolfinx, or conda's environment.yml (CONTRIBUTING.md)"
+#: names of packages that are not those of their modules
+_ON_PYPI = {"vtkmodules": "vtk", "yaml": "pyyaml"}
 
 
 class _Parser(argparse.ArgumentParser):
@@ -25,16 +34,22 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line. Returns the exit status: 0, or 2 for bad input, told in one line on standard error.
+    """Run the command line. Returns the exit status: 0; 2 for bad input, or for files, memory or packages that are not
+    to be had, told in one line on standard error; 130 when interrupted.
 
     Under mpirun the first rank runs it, and the others help with the factorisations.
     """
-    if not _under_mpi() or _stranger() is not None:
-        return _main(argv)
-    from modal.petsc import ranks
+    try:
+        with swallowed_interrupts_again():
+            if not _under_mpi() or _stranger() is not None:
+                return _main(argv)
+            from modal.petsc import ranks
 
-    with ranks() as first:
-        return _main(argv) if first else 0
+            with ranks() as first:
+                return _main(argv) if first else 0
+    except KeyboardInterrupt:
+        print("vanedamp: interrupted", file=sys.stderr)
+        return _INTERRUPTED
 
 
 def _main(argv: Sequence[str] | None) -> int:
@@ -45,19 +60,35 @@ def _main(argv: Sequence[str] | None) -> int:
             f"the package `modal` at {stranger} is not the one of vanedamp (PyPI has another of that name); "
             "uninstall it with `pip uninstall modal`, then install vanedamp again"
         )
-    from studies import commands  # what each command needs is loaded when it is wanted
-
     try:
+        from studies import commands  # what each command needs is loaded when it is wanted
+
         getattr(commands, "import_model" if arguments.command == "import" else arguments.command)(arguments)
-    except ValueError as error:
-        # bad input has error classes of our own; any other ValueError is a fault of the program
-        if type(error).__module__.split(".")[0] not in _PACKAGES:
+        sys.stdout.flush()
+    except BrokenPipeError:  # nobody reads on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except (ValueError, OSError, ImportError, MemoryError) as error:
+        told = _told(error, getattr(arguments, "input", None))
+        if told is None:
             raise
-        return _refuse(_located(str(error), getattr(arguments, "input", None)))
-    except KeyboardInterrupt:
-        print("vanedamp: interrupted", file=sys.stderr)
-        return _INTERRUPTED
+        return _refuse(told)
     return 0
+
+
+def _told(error: Exception, file: str | None) -> str | None:
+    """What to say about bad input (in a file) and about what the machine lacks; None for a fault of the program."""
+    if isinstance(error, OSError):
+        where = error.filename or "standard output, or another file"
+        return f"{where}: {error.strerror}" if error.strerror else str(error)
+    if isinstance(error, MemoryError):
+        return f"not enough memory ({error or 'none left'}); make it smaller: the mesh, the model or the sweep"
+    if isinstance(error, ImportError):
+        package = (error.name or "").split(".")[0]
+        remedy = _FINITE_ELEMENTS if package in _SYSTEM else f"pip install {_ON_PYPI.get(package, package)}"
+        return None if package in ("", *_PACKAGES) else f"needs {package}, which cannot be loaded ({error}): {remedy}"
+    # bad input has error classes of our own; any other ValueError is a fault of the program
+    return _located(str(error), file) if type(error).__module__.split(".")[0] in _PACKAGES else None
 
 
 def _refuse(message: str) -> int:
@@ -145,7 +176,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
 
     reduce.add_argument(
-        "--hot-spots", type=_count, default=0, metavar="N",
+        "--hot-spots", type=_spots, default=0, metavar="N",
         help="keep the stresses at the N most stressed places of the first mode as outputs",
     )  # fmt: skip
 
@@ -201,6 +232,12 @@ def _parser() -> argparse.ArgumentParser:
 def _count(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"expected a count, not {text!r}")
+    return int(text)
+
+
+def _spots(text: str) -> int:
+    if _count(text) > _MOST_SPOTS:
+        raise argparse.ArgumentTypeError(f"expected at most {_MOST_SPOTS}, not {text}")
     return int(text)
 
 

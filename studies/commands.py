@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-import os
+import importlib.util
 import sys
 import time
 from argparse import Namespace
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from coupling.inputs import InputError
 from modal.store import clear_leftovers, finite, json_text, write_json
+from studies.files import check_outputs, checkpoint_file, keep, output_folder, refuse_input
 from studies.terminal import progress, tell_calibration, tell_modes, tell_sweep
 from studies.workers import workers
 
@@ -25,8 +25,9 @@ def mesh(arguments: Namespace) -> None:
     """Write the mesh of a case that names a generator."""
     from studies.config import Case, MeshFile
 
-    _check_outputs(arguments, output=(".msh",))
+    check_outputs(arguments, output=(".msh",))
     case = Case.load(arguments.input)
+    keep(arguments, case.files)
     if isinstance(case.mesh, MeshFile):
         raise InputError("mesh.file: the mesh exists already; to make one, name mesh.generator instead")
     case.mesh.build(arguments.output)
@@ -37,8 +38,11 @@ def modal(arguments: Namespace) -> None:
     """Modes, effective masses, rigid model."""
     from studies.config import Case
 
-    _check_outputs(arguments, vtk=(".vtu", ".vtk"))
+    check_outputs(arguments, vtk=(".vtu", ".vtk"))
+    if arguments.vtk and importlib.util.find_spec("pyvista") is None:  # told before the work
+        raise ModuleNotFoundError("--vtk writes with it", name="pyvista")
     case = Case.load(arguments.input)
+    keep(arguments, case.files)
     from studies.pipeline import assemble, modal_analysis
 
     analysis = modal_analysis(assemble(case))
@@ -60,8 +64,9 @@ def calibrate(arguments: Namespace) -> None:
     """Tuning, damping, rigid model, excitation."""
     from studies.config import Case
 
-    _check_outputs(arguments)
+    check_outputs(arguments)
     case = Case.load(arguments.input)
+    keep(arguments, case.files)
     from studies import calibration
 
     found = calibration.calibrate(case)
@@ -78,9 +83,12 @@ def matrices(arguments: Namespace) -> None:
     """Matrices for other codes."""
     from studies.config import Case
 
-    folder = _folder(arguments)
+    folder = output_folder(arguments)
     case = Case.load(arguments.input)
-    from modal.matrix_files import write_folder
+    from modal.matrix_files import FILES, write_folder
+
+    for name in FILES:
+        refuse_input("--output", folder / name, [arguments.input, *case.files])
     from studies.pipeline import assemble
 
     system = assemble(case).matrices
@@ -93,9 +101,10 @@ def reduce(arguments: Namespace) -> None:
     from rom.reduction import check_basis
     from studies.config import Case
 
-    _check_outputs(arguments)
+    check_outputs(arguments)
     check_basis(arguments.basis)
     case = Case.load(arguments.input)
+    keep(arguments, case.files)
     if not case.interface:
         raise InputError("interface: missing; a reduction needs at least one [interface.<label>] table")
     from studies.pipeline import assemble, reduction, unit_doubts, with_hot_spots
@@ -136,8 +145,10 @@ def import_model(arguments: Namespace) -> None:
     """Check another code's reduced model and keep it as one of ours."""
     from studies.external import External
 
-    _check_outputs(arguments)
-    model, findings, warnings = External.load(arguments.input)
+    check_outputs(arguments)
+    external = External.read(arguments.input)
+    keep(arguments, external.files(arguments.input))
+    model, findings, warnings = external.model(arguments.input)
     if arguments.output:
         model.save(arguments.output)
     result = {
@@ -159,10 +170,13 @@ def import_model(arguments: Namespace) -> None:
 
 def run(arguments: Namespace) -> None:
     """One scene."""
-    _check_outputs(arguments)
-    scene = _load_scene(arguments.input)
+    check_outputs(arguments)
+    scene = _load_scene(arguments)
     from coupling.engine import simulate
+    from studies.effort import check_run
     from studies.provenance import versions
+
+    check_run(scene, arguments.samples)
 
     response = simulate(scene, events=arguments.events, samples_per_period=arguments.samples)
     if arguments.output:
@@ -178,21 +192,23 @@ def run(arguments: Namespace) -> None:
 
 def sweep(arguments: Namespace) -> None:
     """A grid of runs; finished points are kept beside the result and taken up again after a kill."""
-    _check_outputs(arguments)
-    checkpoint = None if arguments.output is None else Path(f"{arguments.output}.partial")
+    check_outputs(arguments)
+    checkpoint = checkpoint_file(arguments.output)
     if arguments.resume and (checkpoint is None or not checkpoint.exists()):
         raise InputError(
             "--resume: name the result with -o, its checkpoint lies beside it"
             if checkpoint is None
             else f"--resume: nothing to resume, there is no checkpoint {checkpoint}; leave --resume out to begin"
         )
-    scene = _load_scene(arguments.input)
+    scene = _load_scene(arguments)
     from coupling.checkpoint import Checkpoint, clear
     from coupling.grid import grid
     from coupling.sweep import sweep as run_sweep
+    from studies.effort import check_sweep
     from studies.forced_response import forced_responses
     from studies.provenance import versions
 
+    check_sweep(scene, arguments.workers)
     # processes are slow to start: a bad grid or the checkpoint of another sweep is told before
     points, provenance = grid(scene), {"versions": versions()}
     resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
@@ -218,12 +234,15 @@ def sweep(arguments: Namespace) -> None:
 
 def optimise(arguments: Namespace) -> None:
     """Mass, gap and number of bodies that reduce most, as designed and within tolerances."""
-    _check_outputs(arguments)
+    check_outputs(arguments)
+    from studies.effort import check_optimise
     from studies.optimise import optimise as search
     from studies.optimise_study import Study
     from studies.provenance import versions
 
     study = Study.load(arguments.input)
+    keep(arguments, study.scene.files)
+    check_optimise(study, arguments.workers)
     _tell_resonance(arguments.input, study.scene)
     with workers(arguments.workers) as pool, progress("optimise") as report:
         found = search(study, pool, report, {"versions": versions()})
@@ -238,11 +257,13 @@ def optimise(arguments: Namespace) -> None:
 
 def report(arguments: Namespace) -> None:
     """One HTML page of results."""
-    _check_outputs(arguments, output=(".html", ".htm"))
+    check_outputs(arguments, output=(".html", ".htm"))
     from studies.report import write_report
     from studies.results import collect
 
-    write_report(collect(arguments.inputs), arguments.output)
+    results = collect(arguments.inputs)
+    keep(arguments, results.files)
+    write_report(results, arguments.output)
     print(f"{arguments.output}: report")
 
 
@@ -250,14 +271,14 @@ def paper(arguments: Namespace) -> None:
     """The paper's figures as studies."""
     from studies.paper import run_paper
 
-    run_paper(_folder(arguments), arguments.studies, arguments.workers, arguments.resume)
+    run_paper(output_folder(arguments), arguments.studies, arguments.workers, arguments.resume)
 
 
 def demo(arguments: Namespace) -> None:
     """The whole pipeline on the shipped mesh."""
     from studies.demo import run_demo
 
-    run_demo(Path(arguments.output), arguments.workers)
+    run_demo(output_folder(arguments), arguments.workers)
 
 
 #: module of studies, function and files of each benchmark
@@ -273,18 +294,11 @@ _BENCHES = {
 
 def bench(arguments: Namespace) -> None:
     """Speed and accuracy, measured on this machine."""
-    folder = _folder(arguments)
+    folder = output_folder(arguments)
     module, function, files = _BENCHES[arguments.study]
     study = importlib.import_module(f"studies.{module}")
     study.tell(getattr(study, function)(folder, study.QUICK if arguments.quick else study.FULL))
     print(f"{folder}: {files}.json and figures")
-
-
-def _folder(arguments: Namespace) -> Path:
-    folder = Path(arguments.output)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--output {folder}: expected a folder, not a file")
-    return folder
 
 
 def _tell_choice(source: str, estimate: Mapping[str, Any] | None, warnings: Iterable[str]) -> None:
@@ -320,28 +334,19 @@ def _tell_resonance(source: str, scene: Scene) -> dict[str, Any]:
     return {"resonance": {"frequency": found.frequency, "mode": found.mode, "force": force}}
 
 
-def _load_scene(path: str) -> Scene:
+def _load_scene(arguments: Namespace) -> Scene:
     from coupling.scene import Rom, Scene
 
-    scene = Scene.load(path)
+    scene = Scene.load(arguments.input)
+    keep(arguments, scene.files)
     if isinstance(scene.structure, Rom) and not Path(scene.structure.file).is_file():
         raise InputError(f"structure.file: no such file {scene.structure.file}; `vanedamp reduce` writes one")
+    if not scene.moved:
+        raise InputError(
+            "excitation: nothing moves the structure; give force, base_acceleration or resonance_amplitude, or an "
+            "[initial] state"
+        )
     return scene
-
-
-def _check_outputs(arguments: Namespace, **suffixes: tuple[str, ...]) -> None:
-    """Refuse files that could not be written, before the work."""
-    for option in ("output", "json", "vtk"):
-        name = getattr(arguments, option, None)
-        if name is None or (option == "json" and name == "-"):
-            continue
-        path = Path(name)
-        if path.is_dir() or not path.parent.is_dir():
-            raise InputError(f"--{option} {name}: " + ("is a folder" if path.is_dir() else "its folder does not exist"))
-        if not os.access(path.parent, os.W_OK):
-            raise InputError(f"--{option} {name}: its folder cannot be written to")
-        if path.suffix not in suffixes.get(option, (path.suffix,)):
-            raise InputError(f"--{option} {name}: expected a file name ending in {' or '.join(suffixes[option])}")
 
 
 def _write_json(target: str | None, data: Mapping[str, Any]) -> None:

@@ -247,6 +247,14 @@ class Case:
         return case
 
     @property
+    def files(self) -> list[str]:
+        """The files that the case names: mesh and measurements."""
+        mesh = self.mesh.file if isinstance(self.mesh, MeshFile) else None
+        damping = self.calibration.damping.frf if self.calibration and self.calibration.damping else None
+        tune = self.calibration.tune.shapes if self.calibration and self.calibration.tune else None
+        return [file for file in (mesh, self.modes.shape, damping, tune) if file is not None]
+
+    @property
     def damping_ratio(self) -> float:
         """Modal damping ratio of every mode; zero when the file names none."""
         if self.modes.damping_ratio is not None:
@@ -333,14 +341,21 @@ def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
             raise InputError(
                 f"{path}: mesh.generator: no generator {generator!r}; {_known(str(generator), GENERATORS)}"
             )
-        known = ["generator", "degree", *(item.name for item in fields(GENERATORS[str(generator)]))]
+        known = ["generator", "degree", *_names(GENERATORS[str(generator)])]
     for key in mesh:
+        owners = [f'generator = "{name}"' for name, record in GENERATORS.items() if key in _names(record)]
+        if key not in known and generator is None and owners:
+            raise InputError(f"{path}: mesh.{key}: belongs to {' or '.join(owners)}, not to a file")
         if key not in known:
             raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, known)}")
     if isinstance(file, str):
         mesh["file"] = str(Path(path).parent / file)
         if not Path(mesh["file"]).is_file():
             raise InputError(f"{path}: mesh.file: no such file {mesh['file']}; `vanedamp mesh` writes one")
+
+
+def _names(record: Any) -> list[str]:
+    return [item.name for item in fields(record)]
 
 
 def _check_group(key: str, group: str, known: Mapping[str, list[str]]) -> None:

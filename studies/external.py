@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import asdict, field
 from pathlib import Path
 from typing import Annotated
 
@@ -65,12 +65,24 @@ class External:
 
     @classmethod
     def load(cls, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
-        """The checked model that a file describes, with warnings; the files it names are relative to it.
+        """The checked model that a file describes, with warnings. Raises what `read` and `model` raise."""
+        return cls.read(path).model(path)
+
+    @classmethod
+    def read(cls, path: str | Path) -> External:
+        """The tables of a TOML file. Raises InputError."""
+        return validate(cls, read_toml(path), str(path))
+
+    def files(self, path: str | Path) -> list[Path]:
+        """The files that the tables of the file `path` may name, relative to it."""
+        return [Path(path).parent / name for name in asdict(self.matrices).values() if isinstance(name, str)]
+
+    def model(self, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
+        """The checked model from the tables of the file `path`, with warnings; the files they name are relative to it.
 
         Raises InputError, rom.external.ExternalError and rom.reduced.ReducedModelError.
         """
-        external = validate(cls, read_toml(path), str(path))
-        table = external.matrices
+        table = self.matrices
         folder = Path(path).parent
         found = {} if table.file is None else read_matrices(folder / table.file)
         names = {key: getattr(table, key) for key in ("mass", "stiffness", "damping", "base_load")}
@@ -82,13 +94,13 @@ class External:
         damping, base_load = matrices.pop("damping", None), matrices.pop("base_load", None)
         interface: dict[str, int | np.ndarray] = {
             label: int(item.coordinate or 0) if item.row is None else np.array(item.row)
-            for label, item in external.interface.items()
+            for label, item in self.interface.items()
         }
-        directions = {label: item.direction for label, item in external.interface.items() if item.direction}
+        directions = {label: item.direction for label, item in self.interface.items() if item.direction}
         model, findings = external_model(
             matrices["mass"], matrices["stiffness"], interface, damping=damping, damping_ratio=table.damping_ratio,
             directions=directions, base_load=base_load,
-            provenance={"source": str(external.name or Path(path).name), "matrices": names, "versions": versions()},
+            provenance={"source": str(self.name or Path(path).name), "matrices": names, "versions": versions()},
         )  # fmt: skip
         return model, findings, _doubts(model)
 

@@ -207,7 +207,8 @@ class _Trial:
                 self.study.point(designs[place], deviation, float(frequency))
                 for place in places for deviation in sample for frequency in table.frequencies
             ]  # fmt: skip
-            finished = run_list(self.study.with_bodies(count), points, self._executor)
+            finished = run_list(self.study.with_bodies(count), points, self._executor, self._tell)
+            self.scenes += len(points)
             ok = finished.text("status") == "ok"
             self.trouble += int(np.count_nonzero(~ok))
             for name, amplitudes in ((table.measure, damped), ("amplitude_undamped", undamped)):
@@ -215,10 +216,12 @@ class _Trial:
                 if amplitudes is damped:
                     values = np.where(ok, values, np.nan)
                 amplitudes[places] = values.reshape(len(places), *shape[1:]) / levels
-        self.scenes += math.prod(shape)
-        if self._progress is not None:
-            self._progress(self.scenes, max(self._expected, self.scenes))
         return damped, undamped
+
+    def _tell(self, done: int) -> None:
+        """Show progress: so many runs of the list at hand."""
+        if self._progress is not None:
+            self._progress(self.scenes + done, max(self._expected, self.scenes + done))
 
 
 def _plain(data: Any) -> Any:

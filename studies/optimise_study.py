@@ -18,6 +18,8 @@ from coupling.linear import LinearResponse, linear_responses
 from coupling.scene import Damper, Prescribed, Range, Rom, Scene, axis_values
 from coupling.structure import Resonance, chosen_resonance, excitation_force, linear_structure
 
+_MOST_FREQUENCIES = 10_000
+
 
 def _bounds(value: Any) -> Any:
     """One number is a variable that is held."""
@@ -63,8 +65,8 @@ class Tolerances:
 class Map:
     """Points of the map along mass ratio and gap ratio."""
 
-    mass_ratio: Annotated[Whole, Field(ge=2)] = 9
-    gap_ratio: Annotated[Whole, Field(ge=2)] = 12
+    mass_ratio: Annotated[Whole, Field(ge=2, le=1000)] = 9
+    gap_ratio: Annotated[Whole, Field(ge=2, le=1000)] = 12
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -83,14 +85,21 @@ class Optimise:
     measure: Literal["amplitude_mean", "amplitude_max"] = "amplitude_mean"
     over_band: Literal["worst", "mean"] = "worst"
     over_tolerances: Literal["worst", "mean"] = "worst"
-    samples: Annotated[Whole, Field(ge=1)] = 12
-    evaluations: Annotated[Whole, Field(ge=5)] = 150
+    samples: Annotated[Whole, Field(ge=1, le=10_000)] = 12
+    evaluations: Annotated[Whole, Field(ge=5, le=100_000)] = 150
     seed: Annotated[Whole, Field(ge=0)] = 1
 
     def __post_init__(self) -> None:
+        if self.count > _MOST_FREQUENCIES:
+            raise ValueError(f"band: {self.count} frequencies; at most {_MOST_FREQUENCIES}")
         for before, after in itertools.pairwise(self.frequencies.tolist()):
             if after <= before:
                 raise ValueError(f"band: expected frequencies that rise, not {after:g} Hz after {before:g} Hz")
+
+    @property
+    def count(self) -> int:
+        """Number of frequencies."""
+        return self.band.num if isinstance(self.band, Range) else len(self.band)
 
     @property
     def frequencies(self) -> np.ndarray:

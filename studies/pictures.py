@@ -74,7 +74,25 @@ def save_vtk(modes: Modes, coordinates: np.ndarray, cells: np.ndarray, cell_type
     for number, (frequency, shape) in enumerate(zip(modes.frequencies_hz, modes.shapes, strict=True), start=1):
         grid.point_data[f"mode {number}: {frequency:.6g} Hz"] = shape.reshape(-1, 3)
     with replacing(path) as temporary:
-        grid.save(temporary)
+        temporary.write_bytes(_vtk_bytes(grid, xml=Path(path).suffix == ".vtu"))
+
+
+def _vtk_bytes(grid: Any, xml: bool) -> bytes:
+    """The content of a .vtu (xml) or .vtk file: on a full disk VTK's own writers end the process, or say nothing."""
+    from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    writer: Any = vtkXMLUnstructuredGridWriter() if xml else vtkUnstructuredGridWriter()
+    writer.SetInputDataObject(grid)
+    writer.SetWriteToOutputString(True)
+    if xml:
+        writer.SetDataModeToBinary()
+    else:
+        writer.SetFileTypeToBinary()
+    writer.Write()
+    content = writer.GetOutputString() if xml else writer.GetOutputStdString()
+    # VTK gives text where the bytes are some
+    return content if isinstance(content, bytes) else content.encode()
 
 
 def _grid(coordinates: np.ndarray, cells: np.ndarray, cell_type: int) -> Any:

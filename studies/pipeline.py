@@ -283,6 +283,8 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, mo
         for place in found:
             stress[np.linalg.norm(places - places[place], axis=1) < apart] = 0.0
         for _ in range(spots):
+            if not stress.any():
+                raise InputError(f"hot spots: {len(found)} are all that lie 2 % of the structure's size apart")
             found.append(int(np.argmax(stress)))
             stress[np.linalg.norm(places - places[found[-1]], axis=1) < apart] = 0.0
     values = np.array([solid.stress_components(column, np.array(found)) for column in model.recovery.T])

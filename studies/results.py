@@ -53,6 +53,11 @@ class Results:
     studies: dict[str, Study] = field(default_factory=dict)
 
     @property
+    def files(self) -> list[str]:
+        """Every file that was read."""
+        return [file for records in vars(self).values() for file in records]
+
+    @property
     def names(self) -> dict[str, str]:
         """What to call every file of a record."""
         return short_names([*self.modes, *self.reduced, *self.sweeps, *self.histories, *self.optimisations])

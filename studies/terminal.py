@@ -28,6 +28,9 @@ def tell_sweep(result: Any) -> None:
     from studies.forced_response import forced_responses
 
     for response in forced_responses(result):
+        if not response.reference > 0:
+            print(f"{response.name}: nothing excites the structure, and there is no undamped maximum to compare with")
+            continue
         print(response.sentence)
     bad = [status for status in result.status.ravel() if status != "ok"]
     if bad:

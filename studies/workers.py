@@ -10,6 +10,8 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from contextlib import contextmanager
 from typing import Any
 
+from studies.interrupts import uninterrupted_children
+
 
 class WorkerPool(Executor):
     """A process pool that starts anew after the death of a worker, which breaks a pool of the standard library."""
@@ -20,16 +22,24 @@ class WorkerPool(Executor):
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
         """Run a call in a worker. What a broken pool has lost is not run again."""
-        try:
-            return self._pool.submit(function, *arguments, **options)
-        except BrokenExecutor:
-            self._pool.shutdown(wait=False)
-            self._pool = self._new()
-            return self._pool.submit(function, *arguments, **options)
+        with uninterrupted_children():  # submit starts them
+            try:
+                return self._pool.submit(function, *arguments, **options)
+            except BrokenExecutor:
+                self._pool.shutdown(wait=False)
+                self._pool = self._new()
+                return self._pool.submit(function, *arguments, **options)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the workers."""
+        """End the workers once they have done their work."""
         self._pool.shutdown(wait, cancel_futures=cancel_futures)
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """End the workers; in the middle of their work after an error or an interrupt."""
+        if kind is not None:
+            for process in list((self._pool._processes or {}).values()):
+                process.terminate()
+        self.shutdown(cancel_futures=kind is not None)
 
     def _new(self) -> ProcessPoolExecutor:
         # fresh processes: a fork of one that holds MPI or threads is not safe
@@ -60,11 +70,7 @@ def workers(count: int | None) -> Iterator[Executor | None]:
         from coupling.sweep import warm_up
 
         pool.submit(warm_up).result()
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        yield pool
 
 
 def available_cores() -> int:

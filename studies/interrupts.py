@@ -1,0 +1,51 @@
+"""Ctrl-C: one line from the parent, none from its workers, and it is never lost."""
+
+from __future__ import annotations
+
+import _thread
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+# s, in which the callback that swallowed an interrupt has ended
+_SOON = 0.02
+
+
+@contextmanager
+def swallowed_interrupts_again() -> Iterator[None]:
+    """An interrupt that a callback cannot pass on comes again: LLVM has some while compiled functions are loaded."""
+    before, again = sys.unraisablehook, list[threading.Timer]()
+
+    def hook(unraisable: Any) -> None:
+        if unraisable.exc_type is not None and issubclass(unraisable.exc_type, KeyboardInterrupt):
+            again.append(threading.Timer(_SOON, _thread.interrupt_main))
+            again[-1].start()
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+        for timer in again:
+            timer.join()
+    finally:
+        sys.unraisablehook = before
+
+
+@contextmanager
+def uninterrupted_children() -> Iterator[None]:
+    """Processes that are started meanwhile never see an interrupt: they inherit that it is blocked.
+
+    To have them ignore it is too late, and shows a traceback, for an interrupt while they load.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,311 @@
+"""Files of the command: links, devices and pipes, outputs that are inputs, full disks; packages that are missing."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from cases import DAMPED_BLOCK
+
+from meshes.benchmarks import Block, build
+from modal.matrix_files import FILES
+from modal.store import StoreError, Variable, load, replacing, save
+from rom.reduced import ReducedModel
+from studies.cli import BAD_INPUT, main
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENE = """
+[structure]
+model = "rigid"
+mass = 1.0
+stiffness = 1e4
+damping_ratio = 0.01
+[excitation]
+frequency = 15.9
+force = 1.0
+[time]
+periods = 30
+[sweep]
+"excitation.frequency" = [15.7, 15.8, 15.9]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A working directory with a case, a scene, and the files that a rom scene and a case with a mesh name."""
+    (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
+    (tmp_path / "scene.toml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def vanedamp(*arguments, cwd, **environment):
+    """The command as a process of its own."""
+    variables = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return subprocess.run(
+        [sys.executable, "-m", "studies", *arguments], cwd=cwd, capture_output=True, text=True, check=False,
+        env=variables | {"PYTHONPATH": str(ROOT)} | environment,
+    )  # fmt: skip
+
+
+# links, devices, pipes
+
+
+def test_links_stay_and_their_targets_are_replaced(folder):
+    (folder / "results").mkdir()
+    (folder / "there.h5").symlink_to("results/there.h5")
+    (folder / "results/there.h5").write_text("old")
+    (folder / "new.h5").symlink_to("over.h5")
+    (folder / "over.h5").symlink_to(folder / "results/new.h5")
+    for link in ("there.h5", "new.h5"):
+        assert main(["run", "scene.toml", "-o", link]) == 0
+        assert (folder / link).is_symlink()
+        assert "period" in load(folder / "results" / link, "response")[0]
+    assert (folder / "over.h5").is_symlink()
+    assert sorted(path.name for path in (folder / "results").iterdir()) == ["new.h5", "there.h5"]
+
+
+def test_pipes_get_the_whole_content(folder):
+    os.mkfifo(folder / "pipe.h5")
+    taken = []
+    reader = threading.Thread(target=lambda: taken.append((folder / "pipe.h5").read_bytes()))
+    reader.start()
+    assert main(["run", "scene.toml", "-o", "pipe.h5"]) == 0
+    reader.join()
+    assert (folder / "pipe.h5").is_fifo()
+    (folder / "copy.h5").write_bytes(taken[0])
+    assert main(["run", "scene.toml", "-o", "file.h5"]) == 0
+    assert load("copy.h5", "response")[0]["peak"].tolist() == load("file.h5", "response")[0]["peak"].tolist()
+
+
+def test_sweep_into_a_device_leaves_nothing_beside_it(folder):
+    assert main(["sweep", "scene.toml", "-o", os.devnull, "--json", os.devnull, "--workers", "1"]) == 0
+    assert Path(os.devnull).is_char_device()
+    assert not Path(f"{os.devnull}.partial").exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="no device that is full")
+def test_full_device():
+    with pytest.raises(StoreError, match=r"/dev/full: cannot be written \(No space left on device\)"):
+        save("/dev/full", "none", {"a": Variable([1.0], ("n",))})
+    assert Path("/dev/full").is_char_device()
+
+
+def test_links_in_a_circle(folder, capfd):
+    (folder / "one.h5").symlink_to("two.h5")
+    (folder / "two.h5").symlink_to("one.h5")
+    assert main(["run", "scene.toml", "-o", "one.h5"]) == BAD_INPUT
+    assert "--output one.h5: cannot be written" in capfd.readouterr().err
+
+
+def test_standard_output_by_its_name(folder):
+    finished = vanedamp("run", "scene.toml", "--json", "/dev/stdout", cwd=folder)
+    assert finished.returncode == 0
+    assert json.loads(finished.stdout)["status"] == "ok"
+    finished = vanedamp("run", "scene.toml", "-o", "/dev/stdout", cwd=folder)
+    assert finished.returncode == BAD_INPUT
+    assert "is standard output, where the summary goes" in finished.stderr
+
+
+# inputs
+
+
+def _rom_scene(folder):
+    ReducedModel.from_matrices([[1.0]], [[1e4]], {"tip": [1.0]}, damping_ratio=0.01).save(folder / "rom.h5")
+    text = SCENE.replace('"rigid"', '"rom"\nfile = "rom.h5"').replace("force", 'at = "tip"\nforce')
+    (folder / "rom.toml").write_text(text.replace("mass = 1.0\nstiffness = 1e4\ndamping_ratio = 0.01", ""))
+
+
+def _mesh_case(folder):
+    build(Block(0.1, 0.02, 0.01, divisions=(2, 1, 1)), folder / "block.msh")
+    rest = DAMPED_BLOCK.split("[material.default]")[1]
+    (folder / "mesh.toml").write_text('[mesh]\nfile = "block.msh"\n[material.default]' + rest)
+    (folder / "shapes.csv").write_text("precious")
+    (folder / "shape.toml").write_text(
+        (folder / "mesh.toml").read_text().replace("[modes]", '[modes]\nshape = "shapes.csv"')
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "input_file"),
+    [
+        (["run", "scene.toml", "-o", "scene.toml"], "scene.toml"),
+        (["run", "scene.toml", "--json", "./scene.toml"], "scene.toml"),
+        (["run", "scene.toml", "-o", "hard.h5"], "scene.toml"),
+        (["run", "scene.toml", "-o", "soft.h5"], "scene.toml"),
+        (["run", "rom.toml", "-o", "rom.h5"], "rom.h5"),
+        (["sweep", "rom.toml", "-o", "rom.h5"], "rom.h5"),
+        (["sweep", "it.h5.partial", "-o", "it.h5"], "it.h5.partial"),
+        (["modal", "mesh.toml", "-o", "block.msh"], "block.msh"),
+        (["reduce", "mesh.toml", "--json", "block.msh"], "block.msh"),
+        (["modal", "shape.toml", "-o", "shapes.csv"], "shapes.csv"),
+        (["matrices", "nodes.csv", "-o", "."], "nodes.csv"),
+        (["import", "external.toml", "-o", "mass.mtx"], "mass.mtx"),
+        (["report", "response.html", "-o", "response.html"], "response.html"),
+    ],
+)
+def test_inputs_are_kept(arguments, input_file, folder, capfd):
+    _rom_scene(folder)
+    _mesh_case(folder)
+    os.link("scene.toml", "hard.h5")
+    os.symlink("scene.toml", "soft.h5")
+    (folder / "it.h5.partial").write_text(SCENE)
+    (folder / "nodes.csv").write_text(DAMPED_BLOCK)
+    (folder / "mass.mtx").write_text("precious")
+    (folder / "external.toml").write_text(
+        '[matrices]\nmass = "mass.mtx"\nstiffness = "mass.mtx"\ndamping_ratio = 0.0\n[interface.tip]\ncoordinate = 0\n'
+    )
+    (folder / "response.html").write_text("precious")
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert main(arguments) == BAD_INPUT
+    error = capfd.readouterr().err
+    assert error.count("\n") == 1
+    assert "is an input" in error and input_file in error
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    "outputs",
+    [
+        ["-o", "out", "--json", "out"],
+        ["-o", "out", "--json", "./out"],
+        ["-o", "one", "--json", "two"],
+        ["-o", "out", "--json", "out.partial"],
+    ],
+)
+def test_two_outputs_are_two_files(outputs, folder, capfd):
+    (folder / "one").symlink_to("there")
+    (folder / "two").symlink_to("there")
+    assert main(["sweep", "scene.toml", *outputs]) == BAD_INPUT
+    assert "name two files" in capfd.readouterr().err
+    assert not (folder / "there").exists()
+
+
+# full disks
+
+
+@pytest.fixture
+def small_files():
+    """A function after which no file grows beyond so many bytes: to a writer, that is a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda most: resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "output", "most"),
+    [
+        (["run", "scene.toml", "-o", "response.h5"], "response.h5", 3000),
+        (["run", "scene.toml", "--json", "response.json"], "response.json", 100),
+        (["mesh", "case.toml", "-o", "block.msh"], "block.msh", 3000),
+        (["modal", "case.toml", "--vtk", "modes.vtu"], "modes.vtu", 3000),
+        (["modal", "case.toml", "--vtk", "modes.vtk"], "modes.vtk", 3000),
+        (["matrices", "case.toml", "-o", "matrices"], "matrices/stiffness.mtx", 60000),
+        (["report", "response.h5", "-o", "report.html"], "report.html", 100_000),
+    ],
+)
+def test_full_disk(arguments, output, most, folder, small_files, capfd, monkeypatch):
+    if arguments[0] == "report":
+        assert main(["run", "scene.toml", "-o", "response.h5"]) == 0
+    if "--vtk" in arguments or arguments[0] == "matrices":
+        # what dolfinx compiles and the mesh on its way fit
+        from studies import pipeline
+        from studies.config import Case
+
+        structure = pipeline.assemble(Case.load("case.toml"))
+        monkeypatch.setattr(pipeline, "assemble", lambda case: structure)
+    assert main(arguments) == 0
+    before = (folder / output).read_bytes()
+    capfd.readouterr()
+    small_files(most)
+    assert main(arguments) == BAD_INPUT
+    error = capfd.readouterr().err
+    assert error.count("\n") == 1
+    assert f"{output}: cannot be written" in error
+    assert (folder / output).read_bytes() == before
+    assert not [path for path in folder.rglob(".*")]
+    assert set(os.listdir("matrices")) == set(FILES) if output.startswith("matrices") else True
+
+
+def test_full_standard_output(folder):
+    with open("/dev/full", "w") as full:
+        finished = subprocess.run(
+            [sys.executable, "-m", "studies", "run", "scene.toml", "--json", "-"], cwd=folder, stdout=full,
+            stderr=subprocess.PIPE, text=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )  # fmt: skip
+    assert finished.returncode == BAD_INPUT
+    assert finished.stderr == "vanedamp: standard output, or another file: No space left on device\n"
+
+
+def test_nobody_reads_on(folder):
+    command = f"{sys.executable} -m studies run scene.toml --events --json - | head -c 1"
+    finished = subprocess.run(
+        command, shell=True, cwd=folder, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}
+    )
+    assert (finished.stdout, finished.stderr) == ("{", "")
+
+
+def test_leftovers_beside_the_target_of_a_link(tmp_path):
+    from modal.store import clear_leftovers
+
+    (tmp_path / "far").mkdir()
+    (tmp_path / "link.h5").symlink_to("far/it.h5")
+    with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "link.h5") as temporary:
+        temporary.write_text("half")
+        raise KeyboardInterrupt
+    (tmp_path / "far" / ".it-12345678.h5").write_text("half")
+    clear_leftovers(tmp_path / "link.h5")
+    assert not list((tmp_path / "far").iterdir())
+
+
+# inputs that cannot be read, packages and folders that are missing
+
+
+@pytest.mark.parametrize("command", ["modal", "run", "sweep", "optimise", "import", "report"])
+def test_folders_are_no_files(command, folder, capfd):
+    (folder / "it.h5").mkdir()
+    assert main([command, "it.h5", *(["-o", "report.html"] if command == "report" else [])]) == BAD_INPUT
+    error = capfd.readouterr().err
+    assert error.count("\n") == 1 and "it.h5" in error
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root reads every file")
+def test_files_without_permission(folder, capfd):
+    (folder / "scene.toml").chmod(0)
+    assert main(["run", "scene.toml"]) == BAD_INPUT
+    assert "scene.toml: cannot be read" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("package", "arguments", "remedy"),
+    [
+        ("dolfinx", ["modal", "case.toml"], "apt install python3-dolfinx"),
+        ("gmsh", ["mesh", "case.toml", "-o", "block.msh"], "pip install gmsh"),
+        ("pyvista", ["modal", "case.toml", "--vtk", "modes.vtu"], "pip install pyvista"),
+        ("plotly", ["report", "response.h5", "-o", "report.html"], "pip install plotly"),
+        ("h5py", ["run", "scene.toml"], "pip install h5py"),
+    ],
+)
+def test_missing_packages(package, arguments, remedy, folder):
+    (folder / "empty" / package).mkdir(parents=True)
+    absent = f"raise ModuleNotFoundError('No module named {package}', name='{package}')"
+    (folder / "empty" / package / "__init__.py").write_text(absent)
+    if arguments[0] == "report":
+        assert main(["run", "scene.toml", "-o", "response.h5"]) == 0
+    finished = vanedamp(*arguments, cwd=folder, PYTHONPATH=f"{folder / 'empty'}{os.pathsep}{ROOT}")
+    assert finished.returncode == BAD_INPUT
+    assert finished.stderr.count("\n") == 1
+    assert finished.stderr.startswith(f"vanedamp: needs {package}, which cannot be loaded")
+    assert remedy in finished.stderr
+
+
+def test_no_folder_for_compiled_functions(folder):
+    nowhere = {"NUMBA_CACHE_DIR": f"{os.devnull}/cache", "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator"}
+    finished = vanedamp("run", "scene.toml", cwd=folder, **nowhere)
+    assert finished.returncode == BAD_INPUT
+    assert finished.stderr.count("\n") == 1
+    assert "set NUMBA_CACHE_DIR" in finished.stderr

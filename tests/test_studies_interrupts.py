@@ -1,0 +1,139 @@
+"""Ctrl-C: every process of the group gets the signal, one line comes out, and nothing stays behind."""
+
+import contextlib
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from studies.interrupts import swallowed_interrupts_again
+
+ROOT = Path(__file__).resolve().parent.parent
+# hours of work
+SCENE = """
+[structure]
+model = "rigid"
+mass = 1.0
+stiffness = 1e4
+damping_ratio = 0.01
+[excitation]
+frequency = 15.9
+resonance_amplitude = 1e-3
+[[cavity]]
+name = "c1"
+gap = 2e-4
+[[damper]]
+cavity = "c1"
+mass = 0.05
+friction = 0.3
+restitution = 0.6
+[time]
+periods = 2000
+[sweep]
+"excitation.frequency" = {start = 15.4, stop = 16.2, num = 100_000}
+"""
+#: the command; it sends the signal to its process group at the n-th event of a kind
+PROGRAM = """
+import os, signal, sys
+event, end, left = sys.argv[1], sys.argv[2], int(sys.argv[3])
+def watch(name, arguments):
+    global left
+    if name == event and str(arguments[0]).endswith(end):
+        left -= 1
+        if left == 0:
+            os.killpg(0, signal.SIGINT)
+sys.addaudithook(watch)
+from studies.cli import main
+sys.exit(main(sys.argv[4:]))
+"""
+
+
+def sweep(folder, workers, event="none", end="", count=1):
+    """The sweep in a process group of its own; its standard output and error are pipes."""
+    (folder / "scene.toml").write_text(SCENE)
+    (folder / "sweep.h5").write_text("precious")
+    command = ["sweep", "scene.toml", "-o", "sweep.h5", "--workers", str(workers)]
+    return subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, event, end, str(count), *command], cwd=folder, start_new_session=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+
+
+def until(condition):
+    """Wait for what will happen."""
+    while not condition():
+        time.sleep(0.01)
+
+
+def members(group):
+    """Processes of a process group."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            state, _, pgrp = process.read_text().rpartition(")")[2].split()[:3]
+            found += [process.parent.name] if int(pgrp) == group and state != "Z" else []
+    return found
+
+
+def check(process, folder):
+    out, error = process.communicate()
+    assert (process.returncode, out, error) == (130, "", "vanedamp: interrupted\n")
+    until(lambda: not members(process.pid))
+    assert (folder / "sweep.h5").read_text() == "precious"
+    assert {path.name for path in folder.iterdir()} <= {"scene.toml", "sweep.h5", "sweep.h5.partial"}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize(
+    ("event", "end", "count"),
+    [
+        ("import", "studies.commands", 1),
+        ("open", "scene.toml", 1),
+        ("import", "coupling.sweep", 1),
+        ("import", "numba.core.caching", 1),
+        ("import", "coupling.automaton", 1),
+        ("import", "tqdm", 1),
+        ("os.rename", ".partial", 1),
+        ("os.rename", ".partial", 2),
+    ],
+)
+def test_interrupt_at_an_event(event, end, count, workers, tmp_path):
+    check(sweep(tmp_path, workers, event, end, count), tmp_path)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_interrupt_while_compiled_functions_are_loaded(count, tmp_path):
+    check(sweep(tmp_path, 1, "open", ".nbc", count), tmp_path)
+
+
+@pytest.mark.parametrize("processes", [2, 3, 4])
+def test_interrupt_while_workers_start(processes, tmp_path):
+    process = sweep(tmp_path, 2)
+    until(lambda: len(members(process.pid)) >= processes)
+    os.killpg(process.pid, signal.SIGINT)
+    check(process, tmp_path)
+
+
+def test_interrupt_while_workers_work(tmp_path):
+    process = sweep(tmp_path, 2)
+    until((tmp_path / "sweep.h5.partial").exists)
+    os.killpg(process.pid, signal.SIGINT)
+    check(process, tmp_path)
+
+
+def test_interrupts_that_a_callback_swallows_come_again():
+    @ctypes.CFUNCTYPE(None)
+    def callback():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), swallowed_interrupts_again():
+        callback()
+    before = sys.unraisablehook
+    with swallowed_interrupts_again():
+        assert sys.unraisablehook is not before
+    assert sys.unraisablehook is before

@@ -1,0 +1,198 @@
+"""One line for what is wrong: in files that look right, and for work that nobody would wait for."""
+
+import pytest
+from cases import BLOCK, changed
+
+from coupling.engine import simulate
+from coupling.scene import Scene
+from meshes.benchmarks import Block
+from meshes.parameters import ParameterError
+from meshes.vane_cluster import VaneCluster
+from studies.cli import BAD_INPUT, main
+
+SCENE = """
+[structure]
+model = "rigid"
+mass = 1.0
+stiffness = 1e4
+damping_ratio = 0.01
+[excitation]
+frequency = 15.9
+force = 1.0
+[[cavity]]
+name = "c1"
+gap = 2e-4
+[[damper]]
+cavity = "c1"
+mass = 0.05
+[time]
+periods = 30
+[sweep]
+"excitation.frequency" = [15.8, 15.9]
+"""
+RANGE = '"excitation.frequency" = [15.8, 15.9]'
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", ["run", "modal"])
+def test_files_with_a_mark_of_their_encoding(command, folder):
+    text = SCENE if command == "run" else changed(BLOCK, ("divisions = [6, 2, 1]", "divisions = [2, 1, 1]\ndegree = 1"))
+    (folder / "file.toml").write_text(text, encoding="utf-8-sig")
+    assert main([command, "file.toml"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("[[damper]]", "[damper]", "damper: expected a list of tables, each headed [[damper]], not [damper]"),
+        ("[excitation]", "[[excitation]]", "excitation: expected a table, headed [excitation]"),
+        ("[structure]", "[[structure]]", "structure: expected a table, headed [structure]"),
+        (
+            RANGE,
+            '"excitation.frequency" = 15.9',
+            "excitation.frequency: a sweep needs a list, such as [1.0, 2.0]",
+        ),
+        (RANGE, '"excitation.frequency" = [[15.9]]', "sweep.excitation.frequency[0]: should be a valid number"),
+        (RANGE, '"cavity.c1" = [1.0]', "sweep: at cavity.c1 = 1.0: cavity.c1: names a table, not a value"),
+        (RANGE, '"cavity.0" = [1.0]', "cavity.0: names a table, not a value"),
+        (RANGE, '"cavity.\u00b2.gap" = [1.0]', "no entry '\u00b2'; known: c1"),
+        (RANGE, '"excitation.frequency.x" = [1.0]', "excitation.frequency.x: no table holds 'x'; leave it out"),
+        ("stiffness = 1e4", 'file = "rom.h5"', 'structure.file: belongs to model = "rom", not to model = "rigid"'),
+        ('"rigid"', '"prescribed"', 'structure.mass: belongs to model = "rigid", not to model = "prescribed"'),
+        ("[time]", '[contact]\nlaw = "massless"\nstiffness = 1.0\n[time]', 'stiffness: belongs to law = "compliant"'),
+        ('name = "c1"', 'name = ""', "cavity[0].name: expected a word that is no number"),
+        ('name = "c1"', 'name = "1"', "cavity[0].name: expected a word that is no number"),
+        ('name = "c1"', 'name = "a.b"', "cavity[0].name: expected a word that is no number"),
+        ('name = "c1"', 'name = "gap"', "cavity[0].name: expected a word that is no number and no key"),
+        ("mass = 0.05", "mass = 1e300", "damper[0].mass: expected 0, or a number between 1e-30 and 1e+30 in SI units"),
+        ("force = 1.0", "", "excitation: nothing moves the structure; give force"),
+        ("[structure]", "a = " + "[" * 5000, "not valid TOML"),
+    ],
+)
+def test_scenes(old, new, told, folder, capfd):
+    (folder / "scene.toml").write_text(changed(SCENE, (old, new)), encoding="utf-8")
+    assert main(["sweep", "scene.toml", "--workers", "1"]) == BAD_INPUT
+    out, error = capfd.readouterr()
+    assert (out, error.count("\n")) == ("", 1)
+    assert error.startswith("vanedamp: scene.toml: ") and told in error
+
+
+def test_keys_of_a_generator_beside_a_file(folder, capfd):
+    (folder / "case.toml").write_text(changed(BLOCK, ('generator = "block"', 'file = "block.msh"')))
+    assert main(["modal", "case.toml"]) == BAD_INPUT
+    assert 'mesh.length: belongs to generator = "block", not to a file' in capfd.readouterr().err
+
+
+def test_free_decay_has_no_undamped_maximum(folder, capfd):
+    text = changed(SCENE, ("force = 1.0", "[initial]\ndisplacement = 1e-3"))
+    (folder / "scene.toml").write_text(text)
+    assert main(["sweep", "scene.toml", "--workers", "1"]) == 0
+    out = capfd.readouterr().out
+    assert "nothing excites the structure" in out and "nan" not in out
+
+
+# too much
+
+
+@pytest.mark.parametrize(
+    ("command", "old", "new", "told"),
+    [
+        ("run", "periods = 30", "periods = 1_000_000_000", "time.periods: 1e+09 periods need 300 GB for their"),
+        ("sweep", "periods = 30", "periods = 1_000_000_000", "time.periods: 1e+09 periods need 300 GB"),
+        (
+            "sweep",
+            RANGE,
+            '"excitation.frequency" = {start = 1, stop = 2, num = 10_000_000}',
+            "sweep: 1e+07 points take",
+        ),
+        (
+            "sweep",
+            RANGE,
+            '"excitation.frequency" = {start = 1, stop = 2, num = 100_000_000}\n'
+            '"cavity.c1.gap" = {start = 1e-6, stop = 1e-5, num = 100_000_000}',
+            "sweep: 1e+16 points take",
+        ),
+        (
+            "sweep",
+            "periods = 30",
+            "periods = 20_000_000\n[solver]\nmethod = 'solve_ivp'\nsteps_per_period = 1000",
+            "time.periods: 2e+07 periods take about 23",
+        ),
+    ],
+)
+def test_work_of_months_is_refused(command, old, new, told, folder, capfd):
+    (folder / "scene.toml").write_text(changed(SCENE, (old, new)))
+    assert main([command, "scene.toml"]) == BAD_INPUT
+    error = capfd.readouterr().err
+    assert error.count("\n") == 1
+    assert told in error and "at most" in error
+
+
+def test_samples_that_fill_the_memory(folder, capfd):
+    (folder / "scene.toml").write_text(SCENE)
+    assert main(["run", "scene.toml", "--samples", "100000000"]) == BAD_INPUT
+    assert "--samples: 30 periods need 96 GB for their samples" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            "evaluations = 5",
+            "evaluations = 100_000\nsamples = 10_000",
+            "optimise: 2e+09 scenes on 2 workers take",
+        ),
+        ("num = 2", "num = 1_000_000", "band: 1000000 frequencies; at most 10000"),
+    ],
+)
+def test_optimisation_of_years(old, new, told, folder, capfd):
+    study = SCENE.split("[sweep]")[0] + "[optimise]\nband = {start = 15.5, stop = 16.0, num = 2}\nevaluations = 5\n"
+    (folder / "study.toml").write_text(changed(study, (old, new)))
+    assert main(["optimise", "study.toml", "--workers", "2"]) == BAD_INPUT
+    assert told in capfd.readouterr().err
+
+
+def test_elements_beyond_memory():
+    with pytest.raises(ParameterError, match=r"element_size: 1e-06 m makes about 2\.[0-9]e\+14 elements; at most"):
+        VaneCluster(element_size=1e-6)
+    with pytest.raises(ParameterError, match="element_size: 1e-06 m"):
+        Block(0.1, 0.02, 0.01, element_size=1e-6)
+    with pytest.raises(ParameterError, match="divisions: about 6e"):
+        Block(0.1, 0.02, 0.01, divisions=(1000, 1000, 1000))
+
+
+def test_the_size_that_is_proposed_is_taken():
+    with pytest.raises(ParameterError) as refused:
+        VaneCluster(element_size=1e-5)
+    proposed = float(str(refused.value).rsplit("of ", 1)[1].removesuffix(" m"))
+    assert VaneCluster(element_size=1.05 * proposed).element_size == 1.05 * proposed
+
+
+def test_a_million_hot_spots(folder, capfd):
+    with pytest.raises(SystemExit) as left:
+        main(["reduce", "case.toml", "--hot-spots", "1000000"])
+    assert left.value.code == BAD_INPUT
+    assert "expected at most 1000, not 1000000" in capfd.readouterr().err
+
+
+def test_more_hot_spots_than_places(folder, capfd):
+    (folder / "case.toml").write_text(changed(BLOCK, ("divisions = [6, 2, 1]", "divisions = [2, 1, 1]\ndegree = 1")))
+    assert main(["reduce", "case.toml", "--modes", "2", "--hot-spots", "1000"]) == BAD_INPUT
+    assert "are all that lie 2 % of the structure's size apart" in capfd.readouterr().err
+
+
+def test_a_run_in_blocks_is_the_same(monkeypatch, folder):
+    (folder / "scene.toml").write_text(changed(SCENE, ("periods = 30", "periods = 250")))
+    scene = Scene.load("scene.toml")
+    found = []
+    for block in (7, 1000):
+        monkeypatch.setattr("coupling.evaluation._CHUNK", block)
+        response = simulate(scene)
+        found.append((response.amplitude_mean, response.amplitude_rms, response.events, response.energy))
+    assert found[0] == found[1]
