@@ -6,6 +6,7 @@ What a scene leaves open is chosen here (coupling.choice); the run itself is tha
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 from coupling.choice import settle, warnings_of
@@ -16,16 +17,21 @@ from coupling.scene import Scene
 
 
 def simulate(
-    scene: Scene, events: bool = False, samples_per_period: int = 0, start: Handover | None = None
+    scene: Scene,
+    events: bool = False,
+    samples_per_period: int = 0,
+    start: Handover | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Response:
     """Run a scene from time zero over `scene.time.simulated` excitation periods.
 
     events: keep the list of events; samples_per_period: keep that many equidistant samples of each period; start: the
-    state that another run has left (`Response.final`), in place of the scene's initial one; for the exact engine.
+    state that another run has left (`Response.final`), in place of the scene's initial one; for the exact engine;
+    progress: called with the number of periods done and of those to do.
     Raises InputError for a scene that the model does not allow; numerical trouble is a status of the response.
     """
     started = time.perf_counter()
     settled = settle(scene)
-    response = respond(settled.scene, events, samples_per_period, start)
+    response = respond(settled.scene, events, samples_per_period, start, progress)
     took = time.perf_counter() - started
     return replace(response, estimate=settled.estimate, warnings=warnings_of(settled.scene), wall_time_s=took)

@@ -6,7 +6,7 @@ Every method leaves the same records behind, so that figures of different method
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -54,14 +54,19 @@ class Outcome:
     penetration: float = 0.0
 
 
-def run_scene(run: Run, scene: Scene) -> tuple[Status, int]:
-    """Run all periods, or until the mean amplitude is known well enough. Returns status and length of the transient."""
+def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | None = None) -> tuple[Status, int]:
+    """Run all periods, or until the mean amplitude is known well enough. Returns status and length of the transient.
+
+    progress: called with the number of periods done and of those to do.
+    """
     status, dropped = Status.NOT_STEADY, scene.time.dropped
     for periods in range(_CHUNK, scene.time.simulated + _CHUNK, _CHUNK):
         # compiled functions hear of no interrupt before they return
         ended = run.advance_to(min(periods, scene.time.simulated))
         if ended is not Status.OK:
             return ended, dropped
+        if progress is not None:
+            progress(min(periods, scene.time.simulated), scene.time.simulated)
         if scene.time.steady != "auto":
             continue
         outcome = run.outcome()

@@ -6,6 +6,7 @@ Other methods (`solver.method`) are those of coupling.stepping.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,11 +35,17 @@ _STATUS = {
 _OPEN_LEDGER = 1e-6
 
 
-def respond(scene: Scene, events: bool = False, samples_per_period: int = 0, start: Handover | None = None) -> Response:
+def respond(
+    scene: Scene,
+    events: bool = False,
+    samples_per_period: int = 0,
+    start: Handover | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Response:
     """The response of a scene without open choices (coupling.engine.simulate says the rest)."""
     started = time.perf_counter()
     run = run_of(scene, events, samples_per_period, start)
-    status, transient = run_scene(run, scene)
+    status, transient = run_scene(run, scene, progress)
     final = run.final() if isinstance(run, EngineRun) else None
     return replace(evaluate(scene, run.outcome(), status, transient, started), final=final)
 

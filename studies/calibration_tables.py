@@ -42,7 +42,7 @@ class TuneTable:
     vary: Annotated[list[str], Field(min_length=1)]
     shapes: str | None = None
     modes: list[Annotated[Whole, Field(ge=0)]] | None = None
-    starts: Annotated[Whole, Field(ge=1, le=1000)] = 1
+    starts: Annotated[Whole, Field(ge=1, le=100)] = 1
 
     def __post_init__(self) -> None:
         if self.shapes is not None and self.modes is not None:

@@ -178,7 +178,8 @@ def run(arguments: Namespace) -> None:
 
     check_run(scene, arguments.samples)
 
-    response = simulate(scene, events=arguments.events, samples_per_period=arguments.samples)
+    with progress("run") as report:
+        response = simulate(scene, arguments.events, arguments.samples, progress=report)
     if arguments.output:
         response.save(arguments.output, {"versions": versions(), "scene": scene.to_dict()})
     result = response.to_json(events=arguments.events) | _tell_resonance(arguments.input, scene)

@@ -92,6 +92,8 @@ class Optimise:
     def __post_init__(self) -> None:
         if self.count > _MOST_FREQUENCIES:
             raise ValueError(f"band: {self.count} frequencies; at most {_MOST_FREQUENCIES}")
+        if self.frequencies.min() <= 0.0:
+            raise ValueError(f"band: expected positive frequencies, not {self.frequencies.min():g} Hz")
         for before, after in itertools.pairwise(self.frequencies.tolist()):
             if after <= before:
                 raise ValueError(f"band: expected frequencies that rise, not {after:g} Hz after {before:g} Hz")

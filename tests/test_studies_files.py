@@ -105,7 +105,7 @@ def test_links_in_a_circle(folder, capfd):
 def test_standard_output_by_its_name(folder):
     finished = vanedamp("run", "scene.toml", "--json", "/dev/stdout", cwd=folder)
     assert finished.returncode == 0
-    assert json.loads(finished.stdout)["status"] == "ok"
+    assert json.loads(finished.stdout)["amplitude_max"] > 0.0
     finished = vanedamp("run", "scene.toml", "-o", "/dev/stdout", cwd=folder)
     assert finished.returncode == BAD_INPUT
     assert "is standard output, where the summary goes" in finished.stderr

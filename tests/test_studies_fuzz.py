@@ -35,7 +35,8 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "frf.csv").write_text("frequency,real,imaginary\n" + "\n".join(rows))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(commands, "progress", patient)
-    for scene in (SCENE, ROM_SCENE, PRESCRIBED):  # compiled functions take a minute once
+    explicit = PRESCRIBED | {"solver": {"method": "penalty"}}
+    for scene in (SCENE, ROM_SCENE, PRESCRIBED, explicit):  # compiled functions take a minute once
         simulate(validate(Scene, scene, "warm-up"))
     return tmp_path
 
