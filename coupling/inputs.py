@@ -21,20 +21,27 @@ _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 _NO_TABLE = ("dataclass_type", "dict_type", "mapping_type", "model_attributes_type")
 _NO_LIST = ("tuple_type", "list_type")
 
-#: no quantity in SI units is larger, or smaller and yet not zero; their products and squares are numbers, too
-_LARGEST = 1e30
+#: no quantity is larger, in any units, and none that must not be zero is smaller than its inverse: their products and
+#: squares are numbers, too
+_LARGEST = 1e40
 
 
-def _plausible(value: float) -> float:
-    if abs(value) > _LARGEST or 0.0 < abs(value) < 1.0 / _LARGEST:
-        raise ValueError(f"expected 0, or a number between {1.0 / _LARGEST:g} and {_LARGEST:g} in SI units")
+def _not_huge(value: float) -> float:
+    if abs(value) > _LARGEST:
+        raise ValueError(f"expected a number up to {_LARGEST:g} in SI units")
+    return value
+
+
+def _not_tiny(value: float) -> float:
+    if value < 1.0 / _LARGEST:
+        raise ValueError(f"expected at least {1.0 / _LARGEST:g} in SI units")
     return value
 
 
 # numbers are numbers: no text, no booleans
-Real = Annotated[float, Strict(), AfterValidator(_plausible)]
+Real = Annotated[float, Strict(), AfterValidator(_not_huge)]
 Whole = Annotated[int, Strict()]
-Positive = Annotated[Real, Field(gt=0)]
+Positive = Annotated[Real, Field(gt=0), AfterValidator(_not_tiny)]
 NonNegative = Annotated[Real, Field(ge=0)]
 Fraction = Annotated[Real, Field(ge=0, le=1)]
 

@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
-from coupling.inputs import STRICT, Direction, InputError, NonNegative, Real, Whole, nearest, read_toml, validate
+from coupling.inputs import (
+    STRICT,
+    Direction,
+    InputError,
+    NonNegative,
+    Positive,
+    Real,
+    Whole,
+    nearest,
+    read_toml,
+    validate,
+)
 from meshes import benchmarks, vane_cluster
 from meshes.benchmarks import Block
 from meshes.vane_cluster import VaneCluster
@@ -20,7 +31,6 @@ from studies.calibration_tables import CalibrationTable
 if TYPE_CHECKING:
     from modal.elasticity import ElasticSupport, Material
 
-Positive = Annotated[Real, Field(gt=0)]
 Ratio = Annotated[Real, Field(ge=0, lt=1)]
 Degree = Annotated[Whole, Field(ge=1, le=3)]
 
