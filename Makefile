@@ -17,7 +17,7 @@ ifeq ($(origin PYTHON), file)
 endif
 
 demo: setup ## the whole pipeline on the shipped mesh; the report is out/report.html
-	$(PYTHON) -m studies demo -o out
+	$(PYTHON) -m vanedamp demo -o out
 
 test: setup ## the tests, fast tier
 	$(TESTS)
@@ -38,4 +38,4 @@ check: setup ## ruff, mypy, import contracts
 	$(PYTHON) -c "from importlinter.cli import lint_imports_command as lint; lint()"
 
 bench: setup ## speed and accuracy of the engine, measured here; figures in out/bench
-	$(PYTHON) -m studies bench engine -o out/bench
+	$(PYTHON) -m vanedamp bench engine -o out/bench

@@ -1,6 +1,6 @@
 """The exact engine: a scene in, a response out. Event-driven, closed-form between events, no time step.
 
-What a scene leaves open is chosen here (coupling.choice); the run itself is that of coupling.run.
+What a scene leaves open is chosen here (model_order.selection); the run itself is that of methods.registry.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from coupling.choice import settle, warnings_of
-from coupling.handover import Handover
-from coupling.response import Response
-from coupling.run import respond
-from coupling.scene import Scene
+from vanedamp.coupling.methods.registry import respond
+from vanedamp.coupling.model_order.selection import settle, warnings_of
+from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.scene.scene import Scene
 
 
 def simulate(

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import gmsh
 
-from meshes.parameters import ParameterError, check_elements, check_size
-from modal import msh
+from vanedamp.meshes.parameters import ParameterError, check_elements, check_size
+from vanedamp.modal import msh
 
 #: ratio of lengths; gmsh takes for one what is nearer than 1e-8 of a model's size
 _SLENDEREST = 1e5

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import gmsh
 import numpy as np
 
-from meshes.parameters import ParameterError
+from vanedamp.meshes.parameters import ParameterError
 
 if TYPE_CHECKING:
-    from meshes.vane_cluster import VaneCluster
+    from vanedamp.meshes.parameters import VaneCluster
 
 _TOLERANCE = 1e-7  # m
 

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from modal.frames import Frame, rotation, through
-from modal.msh import MeshError
+from vanedamp.modal.frames import Frame, rotation, through
+from vanedamp.modal.msh import MeshError
 
 # number of nodes -> meshio's name
 _SOLIDS = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 6: "wedge", 15: "wedge15"}

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modal.eigen import Modes, factorize
-from modal.matrices import SystemMatrices, unit_direction
-from modal.store import frozen
+from vanedamp.files.store import frozen
+from vanedamp.modal.eigen import Modes, factorize
+from vanedamp.modal.matrices import SystemMatrices, unit_direction
 
 
 class BaseExcitationError(ValueError):

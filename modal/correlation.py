@@ -13,9 +13,9 @@ from scipy import sparse
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from modal.eigen import Modes
-from modal.matrices import SystemMatrices
-from modal.store import frozen
+from vanedamp.files.store import frozen
+from vanedamp.modal.eigen import Modes
+from vanedamp.modal.matrices import SystemMatrices
 
 #: a pair of modes below this MAC is no pair
 LEAST_MAC = 0.5

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg, sparse
 
-from modal import petsc, store
-from modal.matrices import SystemMatrices
-from modal.petsc import Factorization, SolverError
+from vanedamp.files import store
+from vanedamp.modal import petsc
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.modal.petsc import Factorization, SolverError
 
 __all__ = ["Factorization", "Modes", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes"]
 
@@ -83,7 +84,7 @@ class Modes:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Modes:
-        """Read the record that `save` wrote. Raises modal.store.StoreError."""
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = store.load(path, _KIND)
         return cls(values["frequency"], values["shape"], values["residual"], json.loads(attributes["provenance"]))
 

@@ -12,8 +12,8 @@ import numpy as np
 import ufl
 from scipy import sparse
 
-from modal import fenicsx
-from modal.matrices import Patch, SystemMatrices
+from vanedamp.modal import fenicsx
+from vanedamp.modal.matrices import Patch, SystemMatrices
 
 DEFAULT = "default"
 _COMPONENTS = "xyz"

@@ -28,9 +28,9 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy import sparse
 
-from modal import msh
-from modal.msh import MeshError
-from modal.store import digest
+from vanedamp.files.store import digest
+from vanedamp.modal import msh
+from vanedamp.modal.msh import MeshError
 
 try:
     gmshio: Any = importlib.import_module("dolfinx.io.gmsh")

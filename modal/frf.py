@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modal.rational import Fit, Rational
-from modal.store import frozen
+from vanedamp.files.store import frozen
+from vanedamp.modal.rational_fit import Fit, Rational
 
 #: powers of i w that a response has over the displacement
 QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}

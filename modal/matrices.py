@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from modal import store
+from vanedamp.files import store
 
 _KIND = "system-matrices"
 # assembly adds the same numbers in another order above and below the diagonal
@@ -172,7 +172,7 @@ class SystemMatrices:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SystemMatrices:
-        """Read the record that `save` wrote. Raises modal.store.StoreError."""
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = store.load(path, _KIND)
         offsets = values["patch_offset"]
         normals = values.get("patch_normal", np.zeros((len(offsets) - 1, 3)))

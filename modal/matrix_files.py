@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from scipy import io, sparse
 
-from modal.matrices import MatricesError, Patch, SystemMatrices
-from modal.store import replacing, write_csv
+from vanedamp.files.store import replacing, write_csv
+from vanedamp.modal.matrices import MatricesError, Patch, SystemMatrices
 
 #: what `write_folder` writes
 FILES = ("stiffness.mtx", "mass.mtx", "nodes.csv", "sets.csv", "fixed.csv")

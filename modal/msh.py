@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from modal.store import replacing
+from vanedamp.files.store import replacing
 
 
 class MeshError(ValueError):

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modal.eigen import Modes, shape_signs
-from modal.matrices import SystemMatrices
+from vanedamp.modal.eigen import Modes, shape_signs
+from vanedamp.modal.matrices import SystemMatrices
 
 # below this share of what its size allows, a component along a guide is round-off
 _NOISE = 1e-6

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from modal.frames import Frame, through
-from modal.msh import MeshError
+from vanedamp.modal.frames import Frame, through
+from vanedamp.modal.msh import MeshError
 
 _KINDS = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
 _REFUSED = {

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modal.eigen import Modes
-from modal.matrices import SystemMatrices, unit_direction
+from vanedamp.modal.eigen import Modes
+from vanedamp.modal.matrices import SystemMatrices, unit_direction
 
 NOTABLE_SHARE = 0.1
 

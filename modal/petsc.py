@@ -17,7 +17,7 @@ from petsc4py import PETSc
 from scipy import sparse
 from slepc4py import SLEPc
 
-from modal import parallel
+from vanedamp.modal import parallel
 
 # a round trip through a well-posed finite element matrix loses 5 to 8 digits, through a singular one all of them
 _ROUND_TRIP = 1e-2

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modal import fenicsx
-from modal.elasticity import ElasticityError, Solid
+from vanedamp.modal import fenicsx
+from vanedamp.modal.elasticity import ElasticityError, Solid
 
 
 @dataclass(frozen=True)

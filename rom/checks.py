@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from scipy import linalg, sparse
 
-from modal.matrices import SystemMatrices
-from rom.craig_bampton import Factorize, superlu
-from rom.interface import Interface, rigid_basis
-from rom.reduced import ReducedModel
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.rom.bases.craig_bampton import Factorize, superlu
+from vanedamp.rom.interface import Interface, rigid_basis
+from vanedamp.rom.reduced import ReducedModel
 
 
 class CheckError(ValueError):

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from scipy import io, linalg, sparse
 
-from rom import checks
-from rom.reduced import ReducedModel
+from vanedamp.rom import checks
+from vanedamp.rom.reduced import ReducedModel
 
 #: endings of files that hold several matrices by name, and of those that hold one
 NAMED, SINGLE = (".npz", ".op4"), (".mtx", ".npy")

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from modal import store
-from modal.matrices import Patch, SystemMatrices, patch_average, unit_direction
+from vanedamp.files import store
+from vanedamp.modal.matrices import Patch, SystemMatrices, patch_average, unit_direction
 
 KINDS = ("average", "rigid", "node", "full")
 MOTIONS = ("translation", "rotation")

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rom.reduced import ReducedModel, ReducedModelError
+from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 
 #: components of a symmetric stress, in the order of the outputs "<name>.xx" ...
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")

@@ -5,6 +5,7 @@ Needs numpy, scipy and the record store alone: a user of another code enters her
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,13 +15,14 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from rom import record
-from rom.boundary import attached, boundary_form, massless
-from rom.cut import truncated
-from rom.fields import ReducedModelError, check_definite, check_interface, checked, shaped, symmetric
-from rom.spectrum import halved, modal_damping, rigid_motions, spectrum
+from vanedamp.files import store
+from vanedamp.rom.dense_modes import halved, modal_damping, rigid_motions, spectrum
+from vanedamp.rom.fields import ReducedModelError, check_definite, shaped, symmetric, unit
 
 __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
+
+
+_KIND = "reduced-model"
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +76,9 @@ class ReducedModel:
     normals: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        for name, value in checked(self).items():
+        for name, value in _checked(self).items():
             object.__setattr__(self, name, value)
-        check_interface(self)
+        _check_interface(self)
         check_definite(self.squares)
 
     @classmethod
@@ -135,7 +137,7 @@ class ReducedModel:
 
     @property
     def rigid_modes(self) -> int:
-        """How many motions no support holds: `rom.spectrum.rigid_motions`."""
+        """How many motions no support holds: `rom.dense_modes.rigid_motions`."""
         return rigid_motions(self.stiffness, *self.natural)
 
     @property
@@ -185,15 +187,6 @@ class ReducedModel:
         """How many of the coordinates are modes that `truncated` can drop."""
         return self.fixed_interface_modes or self.free_modes
 
-    def truncated(self, modes: int, blocks: int | None = None) -> ReducedModel:
-        """The model with its first `modes` modes, and its first `blocks` blocks of quasi-static coordinates, alone.
-
-        The static interface stays exact: with fixed-interface modes anyway; of free-interface modes, the blocks and the
-        residual flexibility take up what those dropped give statically. A damping ratio holds for the modes of the
-        smaller model; any other C is cut. Raises ReducedModelError when more are asked for than there are.
-        """
-        return truncated(self, modes, blocks)
-
     def projected(self, basis: np.ndarray, **changes: Any) -> ReducedModel:
         """Ritz model in the coordinates y of q = basis @ y, basis (n, m). `changes` are fields of the new model."""
         mass, stiffness = (halved(basis.T @ matrix @ basis) for matrix in (self.mass, self.stiffness))
@@ -211,34 +204,6 @@ class ReducedModel:
             "recovery": None if self.recovery is None else self.recovery @ basis,
         }
         return replace(self, **(values | changes))
-
-    def massless(self, modes: int) -> ReducedModel:
-        """The model's own lowest `modes` natural modes; the rest of its flexibility, statically: a massless boundary.
-
-        MacNeal (1971), Computers and Structures 1(4), in modal coordinates eta with the interface's forces f,
-
-            eta'' + C eta' + diag(omega^2) eta = Phi_b^T f,   u = Phi_b eta + G f,
-
-        where G is the interface's flexibility that the modes lack. Monjaraz-Tec, Gross and Krack (2022), Computers and
-        Structures 259: contact on it is quasi-static and needs no impact law. `boundary_form` has the singular mass.
-        Raises ReducedModelError for fewer modes than the structure has rigid motions.
-        """
-        return massless(self, modes)
-
-    def attached(self, modes: int) -> ReducedModel:
-        """The model's own lowest `modes` natural modes after residual attachment modes, with their mass (Rubin 1975).
-
-        As many more coordinates as the interface has independent ones; its flexibility stays exact. Raises
-        ReducedModelError for all of the modes, or fewer than the structure has rigid motions.
-        """
-        return attached(self, modes)
-
-    def boundary_form(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Mass (singular), damping and stiffness (k + n, k + n) in (u, eta) of a model with a massless boundary.
-
-        Eliminates the forces, f = G^-1 (u - selection eta). Raises ReducedModelError unless G is positive definite.
-        """
-        return boundary_form(self)
 
     def reconstruct(self, q: np.ndarray, forces: np.ndarray | None = None) -> np.ndarray:
         """Full displacements T q, (N,) or (N, t), of coordinates (n,) or (n, t). Raises ReducedModelError without T.
@@ -262,12 +227,12 @@ class ReducedModel:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an HDF5 record that xarray opens."""
-        record.save(self, path)
+        _save(self, path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> ReducedModel:
-        """Read the record that `save` wrote. Raises modal.store.StoreError."""
-        return cls(**record.load(path))
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        return cls(**_fields(path))
 
     @property
     def squares(self) -> np.ndarray:
@@ -287,3 +252,122 @@ class ReducedModel:
 
 def _with_residual(values: np.ndarray, residual: np.ndarray | None, forces: np.ndarray | None) -> np.ndarray:
     return values if residual is None or forces is None else values + residual @ forces
+
+
+def _checked(model: ReducedModel) -> dict[str, Any]:
+    """The fields of a model as they should be: arrays frozen and symmetric, names as text. Raises ReducedModelError."""
+    if not model.interface:
+        raise ReducedModelError("interface: empty; a reduced model needs a coordinate that loads can act on")
+    size, count = len(np.atleast_1d(model.mass)), len(model.interface)
+    values: dict[str, Any] = {
+        name: symmetric(name, getattr(model, name), size) for name in ("mass", "damping", "stiffness")
+    }
+    for name, shape in {"selection": (count, size), "directions": (count, 3), "base_load": (size, 3)}.items():
+        values[name] = shaped(name, getattr(model, name), shape)
+    values["directions"] = unit(values["directions"])
+    if model.normals is not None:
+        values["normals"] = shaped("normals", model.normals, (count, 3))
+    if model.residual_flexibility is not None:
+        values["residual_flexibility"] = symmetric("residual_flexibility", model.residual_flexibility, count)
+    if model.outputs:
+        values["outputs"] = tuple(str(name) for name in model.outputs)
+        values["output_rows"] = shaped("output_rows", model.output_rows, (len(model.outputs), size))
+        if model.output_residual is not None:
+            values["output_residual"] = shaped("output_residual", model.output_residual, (len(model.outputs), count))
+    values["blocks"] = tuple(int(block) for block in model.blocks)
+    if model.recovery is not None:
+        nodes = len(model.recovery) // 3
+        values["recovery"] = shaped("recovery", model.recovery, (3 * nodes, size))
+        values["coordinates"] = shaped("coordinates", model.coordinates, (nodes, 3))
+        if model.residual_recovery is not None:
+            values["residual_recovery"] = shaped("residual_recovery", model.residual_recovery, (3 * nodes, count))
+    values["interface"] = tuple(str(label) for label in model.interface)
+    values["provenance"] = dict(model.provenance)
+    return values
+
+
+def _check_interface(model: ReducedModel) -> None:
+    """Raise ReducedModelError unless labels, selection, modes and blocks of a model belong together."""
+    twice = sorted({label for label in model.interface if model.interface.count(label) > 1})
+    if twice:
+        raise ReducedModelError(f"interface: the label {twice[0]!r} occurs twice; labels must be unique")
+    residual = model.residual_flexibility
+    for index, (label, row) in enumerate(zip(model.interface, model.selection, strict=True)):
+        if not np.any(row) and (residual is None or residual[index, index] <= 0):
+            raise ReducedModelError(f"selection: the row of {label!r} is zero, so nothing can move it")
+    if not 0 <= model.fixed_interface_modes <= model.size:
+        raise ReducedModelError(f"fixed_interface_modes: expected 0 to {model.size}, not {model.fixed_interface_modes}")
+    if not 0 <= model.free_modes <= model.size or (model.free_modes and model.fixed_interface_modes):
+        raise ReducedModelError(f"free_modes: expected 0 to {model.size} and no fixed-interface modes beside them")
+    if sum(model.blocks) + model.modes > model.size:
+        raise ReducedModelError(f"blocks: {model.blocks} and {model.modes} modes exceed the {model.size} coordinates")
+    if np.any(model.selection[:, model.size - model.fixed_interface_modes :]):
+        raise ReducedModelError("selection: the last coordinates are fixed-interface modes and must not move it")
+
+
+def _save(model: ReducedModel, path: str | os.PathLike[str]) -> None:
+    """Write the record."""
+    square = ("row", "column")
+    variables = {
+        "mass": store.Variable(model.mass, square, "kg"),
+        "damping": store.Variable(model.damping, square, "N s/m"),
+        "stiffness": store.Variable(model.stiffness, square, "N/m"),
+        "interface": store.Variable(np.array(model.interface, dtype=object), ("interface",)),
+        "axis": store.Variable(np.array(["x", "y", "z"], dtype=object), ("axis",)),
+        "selection": store.Variable(model.selection, ("interface", "column")),
+        "directions": store.Variable(model.directions, ("interface", "axis")),
+        "base_load": store.Variable(model.base_load, ("row", "axis"), "kg"),
+        "natural_frequency": store.Variable(model.natural_frequencies_hz, ("mode",), "Hz"),
+    }
+    if model.normals is not None:
+        variables["normals"] = store.Variable(model.normals, ("interface", "axis"))
+    if model.recovery is not None and model.coordinates is not None:
+        variables["recovery"] = store.Variable(model.recovery, ("dof", "column"))
+        variables["coordinates"] = store.Variable(model.coordinates, ("node", "axis"), "m")
+    if model.residual_flexibility is not None:
+        variables["residual_flexibility"] = store.Variable(model.residual_flexibility, ("interface", "force"), "m/N")
+    if model.outputs:
+        variables["output"] = store.Variable(np.array(model.outputs, dtype=object), ("output",))
+        variables["output_rows"] = store.Variable(model.output_rows, ("output", "column"))
+        if model.output_residual is not None:
+            variables["output_residual"] = store.Variable(model.output_residual, ("output", "force"))
+    if model.residual_recovery is not None:
+        variables["residual_recovery"] = store.Variable(model.residual_recovery, ("dof", "force"), "m/N")
+    if model.blocks:
+        variables["blocks"] = store.Variable(np.array(model.blocks, np.int64), ("block",))
+    attributes = {
+        "fixed_interface_modes": model.fixed_interface_modes,
+        "free_modes": model.free_modes,
+        "provenance": dict(model.provenance),
+    }
+    if model.damping_ratio is not None:
+        attributes["damping_ratio"] = model.damping_ratio
+    store.save(path, _KIND, variables, attributes)
+
+
+def _fields(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The fields of the model whose record `save` wrote. Raises files.store.StoreError."""
+    values, attributes = store.load(path, _KIND)
+    fields = {name: values[name] for name in ("mass", "damping", "stiffness", "selection", "directions", "base_load")}
+    for name, values_of in fields.items():
+        if np.iscomplexobj(values_of):
+            raise store.StoreError(f"{path}: {name}: expected real numbers, not complex ones")
+        if not np.all(np.isfinite(values_of)):
+            raise store.StoreError(f"{path}: {name}: holds entries that are not finite")
+    return dict(
+        **fields,
+        interface=tuple(values["interface"]),
+        damping_ratio=attributes.get("damping_ratio"),
+        fixed_interface_modes=attributes["fixed_interface_modes"],
+        free_modes=attributes.get("free_modes", 0),
+        blocks=tuple(values.get("blocks", ())),
+        residual_flexibility=values.get("residual_flexibility"),
+        outputs=tuple(values.get("output", ())),
+        output_rows=values.get("output_rows"),
+        output_residual=values.get("output_residual"),
+        residual_recovery=values.get("residual_recovery"),
+        normals=values.get("normals"),
+        provenance=json.loads(attributes["provenance"]),
+        recovery=values.get("recovery"),
+        coordinates=values.get("coordinates"),
+    )

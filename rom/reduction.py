@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-from modal.matrices import SystemMatrices
-from rom import craig_bampton, free_interface
-from rom.craig_bampton import Factorize, ReductionError, superlu
-from rom.interface import Interface
-from rom.reduced import ReducedModel
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.rom.bases import craig_bampton, free_interface
+from vanedamp.rom.bases.craig_bampton import Factorize, ReductionError, superlu
+from vanedamp.rom.interface import Interface
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.truncation import massless
 
 Basis = Literal["craig-bampton", "rubin", "macneal", "truncated", "massless"]
 BASES: tuple[str, ...] = get_args(Basis)
@@ -35,8 +36,9 @@ def reduce(
            "truncated"      natural modes alone: nothing of the interface is static, the baseline
 
     modes          natural or fixed-interface modes kept
-    quasi_static   further blocks of quasi-static coordinates (rom.craig_bampton.reduce, rom.free_interface.reduce_free)
-    characteristic constraint modes kept of patches of kind "full"; all but natural modes need these
+    quasi_static   further blocks of quasi-static coordinates (bases.craig_bampton.reduce,
+    bases.free_interface.reduce_free) characteristic constraint modes kept of patches of kind "full"; all but natural
+    modes need these
 
     Raises ReductionError for an unknown basis, and what the two functions named raise.
     """
@@ -48,10 +50,10 @@ def reduce(
             matrices, interface, min(fixed, most) if basis == "massless" else modes, factorize, keep_recovery,
             quasi_static, characteristic,
         )  # fmt: skip
-        return model.massless(modes) if basis == "massless" else model
+        return massless(model, modes) if basis == "massless" else model
     blocks = {"rubin": 1 + quasi_static, "macneal": 1, "truncated": 0}[basis]
     model = free_interface.reduce_free(matrices, interface, modes, factorize, keep_recovery, blocks)
-    return model.massless(modes) if basis == "macneal" else model
+    return massless(model, modes) if basis == "macneal" else model
 
 
 def check_basis(basis: str) -> None:

@@ -1,58 +1,133 @@
-"""How many modes a reduction needs: the models of a basis with the estimate of each, out of one reduction.
-
-The estimate is that of rom.ladder: the residual's response in the basis with two more blocks of quasi-static modes.
-"""
+"""Smaller models of a reduced model: with fewer of its modes, or its own natural modes and the rest statically."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
-from modal.matrices import SystemMatrices
-from rom.interface import Interface
-from rom.ladder import Rung, frf_errors
-from rom.reduced import ReducedModel
-from rom.reduction import BASES, Factorize, reduce, superlu
-
-#: blocks of quasi-static coordinates beyond those of a model that its estimate needs
-BLOCKS = 2
+from vanedamp.rom.dense_modes import check_elastic, halved, krylov, rigid_motions, spectrum
+from vanedamp.rom.fields import ReducedModelError
+from vanedamp.rom.reduced import ReducedModel
 
 
-def rich_model(
-    matrices: SystemMatrices,
-    interface: Interface,
-    basis: str,
-    modes: int,
-    factorize: Factorize = superlu,
-    **others: Any,
-) -> ReducedModel:
-    """The reduction that has every model of a basis up to so many modes in it, and what their estimates need.
+def truncated(model: ReducedModel, modes: int, blocks: int | None = None) -> ReducedModel:
+    """A model with its first `modes` modes, and its first `blocks` blocks of quasi-static coordinates, alone.
 
-    Craig-Bampton models are those with one block of quasi-static modes. Other arguments: those of rom.reduction.reduce.
+    The static interface stays exact: with fixed-interface modes anyway; of free-interface modes, the blocks and the
+    residual flexibility take up what those dropped give statically. A damping ratio holds for the modes of the
+    smaller model; any other C is cut. Raises ReducedModelError when more are asked for than there are.
     """
-    if basis in ("craig-bampton", "massless"):
-        return reduce(matrices, interface, "craig-bampton", modes, factorize, quasi_static=1 + BLOCKS, **others)
-    reduction_basis = "rubin" if basis in BASES else basis
-    return reduce(matrices, interface, reduction_basis, modes, factorize, quasi_static=BLOCKS, **others)
+    if not 0 <= modes <= model.modes:
+        kind = "free" if model.free_modes else "fixed"
+        raise ReducedModelError(
+            f"modes: expected 0 to {model.modes} (the {kind}-interface modes of this model), "
+            f"not {modes}; reduce again to keep more"
+        )
+    blocks = len(model.blocks) if blocks is None else blocks
+    if not 0 <= blocks <= len(model.blocks):
+        raise ReducedModelError(f"blocks: expected 0 to {len(model.blocks)} (those of this model), not {blocks}")
+    if model.free_modes:
+        return _free_truncated(model, modes, blocks)
+    lead = model.size - model.modes - sum(model.blocks) + sum(model.blocks[:blocks])
+    first = model.size - model.modes
+    kept = np.r_[0:lead, first : first + modes]
+    return model.projected(np.eye(model.size)[:, kept], fixed_interface_modes=modes, blocks=model.blocks[:blocks])
 
 
-def basis_model(rich: ReducedModel, basis: str, modes: int) -> ReducedModel:
-    """The model of a basis with so many modes, out of `rich_model`."""
-    if basis in ("macneal", "massless"):
-        return rich.massless(modes)
-    return rich.truncated(modes, 0 if basis == "truncated" else 1)
+def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedModel:
+    """Free-interface modes beyond `modes` go; the blocks are built anew in the space of what is dropped."""
+    first = model.size - model.free_modes
+    kept = np.arange(first, first + modes)
+    dropped = np.setdiff1d(np.arange(model.size), kept)
+    changes: dict[str, Any] = {"free_modes": modes, "blocks": ()}
+    inertia, rigidity = (matrix[np.ix_(dropped, dropped)] for matrix in (model.mass, model.stiffness))
+    own: list[np.ndarray] = []
+    if (blocks or model.residual_flexibility is not None) and dropped.size:
+        check_elastic(rigid_motions(rigidity, *spectrum(inertia, rigidity)), 0)
+        static = np.linalg.solve(rigidity, model.selection[:, dropped].T)
+        if model.residual_flexibility is not None:
+            lost = np.zeros((model.size, len(model.interface)))
+            lost[dropped] = static
+            changes |= residual_fields(model, lost)
+        own = krylov(static, rigidity, inertia, blocks)
+    basis = np.zeros((model.size, sum(block.shape[1] for block in own) + modes))
+    if own:
+        basis[dropped, : basis.shape[1] - modes] = np.hstack(own)
+    basis[kept, basis.shape[1] - modes :] = np.eye(modes)
+    if basis.shape[1] == 0:
+        raise ReducedModelError("modes: none are left, and nothing else")
+    return model.projected(basis, **(changes | {"blocks": tuple(block.shape[1] for block in own)}))
 
 
-def basis_ladder(
-    rich: ReducedModel, basis: str, frequencies_hz: np.ndarray, labels: Sequence[str] | None = None
-) -> list[Rung]:
-    """All models of a basis out of `rich_model`, each against that."""
-    least = 0 if basis == "craig-bampton" else max(rich.rigid_modes, int(basis != "rubin"))
-    rungs = []
-    for modes in range(least, rich.modes + 1):
-        model = basis_model(rich, basis, modes)
-        errors = frf_errors(model, rich, frequencies_hz, labels)
-        rungs.append(Rung(modes, model.size, float(errors.max()), 0.0))
-    return rungs
+def massless(model: ReducedModel, modes: int) -> ReducedModel:
+    """A model's own lowest `modes` natural modes; the rest of its flexibility, statically: a massless boundary.
+
+    MacNeal (1971), Computers and Structures 1(4), in modal coordinates eta with the interface's forces f,
+
+        eta'' + C eta' + diag(omega^2) eta = Phi_b^T f,   u = Phi_b eta + G f,
+
+    where G is the interface's flexibility that the modes lack. Monjaraz-Tec, Gross and Krack (2022), Computers and
+    Structures 259: contact on it is quasi-static and needs no impact law. `boundary_form` has the singular mass.
+    Raises ReducedModelError for fewer modes than the structure has rigid motions.
+    """
+    squares, shapes = spectrum(model.mass, model.stiffness)
+    if not 0 < modes <= model.size:
+        raise ReducedModelError(f"modes: expected 1 to {model.size} (the modes of this model), not {modes}")
+    check_elastic(model.rigid_modes, modes)
+    static = shapes[:, modes:] / squares[modes:] @ (model.selection @ shapes[:, modes:]).T
+    kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": ()}
+    return model.projected(shapes[:, :modes], **kept, **residual_fields(model, static))
+
+
+def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
+    """A model's own lowest `modes` natural modes after residual attachment modes, with their mass (Rubin 1975).
+
+    As many more coordinates as the interface has independent ones; its flexibility stays exact. Raises
+    ReducedModelError for all of the modes, or fewer than the structure has rigid motions.
+    """
+    squares, shapes = spectrum(model.mass, model.stiffness)
+    if not 0 < modes < model.size:
+        raise ReducedModelError(f"modes: expected 1 to {model.size - 1} (fewer than all of this model), not {modes}")
+    check_elastic(model.rigid_modes, modes)
+    dropped = shapes[:, modes:]
+    static = (model.selection @ dropped).T / squares[modes:, None]
+    block = np.hstack(krylov(static, np.diag(squares[modes:]), np.eye(len(static)), 1))
+    kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (block.shape[1],)}
+    return model.projected(np.hstack([dropped @ block, shapes[:, :modes]]), **kept)
+
+
+def boundary_form(model: ReducedModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mass (singular), damping and stiffness (k + n, k + n) in (u, eta) of a model with a massless boundary.
+
+    Eliminates the forces, f = G^-1 (u - selection eta). Raises ReducedModelError unless G is positive definite.
+    """
+    residual = model.residual_flexibility
+    if residual is None or linalg.eigvalsh(residual)[0] <= 0.0:
+        raise ReducedModelError(
+            "residual_flexibility: not positive definite, so that not every interface coordinate is without mass"
+        )
+    rows = np.hstack([np.eye(len(residual)), -model.selection])
+    size = len(residual)
+    mass, damping, stiffness = (
+        linalg.block_diag(np.zeros((size, size)), matrix) for matrix in (model.mass, model.damping, model.stiffness)
+    )
+    return mass, damping, halved(stiffness + rows.T @ np.linalg.solve(residual, rows))
+
+
+def residual_fields(model: ReducedModel, static: np.ndarray) -> dict[str, Any]:
+    """The residual fields of a model after the response q = static @ f (n, k) has become part of them."""
+
+    def grown(rows: np.ndarray | None, before: np.ndarray | None) -> np.ndarray | None:
+        if rows is None:
+            return None
+        return rows @ static if before is None else rows @ static + before
+
+    flexibility = grown(model.selection, model.residual_flexibility)
+    assert flexibility is not None
+    return {
+        "residual_flexibility": halved(flexibility),
+        "residual_recovery": grown(model.recovery, model.residual_recovery),
+        "output_residual": grown(model.output_rows, model.output_residual),
+    }

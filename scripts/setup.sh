@@ -83,7 +83,7 @@ finished() {
 import sys
 from importlib.util import find_spec
 
-packages = "dolfinx slepc4py scipy h5py numba gmsh pyvista pytest modal".split()
+packages = "dolfinx slepc4py scipy h5py numba gmsh pyvista pytest vanedamp".split()
 sys.exit(not all(map(find_spec, packages)))
 END
 }

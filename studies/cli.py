@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import math
 import os
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import NoReturn
 
-from studies.interrupts import swallowed_interrupts_again
+from vanedamp.studies.interrupts import swallowed_interrupts_again
 
-_PACKAGES = ("modal", "rom", "coupling", "meshes", "studies")
-_ROOT = Path(__file__).resolve().parent.parent
 BAD_INPUT = 2
 _INTERRUPTED = 130
 #: hot spots are 2 % of the structure's size apart, and each is six outputs of the model
@@ -41,9 +37,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     try:
         with swallowed_interrupts_again():
-            if not _under_mpi() or _stranger() is not None:
+            if not _under_mpi():
                 return _main(argv)
-            from modal.petsc import ranks
+            from vanedamp.modal.petsc import ranks
 
             with ranks() as first:
                 return _main(argv) if first else 0
@@ -54,14 +50,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _main(argv: Sequence[str] | None) -> int:
     arguments = _parser().parse_args(argv)
-    stranger = _stranger()
-    if stranger is not None:
-        return _refuse(
-            f"the package `modal` at {stranger} is not the one of vanedamp (PyPI has another of that name); "
-            "uninstall it with `pip uninstall modal`, then install vanedamp again"
-        )
     try:
-        from studies import commands  # what each command needs is loaded when it is wanted
+        from vanedamp.studies.commands import all as commands  # what each command needs is loaded when it is wanted
 
         getattr(commands, "import_model" if arguments.command == "import" else arguments.command)(arguments)
         sys.stdout.flush()
@@ -86,9 +76,9 @@ def _told(error: Exception, file: str | None) -> str | None:
     if isinstance(error, ImportError):
         package = (error.name or "").split(".")[0]
         remedy = _FINITE_ELEMENTS if package in _SYSTEM else f"pip install {_ON_PYPI.get(package, package)}"
-        return None if package in ("", *_PACKAGES) else f"needs {package}, which cannot be loaded ({error}): {remedy}"
+        return None if package in ("", "vanedamp") else f"needs {package}, which cannot be loaded ({error}): {remedy}"
     # bad input has error classes of our own; any other ValueError is a fault of the program
-    return _located(str(error), file) if type(error).__module__.split(".")[0] in _PACKAGES else None
+    return _located(str(error), file) if type(error).__module__.split(".")[0] == "vanedamp" else None
 
 
 def _refuse(message: str) -> int:
@@ -104,15 +94,6 @@ def _located(message: str, file: str | None) -> str:
 def _under_mpi() -> bool:
     """Whether a launcher of Open MPI, MPICH or Intel MPI started several ranks."""
     return any(int(os.environ.get(name, 1)) > 1 for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"))
-
-
-def _stranger() -> str | None:
-    """Where a package `modal` that is not ours comes from."""
-    found = importlib.util.find_spec("modal")
-    origin = None if found is None or found.origin is None else Path(found.origin).resolve()
-    if origin is not None and origin.parent == _ROOT / "modal" and (origin.parent / "store.py").is_file():
-        return None
-    return str(origin and origin.parent)
 
 
 def _parser() -> argparse.ArgumentParser:

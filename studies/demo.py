@@ -7,14 +7,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from coupling.sweep import Sweep, warm_up
-from modal.store import load
-from studies.forced_response import forced_responses
-from studies.paper import MODES, Session, prepare, study, tell
-from studies.paper_figure import Effort
-from studies.pictures import mode_picture, summary_picture
-from studies.results import CLAIMS
-from studies.workers import WorkerPool, available_cores
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import warm_up
+from vanedamp.files.store import load
+from vanedamp.studies.paper.figure_file import Effort
+from vanedamp.studies.paper.runner import MODES, Session, prepare, study, tell
+from vanedamp.studies.report.forced_response import forced_responses
+from vanedamp.studies.report.pictures import mode_picture, summary_picture
+from vanedamp.studies.report.results import CLAIMS
+from vanedamp.studies.workers import WorkerPool, available_cores
 
 #: figures of the paper, with fewer frequencies and periods than `vanedamp paper` takes
 FIGURES = ("fig9", "fig10", "fig12")
@@ -48,8 +49,8 @@ def run_demo(folder: Path, workers: int | None = None) -> Path:
             found = study(name, session)
             tell(found, time.perf_counter() - begun)
             results += [*(folder / source for source in found.sources), folder / f"{name}{CLAIMS}"]
-    from studies.report import write_report
-    from studies.results import collect
+    from vanedamp.studies.report.page import write_report
+    from vanedamp.studies.report.results import collect
 
     with _stage("report"):
         write_report(collect(results), folder / "report.html")

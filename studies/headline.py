@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coupling.grid import FREQUENCY
+from vanedamp.coupling.sweep.grid import FREQUENCY
 
 #: a damped response within this share of the undamped one has not been touched by the bodies
 UNTOUCHED = 0.01
@@ -130,7 +130,7 @@ def headline(
     """The headline of damped curves (n,) over ascending x (n,), which are nan at points that are not ok.
 
     undamped, fixed: linear curves (n,) at the points; peaks: of them between the points, by the names of
-    coupling.sweep.PEAKS, where they are known.
+    coupling.sweep.sweep.PEAKS, where they are known.
     """
     ok = np.isfinite(damped_mean)
     free = _linear_top("undamped", x, undamped, peaks, along_frequency)

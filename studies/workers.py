@@ -10,7 +10,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from contextlib import contextmanager
 from typing import Any
 
-from studies.interrupts import uninterrupted_children
+from vanedamp.studies.interrupts import uninterrupted_children
 
 
 class WorkerPool(Executor):
@@ -67,7 +67,7 @@ def workers(count: int | None) -> Iterator[Executor | None]:
         yield None
         return
     with WorkerPool(count) as pool:
-        from coupling.sweep import warm_up
+        from vanedamp.coupling.sweep.sweep import warm_up
 
         pool.submit(warm_up).result()
         yield pool

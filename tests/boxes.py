@@ -2,7 +2,7 @@
 
 import gmsh
 
-from modal.msh import session
+from vanedamp.modal.msh import session
 
 
 def write_boxes(path, volumes=None, facets=None, save_all=False, size=0.5):

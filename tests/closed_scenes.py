@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from coupling.inputs import validate
-from coupling.scene import Scene
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
 
 
 def scene(**tables) -> Scene:

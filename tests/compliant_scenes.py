@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from coupling.inputs import validate
-from coupling.scene import Scene
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
 
 STILL = {"model": "prescribed", "displacement_amplitude": 1e-30}
 WEIGHTLESS = {"acceleration": 0.0}

@@ -6,8 +6,8 @@ import pytest
 @pytest.fixture(scope="session")
 def cluster_solid():
     """The shipped cluster in degree 2, with the material of the reference case."""
-    from meshes.vane_cluster import SHIPPED
-    from modal.elasticity import Material, Solid
+    from vanedamp.meshes.vane_cluster import SHIPPED
+    from vanedamp.modal.elasticity import Material, Solid
 
     return Solid(SHIPPED, {"default": Material(young=2.0e11, poisson=0.3, density=8190.0)}, degree=2)
 
@@ -21,6 +21,6 @@ def cluster(cluster_solid):
 @pytest.fixture(scope="session")
 def cluster_modes(cluster):
     """The ten lowest modes of the shipped cluster."""
-    from modal.eigen import solve_modes
+    from vanedamp.modal.eigen import solve_modes
 
     return solve_modes(cluster, count=10)

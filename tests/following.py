@@ -6,10 +6,10 @@ import numpy as np
 from reference import Reference, with_horizon
 from reference_ledger import ledger
 
-from coupling.engine import simulate
-from coupling.response import Event, Response, Status
-from coupling.scene import Scene
-from rom.reduced import ReducedModel
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Event, Response, Status
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.rom.reduced import ReducedModel
 
 SAMPLES = 32
 # impacts slower than this share of the fastest are decided by round-off: a graze is a miss a hair away

@@ -14,9 +14,9 @@ import numpy as np
 from stepping import Segment, Stepper
 from worlds import scene_of
 
-from coupling import state as st
-from coupling.evaluation import events_of
-from coupling.rows import Rows
+from vanedamp.coupling.exact import state as st
+from vanedamp.coupling.response.evaluation import events_of
+from vanedamp.coupling.system.constraints import Rows
 
 #: how far apart the runs that measure chaos begin, as a share of the free travel
 HAIR = 1e-11

@@ -8,12 +8,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from stepping import SLIDES, Moment, Segment, Step, Stepper
 
-from coupling import automaton as auto
-from coupling import state as st
-from coupling.gaps import ROUND_OFF, SIMULTANEOUS
-from coupling.impacts import COLLAPSE
-from coupling.scene import Scene
-from coupling.watch import ADHESION, CHATTER, RESOLUTION
+from vanedamp.coupling.exact import automaton as auto
+from vanedamp.coupling.exact import state as st
+from vanedamp.coupling.exact.event_functions import ADHESION, CHATTER, RESOLUTION
+from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF, SIMULTANEOUS
+from vanedamp.coupling.exact.impacts import COLLAPSE
+from vanedamp.coupling.scene.scene import Scene
 
 #: points at which the motion between two events is looked at
 POINTS = 9

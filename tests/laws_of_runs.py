@@ -21,10 +21,10 @@ from images import compare, hairs, later, mirrored, record, renumbered, reordere
 from laws_by_event import Worst, check_events
 from worlds import scene_of, worlds
 
-from coupling import automaton as auto
-from coupling.engine import simulate
-from coupling.gaps import SIMULTANEOUS
-from coupling.response import Status
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.exact import automaton as auto
+from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
+from vanedamp.coupling.response.response import Status
 
 #: contact law and whether there are friction dampers
 KINDS = {"newton": ("newton", False), "elements": ("newton", True), "compliant": ("compliant", True)}

@@ -1,6 +1,6 @@
 """A program that fails on the first rank while the other one waits for a task; run by test_studies_mpi."""
 
-from modal.petsc import ranks
+from vanedamp.modal.petsc import ranks
 
 with ranks() as first:
     if first:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
-from coupling.rows import Rows
+from vanedamp.coupling.system.constraints import Rows
 
 
 def exponential(generator: mp.matrix, time: float) -> mp.matrix:

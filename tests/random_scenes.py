@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from coupling.inputs import validate
-from coupling.scene import Scene
-from rom.reduced import ReducedModel
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
+from vanedamp.rom.reduced import ReducedModel
 
 LABELS = ("a", "b")
 

@@ -18,8 +18,8 @@ from reference_system import System
 from scipy.integrate import DOP853, DenseOutput, OdeSolution
 from scipy.optimize import brentq
 
-from coupling.scene import Scene
-from rom.reduced import ReducedModel
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.rom.reduced import ReducedModel
 
 #: a few units in the last place
 _ULPS = 2.0**-49

@@ -22,8 +22,11 @@ import numpy as np
 from reference_laws import damping_ratio
 from scipy.linalg import eigh
 
-from coupling.scene import FrictionDamper, Prescribed, Rigid, Scene
-from rom.reduced import ReducedModel
+from vanedamp.coupling.scene.bodies import FrictionDamper
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Prescribed, Rigid
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.truncation import truncated
 
 
 def neighbour_restitution(left: float, right: float) -> float:
@@ -124,7 +127,7 @@ class System:
             self.base = np.full(bodies, base)
             row = lambda label: np.ones(1)  # noqa: E731
         else:
-            model = reduced if scene.structure.modes is None else reduced.truncated(scene.structure.modes)
+            model = reduced if scene.structure.modes is None else truncated(reduced, scene.structure.modes)
             M, C, K = model.mass, model.damping, model.stiffness
             self.output = model.row(excitation.at)
             # the base moves in the direction of the response

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupling import automaton as auto
-from coupling import state as st
-from coupling.rows import Rows
-from coupling.run import EngineRun
-from coupling.scene import Scene
+from vanedamp.coupling.exact import automaton as auto
+from vanedamp.coupling.exact import state as st
+from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.constraints import Rows
 
 SLIDES = (st.SLIP_LEFT, st.SLIP_RIGHT)
 

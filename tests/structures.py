@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import sparse
 
-from modal.matrices import Patch, SystemMatrices
+from vanedamp.modal.matrices import Patch, SystemMatrices
 
 
 def rod(elements=400, damping_ratio=0.0, root=None):

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import tomli_w
 
-from coupling.inputs import validate
-from coupling.scene import Scene
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
 
 ROOT = Path(__file__).resolve().parent.parent
 RESONANCE = 15.915494309189533
@@ -37,7 +37,7 @@ def write(folder, **changes):
 
 def command(folder, *arguments, output="sweep.h5"):
     """A sweep of the folder's scene.toml as a process."""
-    words = [sys.executable, "-m", "studies", "sweep", "scene.toml", "-o", output, *arguments]
+    words = [sys.executable, "-m", "vanedamp", "sweep", "scene.toml", "-o", output, *arguments]
     environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     return subprocess.Popen(words, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from sweeping import RESONANCE, ROOT, command, kill_after_a_flush, scene, write
 
-from coupling import points as module
-from coupling.checkpoint import Checkpoint, clear
-from coupling.engine import simulate
-from coupling.inputs import InputError
-from coupling.sweep import Sweep, sweep
-from modal.store import StoreError, Variable, save
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.sweep import worker as module
+from vanedamp.coupling.sweep.checkpoint import Checkpoint, clear
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.store import StoreError, Variable, save
+from vanedamp.files.toml_input import InputError
 
 LINKED = {"continuation": {"direction": "down"}}
 
@@ -116,8 +117,8 @@ def test_an_unreadable_checkpoint_is_refused_and_kept(damage, tmp_path):
 PROGRAM = """
 import resource, sys
 from sweeping import scene
-from coupling.sweep import sweep
-from modal.store import StoreError
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.store import StoreError
 
 def progress(done, total):
     if done == 8:

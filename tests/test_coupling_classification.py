@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from coupling.engine import simulate
-from coupling.inputs import validate
-from coupling.response import classify
-from coupling.scene import Scene
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import classify
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
 
 
 def scene(mass, ratio, gap=0.5):

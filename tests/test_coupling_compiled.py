@@ -2,20 +2,22 @@
 
 import pytest
 
-from coupling.compiled import _sources
+from vanedamp.coupling.numerics import jit
+from vanedamp.coupling.numerics.jit import _sources
 
 
 @pytest.fixture
-def digest(tmp_path):
+def digest(tmp_path, monkeypatch):
     """Digest of a file of compiled functions in a chain caller -> callee -> records -> scenes."""
     texts = {
-        "caller": "from coupling.callee import rise\n@entry\ndef climb(x): return rise(x)\n",
-        "callee": "from coupling.records import STEP\n@kernel\ndef rise(x): return x + STEP\n",
-        "records": "from coupling.scenes import Scene\nSTEP = 1.0\n",
+        "caller": "from vanedamp.callee import rise\n@entry\ndef climb(x): return rise(x)\n",
+        "callee": "from vanedamp.records import STEP\n@kernel\ndef rise(x): return x + STEP\n",
+        "records": "from vanedamp.scenes import Scene\nSTEP = 1.0\n",
         "scenes": "class Scene: pass\n",
     }
     for name, text in texts.items():
         (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.setattr(jit, "_PACKAGE", tmp_path)
 
     def after(edited=None, file="caller"):
         for name, text in texts.items():

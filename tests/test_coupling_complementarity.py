@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from coupling.complementarity import AT_HIGH, AT_LOW, DEPENDENT, FREE, solve_box
-from coupling.state import new_problem
+from vanedamp.coupling.numerics.complementarity import AT_HIGH, AT_LOW, DEPENDENT, FREE, new_problem, solve_box
 
 
 def solve(a_matrix, b, lo, hi, forced=None):

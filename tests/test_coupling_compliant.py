@@ -9,10 +9,10 @@ from following import follow
 from random_scenes import random_compliant
 from reference_laws import contact_time, damping_ratio
 
-from coupling.engine import simulate
-from coupling.inputs import InputError
-from coupling.response import Status
-from rom.reduced import ReducedModel
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Status
+from vanedamp.files.toml_input import InputError
+from vanedamp.rom.reduced import ReducedModel
 
 RESTITUTIONS = [0.05, 0.1, 0.5, 0.7, 0.9, 1.0]
 

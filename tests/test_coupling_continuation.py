@@ -8,11 +8,12 @@ import pytest
 from scipy.optimize import brentq
 from sweeping import DATA, scene
 
-from coupling.engine import simulate
-from coupling.grid import grid
-from coupling.inputs import InputError, validate
-from coupling.scene import Scene
-from coupling.sweep import Sweep, sweep
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.grid import grid
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.toml_input import InputError, validate
 
 EPS, DAMPING, RESTITUTION, HALF_GAP = 0.005, 0.005, 0.7, 70.0
 RHO = 2 / np.pi * (1 - RESTITUTION) / (1 + RESTITUTION)
@@ -89,7 +90,7 @@ def test_workers_and_files_change_nothing(both, tmp_path):
 
 def test_a_run_that_breaks_off_passes_its_start_on(monkeypatch):
     """The chain goes on with the last state there is."""
-    from coupling import points
+    from vanedamp.coupling.sweep import worker as points
 
     states = []
 

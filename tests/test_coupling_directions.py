@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from coupling.engine import simulate
-from coupling.inputs import InputError, validate
-from coupling.scene import Gravity, Scene
-from coupling.sweep import sweep
-from meshes.vane_cluster import SHIPPED
-from modal.matrices import Patch, SystemMatrices
-from rom.reduced import ReducedModel
-from studies.config import Case, InterfaceTable
-from studies.pipeline import assemble, interface, reduction
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.excitation import Gravity
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.meshes.vane_cluster import SHIPPED
+from vanedamp.modal.matrices import Patch, SystemMatrices
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.case.stages import assemble, interface, reduction
+from vanedamp.studies.case.tables import Case, InterfaceTable
 
 OMEGA = 2 * math.pi
 MASS = 1.0

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from closed_scenes import ball, one_to_one, period_one_start, rubbing, scene, table
 
-from coupling.engine import simulate
-from coupling.inputs import InputError, validate
-from coupling.response import Status
-from coupling.scene import Scene
-from coupling.structure import receptance
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.linear_response import receptance
+from vanedamp.files.toml_input import InputError, validate
 
 
 def cluster(frequency_ratio=0.995, gap_ratio=0.5, mass_ratio=0.02, **changes) -> Scene:

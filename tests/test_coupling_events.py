@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numba import njit
 
-from coupling.events import DEGREE, FORCE, POSITION, VELOCITY, exp_minus_line, exp_minus_one, expand
-from coupling.watch import advance_or_stop
+from vanedamp.coupling.exact.event_functions import advance_or_stop
+from vanedamp.coupling.exact.root_search import DEGREE, FORCE, POSITION, VELOCITY, expand
+from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 
 
 @njit

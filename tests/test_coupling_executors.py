@@ -15,15 +15,16 @@ import pytest
 from sweeping import ROOT, scene
 from test_studies_mpi import ENVIRONMENT
 
-from coupling import points
-from coupling.sweep import SweepError, sweep
-from studies.workers import WorkerPool
+from vanedamp.coupling.sweep import worker as points
+from vanedamp.coupling.sweep.schedule import SweepError
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.studies.workers import WorkerPool
 
 LINKED = {"continuation": {"direction": "up"}}
 PROGRAM = """
 from mpi4py.futures import MPICommExecutor
 from sweeping import scene
-from coupling.sweep import sweep
+from vanedamp.coupling.sweep.sweep import sweep
 
 with MPICommExecutor() as executor:
     if executor is not None:  # the first rank
@@ -73,7 +74,7 @@ def deadly(base, choices, values, task):
 def test_a_point_that_kills_its_worker_is_one_point(changes, monkeypatch):
     """Such as one that needs more memory than there is: all others are what they are without it."""
     expected = sweep(scene(**changes))
-    monkeypatch.setattr("coupling.sweep.run_points", deadly)
+    monkeypatch.setattr("vanedamp.coupling.sweep.sweep.run_points", deadly)
     with WorkerPool(2) as pool:
         found = sweep(scene(**changes), pool)
     assert found.status.ravel()[5] == "error: the worker process ended abruptly (killed, or out of memory)"
@@ -86,7 +87,7 @@ def test_a_point_that_kills_its_worker_is_one_point(changes, monkeypatch):
 @pytest.mark.slow
 def test_a_pool_that_is_gone_is_told(monkeypatch, tmp_path):
     """A pool of the standard library does not start anew; what was finished is kept."""
-    monkeypatch.setattr("coupling.sweep.run_points", deadly)
+    monkeypatch.setattr("vanedamp.coupling.sweep.sweep.run_points", deadly)
     with (
         ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool,
         pytest.raises(SweepError, match=r"workers are gone .* go on from the checkpoint"),
@@ -100,7 +101,7 @@ def test_a_pool_that_is_gone_is_told(monkeypatch, tmp_path):
 
 ORPHANS = """
 import os, time
-from studies.workers import WorkerPool
+from vanedamp.studies.workers import WorkerPool
 
 if __name__ == "__main__":
     pool = WorkerPool(2)

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, null_space
 
-from coupling.flow import add_flow, empty_flows
-from coupling.inputs import validate
-from coupling.rows import rows_of
-from coupling.scene import Scene
-from coupling.structure import LinearStructure
+from vanedamp.coupling.exact.subsystem_assembly import add_flow, empty_flows
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.constraints import rows_of
+from vanedamp.coupling.system.modal_structure import LinearStructure
+from vanedamp.files.toml_input import validate
 
 OMEGA = 1.3
 
@@ -92,7 +92,7 @@ def by_exponential(rows, closed, loads, q, qd, times):
 
 
 def by_flow(rows, closed, flows, loads, q, qd, times):
-    """The same from the records of one subsystem, as coupling.flow documents them."""
+    """The same from the records of one subsystem, as coupling.exact.subsystem_assembly documents them."""
     n, m = len(rows.stiffness), flows.modes[0]
     p, rate = np.r_[q[:n], qd[:n]], flows.eigenvalue[0, :m]
     constant = (flows.static[0] @ loads + flows.held[0] @ q[:n])[:n]

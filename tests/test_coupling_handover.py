@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from coupling.engine import simulate
-from coupling.handover import Handover
-from coupling.inputs import InputError, validate
-from coupling.scene import Scene
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError, validate
 
 BODY = {"cavity": "c", "mass": 0.1, "friction": 0.3, "restitution": 0.6}
 DATA = {

@@ -16,11 +16,11 @@ from random_scenes import random_jenkins, random_scene
 from test_coupling_properties import FAST
 from worlds import scene_of, worlds
 
-from coupling.engine import simulate
-from coupling.inputs import validate
-from coupling.ivp_roots import NODES, first_root
-from coupling.response import Status
-from coupling.scene import Scene
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
 
 PERIODS, RTOL, APART = 4, 1e-10, 1e-11
 # the comparison ends where two runs of one method part by this, in periods

@@ -8,8 +8,8 @@ from compliant_scenes import jenkins, jenkins_turns, scene
 from following import follow
 from random_scenes import random_jenkins
 
-from coupling.engine import simulate
-from coupling.response import Status
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Status
 
 
 @pytest.mark.parametrize(("limit", "stiffness"), [(2.0, 1e5), (30.0, 1e5), (1e-3, 10.0), (99.0, 1e5)])

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 from test_coupling_traps import cluster
 
-from coupling import state as st
-from coupling.evaluation import evaluate, residual
-from coupling.response import Status
-from coupling.run import EngineRun, run_of
+from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.methods.registry import run_of
+from vanedamp.coupling.response import records as recs
+from vanedamp.coupling.response.evaluation import evaluate, residual
+from vanedamp.coupling.response.response import Status
 
 
 def test_what_is_only_carried_along_is_no_flow():
     """A body that carries 1e3 J past a structure which exchanges 1 J with it does not hide a missing 0.1 J."""
-    ledger, parts = np.zeros((3, len(st.ENERGIES))), np.zeros((3, 2))
-    ledger[:, st.STORED] = [1e3, 1e3 + 0.4, 1e3 + 0.1]
+    ledger, parts = np.zeros((3, len(recs.ENERGIES))), np.zeros((3, 2))
+    ledger[:, recs.STORED] = [1e3, 1e3 + 0.4, 1e3 + 0.1]
     parts[:, 0], parts[:, 1] = [0.0, 1.0, 0.5], [1e3, 999.4, 999.6]
     assert residual(ledger, parts) == pytest.approx(0.1 / 1.6)
     assert residual(ledger, parts, exchanged=10.0) == pytest.approx(0.01)
@@ -24,10 +25,10 @@ def test_what_is_only_carried_along_is_no_flow():
 
 def test_terms_that_cancel_are_no_flow():
     """What the loads do and undo within a period counts by its cumulative value at the periods' ends."""
-    ledger = np.zeros((2, len(st.ENERGIES)))
-    ledger[1, [st.EXCITATION, st.VISCOUS]] = 2.0, 1.5
+    ledger = np.zeros((2, len(recs.ENERGIES)))
+    ledger[1, [recs.EXCITATION, recs.VISCOUS]] = 2.0, 1.5
     assert residual(ledger, np.zeros((2, 1))) == pytest.approx(0.25)
-    assert residual(np.zeros((2, len(st.ENERGIES))), np.zeros((2, 1))) == 0.0
+    assert residual(np.zeros((2, len(recs.ENERGIES))), np.zeros((2, 1))) == 0.0
 
 
 @pytest.mark.parametrize("missing", [0.0, 1e-4, np.nan])
@@ -36,7 +37,7 @@ def test_a_ledger_that_does_not_close_ends_a_run(missing):
     scene = cluster(15e-6).replace({"time.periods": 20})
     run = EngineRun(scene, False, 0)
     assert run.advance_to(20) is Status.OK
-    run.records.ledger[-1, st.VISCOUS] += missing * np.abs(run.records.ledger).max()
+    run.records.ledger[-1, recs.VISCOUS] += missing * np.abs(run.records.ledger).max()
     response = evaluate(scene, run.outcome(), Status.OK, 0, time.perf_counter())
     assert response.status == (Status.ENERGY if missing else Status.OK)
 
@@ -49,7 +50,7 @@ def test_every_method_is_judged(solver, bound):
         run = run_of(scene, False, 0)
         assert run.advance_to(5) is Status.OK
         ledger = run.outcome().records.ledger
-        ledger[5, st.VISCOUS] += missing * np.abs(ledger).max()
+        ledger[5, recs.VISCOUS] += missing * np.abs(ledger).max()
         assert evaluate(scene, run.outcome(), Status.OK, 0, time.perf_counter()).status == status
 
 

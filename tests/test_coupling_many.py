@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from laws_by_event import check_events
 
-from coupling.engine import simulate
-from coupling.inputs import validate
-from coupling.response import Status
-from coupling.scene import Scene
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
 
 BODIES = [33, 65, 100, 200]
 

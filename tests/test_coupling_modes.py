@@ -11,14 +11,14 @@ from reference_laws import damping_ratio
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from coupling.engine import simulate
-from coupling.flow import _about_centre, add_flow, empty_flows
-from coupling.inputs import InputError
-from coupling.modes import IllConditioned, complex_modes, real_modes
-from coupling.response import Status
-from coupling.rows import rows_of
-from coupling.structure import LinearStructure, linear_structure
-from rom.reduced import ReducedModel
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes, real_modes
+from vanedamp.coupling.exact.subsystem_assembly import _about_centre, add_flow, empty_flows
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.system.constraints import rows_of
+from vanedamp.coupling.system.modal_structure import LinearStructure, linear_structure
+from vanedamp.files.toml_input import InputError
+from vanedamp.rom.reduced import ReducedModel
 
 EPS = np.finfo(float).eps
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from laws_of_runs import KINDS, SETTINGS, check_images, check_laws, images_of, impacts, laws_of
 from worlds import between, scene_of, worlds
 
-from coupling.engine import simulate
-from coupling.response import Status
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Status
 
 FAST = settings(SETTINGS, max_examples=15, derandomize=True)
 FEW = settings(FAST, max_examples=6)

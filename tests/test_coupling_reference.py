@@ -10,8 +10,8 @@ import pytest
 from random_scenes import random_reduced, random_scene
 from reference import with_horizon
 
-from coupling.engine import simulate
-from coupling.response import Status
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Status
 
 PERIODS, SAMPLES = 10, 32
 # impacts slower than this share of the fastest are the end of a chatter

@@ -11,12 +11,12 @@ import pytest
 from following import follow
 from laws_by_event import check_events
 
-from coupling import flow
-from coupling.engine import simulate
-from coupling.inputs import validate
-from coupling.scene import Scene
-from coupling.structure import linear_structure
-from rom.reduced import ReducedModel
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.exact import subsystem_assembly as flow
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.files.toml_input import validate
+from vanedamp.rom.reduced import ReducedModel
 
 MASS, STIFFNESS, FORCE = 2.0, 8e3, 20.0
 OMEGA = math.sqrt(STIFFNESS / MASS)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import tomli_w
 
-from coupling.inputs import InputError, validate
-from coupling.scene import Scene
-from coupling.structure import chosen_resonance, excitation_force
-from coupling.sweep import sweep
-from rom.reduced import ReducedModel
-from studies.cli import main
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.cli import main
 
 ZETA, TOP = 0.005, 1e-4
 FREQUENCIES, SHAPE = np.array([100.0, 150.0]), np.array([1.0, 3.0])

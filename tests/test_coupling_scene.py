@@ -4,9 +4,9 @@ import copy
 
 import pytest
 
-from coupling.grid import grid
-from coupling.inputs import InputError, validate
-from coupling.scene import Scene
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.grid import grid
+from vanedamp.files.toml_input import InputError, validate
 
 GOOD = {
     "structure": {"model": "rigid", "mass": 0.148, "stiffness": 3.4e7, "damping_ratio": 0.002},

@@ -5,8 +5,8 @@ import pytest
 from random_scenes import random_scene
 from reference import with_horizon
 
-from coupling.engine import simulate
-from coupling.response import Status
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Status
 
 
 @pytest.mark.parametrize("structure", ["rigid", "prescribed"])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from test_coupling_engine import cluster
 
-from coupling.engine import simulate
-from coupling.response import Status
-from coupling.statistics import mean_confidence, transient_length
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
 
 
 def autoregressive(rng, n, correlation):

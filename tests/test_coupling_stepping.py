@@ -9,11 +9,11 @@ import math
 import numpy as np
 import pytest
 
-from coupling.engine import simulate
-from coupling.inputs import InputError, validate
-from coupling.response import Status
-from coupling.scene import Scene
-from studies.method_scenes import double
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.studies.bench.methods.scenes import double
 
 METHODS = {
     "moreau": {"method": "moreau"},

@@ -10,11 +10,13 @@ import pytest
 import xarray
 from sweeping import RESONANCE, scene
 
-from coupling import points as module
-from coupling.engine import simulate
-from coupling.inputs import InputError
-from coupling.structure import excitation_force, receptance
-from coupling.sweep import LOSSES, MEASURES, Sweep, sweep, warm_up
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.sweep import worker as module
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import LOSSES, MEASURES, sweep, warm_up
+from vanedamp.coupling.system.linear_response import receptance
+from vanedamp.coupling.system.resonance import excitation_force
+from vanedamp.files.toml_input import InputError
 
 STIFFNESS, MASS, RATIO, BODY = 1.0e4, 1.0, 0.01, 0.05  # of sweeping.DATA
 

@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from coupling.choice import settle
-from coupling.engine import simulate
-from coupling.inputs import validate
-from coupling.scene import Scene
-from coupling.structure import linear_structure
-from coupling.sweep import sweep
-from coupling.transient import LIMIT, left_over, outlasted
-from rom.reduced import ReducedModel
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.model_order.selection import settle
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.transient import LIMIT, left_over, outlasted
+from vanedamp.files.toml_input import validate
+from vanedamp.rom.reduced import ReducedModel
 
 FIRST, TOP = 100.0, 1e-3
 OUT_OF_REACH, BETWEEN = 1.0, 1e-3

@@ -8,12 +8,12 @@ from random_scenes import random_reduced, random_scene
 from stepping import Stepper
 from worlds import scene_of
 
-from coupling import state as st
-from coupling.engine import simulate
-from coupling.inputs import validate
-from coupling.response import Status
-from coupling.scene import Scene
-from rom.reduced import ReducedModel
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.exact import state as st
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
+from vanedamp.rom.reduced import ReducedModel
 
 # a rigid structure that no body or spring can move: cavities then are laboratories at rest
 HEAVY = {"model": "rigid", "mass": 1e12, "stiffness": 1e12, "damping_ratio": 0.01}

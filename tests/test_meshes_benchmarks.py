@@ -2,9 +2,9 @@
 
 import pytest
 
-from meshes.benchmarks import Block, build
-from meshes.vane_cluster import ParameterError
-from modal.elasticity import Material, assemble
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.vane_cluster import ParameterError
+from vanedamp.modal.elasticity import Material, assemble
 
 UNIT_DENSITY = {"default": Material(young=1.0, poisson=0.25, density=1.0)}
 

@@ -6,11 +6,11 @@ from scipy import linalg
 from scipy.sparse.linalg import spsolve
 from structures import rod
 
-from meshes.benchmarks import Block, build
-from modal.base_excitation import BaseExcitationError, base_response
-from modal.eigen import Modes, solve_modes
-from modal.elasticity import Material, assemble
-from modal.matrices import patch_average
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.base_excitation import BaseExcitationError, base_response
+from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.elasticity import Material, assemble
+from vanedamp.modal.matrices import patch_average
 
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
 RATIO = 0.01

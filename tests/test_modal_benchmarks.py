@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from validation_modes import FV32, SDLS01, square_plate, tapered_membrane
 
-from meshes.benchmarks import Block, build
-from modal.eigen import factorize, solve_modes
-from modal.elasticity import Material, Solid
-from modal.matrices import patch_average
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.eigen import factorize, solve_modes
+from vanedamp.modal.elasticity import Material, Solid
+from vanedamp.modal.matrices import patch_average
 
 
 def converged(solutions):

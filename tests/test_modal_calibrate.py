@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from meshes.benchmarks import Block, build
-from modal.calibrate import CalibrationError, fatigue_amplitude, rigid_model
-from modal.eigen import Modes, solve_modes
-from modal.elasticity import Material, Solid
-from modal.matrices import patch_average
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.elasticity import Material, Solid
+from vanedamp.modal.matrices import patch_average
+from vanedamp.modal.rigid_model import CalibrationError, fatigue_amplitude, rigid_model
 
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
 

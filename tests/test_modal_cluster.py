@@ -9,13 +9,14 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from meshes.vane_cluster import SHIPPED, VaneCluster, build
-from modal.calibrate import rigid_model
-from modal.eigen import count_below, factorize, solve_modes
-from modal.elasticity import Material, assemble
-from modal.matrices import patch_average
-from modal.msh import session
-from modal.participation import effective_mass_shares, effective_masses, first_bending
+from vanedamp.meshes.parameters import VaneCluster
+from vanedamp.meshes.vane_cluster import SHIPPED, build
+from vanedamp.modal.eigen import count_below, factorize, solve_modes
+from vanedamp.modal.elasticity import Material, assemble
+from vanedamp.modal.matrices import patch_average
+from vanedamp.modal.msh import session
+from vanedamp.modal.participation import effective_mass_shares, effective_masses, first_bending
+from vanedamp.modal.rigid_model import rigid_model
 
 YOUNG, POISSON, DENSITY = 2.0e11, 0.3, 8190.0
 MATERIALS = {"default": Material(YOUNG, POISSON, DENSITY)}

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from meshes.benchmarks import Block, build
-from meshes.vane_cluster import VaneCluster
-from meshes.vane_cluster import build as build_cluster
-from modal.correlation import (
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.parameters import VaneCluster
+from vanedamp.meshes.vane_cluster import build as build_cluster
+from vanedamp.modal.correlation import (
     CorrelationError,
     MeasuredShapes,
     compare,
@@ -18,8 +18,8 @@ from modal.correlation import (
     observed_shapes,
     pair_modes,
 )
-from modal.eigen import solve_modes
-from modal.elasticity import Material, assemble
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.elasticity import Material, assemble
 
 STEEL = Material(young=2.0e11, poisson=0.3, density=8190.0)
 

@@ -4,9 +4,9 @@ import gmsh
 import numpy as np
 import pytest
 
-from modal.eigen import solve_modes
-from modal.elasticity import ElasticSupport, Material, assemble
-from modal.msh import session
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.elasticity import ElasticSupport, Material, assemble
+from vanedamp.modal.msh import session
 
 RADIUS, LENGTH, SIZES = 0.5, 1.0, (0.6, 0.3, 0.15)
 UNIT = {"default": Material(young=2.6, poisson=0.3, density=1.0)}  # shear modulus and density one

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from cases import BLOCK
 
-from meshes.benchmarks import Block, build
-from modal import abaqus, nastran
-from modal.eigen import solve_modes
-from modal.elasticity import Material, assemble
-from modal.imports import convert
-from modal.msh import MeshError
-from studies.cli import BAD_INPUT, main
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal import abaqus, nastran
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.elasticity import Material, assemble
+from vanedamp.modal.mesh_import import convert
+from vanedamp.modal.msh import MeshError
+from vanedamp.studies.cli import BAD_INPUT, main
 
 meshio = pytest.importorskip("meshio")
 

@@ -6,11 +6,11 @@ from scipy import linalg, optimize, sparse
 from scipy.sparse.linalg import eigsh, spsolve
 from structures import truss
 
-from meshes.benchmarks import Block, build
-from modal.eigen import Modes, SolverError, count_below, factorize, solve_modes
-from modal.elasticity import Material, assemble
-from modal.matrices import SystemMatrices
-from modal.participation import effective_masses, first_bending
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.eigen import Modes, SolverError, count_below, factorize, solve_modes
+from vanedamp.modal.elasticity import Material, assemble
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.modal.participation import effective_masses, first_bending
 
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from modal.correlation import MeasuredShapes
-from modal.exchange import ExchangeError, read_frf, read_shapes, write_frf, write_shapes
-from modal.frf import Frf
+from vanedamp.modal.correlation import MeasuredShapes
+from vanedamp.modal.frf import Frf
+from vanedamp.modal.test_data import ExchangeError, read_frf, read_shapes, write_frf, write_shapes
 
 
 def shapes(kind=float, axes=True):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from modal.frf import QUANTITIES, Frf, FrfError, identify
-from modal.rational import Rational
+from vanedamp.modal.frf import QUANTITIES, Frf, FrfError, identify
+from vanedamp.modal.rational_fit import Rational
 
 
 def response(frequencies, modes, quantity="receptance"):

@@ -4,12 +4,12 @@ import gmsh
 import numpy as np
 import pytest
 
-from meshes.benchmarks import Block, build
-from modal.eigen import solve_modes
-from modal.elasticity import ElasticityError, Material, Solid, assemble
-from modal.imports import convert
-from modal.msh import MeshError, session
-from studies.cli import BAD_INPUT, main
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.elasticity import ElasticityError, Material, Solid, assemble
+from vanedamp.modal.mesh_import import convert
+from vanedamp.modal.msh import MeshError, session
+from vanedamp.studies.cli import BAD_INPUT, main
 
 meshio = pytest.importorskip("meshio")
 

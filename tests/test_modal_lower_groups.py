@@ -4,14 +4,14 @@ import gmsh
 import numpy as np
 import pytest
 
-from modal.eigen import solve_modes
-from modal.elasticity import ElasticSupport, Material, Solid, assemble
-from modal.imports import convert
-from modal.matrices import patch_average
-from modal.msh import MeshError, session
-from modal.participation import first_bending
-from rom.interface import Interface, InterfaceCoordinate
-from studies.cli import BAD_INPUT, main
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.elasticity import ElasticSupport, Material, Solid, assemble
+from vanedamp.modal.matrices import patch_average
+from vanedamp.modal.mesh_import import convert
+from vanedamp.modal.msh import MeshError, session
+from vanedamp.modal.participation import first_bending
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.studies.cli import BAD_INPUT, main
 
 LENGTH, WIDTH, HEIGHT = 1.0, 0.06, 0.05
 # no lateral contraction: the closed form of a beam holds

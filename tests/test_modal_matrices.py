@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from modal.matrices import MatricesError, Patch, SystemMatrices, patch_average
+from vanedamp.modal.matrices import MatricesError, Patch, SystemMatrices, patch_average
 
 
 def springs(**changes):

@@ -7,9 +7,9 @@ import pytest
 from scipy import io, sparse
 from structures import truss
 
-from modal.eigen import solve_modes
-from modal.matrices import MatricesError
-from modal.matrix_files import read_folder, read_matrices, write_folder
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.matrices import MatricesError
+from vanedamp.modal.matrix_files import read_folder, read_matrices, write_folder
 
 
 @pytest.fixture

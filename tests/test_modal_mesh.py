@@ -10,12 +10,12 @@ import pytest
 from boxes import write_boxes
 from scipy.sparse.linalg import spsolve
 
-from meshes.benchmarks import Block, build
-from meshes.vane_cluster import SHIPPED
-from modal import fenicsx
-from modal.elasticity import Material, assemble
-from modal.matrices import patch_average
-from modal.msh import MeshError, session
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.vane_cluster import SHIPPED
+from vanedamp.modal import fenicsx
+from vanedamp.modal.elasticity import Material, assemble
+from vanedamp.modal.matrices import patch_average
+from vanedamp.modal.msh import MeshError, session
 
 UNIT = {"default": Material(young=1.0, poisson=0.25, density=1.0)}
 
@@ -197,7 +197,7 @@ def test_reading_is_silent(tmp_path):
     path = build(Block(1.0, 1.0, 1.0, divisions=(1, 1, 1)), tmp_path / "block.msh")
     code = (
         "import logging; logging.basicConfig(level=logging.INFO)\n"
-        "from modal.elasticity import Material, assemble\n"
+        "from vanedamp.modal.elasticity import Material, assemble\n"
         f"assemble({str(path)!r}, {{'default': Material(1.0, 0.25, 1.0)}}, {{}}, degree=1)\n"
         "assert logging.root.manager.disable == 0"
     )

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from cases import BLOCK, changed
 
-from meshes.benchmarks import Block, build
-from modal.calibrate import rigid_model
-from modal.eigen import Modes, solve_modes
-from modal.elasticity import Material, assemble
-from modal.matrices import patch_average
-from modal.multiple import rivals, turned
-from studies.cli import main
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.elasticity import Material, assemble
+from vanedamp.modal.matrices import patch_average
+from vanedamp.modal.multiple import rivals, turned
+from vanedamp.modal.rigid_model import rigid_model
+from vanedamp.studies.cli import main
 
 STEEL = Material(young=2e11, poisson=0.0, density=8000.0)
 SQUARE = changed(

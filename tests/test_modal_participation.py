@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from meshes.benchmarks import Block, build
-from modal.eigen import Modes, solve_modes
-from modal.elasticity import Material, assemble
-from modal.participation import (
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.elasticity import Material, assemble
+from vanedamp.modal.participation import (
     ParticipationError,
     effective_mass_shares,
     effective_masses,

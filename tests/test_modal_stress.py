@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from boxes import write_boxes
 
-from modal.elasticity import ElasticityError, Material, Solid
-from modal.stress import hot_spot
+from vanedamp.modal.elasticity import ElasticityError, Material, Solid
+from vanedamp.modal.stress import hot_spot
 
 STEEL = Material(young=2.0e11, poisson=0.25, density=8000.0)
 

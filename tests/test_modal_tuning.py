@@ -7,11 +7,11 @@ import pytest
 from scipy import sparse
 from structures import truss
 
-from meshes.benchmarks import Block, build
-from modal.correlation import MeasuredShapes, observed_shapes
-from modal.eigen import solve_modes
-from modal.elasticity import ElasticSupport, Material, Solid
-from modal.tuning import TuningError, sensitivities, tune
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.correlation import MeasuredShapes, observed_shapes
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.elasticity import ElasticSupport, Material, Solid
+from vanedamp.modal.model_updating import TuningError, sensitivities, tune
 
 STEEL = Material(young=2.0e11, poisson=0.3, density=8190.0)
 

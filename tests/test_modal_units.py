@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from cases import BLOCK, changed
 
-from meshes.benchmarks import Block, build
-from modal.elasticity import ElasticityError, Material, Solid
-from modal.msh import session
-from modal.units import absurdity, doubts, model_doubts
-from studies.cli import BAD_INPUT, main
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.elasticity import ElasticityError, Material, Solid
+from vanedamp.modal.msh import session
+from vanedamp.modal.units import absurdity, doubts, model_doubts
+from vanedamp.studies.cli import BAD_INPUT, main
 
 # E in Pa, rho in kg/m^3 (Ashby, Materials Selection in Mechanical Design, 2011, appendix A)
 SOLIDS = {

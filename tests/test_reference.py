@@ -11,9 +11,9 @@ from reference import Event, Reference, agreement, integrate
 from reference_ledger import imbalance, ledger
 from scipy.optimize import brentq
 
-from coupling.inputs import validate
-from coupling.scene import Scene
-from rom.reduced import ReducedModel
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
+from vanedamp.rom.reduced import ReducedModel
 
 UPRIGHT = {"acceleration": 9.81, "orientation_deg": 90.0}
 LEVEL = {"acceleration": 10.0}

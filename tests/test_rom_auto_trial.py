@@ -1,14 +1,15 @@
 """The automatic choice on scenes that nothing was settled on: is the error it promises kept?
 
-The truth is the response of the whole model, over periods and starts (studies.auto_choice); `vanedamp bench ladder`
-adds what the models cost.
+The truth is the response of the whole model, over periods and starts (studies.bench.model_order.trial); `vanedamp
+bench ladder` adds what the models cost.
 """
 
 import numpy as np
 import pytest
 
-from studies import auto_choice
-from studies.auto_scenes import SEED, beam_model, rod_model, trials
+from vanedamp.studies.bench.model_order import trial as auto_choice
+from vanedamp.studies.bench.model_order.scenes import SEED, trials
+from vanedamp.studies.bench.model_order.structures import beam_model, rod_model
 
 
 def test_models_of_rod_and_beam():

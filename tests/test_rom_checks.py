@@ -7,9 +7,9 @@ import pytest
 from scipy import linalg
 from structures import rod, truss
 
-from rom import checks
-from rom.craig_bampton import reduce
-from rom.interface import Interface, InterfaceCoordinate
+from vanedamp.rom import checks
+from vanedamp.rom.bases.craig_bampton import reduce
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
 
 TIP = [InterfaceCoordinate("tip", "tip", (1, 0, 0))]
 ENDS = [InterfaceCoordinate("a", "a", (0, 1, 0)), InterfaceCoordinate("c", "c", (0, 1, 0))]

@@ -8,18 +8,18 @@ import pytest
 from cases import DAMPED_BLOCK
 from structures import rod
 
-from coupling.choice import settle, settle_all
-from coupling.engine import simulate
-from coupling.inputs import InputError, validate
-from coupling.rows import rows_of
-from coupling.scene import Scene
-from coupling.structure import linear_structure
-from coupling.sweep import sweep
-from rom.interface import Interface, InterfaceCoordinate
-from rom.reduced import ReducedModel
-from rom.reduction import reduce
-from studies.auto_scenes import beam_model
-from studies.cli import main
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.model_order.selection import settle, settle_all
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.system.constraints import rows_of
+from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.reduction import reduce
+from vanedamp.studies.bench.model_order.structures import beam_model
+from vanedamp.studies.cli import main
 
 
 @pytest.fixture(scope="module")

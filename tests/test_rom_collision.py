@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from coupling.laws import damping_ratio
-from rom import ladder
-from rom.collision import Collision, contact_frequency, pulse, pulse_spectrum, share_above
-from rom.reduced import ReducedModel
+from vanedamp.coupling.scene.contact_laws import damping_ratio
+from vanedamp.rom import error_estimate as ladder
+from vanedamp.rom.contact_pulse import Collision, contact_frequency, pulse, pulse_spectrum, share_above
+from vanedamp.rom.reduced import ReducedModel
 
 
 def test_pulse_spectrum():

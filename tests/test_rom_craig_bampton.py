@@ -7,10 +7,11 @@ import pytest
 from scipy import linalg
 from structures import rod, truss
 
-from modal.matrices import Patch, SystemMatrices
-from rom import checks
-from rom.craig_bampton import ReductionError, reduce
-from rom.interface import Interface, InterfaceCoordinate
+from vanedamp.modal.matrices import Patch, SystemMatrices
+from vanedamp.rom import checks
+from vanedamp.rom.bases.craig_bampton import ReductionError, reduce
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.rom.truncation import truncated
 
 COORDINATES = [
     InterfaceCoordinate("a", "a", (0, 1, 0)),
@@ -42,11 +43,11 @@ def interface(structure):
 def test_contact_mass_of_a_rod(modes):
     # the fixed-interface modes sqrt(2) sin(j pi x) take 2 / (j pi)^2 each from the 1/3 of the constraint mode x
     expected = 1 / 3 - sum(2.0 / (j * np.pi) ** 2 for j in range(1, modes + 1))
-    assert rod_model().truncated(modes).contact_mass("tip") == pytest.approx(expected, rel=1e-4)
+    assert truncated(rod_model(), modes).contact_mass("tip") == pytest.approx(expected, rel=1e-4)
     table = {0: "0.333", 1: "0.131", 2: "0.080", 5: "0.0367", 10: "0.0193", 50: "0.0040"}
     digits = len(table[modes]) - 2
     # every printed digit, and within 1e-3 of it before rounding
-    assert f"{rod_model().truncated(modes).contact_mass('tip'):.{digits}f}" == table[modes]
+    assert f"{truncated(rod_model(), modes).contact_mass('tip'):.{digits}f}" == table[modes]
     assert expected == pytest.approx(float(table[modes]), abs=1e-3)
 
 
@@ -67,7 +68,7 @@ def test_rod_in_closed_form():
 
 
 def test_frequencies_of_a_rod_converge_from_above():
-    errors = np.array([checks.frequency_errors(rod_model().truncated(modes), NATURAL) for modes in (2, 4, 8, 16, 32)])
+    errors = np.array([checks.frequency_errors(truncated(rod_model(), modes), NATURAL) for modes in (2, 4, 8, 16, 32)])
     assert np.all(errors > 0.0)
     # the slope at the tip is zero in a mode and not in a sine: errors fall with the third power of the modes
     assert np.log2(errors[-2] / errors[-1]) == pytest.approx([3.0, 3.0, 3.0], abs=0.1)
@@ -75,7 +76,7 @@ def test_frequencies_of_a_rod_converge_from_above():
 
 def test_quasi_static_modes_of_a_rod():
     # the constraint mode x lags by (x - x^3) / 6: contact mass 1/3 - (2/15)^2 / (8/105)
-    model = rod_model(quasi_static=True).truncated(0)
+    model = truncated(rod_model(quasi_static=True), 0)
     assert model.size == 2
     assert model.contact_mass("tip") == pytest.approx(0.1, rel=1e-9)
     stiffness, mass = [[1.0, 0.0], [0.0, 4.0 / 5.0]], [[1 / 3, 2 / 15], [2 / 15, 8 / 105]]
@@ -85,7 +86,7 @@ def test_quasi_static_modes_of_a_rod():
 
 def test_quasi_static_modes_raise_the_order_from_three_to_seven():
     model = rod_model(quasi_static=True)
-    errors = np.array([checks.frequency_errors(model.truncated(modes), NATURAL) for modes in (2, 4, 8, 16)])
+    errors = np.array([checks.frequency_errors(truncated(model, modes), NATURAL) for modes in (2, 4, 8, 16)])
     # the first frequency reaches the error of the finite elements at once
     assert abs(errors[-1, 0]) < 1e-10
     assert np.log2(errors[-2, 1:] / errors[-1, 1:]) == pytest.approx([7.0, 7.0], abs=0.5)
@@ -96,7 +97,7 @@ def test_receptance_of_a_rod(quasi_static, modes, error):
     frequencies = np.array([0.1, 0.3, 0.6, 0.7, 0.9, 1.1])
     omega = 2 * np.pi * frequencies
     exact = (np.tan(omega) / omega)[:, None, None]
-    model = rod_model(quasi_static).truncated(modes)
+    model = truncated(rod_model(quasi_static), modes)
     assert checks.receptance_errors(model, frequencies, exact).max() < error
 
 
@@ -145,7 +146,7 @@ def test_reduction_against_dense_algebra(structure, interface, quasi_static):
 def test_static_stiffness_is_exact_for_any_number_of_modes(structure, interface):
     model = reduce(structure, interface, 8, quasi_static=True)
     for modes in (0, 3, 8):
-        assert checks.static_stiffness_error(model.truncated(modes), structure, interface) < 1e-12
+        assert checks.static_stiffness_error(truncated(model, modes), structure, interface) < 1e-12
 
 
 def test_quasi_static_modes_give_way_to_the_modes(structure, interface):
@@ -170,7 +171,7 @@ def test_many_quasi_static_blocks_stay_well_conditioned(nodes, modes):
 
 def test_truncation_is_a_smaller_reduction(structure, interface):
     large, small = (reduce(structure, interface, modes, keep_recovery=True) for modes in (9, 4))
-    cut = large.truncated(4)
+    cut = truncated(large, 4)
     for name in ("mass", "damping", "stiffness", "base_load", "recovery"):
         assert getattr(cut, name) == pytest.approx(getattr(small, name), abs=1e-9), name
 

@@ -7,12 +7,13 @@ import pytest
 from scipy import io, linalg, sparse
 from structures import truss
 
-from coupling.structure import modal_basis
-from rom.external import ExternalError, external_model, read_matrices
-from rom.interface import Interface, InterfaceCoordinate
-from rom.reduced import ReducedModel
-from rom.reduction import reduce
-from studies.cli import main
+from vanedamp.coupling.system.modal_basis import modal_basis
+from vanedamp.rom.external import ExternalError, external_model, read_matrices
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.reduction import reduce
+from vanedamp.rom.truncation import boundary_form
+from vanedamp.studies.cli import main
 
 ENDS = [InterfaceCoordinate("a", "a", (0, 1, 0)), InterfaceCoordinate("c", "c", (0, 1, 0))]
 TOML = """
@@ -63,7 +64,7 @@ def test_every_format_by_the_command(model, kind, tmp_path, monkeypatch, capsys)
 def test_boundary_without_mass_is_condensed():
     """MacNeal's form of a truss, as another code would hand it over: singular mass at the interface."""
     macneal = reduce(truss(), Interface.on_patches(truss(), ENDS), "macneal", modes=5)
-    mass, _, stiffness = macneal.boundary_form()
+    mass, _, stiffness = boundary_form(macneal)
     made, findings = external_model(mass, stiffness, {"a": 0, "c": 1}, damping_ratio=0.01)
     assert findings.condensed == 2
     assert made.size == 5

@@ -5,8 +5,8 @@ import pytest
 from scipy import linalg
 from structures import truss
 
-from modal.matrices import MatricesError
-from rom.interface import Interface, InterfaceCoordinate, InterfaceError, rigid_motions
+from vanedamp.modal.matrices import MatricesError
+from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, rigid_motions
 
 Y = (0.0, 1.0, 0.0)
 

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from studies.bounce import GAP, GRAVITY, LENGTH, MODULUS, PERIOD, bar, bounce
-from studies.cli import main
+from vanedamp.studies.bench.model_order.bar_on_wall import GAP, GRAVITY, LENGTH, MODULUS, PERIOD, bar, bounce
+from vanedamp.studies.cli import main
 
 
 def test_one_mode_is_a_mass_on_a_spring():

@@ -8,11 +8,12 @@ import pytest
 from massless_boundary import Boundary, craig_bampton, frequencies, macneal
 from structures import rod, truss
 
-from coupling.engine import simulate
-from coupling.inputs import validate
-from coupling.scene import Scene
-from rom.interface import Interface, InterfaceCoordinate
-from rom.reduction import reduce
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.rom.reduction import reduce
+from vanedamp.rom.truncation import boundary_form, massless
 
 TIP = [InterfaceCoordinate("tip", "tip", (1, 0, 0))]
 NODES = [InterfaceCoordinate(label, label, (0, 1, 0), kind="node") for label in ("a", "c")]
@@ -33,7 +34,7 @@ def test_form_is_the_published_one(basis):
     modes = 14 if basis == "massless" else 5
     model = reduce(matrices, interface, basis, modes)
     published, at = macneal(mass, stiffness, boundary, modes)
-    singular, _, own = model.boundary_form()
+    singular, _, own = boundary_form(model)
     assert np.allclose(singular, np.diag(np.r_[0, 0, np.ones(modes)]), atol=1e-9)
     signs = np.r_[1, 1, np.sign((model.selection * at).sum(axis=0))]
     assert np.allclose(signs[:, None] * own * signs, published, rtol=0, atol=1e-8 * np.abs(published).max())
@@ -81,7 +82,7 @@ def test_engine_follows_the_differential_algebraic_system(tmp_path, modes):
     assert response.status == "ok"
     assert response.impacts_per_period * 4 > 3
     contacts = [("tip", 0, 1, 0.25), ("tip", 0, -1, 0.25)]
-    natural = model.massless(modes)
+    natural = massless(model, modes)
     system = Boundary(natural, [0.05], contacts, 0.05, 2 * np.pi * 0.24, "tip", coupled=False)
     states = system.run(([0.1], [0.3]), response.time, max_step=0.05)
     displacement = states[:, :modes] @ natural.row("tip")

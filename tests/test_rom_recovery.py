@@ -6,13 +6,14 @@ from cases import DAMPED_BLOCK
 from scipy import linalg
 from structures import truss
 
-from coupling.inputs import InputError, validate
-from coupling.recovery import histories
-from coupling.scene import Scene
-from rom.interface import Interface, InterfaceCoordinate
-from rom.recovery import COMPONENTS, von_mises, with_displacements, with_outputs, with_stresses
-from rom.reduced import ReducedModel, ReducedModelError
-from rom.reduction import reduce
+from vanedamp.coupling.output_histories import histories
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.rom.recovery import COMPONENTS, von_mises, with_displacements, with_outputs, with_stresses
+from vanedamp.rom.reduced import ReducedModel, ReducedModelError
+from vanedamp.rom.reduction import reduce
+from vanedamp.rom.truncation import truncated
 
 ENDS = [InterfaceCoordinate("a", "a", (0, 1, 0)), InterfaceCoordinate("c", "c", (0, 1, 0))]
 
@@ -20,9 +21,9 @@ ENDS = [InterfaceCoordinate("a", "a", (0, 1, 0)), InterfaceCoordinate("c", "c", 
 @pytest.fixture(scope="module")
 def block(tmp_path_factory):
     """The clamped block of the command's tests: its finite elements, 60 modes, and a model with its hottest spot."""
-    from modal.eigen import solve_modes
-    from studies.config import Case
-    from studies.pipeline import assemble, reduction, with_hot_spots
+    from vanedamp.modal.eigen import solve_modes
+    from vanedamp.studies.case.stages import assemble, reduction, with_hot_spots
+    from vanedamp.studies.case.tables import Case
 
     path = tmp_path_factory.mktemp("block") / "case.toml"
     path.write_text(DAMPED_BLOCK)
@@ -42,7 +43,7 @@ def test_displacements_at_points(basis):
     assert model.evaluate(q, forces)[:3] == pytest.approx(full[27:30], rel=1e-12)
     assert np.all(model.evaluate(q, forces)[3:] == 0.0)
     # outputs follow their model through truncation
-    smaller = model.truncated(3)
+    smaller = truncated(model, 3)
     again = with_displacements(
         reduce(matrices, Interface.on_patches(matrices, ENDS), basis, 3, keep_recovery=True),
         {"top": matrices.coordinates[9]},
@@ -79,7 +80,7 @@ def test_stress_history_of_a_damped_run_equals_modal_superposition(block, tmp_pa
     model.save(tmp_path / "rom.h5")
     assert ReducedModel.load(tmp_path / "rom.h5").outputs == model.outputs
     # the full model's modes, each with its own stress at the spot: a modal model of the same structure
-    from studies.pipeline import interface
+    from vanedamp.studies.case.stages import interface
 
     rows = modes.shapes @ interface(structure.case, structure.matrices).vectors
     place = np.argmin(np.linalg.norm(structure.solid.stress_points() - model.provenance["hot_spots"]["hot1"], axis=1))

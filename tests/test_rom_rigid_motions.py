@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from coupling.engine import simulate
-from coupling.inputs import InputError, validate
-from coupling.scene import Scene
-from coupling.structure import modal_basis
-from rom.external import external_model
-from rom.reduced import ReducedModel
-from rom.spectrum import rounding, spectrum
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.modal_basis import modal_basis
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.dense_modes import rounding, spectrum
+from vanedamp.rom.external import external_model
+from vanedamp.rom.reduced import ReducedModel
 
 # SI; N, mm and t; both of one structure
 UNITS = {"SI": (1.0, 1.0), "mm": (1e-3, 1e-3)}

@@ -6,9 +6,9 @@ import pytest
 from cases import BLOCK
 from scipy import io, sparse
 
-from modal.matrices import MatricesError, SystemMatrices
-from rom.reduced import ReducedModel
-from studies.cli import BAD_INPUT, main
+from vanedamp.modal.matrices import MatricesError, SystemMatrices
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.cli import BAD_INPUT, main
 
 STIFFNESS, MASS = np.diag([4e6, 9e6]), np.eye(2)
 NAMES = 'mass = "m"\nstiffness = "k"\ndamping_ratio = 0.1'

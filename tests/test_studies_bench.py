@@ -6,12 +6,18 @@ import json
 import numpy as np
 import pytest
 
-from coupling.engine import simulate
-from studies import bench_scenes
-from studies.bench_engine import Effort, run_bench, tell
-from studies.cli import BAD_INPUT, main
-from studies.hand_loop import ACCOUNT, ImpactOscillator, complete_loop, lean_loop, plain_loop
-from studies.rivals import solve_with_events, truth
+from vanedamp.coupling.engine import simulate
+from vanedamp.studies.bench.engine import scenes as bench_scenes
+from vanedamp.studies.bench.engine.hand_written_loop import (
+    ACCOUNT,
+    ImpactOscillator,
+    complete_loop,
+    lean_loop,
+    plain_loop,
+)
+from vanedamp.studies.bench.engine.measure import Effort, run_bench, tell
+from vanedamp.studies.bench.engine.reference_solutions import solve_with_events, truth
+from vanedamp.studies.cli import BAD_INPUT, main
 
 PERIODS = 20
 TINY = Effort(

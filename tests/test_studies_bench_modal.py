@@ -5,8 +5,8 @@ import json
 
 import pytest
 
-from studies import bench_modal
-from studies.bench_modal import Effort, run_bench, tell
+from vanedamp.studies.bench.modes import measure as bench_modal
+from vanedamp.studies.bench.modes.measure import Effort, run_bench, tell
 
 TINY = Effort(sizes=(0.008,), rounds=1, limit=120.0)
 

@@ -6,9 +6,9 @@ import json
 import pytest
 from PIL import Image
 
-from coupling.grid import grid
-from studies.bench_sweep import Effort, _efficiency, run_bench, tell
-from studies.bench_sweep_worker import measure, scene
+from vanedamp.coupling.sweep.grid import grid
+from vanedamp.studies.bench.sweep.measure import Effort, _efficiency, run_bench, tell
+from vanedamp.studies.bench.sweep.worker import measure, scene
 
 TINY = Effort((4, 8), 8, 1)
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from cases import BLOCK, changed
 
-from modal.correlation import MeasuredShapes, observed_shapes
-from modal.eigen import solve_modes
-from modal.exchange import write_frf, write_shapes
-from modal.frf import Frf
-from studies.cli import BAD_INPUT, main
-from studies.config import Case
-from studies.pipeline import assemble
+from vanedamp.modal.correlation import MeasuredShapes, observed_shapes
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.frf import Frf
+from vanedamp.modal.test_data import write_frf, write_shapes
+from vanedamp.studies.case.stages import assemble
+from vanedamp.studies.case.tables import Case
+from vanedamp.studies.cli import BAD_INPUT, main
 
 YOUNG, SPRINGS, RATIO = 1.9e11, 3e13, 0.004
 CASE = changed(

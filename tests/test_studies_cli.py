@@ -13,14 +13,14 @@ import pytest
 import xarray
 from cases import DAMPED_BLOCK
 
-from coupling.scene import Scene
-from coupling.sweep import Sweep
-from modal.eigen import Modes
-from modal.matrix_files import read_folder
-from modal.store import StoreError, load
-from rom.reduced import ReducedModel
-from studies import commands
-from studies.cli import BAD_INPUT, _parser, main
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.files.store import StoreError, load
+from vanedamp.modal.eigen import Modes
+from vanedamp.modal.matrix_files import read_folder
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.cli import BAD_INPUT, _parser, main
+from vanedamp.studies.commands import all as commands
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = """
@@ -67,7 +67,7 @@ def vanedamp(*arguments, cwd, **environment):
     """The command as a process of its own."""
     variables = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     return subprocess.run(
-        [sys.executable, "-m", "studies", *arguments], cwd=cwd, capture_output=True, text=True, check=False,
+        [sys.executable, "-m", "vanedamp", *arguments], cwd=cwd, capture_output=True, text=True, check=False,
         env=variables | {"PYTHONPATH": str(ROOT)} | environment,
     )  # fmt: skip
 
@@ -441,10 +441,10 @@ def test_failing_write_leaves_the_old_files(folder, monkeypatch, capfd):
 def test_killed_sweep_keeps_the_old_file_and_goes_on(folder):
     (folder / "sweep.h5").write_text("precious")
     killer = (
-        "import os, signal, sys\nimport coupling.sweep as module\nrun = module.sweep\n"
+        "import os, signal, sys\nimport vanedamp.coupling.sweep.sweep as module\nrun = module.sweep\n"
         "def stop(done, total):\n    if done >= 2: os.kill(os.getpid(), signal.SIGKILL)\n"
         "module.sweep = lambda scene, pool, report, *rest: run(scene, pool, stop, *rest)\n"
-        "from studies.cli import main\nmain(sys.argv[1:])\n"
+        "from vanedamp.studies.cli import main\nmain(sys.argv[1:])\n"
     )
     arguments = ["sweep", "scene.toml", "-o", "sweep.h5", "--workers", "1"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -501,11 +501,9 @@ def test_process_writes_json_alone(folder):
     assert json.loads(finished.stdout)["first_bending"] == 0
 
 
-def test_stranger_of_the_same_name(folder):
+def test_packages_with_the_names_of_parts_do_not_matter(folder):
     stranger = folder / "site" / "modal"
     stranger.mkdir(parents=True)
-    (stranger / "__init__.py").write_text("")
+    (stranger / "__init__.py").write_text("raise RuntimeError('not ours')")
     finished = vanedamp("run", "scene.toml", cwd=folder, PYTHONPATH=f"{folder / 'site'}{os.pathsep}{ROOT}")
-    assert finished.returncode == BAD_INPUT
-    assert finished.stderr.count("\n") == 1
-    assert f"the package `modal` at {stranger} is not the one of vanedamp" in finished.stderr
+    assert (finished.returncode, finished.stderr) == (0, "")

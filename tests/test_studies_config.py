@@ -3,9 +3,9 @@
 import cases
 import pytest
 
-from coupling.inputs import InputError
-from meshes.vane_cluster import SHIPPED
-from studies.config import Case
+from vanedamp.files.toml_input import InputError
+from vanedamp.meshes.vane_cluster import SHIPPED
+from vanedamp.studies.case.tables import Case
 
 CASE = f"""
 [mesh]

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupling.sweep import Sweep, sweep
-from studies import demo
-from studies.forced_response import forced_responses
-from studies.paper_figure import Effort, PaperFigure, Structure
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.studies import demo
+from vanedamp.studies.paper.figure_file import Effort, PaperFigure, Structure
+from vanedamp.studies.report.forced_response import forced_responses
 
 MASS, FREQUENCY, RATIO, AMPLITUDE = 0.157, 2412.0, 0.002, 70e-6
 STRUCTURE = Structure(MASS, MASS * (2 * math.pi * FREQUENCY) ** 2, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))

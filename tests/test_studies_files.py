@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from cases import DAMPED_BLOCK
 
-from meshes.benchmarks import Block, build
-from modal.matrix_files import FILES
-from modal.store import StoreError, Variable, load, replacing, save
-from rom.reduced import ReducedModel
-from studies.cli import BAD_INPUT, main
+from vanedamp.files.store import StoreError, Variable, load, replacing, save
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.matrix_files import FILES
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.cli import BAD_INPUT, main
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = """
@@ -47,7 +47,7 @@ def vanedamp(*arguments, cwd, **environment):
     """The command as a process of its own."""
     variables = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     return subprocess.run(
-        [sys.executable, "-m", "studies", *arguments], cwd=cwd, capture_output=True, text=True, check=False,
+        [sys.executable, "-m", "vanedamp", *arguments], cwd=cwd, capture_output=True, text=True, check=False,
         env=variables | {"PYTHONPATH": str(ROOT)} | environment,
     )  # fmt: skip
 
@@ -213,8 +213,8 @@ def test_full_disk(arguments, output, most, folder, small_files, capfd, monkeypa
         assert main(["run", "scene.toml", "-o", "response.h5"]) == 0
     if "--vtk" in arguments or arguments[0] == "matrices":
         # what dolfinx compiles and the mesh on its way fit
-        from studies import pipeline
-        from studies.config import Case
+        from vanedamp.studies.case import stages as pipeline
+        from vanedamp.studies.case.tables import Case
 
         structure = pipeline.assemble(Case.load("case.toml"))
         monkeypatch.setattr(pipeline, "assemble", lambda case: structure)
@@ -234,7 +234,7 @@ def test_full_disk(arguments, output, most, folder, small_files, capfd, monkeypa
 def test_full_standard_output(folder):
     with open("/dev/full", "w") as full:
         finished = subprocess.run(
-            [sys.executable, "-m", "studies", "run", "scene.toml", "--json", "-"], cwd=folder, stdout=full,
+            [sys.executable, "-m", "vanedamp", "run", "scene.toml", "--json", "-"], cwd=folder, stdout=full,
             stderr=subprocess.PIPE, text=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)},
         )  # fmt: skip
     assert finished.returncode == BAD_INPUT
@@ -242,7 +242,7 @@ def test_full_standard_output(folder):
 
 
 def test_nobody_reads_on(folder):
-    command = f"{sys.executable} -m studies run scene.toml --events --json - | head -c 1"
+    command = f"{sys.executable} -m vanedamp run scene.toml --events --json - | head -c 1"
     finished = subprocess.run(
         command, shell=True, cwd=folder, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}
     )
@@ -250,7 +250,7 @@ def test_nobody_reads_on(folder):
 
 
 def test_leftovers_beside_the_target_of_a_link(tmp_path):
-    from modal.store import clear_leftovers
+    from vanedamp.files.store import clear_leftovers
 
     (tmp_path / "far").mkdir()
     (tmp_path / "link.h5").symlink_to("far/it.h5")

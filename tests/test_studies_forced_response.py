@@ -9,14 +9,15 @@ import pytest
 import tomli_w
 import xarray
 
-from coupling.inputs import validate
-from coupling.scene import Scene
-from coupling.sweep import LOSSES, MEASURES, Sweep
-from coupling.sweep import sweep as run_sweep
-from modal.store import finite
-from studies.cli import main
-from studies.forced_response import forced_responses, model_name, resonance_grid
-from studies.headline import shown
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import LOSSES, MEASURES
+from vanedamp.coupling.sweep.sweep import sweep as run_sweep
+from vanedamp.files.store import finite
+from vanedamp.files.toml_input import validate
+from vanedamp.studies.cli import main
+from vanedamp.studies.headline import shown
+from vanedamp.studies.report.forced_response import forced_responses, model_name, resonance_grid
 
 DATA = {
     "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},

@@ -7,13 +7,13 @@ import pytest
 from scipy.optimize import brentq
 from structures import rod
 
-from coupling.engine import simulate
-from coupling.inputs import InputError, validate
-from coupling.scene import Scene
-from rom.craig_bampton import reduce
-from rom.interface import Interface, InterfaceCoordinate
-from studies.full_elements import explicit_run, glued_frequencies_hz, lumped
-from studies.whole_mesh import CurveEffort, curve, ladder
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.bases.craig_bampton import reduce
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.studies.bench.methods.full_mesh_comparison import CurveEffort, curve, ladder
+from vanedamp.studies.bench.methods.full_mesh_run import explicit_run, glued_frequencies_hz, lumped
 
 
 @pytest.fixture(scope="module")

@@ -10,12 +10,12 @@ import pytest
 import tomli_w
 from fuzz import PRESCRIBED, ROM_SCENE, SCENE, drawn
 
-from coupling.engine import simulate
-from coupling.inputs import validate
-from coupling.scene import Scene
-from rom.reduced import ReducedModel
-from studies import commands
-from studies.cli import BAD_INPUT, main
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.commands import all as commands
 
 #: s without an answer after which a command counts as stuck
 PATIENCE = 10

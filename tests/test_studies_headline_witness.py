@@ -8,7 +8,7 @@ import pytest
 import tomli_w
 from random_scenes import random_reduced, random_scene
 
-from studies.cli import main
+from vanedamp.studies.cli import main
 
 PATH = "excitation.frequency"
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.interrupts import swallowed_interrupts_again
+from vanedamp.studies.interrupts import swallowed_interrupts_again
 
 ROOT = Path(__file__).resolve().parent.parent
 # hours of work
@@ -48,7 +48,7 @@ def watch(name, arguments):
         if left == 0:
             os.killpg(0, signal.SIGINT)
 sys.addaudithook(watch)
-from studies.cli import main
+from vanedamp.studies.cli import main
 sys.exit(main(sys.argv[4:]))
 """
 
@@ -92,11 +92,11 @@ def check(process, folder):
 @pytest.mark.parametrize(
     ("event", "end", "count"),
     [
-        ("import", "studies.commands", 1),
+        ("import", "vanedamp.studies.commands.all", 1),
         ("open", "scene.toml", 1),
-        ("import", "coupling.sweep", 1),
+        ("import", "vanedamp.coupling.sweep.sweep", 1),
         ("import", "numba.core.caching", 1),
-        ("import", "coupling.automaton", 1),
+        ("import", "vanedamp.coupling.exact.automaton", 1),
         ("import", "tqdm", 1),
         ("os.rename", ".partial", 1),
         ("os.rename", ".partial", 2),

@@ -3,12 +3,11 @@
 import pytest
 from cases import BLOCK, changed
 
-from coupling.engine import simulate
-from coupling.scene import Scene
-from meshes.benchmarks import Block
-from meshes.parameters import ParameterError
-from meshes.vane_cluster import VaneCluster
-from studies.cli import BAD_INPUT, main
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.meshes.benchmarks import Block
+from vanedamp.meshes.parameters import ParameterError, VaneCluster
+from vanedamp.studies.cli import BAD_INPUT, main
 
 SCENE = """
 [structure]
@@ -193,7 +192,7 @@ def test_a_run_in_blocks_is_the_same(monkeypatch, folder):
     scene = Scene.load("scene.toml")
     found = []
     for block in (7, 1000):
-        monkeypatch.setattr("coupling.evaluation._CHUNK", block)
+        monkeypatch.setattr("vanedamp.coupling.response.evaluation._CHUNK", block)
         response = simulate(scene)
         found.append((response.amplitude_mean, response.amplitude_rms, response.events, response.energy))
     assert found[0] == found[1]

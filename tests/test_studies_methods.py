@@ -7,12 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from studies import stability, work_precision
-from studies.cli import main
-from studies.failing import DAMPING
-from studies.failure_maps import CO_SIMULATIONS, MAPS, MapEffort
-from studies.macro_step import macro_step
-from studies.peers import PEERS
+from vanedamp.studies.bench.methods import measure as work_precision
+from vanedamp.studies.bench.methods.peers import PEERS
+from vanedamp.studies.bench.stability import limits as stability
+from vanedamp.studies.bench.stability.macro_step import macro_step
+from vanedamp.studies.bench.stability.maps import CO_SIMULATIONS, MAPS, MapEffort
+from vanedamp.studies.bench.stability.scenes import DAMPING
+from vanedamp.studies.cli import main
 
 SMALL = stability.Effort(points=2, runs=3, modes=(0, 1, 2, 5, 10, 20))
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from cases import BLOCK, changed
 
-from modal.eigen import Modes
-from studies.cli import BAD_INPUT, main
-from studies.report import write_report
-from studies.results import collect
+from vanedamp.modal.eigen import Modes
+from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.report.page import write_report
+from vanedamp.studies.report.results import collect
 
 CASE = BLOCK.replace("count = 6", "count = 8")
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from cases import BLOCK
 
-from modal.eigen import Modes
-from studies.cli import BAD_INPUT, main
+from vanedamp.modal.eigen import Modes
+from vanedamp.studies.cli import BAD_INPUT, main
 
 ROOT = Path(__file__).resolve().parent.parent
 # Open MPI 4 and 5: more ranks than cores, as root in a container
@@ -28,7 +28,7 @@ ENVIRONMENT = {
 pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mpirun")
 
 
-def on_two_ranks(*arguments, cwd, program=("-m", "studies")):
+def on_two_ranks(*arguments, cwd, program=("-m", "vanedamp")):
     command = ["mpirun", "-n", "2", sys.executable, *program, *arguments]
     return subprocess.run(
         command, cwd=cwd, env=os.environ | ENVIRONMENT, capture_output=True, text=True, check=False, timeout=300

@@ -10,14 +10,14 @@ import tomli_w
 import xarray
 from sweeping import ROOT
 
-from coupling.engine import simulate
-from coupling.inputs import InputError
-from studies import optimise as module
-from studies.cli import BAD_INPUT, main
-from studies.optimisation import Optimisation
-from studies.optimise import deviations, optimise
-from studies.optimise_figures import optimisation_figure
-from studies.optimise_study import Design, Study
+from vanedamp.coupling.engine import simulate
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.optimisation import search as module
+from vanedamp.studies.optimisation.record import Optimisation
+from vanedamp.studies.optimisation.search import deviations, optimise
+from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.report.optimum_chart import optimisation_figure
 
 EXAMPLE = ROOT / "docs" / "examples" / "optimise.toml"
 

@@ -9,18 +9,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupling.engine import simulate
-from coupling.inputs import InputError
-from coupling.scene import Scene
-from coupling.sweep import Sweep, sweep
-from modal.store import Variable, save
-from studies import paper
-from studies.cli import main
-from studies.paper import Session, run_paper, study
-from studies.paper_claims import attached_closed_form, regime, verdict
-from studies.paper_curve import curves
-from studies.paper_figure import FOLDER, Bar, Effort, PaperFigure, Structure, linear_peaks, with_length, write_scene
-from studies.results import collect
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.store import Variable, save
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.cli import main
+from vanedamp.studies.paper import runner as paper
+from vanedamp.studies.paper.claims_rigid import attached_closed_form, regime, verdict
+from vanedamp.studies.paper.curve import curves
+from vanedamp.studies.paper.figure_file import (
+    FOLDER,
+    Bar,
+    Effort,
+    PaperFigure,
+    Structure,
+    linear_peaks,
+    with_length,
+    write_scene,
+)
+from vanedamp.studies.paper.runner import Session, run_paper, study
+from vanedamp.studies.report.results import collect
 
 FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
 STIFFNESS = MASS * (2 * math.pi * FREQUENCY) ** 2

@@ -5,9 +5,10 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from coupling.engine import simulate
-from coupling.inputs import InputError
-from studies import method_scenes, peers
+from vanedamp.coupling.engine import simulate
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.bench.methods import peers
+from vanedamp.studies.bench.methods import scenes as method_scenes
 
 PERIODS, SAMPLES = 3, 10
 

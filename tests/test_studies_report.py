@@ -12,17 +12,18 @@ import subprocess
 import numpy as np
 import pytest
 
-from coupling.engine import simulate
-from coupling.inputs import InputError, validate
-from coupling.scene import Scene
-from coupling.sweep import Sweep, sweep
-from modal.store import Variable, load, save, write_json
-from rom.reduced import ReducedModel
-from studies import report as module
-from studies.cli import main
-from studies.mode_figure import sharp_edges, surface
-from studies.report import write_report
-from studies.results import collect
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.store import Variable, load, save, write_json
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.cli import main
+from vanedamp.studies.report import page as module
+from vanedamp.studies.report.mode_chart import sharp_edges, surface
+from vanedamp.studies.report.page import write_report
+from vanedamp.studies.report.results import collect
 
 RESONANCE = 100.0 / (2 * np.pi)
 DATA = {
@@ -231,12 +232,12 @@ def test_names_are_escaped(results, tmp_path):
 
 
 def test_a_sweep_that_failed_everywhere_still_makes_a_page(results, tmp_path, monkeypatch):
-    import coupling.points
+    from vanedamp.coupling.sweep import worker
 
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("everywhere")
 
-    monkeypatch.setattr(coupling.points, "simulate", broken)
+    monkeypatch.setattr(worker, "simulate", broken)
     sweep(validate(Scene, DATA | {"sweep": {"excitation.frequency": FREQUENCIES}}, "x")).save(tmp_path / "bad.h5")
     write_report(collect([tmp_path]), tmp_path / "report.html")
     assert "7 of 7 points are left out, which are not ok." in (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from coupling.inputs import InputError
-from rom.reduced import ReducedModel
-from studies.config import Case
-from studies.tied import compare_tied, loaded_frequency
+from vanedamp.files.toml_input import InputError
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.case.glued_bodies import compare_tied, loaded_frequency
+from vanedamp.studies.case.tables import Case
 
 CASE = """
 [mesh]

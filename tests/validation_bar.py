@@ -12,10 +12,11 @@ from closed_scenes import scene
 from structures import rod
 from validation import Figure, case
 
-from coupling.engine import simulate
-from rom.interface import Interface, InterfaceCoordinate
-from rom.reduction import reduce
-from studies.bounce import bounce
+from vanedamp.coupling.engine import simulate
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.rom.reduction import reduce
+from vanedamp.rom.truncation import massless
+from vanedamp.studies.bench.model_order.bar_on_wall import bounce
 
 # the engine takes no free structure and no wall but a body: a spring that is soft against the bar's stiffness, 1, and
 # a body that is heavy against its mass, 1. They take some 1e-4 from the impulse.
@@ -63,7 +64,7 @@ class Bar:
         )
         begin, end = response.event_list
         assert (begin.kind, end.kind) == ("impact", "detach")
-        flexibility = self.model.massless(modes).residual_flexibility
+        flexibility = massless(self.model, modes).residual_flexibility
         assert flexibility is not None
         yields = flexibility[0, 0] + (1 / law["stiffness"] if "stiffness" in law else 0.0)
         within = (response.time > 0.0) & (response.time < min(end.time, 2.0))

@@ -13,9 +13,9 @@ from validation import Case, Figure, case
 from validation_bar import bar_on_a_spring, bar_on_a_wall, falling_bar
 from validation_unilateral import unilateral_spring
 
-from coupling.engine import simulate
-from coupling.handover import Handover
-from coupling.response import Response
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.response.restart_state import Handover
 
 # a body so heavy that it is the ground: what an impact gives it in speed is below round-off of the structure's
 GROUND = 1e15

@@ -13,10 +13,10 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from validation import Case, Figure, case
 
-from meshes.benchmarks import Block, build
-from modal.eigen import solve_modes
-from modal.elasticity import Material, assemble
-from modal.msh import session
+from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.elasticity import Material, assemble
+from vanedamp.modal.msh import session
 
 STEEL = Material(200e9, 0.3, 8000.0)
 FV31 = ("52.404", "125.69", "140.78", "222.54", "241.41", "255.74")

@@ -10,11 +10,11 @@ from closed_scenes import scene
 from scipy.optimize import minimize_scalar, root
 from validation import Figure, case
 
-from coupling.engine import simulate
-from coupling.handover import Handover
-from coupling.response import Response
-from coupling.structure import linear_structure
-from rom.reduced import ReducedModel
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.rom.reduced import ReducedModel
 
 STIFFNESS = np.array([[1.0, -1.0], [-1.0, 2.0]])
 DAMPING = 0.03 * STIFFNESS

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 
-from coupling.inputs import validate
-from coupling.scene import Scene
-from rom.reduced import ReducedModel
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
+from vanedamp.rom.reduced import ReducedModel
 
 LAWS = ("newton", "compliant")
 STRUCTURES = ("prescribed", "rigid", "rom")

@@ -1,0 +1,1 @@
+"""The event-driven engine: closed-form flow from event to event."""

@@ -1,0 +1,333 @@
+"""Which event functions a state calls for, and the first of their roots."""
+
+from __future__ import annotations
+
+import math
+
+from vanedamp.coupling.exact.root_search import (
+    FORCE,
+    POSITION,
+    VELOCITY,
+    add_secular,
+    expand,
+    first_root_of_parabola,
+    safe_step,
+)
+from vanedamp.coupling.exact.state import (
+    AWAKE,
+    BOUNDED,
+    CARRIED,
+    CLOSED,
+    CLOSES,
+    EVALUATIONS,
+    EXPANDED,
+    FLOW,
+    LEAVING,
+    OPEN,
+    OPENS,
+    RECLOSES,
+    ROOT,
+    SEGMENTS,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    SPRUNG,
+    STICK,
+)
+from vanedamp.coupling.numerics.complementarity import AT_HIGH, AT_LOW
+from vanedamp.coupling.numerics.exponentials import secular_bound
+from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
+
+#: shortest step in periods: what a double can resolve within a period
+RESOLUTION = 1e-15
+#: a compliant contact ends when its spring is pulled by this share of the free travel
+ADHESION = 1e-13
+#: what is left of a chatter, in periods, when it is completed by a plastic impact; a body at rest does not leave for
+#: less. Relative displacement and speed are zero at its end either way: the motion of the structure is changed by no
+#: more than the order of (2 pi CHATTER)^3 of it
+CHATTER = 3e-7
+
+
+@inlined
+def next_event(rows, flows, st, ch):
+    """Time to the next event and its channel, or to the period's end and -1.
+
+    What is known beyond the period's end stays known in the next segment (`carry`).
+    """
+    s = st.counters[FLOW]
+    driven = flows.driven[s]
+    left = max(rows.period - st.time[0], 0.0)
+    shortest = RESOLUTION * rows.period
+    eigenvalue, awake = flows.eigenvalue[s], st.awake[: st.counters[AWAKE]]
+    count = _watch(rows, flows, st, ch, s)
+    st.counters[SEGMENTS] += 1
+    while True:
+        k, tau = -1, left
+        for i in range(count):
+            if ch.safe[i] < tau:
+                k, tau = i, ch.safe[i]
+        if k < 0:
+            st.counters[CARRIED] = count
+            return left, -1
+        if ch.known[k] == ROOT:
+            st.counters[CARRIED] = 0
+            # what a double cannot tell from the segment's start happens at its start
+            return (tau if tau > shortest else 0.0), k
+        if ch.known[k] == BOUNDED:
+            tau = 0.0  # where exponentials cost nothing
+        else:
+            st.counters[EVALUATIONS] += 1
+        noise, second, calm = expand(
+            ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau, ch.lower
+        )
+        if driven > 0:
+            drive = ch.drive[k, : driven + 1]
+            more, bound = add_secular(ch.order[k], drive, eigenvalue, tau, rows.period, ch.lower)
+            noise, second = noise + more, second + bound
+            calm = calm + bound if calm >= 0.0 else calm
+        step, found = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, rows.period, shortest)
+        ch.known[k] = ROOT if found else EXPANDED
+        ch.safe[k] = tau + step if found else max(ch.safe[k], tau + step)
+
+
+@inlined
+def carry(st, ch, tau):
+    """Take what is known of the event functions over the end of a period, tau from the segment's start."""
+    for k in range(st.counters[CARRIED]):
+        ch.safe[k] = max(ch.safe[k] - tau, 0.0)
+        if ch.known[k] == EXPANDED:
+            ch.known[k] = BOUNDED
+
+
+@inlined
+def advance_or_stop(lower, noise, second, calm, longest, shortest):
+    """Safe step from a point of an event function, and whether its root is at the end.
+
+    lower, second, calm: lower polynomials and bounds of second derivatives as of exact.root_search.expand.
+    """
+    a, slow = lower[0], lower[1]
+    f = a[0]
+    if f <= noise:
+        if a[1] < 0.0 or (a[1] <= second * shortest and a[2] < 0.0):
+            return 0.0, True
+        f = 0.0
+    longest = max(longest, shortest)
+    far = 0.0
+    if calm >= 0.0 and slow[0] > noise:
+        far, _ = safe_step(slow, slow[0], 0.0, calm, longest)
+        if far >= longest:
+            return far, False
+    step, found = safe_step(a, f, noise, second, longest)
+    if far > step:
+        return far, False
+    if step < shortest:
+        falls = a[1] < 0.0 and f <= 2.0 * shortest * (second * shortest - a[1])
+        return (0.0, True) if falls else (shortest, False)
+    return step, found
+
+
+@inlined
+def _watch(rows, flows, st, ch, s):
+    """Set up the event functions of the segment. Returns how many."""
+    count = ZERO
+    for r in range(rows.friction_rows):
+        state = st.state[r]
+        if state == STICK or state == SPRUNG:
+            for side in (AT_LOW, AT_HIGH):
+                count = _watch_force(rows, flows, st, ch, s, r, side, rows.limit[r], count)
+        elif state == SLIP_LEFT or state == SLIP_RIGHT:
+            count = _watch_motion(rows, flows, st, ch, s, r, VELOCITY, float(state), 0, count)
+    for r in range(rows.friction_rows, len(st.state)):
+        state = st.state[r]
+        if state == CLOSED or state == SPRUNG:
+            count = _watch_force(rows, flows, st, ch, s, r, AT_LOW, 0.0, count)
+        elif state == OPEN and not _surely_opens(rows, st, r):
+            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, 1.0, CLOSES, count)
+        elif state == LEAVING:
+            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, -1.0, OPENS, count)
+            count = _watch_spring(rows, flows, st, ch, s, r, count)
+    return count
+
+
+@inlined
+def _surely_opens(rows, st, r):
+    """Whether a gap can only widen in this segment: the body slides away from a wall that rides on its floor."""
+    if not rows.rides[r]:
+        return False
+    if rows.before[r] < 0:
+        return st.state[rows.after[r]] == SLIP_RIGHT
+    return rows.after[r] < 0 and st.state[rows.before[r]] == SLIP_LEFT
+
+
+@inlined
+def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
+    """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign, for its first root."""
+    if order == POSITION:
+        value, slope, ch.k2[k] = sign * st.displacement[r], sign * st.velocity[r], sign * st.drift[r]
+        ch.k0[k], ch.k1[k] = value, slope
+    else:
+        value, slope, ch.k2[k] = sign * st.velocity[r], sign * st.drift[r], 0.0
+        ch.k0[k], ch.k1[k] = value, slope
+    bound, curvature = 0.0, ch.k2[k]
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        rate, g = flows.eigenvalue[s, j], flows.velocity[s, r, j] if order == VELOCITY else flows.motion[s, r, j]
+        g *= sign * st.amplitude[j]
+        once = rate * g
+        ch.g[k, j] = g
+        if order == VELOCITY:
+            slope += once.real
+        else:
+            curvature += rate.real * once.real - rate.imag * once.imag
+        bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
+    if flows.driven[s] > 0:
+        on_motion, on_velocity = (0.0, sign) if order == VELOCITY else (sign, 0.0)
+        first, second, largest, _ = _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, 0.0, k)
+        if order == VELOCITY:
+            slope += first
+        curvature += second
+        bound += largest
+    _know(st, ch, r, order, what, value, slope, bound - ch.k2[k], k)
+    if flows.driven[s] > 0:
+        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)  # as far as the bounds hold
+    if what == CLOSES or what == OPENS:
+        st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
+    if st.released[r] != 0:
+        _leave(rows, flows, st, ch, s, r, order, sign, k)
+    return k + 1
+
+
+@inlined
+def _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, on_force, k):
+    """Watch what the excitation adds to driven modes (`_watch_growth`)."""
+    load = flows.load[s, : flows.driven[s] + 1]
+    return _watch_growth(
+        flows.eigenvalue[s], flows.motion[s, r], flows.velocity[s, r], flows.force[s, r], on_motion, on_velocity,
+        on_force, load, st.amplitude[0], rows.period, ch.drive[k],
+    )  # fmt: skip
+
+
+@kernel
+def _watch_growth(eigenvalue, motion, velocity, force, on_motion, on_velocity, on_force, load, phase, period, drive):
+    """Growth of driven modes in an event function, a sum of a row's motion, velocity and force times these factors.
+
+    Returns its first two derivatives at the segment's start, and bounds of the second and third.
+    """
+    first, second, second_bound, third_bound = 0.0, 0.0, 0.0, 0.0
+    excitation = eigenvalue[0]
+    for j in range(1, len(load)):
+        rate = eigenvalue[j]
+        part = (on_motion * motion[j] + on_velocity * velocity[j] + on_force * force[j]) * load[j] * phase
+        drive[j] = part
+        first += part.real
+        second += (part * (rate + excitation)).real
+        second_bound += secular_bound(part, rate, excitation, period, 2)
+        third_bound += secular_bound(part, rate, excitation, period, 3)
+    return first, second, second_bound, third_bound
+
+
+@inlined
+def _know(st, ch, r, order, what, value, slope, bound, k):
+    """Begin event function k: its second derivative nowhere lies below -bound. What was carried over stays known."""
+    carried = k < st.counters[CARRIED]
+    if carried and ch.row[k] == r and ch.order[k] == order and ch.side[k] == what:
+        return
+    ch.row[k], ch.order[k], ch.side[k], ch.noise[k], ch.known[k], ch.safe[k] = r, order, what, 0.0, BOUNDED, 0.0
+    if value > 0.0 or (value == 0.0 and slope > 0.0):
+        ch.safe[k] = first_root_of_parabola(value, slope, -bound)
+
+
+@kernel
+def _leave(rows, flows, st, ch, s, r, order, sign, k):
+    """First safe step of a row whose force was at its bound: from rest, no acceleration, and its jerk decides."""
+    jerk, snap = 0.0, 0.0
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        rate, g = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * st.amplitude[j]
+        square = rate.real * rate.real + rate.imag * rate.imag
+        second = g * rate * rate
+        jerk += (second * rate).real
+        snap += (abs(second.real) + abs(second.imag)) * square
+    excitation = flows.eigenvalue[s, 0]
+    for j in range(1, flows.driven[s] + 1):
+        rate, drive = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * flows.load[s, j] * st.amplitude[0]
+        jerk += (drive * (rate * rate + rate * excitation + excitation * excitation)).real
+        snap += secular_bound(drive, rate, excitation, rows.period, 4)
+    quick = (2.0 if order == POSITION else 1.5) * jerk / snap
+    shortest = 1e3 * RESOLUTION * rows.period
+    ch.safe[k], ch.known[k] = max(quick if quick == quick else rows.period, shortest), EXPANDED
+
+
+@kernel
+def longest_hop(rows, flows, st, r):
+    """Speed (m/s) with which a contact at rest would leave for a flight of CHATTER, from its force now."""
+    s = st.counters[FLOW]
+    force = st.level[r]
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        force += (flows.force[s, r, j] * st.amplitude[j]).real
+    return max(0.0, force) * rows.delassus[r, r] * 0.5 * CHATTER * rows.period
+
+
+@kernel
+def _watch_spring(rows, flows, st, ch, s, r, k):
+    """Watch a compliant contact that has ended for the spring's wish to push again: spring gap + dashpot rate > 0."""
+    spring, dashpot = rows.spring[r], rows.dashpot[r]
+    ch.row[k], ch.order[k], ch.side[k], ch.known[k], ch.safe[k] = r, POSITION, RECLOSES, BOUNDED, 0.0
+    acceleration = st.drift[r]
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        velocity = flows.velocity[s, r, j] * st.amplitude[j]
+        ch.g[k, j] = spring * flows.motion[s, r, j] * st.amplitude[j] + dashpot * velocity
+        acceleration += (flows.eigenvalue[s, j] * velocity).real
+    ch.k0[k] = spring * st.displacement[r] + dashpot * st.velocity[r]
+    ch.k1[k] = spring * st.velocity[r] + dashpot * acceleration
+    ch.k2[k] = spring * st.drift[r]
+    if flows.driven[s] > 0:
+        # the row's velocity has its share of the growth already, its acceleration has not
+        acceleration, _, _, _ = _watch_drive(rows, flows, st, ch, s, r, 0.0, 1.0, 0.0, k)
+        ch.k1[k] += dashpot * acceleration
+        _watch_drive(rows, flows, st, ch, s, r, spring, dashpot, 0.0, k)
+    # the contact ended at zero force
+    ch.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
+    return k + 1
+
+
+@inlined
+def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
+    """Watch the force of a closed row for reaching its low (AT_LOW) or high (AT_HIGH) bound."""
+    sign = 1.0 if side == AT_LOW else -1.0
+    constant, swing, value, slope, bound = sign * st.level[r] + limit, 0.0, 0.0, 0.0, 0.0
+    for a in range(st.counters[AWAKE]):
+        j = st.awake[a]
+        rate, g = flows.eigenvalue[s, j], sign * flows.force[s, r, j] * st.amplitude[j]
+        ch.g[k, j] = g
+        size = math.sqrt(g.real * g.real + g.imag * g.imag)
+        swing += size
+        value += g.real
+        slope += rate.real * g.real - rate.imag * g.imag
+        bound += size * (rate.real * rate.real + rate.imag * rate.imag)
+    curvature, third = 0.0, 0.0
+    if flows.driven[s] > 0:  # a force that grows is always watched
+        first, curvature, second_bound, third = _watch_drive(rows, flows, st, ch, s, r, 0.0, 0.0, sign, k)
+        slope += first
+        bound += second_bound
+    elif constant > swing:
+        return k  # the force never comes near its bound: nothing to watch
+    if st.state[r] == SPRUNG and r >= rows.friction_rows:
+        # bodies that touch without force, as in a free flight side by side, are not parted by round-off
+        constant += ADHESION * rows.spring[r] * rows.gap[r - rows.friction_rows]
+    ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
+    _know(st, ch, r, FORCE, side, constant + value, slope, bound, k)
+    if flows.driven[s] > 0:
+        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)  # as far as the bounds hold
+    if st.released[r] == -side:
+        for a in range(st.counters[AWAKE]):
+            j = st.awake[a]
+            rate = flows.eigenvalue[s, j]
+            second = ch.g[k, j] * rate * rate
+            curvature += second.real
+            third += (abs(second.real) + abs(second.imag)) * abs(rate)
+        quick = 2.9 * curvature / third if third > 0.0 else rows.period
+        ch.safe[k] = max(quick, 1e3 * RESOLUTION * rows.period)
+        ch.known[k] = EXPANDED
+    return k + 1

@@ -1,0 +1,59 @@
+"""The log of events as the compiled engine writes it; coupling.engine turns it into events by name."""
+
+from __future__ import annotations
+
+from vanedamp.coupling.exact.state import IMPACTS, LOGGED, OPEN, PERIOD, SPRUNG, STICK
+from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.response.records import DETACHES, IMPACT, RESTS, SLIPS, STICKS
+
+
+@kernel
+def log_event(period, counters, time, log, kind, r, before, after, impulse):
+    """One entry: kind and row, relative velocities (m/s), impulse (N s)."""
+    entry = log[counters[LOGGED]]
+    counters[LOGGED] += 1
+    entry[0] = counters[PERIOD] * period + time[0]
+    entry[1], entry[2], entry[3], entry[4], entry[5] = kind, r, before, after, impulse
+
+
+@inlined
+def log_impact(rows, st, rec, r, before, after, impulse):
+    """Count an impact of row r and log it: relative velocities (m/s), impulse (N s)."""
+    _count(st.counters, rec.impacts, rec.collided, 0.5 * before * before / rows.delassus[r, r])
+    log_event(rows.period, st.counters, st.time, rec.log, IMPACT, r, before, after, impulse)
+
+
+@kernel
+def _count(counters, impacts, collided, energy):
+    """Count an impact and the energy of its relative motion, J. A call of its own: compiled in, it slows the loop."""
+    counters[IMPACTS] += 1
+    impacts[counters[PERIOD]] += 1
+    collided[counters[PERIOD]] += energy
+
+
+@kernel
+def log_changes(rows, st, rec, work):
+    """Log what changed. A body that rests at a wall is at rest on the floor too, and only the wall is named."""
+    for r in range(len(st.state)):
+        was, now = work.before[r], st.state[r]
+        if r < rows.friction_rows:
+            if now >= STICK > was and not _at_wall(rows, st.state, r):
+                log_event(rows.period, st.counters, st.time, rec.log, STICKS, r, 0.0, 0.0, 0.0)
+            elif was >= STICK > now and not _at_wall(rows, work.before, r):
+                log_event(rows.period, st.counters, st.time, rec.log, SLIPS, r, 0.0, st.velocity[r], 0.0)
+        elif now == SPRUNG or was == SPRUNG:
+            continue  # logged where a spring begins and ends to push
+        elif now != OPEN and was == OPEN:
+            log_event(rows.period, st.counters, st.time, rec.log, RESTS, r, 0.0, 0.0, 0.0)
+        elif now == OPEN and was != OPEN:
+            log_event(rows.period, st.counters, st.time, rec.log, DETACHES, r, 0.0, st.velocity[r], 0.0)
+
+
+@kernel
+def _at_wall(rows, state, body):
+    """Whether a body rests at a wall that moves with its floor."""
+    for r in range(rows.friction_rows, len(state)):
+        at_wall = (rows.before[r] == body and rows.after[r] < 0) or (rows.after[r] == body and rows.before[r] < 0)
+        if at_wall and rows.rides[r] and state[r] != OPEN and state[r] != SPRUNG:
+            return True
+    return False

@@ -1,0 +1,227 @@
+"""Impacts by Newton's law: several contacts at once are one complementarity problem on velocities, solved exactly.
+
+Pfeiffer and Glocker (1996), chapter 8; friction is free of impulses.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vanedamp.coupling.exact.event_log import log_impact
+from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS, close, join_speeds, measure_gaps, rigid, slowest
+from vanedamp.coupling.exact.state import CLOSED, COAST, OPEN, SPRUNG, STICK
+from vanedamp.coupling.numerics.complementarity import AT_LOW, DEPENDENT, FREE, solve_box
+from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.response.records import IMPACT_LOSS
+
+#: impacts of one contact that follow each other within this share of a period are the end of an inelastic collapse:
+#: bodies in a row can meet infinitely often in finite time (McNamara and Young 1992)
+COLLAPSE = 1e-13
+
+
+@inlined
+def bounce(rows, st, rec, work, r):
+    """The ordinary impact: row r alone, of free flights that go on in their directions, not the last of a chatter.
+
+    Returns False, with nothing changed, if it is not that: then `collide` decides.
+    """
+    friction, speed = rows.friction_rows, st.velocity[r]
+    restitution = rows.restitution[r - friction]
+    last = st.time[0] - st.last_impact[r] < COLLAPSE * rows.period
+    if not rigid(rows, r) or not rows.rides[r] or last or -speed * restitution <= st.settling[r]:
+        return False
+    if -speed <= slowest(rows, st):
+        return False
+    for i in range(friction, len(st.state)):
+        if st.state[i] != OPEN or (i != r and st.displacement[i] <= SIMULTANEOUS * rows.gap[i - friction]):
+            return False
+    impulse = -(1.0 + restitution) * speed / rows.delassus[r, r]
+    for i in range(friction):
+        turns = st.state[i] * (st.velocity[i] + rows.delassus[i, r] * impulse) <= 0.0
+        if st.state[i] >= STICK or (st.state[i] != COAST and turns):
+            return False
+    for i in range(len(st.state)):
+        work.impulse[i] = 0.0
+        if i < friction or not rows.rides[i]:
+            st.velocity[i] += rows.delassus[i, r] * impulse
+    # the contact obeys the law to the last bit
+    before, after, half = rows.before[r], rows.after[r], 0.5 * rows.gap[r - friction]
+    if before < 0:
+        st.displacement[after], st.low[after], st.velocity[after] = -half, 0.0, -restitution * speed
+    elif after < 0:
+        st.displacement[before], st.low[before], st.velocity[before] = half, 0.0, restitution * speed
+    else:
+        st.displacement[after], st.low[after] = st.displacement[before], st.low[before]
+        st.velocity[after] = st.velocity[before] - restitution * speed
+    measure_gaps(rows, st)
+    work.impulse[r] = impulse
+    st.ledger[IMPACT_LOSS] -= 0.5 * (1.0 - restitution) * impulse * speed
+    _note(rows, st, rec, r, speed, -restitution * speed, impulse)
+    return True
+
+
+@inlined
+def _note(rows, st, rec, r, before, after, impulse):
+    """Log an impact, and when it was."""
+    st.last_impact[r] = st.time[0]
+    log_impact(rows, st, rec, r, before, after, impulse)
+
+
+@kernel
+def collide(rows, st, rec, work):
+    """Newton's law at all touching rigid contacts at once: v+ + k v- >= 0 and P >= 0 complement each other.
+
+    Velocities of rows jump; the impulses are left in work.impulse (r,). An impact at the end of a chatter or of an
+    inelastic collapse is plastic. Contacts that would leave for a flight below the tolerance (st.settling) end their
+    chatter together (`_complete`), so that bodies that chatter on one structure do not wake each other for ever.
+    Returns False if the problem cannot be solved.
+    """
+    friction, problem = rows.friction_rows, work.problem
+    k = close(rows, st, work)
+    tiny = slowest(rows, st)
+    for p in range(k):
+        r = work.rows[p]
+        speed = st.velocity[r] if abs(st.velocity[r]) > tiny else 0.0
+        # kept before the jump, for the ledger and the log
+        work.jerk[p], work.acceleration[p] = speed, min(speed, 0.0)
+        restitution = rows.restitution[r - friction]
+        collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * rows.period
+        if collapsed or -speed * restitution < _share(restitution) * st.settling[r]:
+            restitution = 0.0
+        problem.restitution[p] = restitution
+        # a contact that separates already may not be driven together: its law starts from zero
+        problem.b[p] = speed + restitution * min(speed, 0.0)
+        problem.low[p], problem.high[p], problem.forced[p] = 0.0, np.inf, 0
+        for q in range(k):
+            problem.matrix[p, q] = rows.delassus[r, work.rows[q]]
+        work.reaction[p] = 0.0
+    if not solve_box(problem, k, 0.0):
+        return False
+    if _leave_slowly(rows, st, work, k) and not _complete(rows, st, work, k):
+        return False
+    _jump(rows, st, work, k)
+    for p in range(k):
+        r, before, impulse = work.rows[p], work.acceleration[p], problem.force[p]
+        after = st.velocity[r]
+        if impulse != 0.0 or problem.state[p] == DEPENDENT:
+            after = -problem.restitution[p] * before
+        st.ledger[IMPACT_LOSS] -= 0.5 * impulse * (work.jerk[p] + after)
+        if before < 0.0:
+            _note(rows, st, rec, r, before, after, max(impulse, work.reaction[p]))
+    return True
+
+
+@inlined
+def _share(restitution):
+    """Share of the time that is left of a chatter that its next flight takes.
+
+    An elastic contact has no chatter of its own, but what other contacts lose may shorten its flights without end.
+    """
+    return max(1.0 - restitution, 0.1)
+
+
+@kernel
+def _leave_slowly(rows, st, work, k):
+    """Mark the contacts (work.side) that rest or would separate too slowly. Returns whether any would separate."""
+    problem, found = work.problem, False
+    for p in range(k):
+        r = work.rows[p]
+        work.side[p] = problem.restitution[p] == 0.0 or work.acceleration[p] == 0.0
+        after = problem.acceleration[p] - problem.restitution[p] * work.acceleration[p]
+        if problem.state[p] == AT_LOW and after < _share(rows.restitution[r - rows.friction_rows]) * st.settling[r]:
+            work.side[p], found = True, True
+    return found
+
+
+@kernel
+def _complete(rows, st, work, k):
+    """End the chatter of the marked contacts together, by what their impacts and forces do until it is over.
+
+    A chatter that is over within CHATTER leaves its contacts closed without speed. Its impacts and the pressing forces
+    in between have then handed over impulses that only push: those of one step of Moreau's scheme of that length
+    (Moreau 1988), left in work.reaction. Contacts that keep an impulse in it are closed from now on; others leave.
+    What the forces press in that time is then still to come: the jump itself, which ties the contacts, is less by it.
+    Returns False if the problem cannot be solved.
+    """
+    problem = work.problem
+    for p in range(k):
+        problem.forced[p] = 0  # the solver's own mark
+        if work.side[p]:
+            problem.restitution[p] = 0.0
+            problem.b[p] = work.jerk[p] + _pressed(rows, st, work, p, k)
+    if not solve_box(problem, k, 0.0):
+        return False
+    for p in range(k):
+        problem.forced[p] = 0
+        if work.side[p]:
+            problem.b[p] = work.jerk[p]
+            if problem.state[p] == FREE:
+                problem.low[p], work.reaction[p] = -np.inf, problem.force[p]
+    return solve_box(problem, k, 0.0)
+
+
+@kernel
+def _pressed(rows, st, work, p, k):
+    """Speed (m/s) that touching contact p gains within CHATTER if none of them carries a force."""
+    r = work.rows[p]
+    speed = 0.0 if st.state[r] == CLOSED else -2.0 * st.settling[r]
+    for q in range(k):
+        other = work.rows[q]
+        if st.state[other] == CLOSED:
+            # the speed that its own force holds back
+            speed -= 2.0 * st.settling[other] * rows.delassus[r, other] / rows.delassus[other, other]
+    return speed
+
+
+@inlined
+def _jump(rows, st, work, k):
+    """Apply the impulses to the velocities. Contacts obey the law, or are at rest, to the last bit."""
+    friction, problem, speed = rows.friction_rows, work.problem, st.velocity
+    for r in range(len(st.state)):
+        work.impulse[r], work.shut[r] = 0.0, False
+    for p in range(k):
+        work.impulse[work.rows[p]] = problem.force[p]
+    for r in range(len(st.state)):
+        if r >= friction and rows.rides[r]:
+            continue
+        change, size = 0.0, 0.0
+        for p in range(k):
+            part = rows.delassus[r, work.rows[p]] * problem.force[p]
+            change += part
+            size += abs(part)
+        if abs(change) > 1e-13 * size:
+            speed[r] += change
+    measure_gaps(rows, st)
+    tiny = slowest(rows, st)
+    for p in range(k):
+        r = work.rows[p]
+        if problem.force[p] != 0.0 or problem.state[p] == DEPENDENT:
+            after = -problem.restitution[p] * work.acceleration[p]
+            work.shut[r] = after == 0.0
+            if not rows.rides[r]:
+                speed[r] = after
+            elif rows.before[r] < 0:
+                speed[rows.after[r]] = after
+            elif rows.after[r] < 0:
+                speed[rows.before[r]] = -after
+        else:
+            work.shut[r] = abs(speed[r]) <= tiny
+        if work.shut[r] and not rows.rides[r]:
+            speed[r] = 0.0
+    join_speeds(rows, st, work)
+    measure_gaps(rows, st)
+
+
+@inlined
+def all_move(rows, st):
+    """Whether no row is or was at rest and no slip has changed its direction: an impact between free flights."""
+    for r in range(len(st.state)):
+        state = st.state[r]
+        if state == SPRUNG:
+            continue  # a spring's force does not jump
+        if r >= rows.friction_rows:
+            if state != OPEN or (st.displacement[r] == 0.0 and st.velocity[r] == 0.0):
+                return False
+        elif state != COAST and (state >= STICK or state * st.velocity[r] <= 0.0):
+            return False
+    return True

@@ -1,0 +1,186 @@
+"""The largest response of a segment: a grid finds its maxima with a guarantee, Newton's method polishes them."""
+
+from __future__ import annotations
+
+import math
+
+from vanedamp.coupling.exact.state import AWAKE
+from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound
+from vanedamp.coupling.numerics.jit import inlined, kernel
+
+
+@inlined
+def highest(rows, flows, st, work, s, tau, constant, peak):
+    """Largest |response| on [0, tau] and before.
+
+    Between points of a grid the response differs from its cubic Hermite interpolant by at most (bound of the fourth
+    derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is polished by Newton.
+    Where interpolant and bound stay below the peak so far there is nothing to find.
+    """
+    fourth, size = 0.0, abs(constant)
+    x0, v0, x1, v1 = constant, 0.0, constant, 0.0
+    count = st.counters[AWAKE]
+    for a in range(count):
+        j = st.awake[a]
+        rate = flows.eigenvalue[s, j]
+        wave = flows.response[s, j] * st.amplitude[j]
+        work.wave[a], work.rate[a] = wave, rate
+        square = rate.real * rate.real + rate.imag * rate.imag
+        part = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
+        fourth += part * square * square
+        size += part
+        x0 += wave.real
+        v0 += rate.real * wave.real - rate.imag * wave.imag
+        wave += flows.response[s, j] * work.gain[a]
+        x1 += wave.real
+        v1 += rate.real * wave.real - rate.imag * wave.imag
+    driven = flows.driven[s]
+    if driven > 0:
+        load = flows.load[s, : driven + 1]
+        more = _drive(
+            flows.eigenvalue[s], flows.response[s], load, st.amplitude[0], work.gain[0], rows.period, work.drive
+        )
+        v0, v1, size, fourth = v0 + more[0], v1 + more[1], size + more[2] * tau, fourth + more[3]
+    if size <= peak or tau <= 0.0:
+        return peak
+    peak = max(peak, abs(x0), abs(x1))
+    if not _may_exceed(peak, x0, v0, x1, v1, tau, fourth):
+        return peak
+    h = 0.125 * rows.period
+    if fourth * min(h, tau) ** 4 <= 0.384 * size:
+        pieces = math.ceil(tau / h)
+        for a in range(count):
+            work.turn[a] = flows.turn[s, st.awake[a]]
+    else:
+        pieces = min(math.ceil(tau * math.sqrt(math.sqrt(fourth / (0.384 * size)))), 4096)
+        h = tau / pieces
+        for a in range(count):
+            work.turn[a] = exp_minus_one(work.rate[a] * h) + 1.0
+    return _climb(
+        work.rate[:count], work.wave, work.turn, work.drive[: driven + 1], work.growth, constant, x0, v0, x1, v1, tau,
+        h, pieces, fourth, peak,
+    )  # fmt: skip
+
+
+@kernel
+def _drive(eigenvalue, response, load, phase, change, period, drive):
+    """Share of the response in the growth of driven modes: sets drive, 1/s.
+
+    Returns what it adds to the speed at both ends and to the bounds of the response, by time, and fourth derivative.
+    """
+    v0, v1, size, fourth = 0.0, 0.0, 0.0, 0.0
+    for j in range(1, len(load)):
+        drive[j] = response[j] * load[j] * phase
+        v0 += drive[j].real
+        v1 += (response[j] * load[j] * (phase + change)).real
+        size += abs(drive[j].real) + abs(drive[j].imag)
+        fourth += secular_bound(drive[j], eigenvalue[j], eigenvalue[0], period, 4)
+    return v0, v1, size, fourth
+
+
+@inlined
+def _climb(rates, waves, turns, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak):
+    """The largest |response| on a grid of so many pieces of length h, the last one shorter, and before."""
+    count, driven = len(rates), len(drives)
+    for j in range(1, driven):
+        growths[j], _ = secular(rates[j], rates[0], h)
+    end, end_slope = x1, v1
+    for i in range(pieces):
+        x1, v1 = constant, 0.0
+        if i == pieces - 1:
+            x1, v1, h = end, end_slope, tau - i * h
+        else:
+            for a in range(count):
+                wave, rate = waves[a] * turns[a], rates[a]
+                x1 += wave.real
+                v1 += rate.real * wave.real - rate.imag * wave.imag
+            for j in range(1, driven):
+                x1 += (drives[j] * growths[j]).real
+                v1 += (drives[j] * (rates[j] * growths[j] + turns[0])).real
+            peak = max(peak, abs(x1))
+        if v0 * v1 < 0.0 and _may_exceed(peak, x0, v0, x1, v1, h, fourth):
+            peak = max(peak, _extremum(rates, waves, drives, constant, x0, v0, x1, v1, h))
+        x0, v0 = x1, v1
+        if i < pieces - 1:
+            for a in range(count):
+                waves[a] *= turns[a]
+            for j in range(1, driven):
+                waves[j] += drives[j] * growths[j]
+                drives[j] *= turns[0]
+    return peak
+
+
+@inlined
+def _may_exceed(peak, x0, v0, x1, v1, h, fourth):
+    """Whether |x| may exceed peak within [0, h]: cubic interpolant of the ends, and what it may be wrong by."""
+    room = peak - fourth * h * h * h * h / 384.0
+    # the interpolant's basis functions of the slopes stay below 4/27 h
+    rise = max(x0, x1) + (4 / 27) * h * (max(v0, 0.0) + max(-v1, 0.0))
+    fall = min(x0, x1) + (4 / 27) * h * (min(v0, 0.0) + min(-v1, 0.0))
+    return rise > room or -fall > room
+
+
+@kernel
+def _extremum(rates, waves, drives, constant, x0, v0, x1, v1, h):
+    """|x| where its slope vanishes within [0, h], v0 and v1 of opposite sign: Newton from the cubic interpolant."""
+    # slope v0 + b u + c u^2, u = t/h; the root on [0, 1] by the formula that does not cancel
+    b = 6.0 * (x1 - x0) / h - 4.0 * v0 - 2.0 * v1
+    c = 3.0 * (v0 + v1) - 6.0 * (x1 - x0) / h
+    root = math.sqrt(max(b * b - 4.0 * c * v0, 0.0))
+    lo, hi = 0.0, h
+    t = (
+        h * (-2.0 * v0 / (b + math.copysign(root, b)))
+        if b * v0 < 0.0
+        else h * (-b - math.copysign(root, v0)) / (2.0 * c)
+    )
+    if not lo < t < hi:
+        t = h * v0 / (v0 - v1)
+    x = x0
+    for _ in range(8):
+        # derivatives at t by the recurrence of the modes' characteristic polynomials
+        x, v, w, third, fourth, fifth, sixth = constant, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for a in range(len(rates)):
+            rate, wave = rates[a], waves[a]
+            part = wave + wave * exp_minus_one(rate * t)
+            twice, square = 2.0 * rate.real, rate.real * rate.real + rate.imag * rate.imag
+            d0, d1 = part.real, rate.real * part.real - rate.imag * part.imag
+            d2 = twice * d1 - square * d0
+            d3 = twice * d2 - square * d1
+            d4 = twice * d3 - square * d2
+            x, v, w, third, fourth = x + d0, v + d1, w + d2, third + d3, fourth + d4
+            fifth += twice * d4 - square * d3
+            sixth += (abs(part.real) + abs(part.imag)) * square * square * square
+        for j in range(1, len(drives)):
+            rate, excitation = rates[j], rates[0]
+            growth, _ = secular(rate, excitation, t)
+            part, turn = drives[j] * growth, drives[j] * (1.0 + exp_minus_one(excitation * t))
+            x += part.real
+            part, turn = rate * part + turn, excitation * turn
+            v += part.real
+            part, turn = rate * part + turn, excitation * turn
+            w += part.real
+            part, turn = rate * part + turn, excitation * turn
+            third += part.real
+            part, turn = rate * part + turn, excitation * turn
+            fourth += part.real
+            part = rate * part + turn
+            fifth += part.real
+            sixth += secular_bound(drives[j], rate, excitation, 2.0 * math.pi / excitation.imag, 6)
+        if v * v0 > 0.0:
+            lo = t
+        else:
+            hi = t
+        step = -v / w if w != 0.0 else math.inf
+        for _ in range(3):
+            slope = v + step * (w + step * (third / 2 + step * (fourth / 6 + step * fifth / 24)))
+            step -= slope / (w + step * (third + step * (fourth / 2 + step * fifth / 6)))
+        if lo <= t + step <= hi:
+            top = x + step * (v + step * (w / 2 + step * (third / 6 + step * (fourth / 24 + step * fifth / 120))))
+            square = step * step
+            # x has no slope there: a step that is wrong by its square root leaves its digits
+            if sixth * square * square * square < 1e-13 * abs(top):
+                return abs(top)
+            t += step
+        else:
+            t = 0.5 * (lo + hi)
+    return abs(x)

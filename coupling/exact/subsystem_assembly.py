@@ -1,0 +1,495 @@
+"""Exact flow between two events: the linear subsystems that the sets of closed rows (system.constraints) name.
+
+Bodies held to the structure add their mass to it, bodies on closed springs (compliant contacts) their coordinate; the
+others move freely. The state of a subsystem is a vector of complex modal amplitudes c, and with c_0 the excitation
+(eigenvalue i omega), every displacement is  constant + polynomial + Re sum_j row_j c_j exp(lambda_j t),  exact for any
+t (quadratic eigenvalue problem of a viscously damped structure, Tisseur and Meerbergen 2001).
+
+In step with the excitation a mode r would answer with load_r c_0/(i omega - lambda_r): near its own frequency, hardly
+damped, this and c_r are large and cancel. Such driven modes keep their whole motion in c_r, which the excitation makes
+grow by c_r' = lambda_r c_r + load_r c_0: c_r(t) = c_r exp(lambda_r t) + load_r c_0 D(t) with
+D(t) = (exp(i omega t) - exp(lambda_r t))/(i omega - lambda_r), which is t exp(i omega t) at resonance without damping
+(exact.root_search.secular). All rows stay functionals of c.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag, null_space
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from vanedamp.coupling.exact.complex_modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
+from vanedamp.coupling.exact.state import ALONE, CALM, DIFFERENCE, SUM
+from vanedamp.coupling.system.constraints import Rows
+
+#: products of modes that change by less than this share over a period have no antiderivative worth having
+SLOW = 1e-2
+#: share of its terms below which the motion of a row is round-off
+HELD_STILL = 1e-14
+#: bytes that the subsystems of one run may take
+ROOM = 2**29
+#: share of a gap or a period that round-off may be where modes swing far out: a heavy body on a spring, weight
+FAR = 1e-6
+#: what rows feel of a mode counts at least as this share of what they feel of the others
+_UNFELT = 1e-8
+#: modes with |i omega - lambda| times the period below this are driven. Beyond, the response in step with the
+#: excitation is at most 1/NEAR times what one period adds: less than two digits cancel. Driven modes cost time, so that
+#: a wider bound would slow down scenes more than 0.3 % beside their resonance. exact.root_search.secular relies on it
+NEAR = 2e-2
+
+#: eigenvalues (2k,) of k coordinates, vectors of them and their rates (2k, 2k) and their inverse
+_Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+class Flows(NamedTuple):
+    """Stack of the subsystems met so far, first axis s. m is the largest number of complex modes.
+
+    Compiled functions hand over every array of it in each call: one more has cost half the engine's speed.
+    """
+
+    key: np.ndarray  # (s, r) which rows are closed
+    modes: np.ndarray  # (s,) number of complex modes, the excitation included
+    eigenvalue: np.ndarray  # (s, m)
+    shape: np.ndarray  # (s, 2n, m): (p, p') = constant + Re(shape c)
+    excited: np.ndarray  # (s, 2b): share of the excitation in the displacements xi of sprung bodies and their rates
+    project: np.ndarray  # (s, m, 2n): c = project ((p, p') - constant - excitation) + ...
+    project_slip: np.ndarray  # (s, m, 2b): ... project_slip ((slips, rates) - constant - excitation)
+    sprung: np.ndarray  # (s,) whether springs are closed
+    attached: np.ndarray  # (s, b) whether rigid rows hold a body to the structure
+    kick: np.ndarray  # (s, r, m): change of c by a unit impulse on a row
+    motion: np.ndarray  # (s, r, m): displacement of each row
+    velocity: np.ndarray  # (s, r, m): its rate
+    force: np.ndarray  # (s, r, m): force of each closed row
+    impulse: np.ndarray  # (s, r, m): its antiderivative, for rows with springs
+    closed_inverse: np.ndarray  # (s, r, r): inverse Delassus matrix of the rigid closed rows
+    static: np.ndarray  # (s, n + b, n + b): constant (p, xi) under constant loads on (p, x)
+    held: np.ndarray  # (s, n + b, n): constant (p, xi) kept by constraints inside the structure
+    body_acceleration: np.ndarray  # (s, b, b): of free bodies under constant loads
+    body: np.ndarray  # (s, b, m): displacement of each body
+    response: np.ndarray  # (s, m)
+    speed: np.ndarray  # (s, m): largest speed of a mode over all rows and the response
+    acceleration: np.ndarray  # (s, m): largest acceleration of its terms, whether closed rows hold them or not
+    turn: np.ndarray  # (s, m): change of its amplitude over an eighth of a period, as a factor
+    driven: np.ndarray  # (s,) number of driven modes: they come first, after the excitation
+    load: np.ndarray  # (s, m): rate at which the excitation makes them grow
+    # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a
+    # segment is the form at its end minus the form at its start. Where the rate by which a product of two modes
+    # changes vanishes beside the frequency the form would cancel: such pairs are left out of the forms, and listed.
+    work: np.ndarray  # (s, m) complex: velocity under the harmonic loads
+    momentum: np.ndarray  # (s, m) complex: momentum of all bodies
+    linear: np.ndarray  # (s, m, 16): maps for work, harmonic and momentum; mean of x; momentum of the free bodies
+    loss: np.ndarray  # (s, m, m, 4): viscous loss of two modes, by their real and imaginary parts
+    dashpot: np.ndarray  # (s, m, m, 4): loss in the dashpots of contacts
+    square: np.ndarray  # (s, m, m, 4): squared response of two modes
+    damped: np.ndarray  # (s,) whether contacts with dashpots are closed
+    uncoupled: np.ndarray  # (s,) whether damping couples no two free modes
+    slow: np.ndarray  # (s, p, 3): pairs left out (j, k, kind), SUM, DIFFERENCE or ALONE; then modes (j, 0, CALM)
+    slow_loss: np.ndarray  # (s, p) complex: viscous power of such a pair
+    slow_dashpot: np.ndarray  # (s, p) complex: power in the dashpots
+    slow_square: np.ndarray  # (s, p) complex: its share of the squared response
+    slow_count: np.ndarray  # (s,)
+
+
+def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
+    """Room for `capacity` subsystems, none of them filled (modes 0)."""
+    n, b, r = len(rows.stiffness), len(rows.mass), len(rows.delassus)
+    m = 2 * n + 1 + 2 * b * bool(np.isfinite(rows.spring[rows.friction_rows :]).any())
+    pairs = m * (m + 3)
+    z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
+    f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
+    return Flows(
+        np.zeros((capacity, r), np.bool_), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
+        z(m, 2 * b), np.zeros(capacity, np.bool_), np.zeros((capacity, b), np.bool_),
+        z(r, m), z(r, m), z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
+        f(b, b), z(b, m), z(m), f(m), f(m), z(m), np.zeros(capacity, np.int64), z(m),
+        z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
+        np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 3), np.int64),
+        z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
+    )  # fmt: skip
+
+
+def add_flow(flows: Flows, rows: Rows, closed: np.ndarray) -> Flows:
+    """The stack with the subsystem of the closed rows (r,) in its first free place.
+
+    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
+    Raises IllConditioned (exact.complex_modes) for one that doubles cannot resolve.
+    """
+    free = np.flatnonzero(flows.modes == 0)
+    if len(free) == 0:
+        size, room = len(flows.modes), sum(part.nbytes for part in flows)
+        if 2 * room > ROOM:
+            flows = empty_flows(rows, size)
+        else:
+            more = empty_flows(rows, size)
+            flows = Flows(*(np.concatenate([old, new]) for old, new in zip(flows, more, strict=True)))
+        free = np.flatnonzero(flows.modes == 0)
+    place = free[0]
+    _fill(flows, rows, place, np.flatnonzero(closed))
+    flows.key[place] = closed
+    return flows
+
+
+def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
+    n, b = len(rows.stiffness), len(rows.mass)
+    rigid, sprung = closed[np.isinf(rows.spring[closed])], closed[np.isfinite(rows.spring[closed])]
+    carrier, cluster, inner = _attachment(rows, rigid)
+    springs = _sprung_bodies(rows, cluster, sprung)
+    carrier[springs.anchored] = rows.floor[springs.anchored]
+    free = (cluster >= 0) & ~springs.anchored
+    # coordinates z = (p, xi): bodies are at x = carrier p + xi, besides the parabolas of free ones; z = lift eta
+    basis = null_space(inner) if len(inner) else np.eye(n)
+    lift, drop = block_diag(basis, springs.lift), block_diag(basis.T, springs.drop)
+    spread = np.vstack([np.hstack([np.eye(n), carrier.T]), np.hstack([np.zeros((b, n)), np.eye(b)])])
+    loads = lift.T @ spread  # loads on (p, x) become loads on eta
+    functional = _functional(rows, carrier)
+    law = np.hstack([functional[sprung], rows.bodies[sprung]])
+    elastic = np.vstack([np.eye(n, n + b), law]) * np.sqrt(np.r_[rows.stiffness, rows.spring[sprung]])[:, None]
+    if rows.proportional and lift.shape[1] == n and not len(sprung) and not np.any(cluster < 0):
+        real = RealModes(np.sqrt(rows.stiffness), np.eye(n), np.eye(n), rows.damping)
+    else:
+        root = np.sqrt(rows.stiffness)
+        loss = block_diag(rows.damping / root / root[:, None], np.diag(rows.dashpot[sprung] / rows.spring[sprung]))
+        real = real_modes(np.sqrt(np.r_[np.ones(n), rows.mass])[:, None] * loads.T, elastic @ lift, loss)
+    # from here on eta are the amplitudes of the real modes
+    lift, drop, loads = lift @ real.shape, real.project @ drop, real.shape.T @ loads
+    damping, stiffness = real.damping, np.diag(real.frequency**2)
+    modes, harmonic, growth = _excite(
+        rows, damping, stiffness, loads @ np.r_[rows.force, rows.inertia], complex_modes(real.frequency, damping)
+    )
+    eigenvalue, shape, project = _one_of_each_pair(*modes)
+    shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
+    felt = np.abs(np.vstack([functional, rows.response]))
+    _check_split(rows, felt.max(axis=0), law, sprung, shape, project)
+    flexibility = lift / real.frequency**2
+    _check_rest(rows, felt, flexibility @ loads)
+    m = len(eigenvalue) + 1
+    flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, cluster < 0
+    flows.eigenvalue[s, :m] = np.r_[1j * rows.omega, eigenvalue]
+    driven = len(growth)
+    flows.driven[s], flows.load[s, 1 : driven + 1] = driven, growth
+    harmonic = lift @ harmonic
+    in_step = np.r_[harmonic, 1j * rows.omega * harmonic + shape[: n + b, :driven] @ growth]
+    full = np.hstack([in_step[:, None], shape])
+    structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
+    flows.shape[s, :, :m] = full[structure]
+    flows.excited[s] = full[xi, 0]
+    flows.project[s, 1:m], flows.project_slip[s, 1:m] = project[:, structure], project[:, xi]
+    flows.kick[s, :, 1:m] = rows.structure @ project[:, n + b : 2 * n + b].T
+    own = full[n : n + b].copy()
+    own[free, 0] -= (rows.inertia / rows.mass)[free] / rows.omega**2
+    body = carrier @ full[:n] + own
+    for c in np.unique(springs.cluster[free]):
+        members = free & (springs.cluster == c)
+        flows.body_acceleration[s][np.ix_(members, members)] = 1 / rows.mass[members].sum()
+    flows.body[s, :, :m] = body
+    motion = functional @ full[:n] + rows.bodies @ own
+    terms = np.abs(functional) @ np.abs(full[:n]) + np.abs(rows.bodies) @ np.abs(own)
+    # a row that others hold is at rest: round-off would make a Jenkins element there stick and slip without end
+    flows.motion[s, :, :m] = np.where(np.abs(motion) <= HELD_STILL * terms, 0, motion)
+    flows.velocity[s, :, :m] = _rate(flows, s, flows.motion[s, :, :m])
+    flows.static[s] = flexibility @ loads
+    if len(inner):
+        kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
+        flows.held[s] = kept - flexibility @ (elastic @ lift).T @ elastic @ kept
+    flows.response[s, :m] = rows.response @ full[:n]
+    flows.response[s, 0] += rows.table
+    rate = np.abs(flows.eigenvalue[s, :m])
+    size = np.abs(np.vstack([flows.motion[s, :, :m], flows.response[s, :m]])).max(axis=0)
+    # terms by their sizes: a mode may be where no row feels it as long as others are closed
+    held = np.vstack([np.abs(functional) @ np.abs(full[:n]), np.abs(rows.response) @ np.abs(full[:n])]).max(axis=0)
+    flows.speed[s, :m], flows.acceleration[s, :m] = size * rate, np.maximum(size, held) * rate**2
+    flows.turn[s, :m] = np.exp(flows.eigenvalue[s, :m] * rows.period / 8)
+    _fill_forces(flows, rows, s, full[structure], rigid, sprung)
+    _fill_energy(flows, rows, s, full[structure], body)
+
+
+def _check_split(
+    rows: Rows, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, shape: np.ndarray, project: np.ndarray
+) -> None:
+    """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
+
+    Each coordinate counts by what the rows and the response feel of it (felt (n,)), its rate by its own frequency or
+    that of the excitation.
+    """
+    n, b = len(rows.stiffness), len(rows.mass)
+    size = np.r_[1 / np.maximum(felt, _UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
+    stiffness = np.r_[rows.stiffness, np.zeros(b)] + rows.spring[sprung] @ law**2
+    rate = np.maximum(rows.omega, np.sqrt(stiffness / np.r_[np.ones(n), rows.mass]))
+    size = np.r_[size, size * rate]
+    grows = np.finfo(float).eps * size / size[:, None]
+    parts = sum(np.abs(part(shape)) @ np.abs(part(project)) for part in (np.real, np.imag))
+    # the search for events knows no more of an amplitude than its modulus
+    whole = np.abs(shape) @ np.abs(project)
+    if not (np.all(parts * grows <= LOST) and np.all(whole * grows <= FAR)):
+        raise IllConditioned("its modes cancel")
+
+
+def _check_rest(rows: Rows, felt: np.ndarray, static: np.ndarray) -> None:
+    """Refuse a subsystem that weight would carry so far that its round-off there is more than FAR of a gap."""
+    n, eps = len(rows.stiffness), np.finfo(float).eps
+    far = felt @ np.abs(static[:n, n:] @ rows.weight)
+    if len(rows.gap) and not eps * far.max(initial=0.0) <= FAR * rows.gap.min():
+        raise IllConditioned("at rest under its weight the structure is too far away")
+
+
+def _fill_forces(flows: Flows, rows: Rows, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
+    m = flows.modes[s]
+    rate, load = flows.eigenvalue[s, :m], flows.load[s, :m]
+    spring, dashpot = rows.spring[sprung, None], rows.dashpot[sprung, None]
+    push = -spring * flows.motion[s, sprung, :m] - dashpot * flows.velocity[s, sprung, :m]
+    flows.force[s, sprung, :m], flows.impulse[s, sprung, :m] = push, _antiderivative(push, 1 / rate, load)
+    if not len(rigid):
+        return
+    pull = rows.structure @ np.hstack([-np.diag(rows.stiffness), -rows.damping])
+    acceleration, size = pull @ full, np.abs(pull) @ np.abs(full)
+    excited = rows.structure @ rows.force + rows.bodies @ (rows.inertia / rows.mass)
+    acceleration[:, 0] += excited
+    size[:, 0] += np.abs(excited)
+    acceleration += rows.delassus[:, sprung] @ flows.force[s, sprung, :m]
+    inverse = np.linalg.inv(rows.delassus[np.ix_(rigid, rigid)])
+    flows.closed_inverse[s][np.ix_(rigid, rigid)] = inverse
+    force = -inverse @ acceleration[rigid]
+    # a contact without force has none, not round-off, or it would open and close at every tick of the clock
+    force[np.abs(force) <= 1e-14 * (np.abs(inverse) @ size[rigid])] = 0.0
+    flows.force[s, rigid, :m] = force
+
+
+def _excite(
+    rows: Rows, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
+) -> tuple[_Modes, np.ndarray, np.ndarray]:
+    """The modes, driven ones first; eta (k,) in step with a harmonic load, without their share; their growth."""
+    eigenvalue, shape, project = modes
+    if not load.any():  # free decay, at any frequency
+        return modes, np.zeros_like(load), np.zeros(0)
+    k, apart = len(load), 1j * rows.omega - eigenvalue
+    driven = np.abs(apart) * rows.period < NEAR
+    if not driven.any():
+        dynamic = stiffness + 1j * rows.omega * damping - rows.omega**2 * np.eye(k)
+        return modes, np.linalg.solve(dynamic, load), np.zeros(0)
+    growth = project[:, k:] @ load
+    harmonic = shape[:k] @ np.where(driven, 0, growth / np.where(driven, 1, apart))
+    order = np.argsort(~driven, kind="stable")
+    # a real load is half of what turns with the excitation, half of what turns against it, in step with the conjugate
+    return (eigenvalue[order], shape[:, order], project[order]), harmonic, growth[driven] / 2
+
+
+def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
+    """Time derivative of functionals (..., m) of the amplitudes."""
+    m = flows.modes[s]
+    rate: np.ndarray = functional * flows.eigenvalue[s, :m]
+    rate[..., 0] += functional @ flows.load[s, :m]
+    return rate
+
+
+def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.ndarray) -> None:
+    n, m = len(rows.stiffness), flows.modes[s]
+    velocity, rate, load = full[n:], flows.eigenvalue[s, :m], flows.load[s, :m]
+    body_rate = _rate(flows, s, body)
+    response, momentum = flows.response[s, :m], rows.mass @ body_rate
+    # all harmonic loads are in phase with the sine: real amplitudes
+    work = -rows.force.imag @ velocity - rows.inertia.imag @ body_rate
+    free = rows.mass * (np.diagonal(flows.body_acceleration[s]) != 0)
+    # the excitation and the modes that it drives turn together: a product of one with a conjugate one is slow
+    together = np.arange(m) <= flows.driven[s]
+    along, _ = _reciprocal(rate + rate[0], rows.period)
+    against, _ = _reciprocal(rate - rate[0], rows.period, together)
+    back, _ = _reciprocal(rate.conj() - rate[0], rows.period)
+    alone, slow_alone = _reciprocal(rate, rows.period)
+    mean = 2 * _antiderivative(response, alone, load)
+    free_momentum = free @ flows.velocity[s, : len(free), :m]
+    work_along, work_against = _antiderivative(work, along, load), work * against
+    response_back = _antiderivative(response.conj(), back, load.conj())
+    momentum_back = _antiderivative(momentum.conj(), back, load.conj())
+    flows.work[s, :m], flows.momentum[s, :m] = work, momentum
+    flows.linear[s, :m] = np.hstack([
+        _real_map(-0.5j * (work_along - work_against), 0 * work).take([0, 1], axis=-1),
+        _real_map(0.5 * (work_along + work_against), 0 * work).take([0, 1], axis=-1),
+        _real_map(0.5 * response * against, 0.5 * response_back),
+        _real_map(0.5 * momentum * against, 0.5 * momentum_back),
+        np.column_stack([mean.real, -mean.imag, free_momentum.real, -free_momentum.imag]),
+    ])  # fmt: skip
+    sprung = np.isfinite(rows.spring) & flows.force[s].any(axis=1)
+    push, damper = flows.velocity[s, sprung, :m], np.diag(rows.dashpot[sprung])
+    reciprocal, slow = zip(
+        _reciprocal(rate[:, None] + rate, rows.period),
+        _reciprocal(rate[:, None] + rate.conj(), rows.period, np.outer(together, together)),
+        strict=True,
+    )
+    forms = (flows.loss, flows.dashpot, flows.square), (flows.slow_loss, flows.slow_dashpot, flows.slow_square)
+    products = [
+        [left.T @ middle @ right for right in (left, left.conj())]
+        for left, middle in ((velocity, rows.damping), (push, damper), (response[None], np.eye(1)))
+    ]
+    integral: list[np.ndarray] = [np.zeros(0)] * 2
+    for form, product in zip(forms[0], products, strict=True):
+        for kind, other in ((SUM, load), (DIFFERENCE, load.conj())):
+            product[kind], integral[kind] = _antiderivatives(product[kind], reciprocal[kind], load, other)
+        form[s, :m, :m] = _real_form(*integral)
+    flows.damped[s] = rows.dashpot[sprung].any()
+    flows.uncoupled[s] = rows.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + 1
+    # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
+    # is taken at once (exact.energy_balance)
+    calm = np.abs(rate) * rows.period < SLOW / 2
+    products[2] = [np.where(np.outer(calm, calm), 0, product) for product in products[2]]
+    listed = [(j, k, kind) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
+    count = len(listed)
+    for i, (j, k, kind) in enumerate(listed):
+        half = 0.5 if j == k else 1.0
+        for form, product in zip(forms[1], products, strict=True):
+            form[s, i] = half * product[kind][j, k]
+    listed += [(j, 0, ALONE) for j in np.flatnonzero(slow_alone)]
+    flows.slow_square[s, count : len(listed)] = 2 * np.where(calm, 0, response)[slow_alone]
+    listed += [(j, 0, CALM) for j in np.flatnonzero(calm)]
+    flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 3)
+    flows.slow_count[s] = len(listed)
+
+
+def _reciprocal(rate: np.ndarray, period: float, together: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """1/rate, 0 where a product with this rate hardly changes over a period or is said to, and whether that is so."""
+    slow = (np.abs(rate) * period < SLOW) | together
+    return np.where(slow, 0, 1 / np.where(slow, 1, rate)), slow
+
+
+def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Functional (..., m) of the amplitudes whose rate is the one given; `reciprocal` of the rates of its terms.
+
+    By parts: a driven mode's rate has a term in mode 0.
+    """
+    integral: np.ndarray = functional * reciprocal
+    integral[..., 0] -= integral @ load * reciprocal[0]
+    return integral
+
+
+def _antiderivatives(
+    product: np.ndarray, reciprocal: np.ndarray, left: np.ndarray, right: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same for a form (m, m), with the loads on its two factors: what is left to slow pairs, and the form."""
+    rest, integral = product, product * reciprocal
+    for _ in range(2 if left.any() else 0):  # the second time for the pair of mode 0 with itself
+        rest = product.copy()
+        rest[0] -= left @ integral
+        rest[:, 0] -= integral @ right
+        integral = rest * reciprocal
+    return rest, integral
+
+
+def _real_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Coefficients (..., 4) of the real map a c + b conj(c): real part by Re c and Im c, imaginary part by these."""
+    return np.stack([(a + b).real, (b - a).imag, (a + b).imag, (a - b).real], axis=-1)
+
+
+def _real_form(both: np.ndarray, mixed: np.ndarray) -> np.ndarray:
+    """Coefficients (m, m, 4) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts."""
+    return 0.5 * _real_map(both, mixed) * [1, 1, -1, -1]
+
+
+def _attachment(rows: Rows, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Who moves with whom: (functional each body rides on, its free cluster or -1 if it rides, inner constraints).
+
+    An inner constraint is a combination of closed rows that ties two functionals of the structure to each other.
+    """
+    n, b = rows.structure.shape[1], len(rows.mass)
+    carrier, known = np.zeros((b, n)), np.zeros(b, bool)
+    remaining, inner = [int(r) for r in closed], []
+    while True:
+        ready = [r for r in remaining if _decided(rows, r, known)]
+        if not ready:
+            break
+        r = ready[0]
+        remaining.remove(r)
+        functional = rows.bodies[r] @ carrier + rows.structure[r]
+        unknown = np.flatnonzero((rows.bodies[r] != 0) & ~known)
+        if len(unknown):
+            carrier[unknown[0]] = -functional / rows.bodies[r, unknown[0]]
+            known[unknown[0]] = True
+        elif np.linalg.norm(functional) > 1e-12 * np.linalg.norm(rows.structure[r]):
+            inner.append(functional)
+    cluster = _connected([np.flatnonzero(rows.bodies[r]) for r in remaining], b)
+    numbers = np.unique(cluster[~known])
+    cluster = np.where(known, -1, np.searchsorted(numbers, cluster))
+    return carrier, cluster, np.array(inner)
+
+
+def _connected(links: list[np.ndarray], count: int) -> np.ndarray:
+    """Number of the connected part of each of `count` nodes."""
+    if not links:  # the usual case, and the library takes its time
+        return np.arange(count)
+    graph = coo_matrix((np.ones(len(links)), np.array(links, int).T), (count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def _decided(rows: Rows, r: int, known: np.ndarray) -> bool:
+    """Whether all but one of the bodies of a closed row are known to ride on the structure."""
+    bodies = rows.bodies[r] != 0
+    free = np.count_nonzero(bodies & ~known)
+    return free == 0 or (free == 1 and (np.count_nonzero(bodies) == 1 or bool(known[bodies].any())))
+
+
+def _functional(rows: Rows, carrier: np.ndarray) -> np.ndarray:
+    """Functional of p in each row (r, n); exactly zero where the row's two sides ride on one functional."""
+    functional: np.ndarray = rows.structure + rows.bodies @ carrier
+    scale = (np.abs(rows.structure) + np.abs(rows.bodies) @ np.abs(carrier)).max(axis=1, initial=0)
+    functional[np.abs(functional).max(axis=1, initial=0) <= 1e-12 * scale] = 0
+    return functional
+
+
+class _SprungBodies(NamedTuple):
+    """The coordinates of bodies that springs hold: q of b bodies' displacements xi = lift eta, eta = drop xi."""
+
+    lift: np.ndarray  # (b, q)
+    drop: np.ndarray  # (q, b)
+    anchored: np.ndarray  # (b,) whether springs tie a body to the structure
+    cluster: np.ndarray  # (b,) number of the bodies that move freely together
+
+
+def _sprung_bodies(rows: Rows, cluster: np.ndarray, sprung: np.ndarray) -> _SprungBodies:
+    """Bodies that springs tie to the structure move with it; others vibrate about their common centre of mass."""
+    b, groups = len(cluster), cluster.max(initial=-1) + 1
+    if not len(sprung):
+        return _SprungBodies(np.zeros((b, 0)), np.zeros((0, b)), np.zeros(b, bool), cluster)
+    member = (cluster == np.arange(groups)[:, None]).astype(float)
+    links = rows.bodies[sprung] @ member.T
+    # the last node is the structure
+    ends = [np.r_[np.flatnonzero(link), groups][:2] for link in links if link.any()]
+    part = _connected(ends, groups + 1)
+    columns, rests = [np.zeros((b, 0))], [np.zeros((0, b))]
+    first = np.array([member[g] * (np.arange(b) == np.argmax(member[g])) for g in range(groups)]).reshape(groups, b)
+    for c in np.unique(part[:groups]):
+        inside = np.flatnonzero(part[:groups] == c)
+        if c == part[groups]:
+            columns.append(member[inside].T)
+            rests.append(first[inside])
+        elif len(inside) > 1:
+            spread, gather = _about_centre(member[inside] @ rows.mass)
+            columns.append(member[inside].T @ spread)
+            rests.append(gather @ first[inside])
+    anchored = (cluster >= 0) & (part[cluster] == part[groups])
+    return _SprungBodies(np.hstack(columns), np.vstack(rests), anchored, np.where(cluster < 0, -1, part[cluster]))
+
+
+def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k, k-1) and (k-1, k): displacements of k masses about their centre from coordinates, and these from those.
+
+    Each mass moves against all that are heavier: products of masses alone, so that a light one beside a heavy one keeps
+    its digits (Helmert's orthogonal contrasts).
+    """
+    order = np.argsort(mass, kind="stable")
+    spread, gather = np.zeros((len(mass), len(mass) - 1)), np.zeros((len(mass) - 1, len(mass)))
+    for i, light in enumerate(order[:-1]):
+        heavier = order[i + 1 :]
+        total = mass[heavier].sum()
+        spread[light, i], spread[heavier, i] = 1.0, -mass[light] / total
+        gather[i, light], gather[i, heavier] = 1.0, -mass[heavier] / total
+        gather[i] *= total / (total + mass[light])
+    return spread, gather
+
+
+def _one_of_each_pair(
+    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each conjugate pair the upper one, with twice its vector: displacement = Re(vector c)."""
+    keep = values.imag >= 0
+    return values[keep], vectors[:, keep] * np.where(values.imag > 0, 2.0, 1.0)[keep], inverse[keep]

@@ -1,0 +1,1 @@
+"""The values of `solver.method`, each a way to run a scene."""

@@ -1,0 +1,138 @@
+"""Co-simulation: structure and bodies are separate units that exchange motion and forces once a macro-step.
+
+The structure's unit is exact between two exchanges (matrix exponential); the bodies' unit takes smaller steps of
+central differences with penalty contacts. Each extrapolates what it got from the other by a constant (hold 0) or a line
+(hold 1); the structure gets the mean force of a macro-step, so that no impulse is lost. Jacobi: both units start from
+the last exchange; Gauss-Seidel: the bodies already know the structure's new motion. Kuebler and Schiehlen (2000);
+Gomes and others, Co-simulation: a survey (2018).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.linalg import expm
+
+from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, STEPS, System
+from vanedamp.coupling.methods.newmark import first_forces, net_load, row_force
+from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
+from vanedamp.coupling.numerics.jit import entry, kernel
+
+
+def cosimulation_matrices(system: System) -> np.ndarray:
+    """Exact step of the structure: (2n, 4n + 2) on p, p', cos and sin of omega t, constant and linear modal loads."""
+    n = system.modes
+    rate = np.zeros((4 * n + 2, 4 * n + 2))
+    rate[:n, n : 2 * n] = np.eye(n)
+    rate[n : 2 * n, :n] = -np.diag(system.stiffness[:n])
+    rate[n : 2 * n, n : 2 * n] = -system.damping[:n, :n]
+    rate[n : 2 * n, 2 * n] = system.load[:n, 0]
+    rate[n : 2 * n, 2 * n + 1] = -system.load[:n, 1]
+    rate[2 * n, 2 * n + 1], rate[2 * n + 1, 2 * n] = -system.omega, system.omega
+    rate[n : 2 * n, 2 * n + 2 : 3 * n + 2] = np.eye(n)
+    rate[2 * n + 2 : 3 * n + 2, 3 * n + 2 :] = np.eye(n)
+    exact: np.ndarray = expm(rate * system.step)[: 2 * n]
+    return np.ascontiguousarray(exact)
+
+
+@entry
+def march_cosimulation(
+    system, motion, records, log, matrix, memory, slow, gauss_seidel, hold, substeps, periods, budget, deepest
+):
+    """Step to the end of `periods`. memory (3, 4n + 2 + r): last velocities and mean forces; those before; scratch."""
+    n, size, rows = system.modes, len(motion.q), len(system.J)
+    h, steps = system.step, len(system.phase) - 1
+    q, v, known = motion.coordinates[0], motion.coordinates[1], memory[2]
+    place, rate, bend, mean = motion.rows[4], motion.rows[5], motion.rows[6], motion.rows[7]
+    impulse, speed, before = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows]
+    last_speed, last_force, older_force = memory[0, :n], memory[0, n : n + rows], memory[1, :rows]
+    if motion.counters[PERIOD] == 0:
+        record_start(system, motion, records)
+        first_forces(system, motion, slow)
+        for i in range(n, size):
+            start = net_load(system, motion, motion.q, motion.v, 0, i) / system.mass[i]
+            motion.half[i] = motion.v[i] + 0.5 * h / substeps * start
+        copy(motion.v, last_speed)
+        copy(motion.force, last_force)
+        copy(motion.force, older_force)
+    while motion.counters[PERIOD] < periods:
+        for k in range(steps):
+            open_step(system, motion, records, k, q, v, before)
+            _structure(system, motion, matrix, known, last_force, older_force, hold, k, q, v)
+            for r in range(rows):
+                place[r], rate[r], bend[r] = 0.0, 0.0, 0.0
+                speed[r], mean[r] = row_speed(system, r, v), 0.0
+                for i in range(n):
+                    place[r] += system.J[r, i] * q[i]
+                    if gauss_seidel and hold == 0:
+                        rate[r] += system.J[r, i] * (motion.q[i] - q[i]) / h
+                    else:
+                        rate[r] += system.J[r, i] * v[i]
+                    if hold == 1:
+                        change = motion.v[i] - v[i] if gauss_seidel else v[i] - last_speed[i]
+                        bend[r] += system.J[r, i] * change / h
+            copy(v, last_speed)
+            _bodies(system, motion, slow, substeps, k, place, rate, bend, mean)
+            copy(last_force, older_force)
+            copy(mean, last_force)
+            for r in range(rows):
+                impulse[r] = h * mean[r]
+            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
+            if code != DONE:
+                return code
+        code = end_period(system, motion, records, budget)
+        if code != DONE:
+            return code
+    return DONE
+
+
+@kernel
+def _structure(system, motion, matrix, known, force, older, hold, k, q, v):
+    """The structure's macro-step under the forces that it was given."""
+    n, h = system.modes, system.step
+    for i in range(n):
+        known[i], known[n + i] = q[i], v[i]
+        constant, slope = 0.0, 0.0
+        for r in range(len(system.J)):
+            constant += system.J[r, i] * force[r]
+            if hold == 1:
+                slope += system.J[r, i] * (force[r] - older[r]) / h
+        # the mean belongs to the middle of the last macro-step
+        known[2 * n + 2 + i], known[3 * n + 2 + i] = constant + 0.5 * h * slope, slope
+    known[2 * n], known[2 * n + 1] = system.phase[k, 0], system.phase[k, 1]
+    for i in range(n):
+        p, rate = 0.0, 0.0
+        for j in range(4 * n + 2):
+            p += matrix[i, j] * known[j]
+            rate += matrix[n + i, j] * known[j]
+        motion.q[i], motion.v[i] = p, rate
+
+
+@kernel
+def _bodies(system, motion, slow, substeps, k, place, rate, bend, mean):
+    """The bodies' macro-step on walls that move as they were told; adds up the mean forces of the rows."""
+    n, size, rows = system.modes, len(motion.q), len(system.J)
+    small = system.step / substeps
+    for j in range(substeps):
+        t = (j + 1) * small
+        angle = system.omega * (k * system.step + t)
+        cosine, sine = math.cos(angle), math.sin(angle)
+        for i in range(n, size):
+            motion.q[i] += small * motion.half[i]
+        for r in range(rows):
+            displacement, speed = place[r] + t * (rate[r] + 0.5 * t * bend[r]), rate[r] + t * bend[r]
+            for i in range(n, size):
+                displacement += system.J[r, i] * motion.q[i]
+                speed += system.J[r, i] * motion.half[i]
+            mean[r] += 0.5 * motion.force[r] / substeps
+            row_force(system, motion, r, displacement, speed, slow, small * speed)
+            mean[r] += 0.5 * motion.force[r] / substeps
+        for i in range(n, size):
+            force = system.weight[i] + system.load[i, 0] * cosine - system.load[i, 1] * sine
+            for r in range(rows):
+                force += system.J[r, i] * motion.force[r]
+            change = small * force / system.mass[i]
+            motion.v[i] = motion.half[i] + 0.5 * change
+            motion.half[i] += change
+    motion.counters[STEPS] += substeps - 1

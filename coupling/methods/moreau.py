@@ -1,0 +1,152 @@
+"""Moreau-Jean time stepping: velocities and impulses over a step, contacts and friction by one exact small problem.
+
+Jean (1999); Acary and Brogliato (2008), chapter 10. The theta method for the smooth part, Newton's law and Coulomb's on
+velocities; a contact takes part in a step if its gap, half a step ahead, is closed. Second order where no row is
+active (theta = 1/2), first order over impacts. An impact that others bring about within a step is a problem of its own,
+after theirs. Springs of compliant contacts and Jenkins elements enter the same problem, implicitly.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, System
+from vanedamp.coupling.methods.step_problem import list_row, solve_rows
+from vanedamp.coupling.methods.step_records import (
+    close_step,
+    damped,
+    end_period,
+    load_at,
+    open_step,
+    record_start,
+    row_speed,
+    solve_inverse,
+)
+from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+
+#: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
+_TURNS, _ROUND_OFF = 20, 1e-12
+
+
+def moreau_matrices(system: System, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Inverse of the iteration matrix (N, N), its product with J^T (N, r), and the rows' mobility (r, r)."""
+    h = system.step
+    matrix = np.diag(system.mass + (h * theta) ** 2 * system.stiffness) + h * theta * system.damping
+    inverse = np.linalg.inv(matrix)
+    turned = inverse @ system.J.T
+    return inverse, turned, system.J @ turned
+
+
+@entry
+def march_moreau(system, motion, records, log, problem, inverse, turned, mobility, theta, periods, budget, deepest):
+    """Step to the end of `periods`. Returns one of the codes of methods.equations_of_motion."""
+    size, rows, h, steps = len(motion.q), len(system.J), system.step, len(system.phase) - 1
+    q, v, rhs, free = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
+    impulse, speed, before = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows]
+    if motion.counters[PERIOD] == 0:
+        record_start(system, motion, records)
+    while motion.counters[PERIOD] < periods:
+        for k in range(steps):
+            open_step(system, motion, records, k, q, v, before)
+            for i in range(size):
+                load = theta * load_at(system, k + 1, i) + (1.0 - theta) * load_at(system, k, i)
+                rhs[i] = h * (load - damped(system, v, i) - system.stiffness[i] * (q[i] + h * theta * v[i]))
+            solve_inverse(inverse, system.proportional, rhs, free)
+            for i in range(size):
+                free[i] += v[i]
+            for r in range(rows):
+                speed[r], impulse[r] = row_speed(system, r, v), 0.0
+            if not _impulses(system, motion, problem, mobility, turned, free, speed, impulse, theta):
+                return UNDECIDED
+            for i in range(size):
+                motion.v[i] = free[i]
+                motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
+            for r in range(system.friction_rows):
+                if system.spring[r] != math.inf and system.limit[r] > 0.0:
+                    motion.elongation[r] = -impulse[r] / (h * system.spring[r])
+            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
+            if code != DONE:
+                return code
+        code = end_period(system, motion, records, budget)
+        if code != DONE:
+            return code
+    return DONE
+
+
+@inlined
+def _impulses(system, motion, problem, mobility, turned, free, speed, impulse, theta):
+    """Set the impulses (r,) of a step; `free` (N,) becomes the velocity at its end. Returns False if undecided.
+
+    A contact that parts as the step begins waits. Where impulses of others drive it together, it meets a second impact
+    after theirs, at its new speed: in one problem with them it would end without rebound, and since nothing opens an
+    overlap without speed, bodies in a row would fly as one ever after.
+    """
+    slowest = 0.0
+    for r in range(system.friction_rows, len(system.J)):
+        slowest = max(slowest, _ROUND_OFF * abs(speed[r]))
+    for turn in range(_TURNS):
+        last = turn == _TURNS - 1
+        count = _list_rows(system, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last)
+        if count == 0:
+            return True
+        motion.counters[SOLVES] += 1
+        if not solve_rows(problem, count):
+            return False
+        for a in range(count):
+            r = motion.listed[a]
+            impulse[r] += problem.force[a]
+            for i in range(len(free)):
+                free[i] += turned[i, r] * problem.force[a]
+        if not _approaching(system, motion, free, slowest):
+            return True
+    return True
+
+
+@inlined
+def _approaching(system, motion, free, slowest):
+    """Whether a closed rigid contact still approaches."""
+    for r in range(system.friction_rows, len(system.J)):
+        if motion.rows[4, r] > 0.0 and row_speed(system, r, free) < -slowest:
+            return True
+    return False
+
+
+@kernel
+def _list_rows(system, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last):
+    """Set up the problem of the rows that take part in a turn. Returns how many they are."""
+    h, count, closed = system.step, 0, motion.rows[4]
+    for r in range(len(system.J)):
+        low, high, shift, soft = 0.0, np.inf, 0.0, 0.0
+        now = row_speed(system, r, free)
+        if turn == 0:
+            closed[r] = 0.0
+        if r < system.friction_rows:
+            if system.limit[r] == 0.0:
+                continue
+            low, high = -h * system.limit[r], h * system.limit[r]
+            if system.spring[r] != math.inf:
+                shift, soft = motion.elongation[r] / h, 1.0 / (h * h * system.spring[r])
+        else:
+            gap = system.offset[r] + row_speed(system, r, motion.q)
+            if system.spring[r] == math.inf:
+                if gap + 0.5 * h * speed[r] > 0.0:
+                    continue
+                closed[r] = 1.0
+                before = speed[r] if turn == 0 else now
+                if not last and before > slowest and now > -slowest:
+                    continue
+                shift = system.restitution[r] * min(before, 0.0)
+            else:
+                if gap + h * min(speed[r], row_speed(system, r, free)) > 0.0:
+                    continue
+                k, c = system.spring[r], system.dashpot[r]
+                stiff = theta * (k * h * theta + c)
+                shift = (k * (gap + h * theta * (1.0 - theta) * speed[r]) + c * (1.0 - theta) * speed[r]) / stiff
+                soft = 1.0 / (h * stiff)
+        if system.spring[r] != math.inf or r < system.friction_rows:
+            low, high, shift = low - impulse[r], high - impulse[r], shift + soft * impulse[r]
+        list_row(problem, motion.listed, mobility, count, r, now + shift, low, high, soft)
+        count += 1
+    return count

@@ -1,0 +1,269 @@
+"""A general solver of differential equations with events: scipy's DOP853, stopped at every change of contact.
+
+An independent witness of the exact engine: it shares the rows of a scene with it, and the solution of complementarity
+problems, but neither motion nor search nor decisions. Impacts are jumps between two integrations, closed contacts and
+sticking bodies constraints on accelerations (methods.scipy_ivp.motion, methods.scipy_ivp.contact_states,
+methods.scipy_ivp.impacts); events are searched on the solver's interpolant, where none can be missed
+(methods.scipy_ivp.root_search). Energies and harmonics are integrated along (methods.scipy_ivp.integrals).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
+from vanedamp.coupling.methods.scipy_ivp.impacts import COLLAPSE, FRESH, TOUCH, calm, collide
+from vanedamp.coupling.methods.scipy_ivp.integrals import Recorder
+from vanedamp.coupling.methods.scipy_ivp.motion import (
+    GAP,
+    HIGH,
+    LOW,
+    OPENS,
+    REST,
+    SLIP,
+    UNFORCED,
+    Contacts,
+    Motion,
+    Unforced,
+)
+from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
+from vanedamp.coupling.numerics.complementarity import new_problem
+from vanedamp.coupling.response.evaluation import Outcome
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.constraints import rows_of
+from vanedamp.coupling.system.modal_structure import linear_structure
+
+#: the shortest first step, as a share of a period
+_SHORTEST = 1e-26
+#: gaps below this share of the free travel are closed at the start
+_TOUCHING = 1e-12
+#: imbalance of the ledger above which a response is not to be used, in units of rtol or of _LEAST
+_OPEN_LEDGER, _LEAST = 1e3, 1e-9
+#: events without time between them before the run is given up
+_STANDING = 100
+
+
+class Arc(NamedTuple):
+    """Motion between two events: states (size, k) at the points t (k,) of the grid, and what has ended it.
+
+    event: index of the event function, None at the end of the grid; duration, last: time since the start, state there.
+    """
+
+    t: np.ndarray
+    y: np.ndarray
+    event: int | None
+    duration: float
+    last: np.ndarray
+    evaluations: int
+    failed: bool = False
+
+
+class IvpRun:
+    """A run by solve_ivp: state y = (z, integrals) and the states of the rows. Times count from the period's start."""
+
+    def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
+        self.solver, self.steps = scene.solver, scene.solver.steps
+        structure = linear_structure(scene)
+        self.rows, displacement, velocity = rows_of(scene, structure)
+        self.unforced = u = Unforced(self.rows)
+        self.record = Recorder(scene, u, events, samples_per_period)
+        self.y = np.zeros(u.size + self.record.count)
+        self.y[u.p], self.y[u.d] = structure.displacement, displacement
+        self.y[u.p_rate], self.y[u.s] = structure.velocity, velocity
+        self.time, self.step = 0.0, self.rows.period / self.steps
+        self.problem = new_problem(u.r)
+        self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
+        self.since = np.full(u.r, np.inf)  # s, since each contact's last impact
+        self.begun = False
+        nothing = np.zeros(u.r, int)
+        self._follow(Contacts(nothing + UNFORCED, nothing.astype(float), nothing, nothing))
+        self.tolerance = self.solver.rtol or 1e-9
+        self.absolute = self.tolerance * self.record.sizes(_reach(scene, u))
+
+    def advance_to(self, periods: int) -> Status:
+        """Continue to the end of `periods`, or to what ends the run."""
+        if not self.begun and not self._begin():
+            return Status.UNDECIDED
+        with np.errstate(all="ignore"):
+            while self.record.period < periods:
+                if self.events >= self.solver.max_events:
+                    return Status.EVENT_BUDGET
+                status = self._segment()
+                if status is not Status.OK:
+                    return status
+        return Status.OK
+
+    def outcome(self) -> Outcome:
+        """What the run leaves behind."""
+        record = self.record
+        numbers = {"impacts": record.impacts, "evaluations": self.evaluations}
+        log = [np.array(record.log)] if record.log else []
+        open_ledger = _OPEN_LEDGER * max(self.solver.rtol or 0.0, _LEAST)
+        return Outcome(
+            self.rows, record.records, record.period, self.events, open_ledger, numbers, log, max(record.deep, 0.0)
+        )
+
+    def _begin(self) -> bool:
+        self.begun, place = True, self.y[self.unforced.d]
+        gap = np.concatenate([np.zeros(self.rows.friction_rows), self.rows.gap])
+        place[np.abs(place) <= _TOUCHING * gap] = 0.0
+        decided = self._decide(-1, -1)
+        self.record.start(self.y)
+        return decided
+
+    # -- motion between events
+
+    def _segment(self) -> Status:
+        """Integrate to the next event or to the end of the period."""
+        grid = np.arange(1, self.steps + 1) * self.step
+        grid = grid[grid > self.time]
+        if not len(grid):  # an event has fallen on the period's end
+            return self._end_period()
+        arc = self._integrate(grid)
+        self.evaluations += arc.evaluations
+        if arc.failed or not np.isfinite(arc.last).all():
+            return Status.DIVERGED
+        self.record.points(arc.t, arc.y)
+        if self.record.deep > self.solver.deepest:
+            return Status.PENETRATION
+        self.time, self.y = self.time + arc.duration, arc.last
+        self.since += arc.duration
+        if arc.event is None:
+            self.guards.order[:] = 0
+            return self._end_period()
+        self.events += 1
+        self.standing = self.standing + 1 if arc.duration < COLLAPSE * self.rows.period else 0
+        if self.standing > _STANDING:
+            return Status.UNDECIDED
+        decided = self._decide(int(self.guards.row[arc.event]), int(self.guards.kind[arc.event]))
+        return Status.OK if decided else Status.UNDECIDED
+
+    def _end_period(self) -> Status:
+        self.time = 0.0
+        self.record.end_period(self.y)
+        return Status.OK
+
+    def _integrate(self, grid: np.ndarray) -> Arc:
+        """The motion from now to the first event, or to the end of the grid."""
+        u, far = self.unforced, grid - self.time
+        solver = DOP853(
+            lambda tau, y: self.rate(self.time + tau, y), 0.0, self.y, far[-1], max_step=self.step,
+            rtol=self.tolerance, atol=self.absolute, first_step=min(self._first_step(), far[-1]),
+        )  # fmt: skip
+        states, order, reached, root = [], self.guards.order, 0, None
+        while solver.status == "running" and root is None:
+            solver.step()
+            if solver.status == "failed":
+                return Arc(grid[:0], self.y[:, None][:, :0], None, 0.0, self.y, solver.nfev, True)
+            piece, now, last = solver.dense_output(), solver.t, solver.y
+            if len(order):
+                at = solver.t_old + NODES * (solver.t - solver.t_old)
+                root = first_root(self.guards.functional @ u.extended(self.time + at, piece(at)[: u.size]), order)
+            if root is not None:
+                now = solver.t_old + root[0] * (solver.t - solver.t_old)
+                last = piece(now)
+            passed = reached + np.count_nonzero(far[reached:] <= now)
+            states += [piece(tau) for tau in far[reached:passed]]
+            order, reached = np.zeros_like(order), passed
+        points = np.array(states).reshape(reached, len(self.y)).T
+        return Arc(grid[:reached], points, None if root is None else root[1], now, last, solver.nfev)
+
+    def _first_step(self) -> float:
+        """Twice the time to the first event by the functions' parabolas, so that round-off is that of the flight."""
+        u, guards = self.unforced, self.guards
+        now = u.extended(self.time, self.y[: u.size])
+        rate = u.rates(self.motion, now)
+        value = np.where(guards.order > 0, 0.0, guards.functional @ now)
+        slope, curvature = guards.functional @ rate, guards.functional @ u.rates(self.motion, rate)
+        with np.errstate(all="ignore"):
+            root = np.sqrt(slope**2 - 2 * curvature * value)
+            times = np.where(slope > 0, -(slope + root) / curvature, 2 * value / (root - slope))
+        times = times[np.isfinite(times) & (times > 0)]
+        return float(np.clip(2 * times.min(initial=np.inf), _SHORTEST * self.rows.period, self.step))
+
+    def rate(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Rates of the state and of the integrals."""
+        u, phase = self.unforced, self.rows.omega * t
+        self._extended[: u.size] = y[: u.size]
+        self._extended[u.cosine], self._extended[u.sine] = np.cos(phase), np.sin(phase)
+        found = self._linear @ self._extended
+        return np.concatenate([found[: u.size], self.record.rates(self._extended, found[u.size :])])
+
+    # -- events
+
+    def _decide(self, row: int, kind: int) -> bool:
+        """Impacts, then new contact states. Returns False if a complementarity problem has no solution."""
+        u, z = self.unforced, self.y[: self.unforced.size]
+        self._arrive(row, kind, z)
+        self.record.turning(self.time, self.y)
+        self._calm(z)
+        for _ in range(_STANDING):
+            # an impact may close gaps that are about to
+            if not np.any(u.rigid_contact & (z[u.d] == 0) & (z[u.s] < 0)):
+                break
+            if not self._impact(z):
+                return False
+            self._calm(z)
+        else:
+            return False
+        self.record.turning(self.time, self.y)
+        contacts = decide(u, self.time, z)
+        if contacts is None:
+            return False
+        self.record.springs(self.time, self.y, self.motion.contacts.state, contacts.state)
+        self._follow(contacts)
+        return True
+
+    def _follow(self, contacts: Contacts) -> None:
+        u = self.unforced
+        self.motion = Motion(u, contacts)
+        self.guards = self.motion.guards()
+        self._linear = np.vstack([self.motion.rate, self.motion.force, self.record.functionals])
+        self._extended = np.ones(u.size + 3)
+        self.record.states = contacts.state
+
+    def _arrive(self, row: int, kind: int, z: np.ndarray) -> None:
+        """What the event has brought to zero, or to its bound, is there exactly."""
+        u, rows = self.unforced, self.rows
+        if kind in (GAP, OPENS) or (kind == LOW and u.soft_contact[row] and rows.dashpot[row] == 0):
+            z[u.d.start + row] = 0.0
+        elif kind == SLIP:
+            z[u.s.start + row] = 0.0
+        elif kind in (LOW, HIGH) and u.slider[row]:
+            z[u.d.start + row] = (1 if kind == LOW else -1) * u.limit[row] / rows.spring[row]
+
+    def _calm(self, z: np.ndarray) -> None:
+        """Zero to the round-off of the run's largest speed is zero: two slips may come to rest together."""
+        self.fastest = max(self.fastest, float(np.abs(z[self.unforced.s]).max(initial=0.0)))
+        # gaps of contacts that have just collided are known beyond the round-off of places
+        touch = np.where(self.since > FRESH * self.rows.period, TOUCH * self.rows.period, 0.0)
+        calm(self.unforced, z, self.fastest, touch)
+
+    def _impact(self, z: np.ndarray) -> bool:
+        u, rows, complete = self.unforced, self.rows, self.solver.complete_chatter is not False
+        pressing, resting, collapsed = np.zeros(u.r), np.zeros(u.r, bool), np.zeros(u.r, bool)
+        if complete:
+            extended = u.extended(self.time, z)
+            resting = self.motion.contacts.state == REST
+            push = np.diag(rows.delassus) * (self.motion.force @ extended)
+            pressing = np.where(resting, push, -(self.motion.rate[u.s] @ extended))
+            collapsed = self.since < COLLAPSE * rows.period
+        impact = collide(u, z, pressing, resting, collapsed, self.problem)
+        if impact is None:
+            return False
+        self.since[impact.row[impact.before < 0]] = 0.0
+        self.record.impact(self.time, impact)
+        return True
+
+
+def _reach(scene: Scene, u: Unforced) -> float:
+    """A typical displacement, m: the narrowest gap, the least elongation at which a spring slides, the static one."""
+    rows = u.rows
+    lengths = [cavity.gap for cavity in scene.cavity] + list(u.limit[u.slider] / rows.spring[u.slider])
+    lengths = [length for length in lengths if length > 0]
+    static = np.abs(rows.structure) @ (np.abs(rows.force) / rows.stiffness)
+    return float(min(lengths, default=static.max(initial=1e-12)))

@@ -1,0 +1,1 @@
+"""Choice of the number of modes, with an error estimate."""

@@ -1,0 +1,302 @@
+"""What a scene leaves open, settled: how many modes of a reduced model it needs, how long its transient is.
+
+`modes = "auto"` takes the fewest natural modes whose estimated error stays within the tolerance (rom.error_estimate):
+of the receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus
+that of the pulse of a collision, in the measure in which the bodies can change the response at all. The whole model of
+the file is the measure.
+
+A boundary without mass yields under its contact force by the flexibility G that the modes lack, u = Phi eta + G f,
+while it touches and not otherwise. For one contact at a time this is a spring 1/G between body and modes, which is what
+the engine runs, at every wall with its own G. Left out are the boundary's motion under friction on the floor and under
+forces at other coordinates; where walls that can be touched at once have much of G in common, the estimate tells.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.model_order.collision_sensitivity import sensitivity
+from vanedamp.coupling.scene.contact_laws import Compliant, Massless, Newton
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.reduced_model_file import reduced_model
+from vanedamp.coupling.system.resonance import excitation_force
+from vanedamp.coupling.system.transient import timed
+from vanedamp.files.toml_input import InputError
+from vanedamp.rom.contact_pulse import Collision, pulse
+from vanedamp.rom.dense_modes import spectrum
+from vanedamp.rom.error_estimate import Choice, choose, grid, natural_ladder, rigid_errors
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.truncation import massless
+
+#: bodies that hit twice a period act like up to 1.7 times their mass (docs/engine.md: attached mass), and damp besides
+_IMPACTS = 2.0
+#: share of a flexibility in common that is told
+_SHARED = 0.1
+#: what the sensitivity of the one-mode model is short of that of a richer one, at most, by experience
+_CAUTION = 5.0
+#: resonances in the range that are tried, share of the highest from which on they count, and places on the way from
+#: loose (0) to glued bodies (1)
+_RESONANCES, _SEEN, _PLACES = 4, 0.03, (0.0, 0.5, 1.0)
+#: scenes of a sweep that are tried, of those that differ in more than their frequency
+_SCENES = 4
+#: between a single collision and the response, in which collisions meet the waves of those before
+_SAFETY = 1.5
+_NEWTON = "; of the forced response alone: Newton's impacts have no limit as modes grow, compliant contacts have"
+
+
+#: the choice of a number of modes by file, `modes` and tolerance
+Choices = Mapping[tuple[Any, ...], Choice]
+
+
+class Settled(NamedTuple):
+    """A scene without open choices, and the estimate of the model chosen (None if there was no choice)."""
+
+    scene: Scene
+    estimate: dict[str, Any] | None
+
+
+def settle(scene: Scene) -> Settled:
+    """The scene with its number of modes. Raises InputError when there is no good choice."""
+    return settle_all([scene])[0]
+
+
+def settle_all(scenes: Sequence[Scene]) -> list[Settled]:
+    """The same for the points of a sweep: those with one model and tolerance share the choice that suits them all."""
+    choices = choices_of(scenes)
+    return [settled(scene, choices) for scene in scenes]
+
+
+def choices_of(scenes: Iterable[Scene]) -> Choices:
+    """The number of modes that suits all scenes with one model and tolerance, for each of these."""
+    groups: dict[tuple[Any, ...], list[Scene]] = {}
+    for scene in scenes:
+        if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+            groups.setdefault(_group(scene), []).append(scene)
+    return {key: _choice(members) for key, members in groups.items()}
+
+
+def is_open(scene: Scene) -> bool:
+    """Whether a scene leaves something to settle."""
+    return isinstance(scene.structure, Rom) and scene.structure.modes == "auto"
+
+
+def _group(scene: Scene) -> tuple[Any, ...]:
+    structure = scene.structure
+    return (structure.file, structure.modes, structure.tolerance) if isinstance(structure, Rom) else ()
+
+
+def settled(scene: Scene, choices: Choices) -> Settled:
+    """The scene with the choice that was made for it."""
+    structure, choice = scene.structure, choices.get(_group(scene))
+    if not isinstance(structure, Rom):
+        return Settled(timed(scene), None)
+    if choice is None:
+        return Settled(timed(scene), _warning(_shared(scene, structure)))
+    structure = replace(structure, modes=choice.chosen.modes, natural=True, attached=choice.chosen.attached)
+    scene = replace(scene, structure=structure)
+    contacts = _collisions(scene, reduced_model(structure))
+    stiffness = min((collision.stiffness for collision in contacts), default=None)
+    estimate = choice.to_json() | {"stiffness": stiffness}
+    warning = _warning(_shared(scene, structure))
+    if warning is not None:
+        estimate |= warning | {"sentence": f"{choice.sentence}; {warning['sentence']}"}
+    return Settled(timed(scene), estimate)
+
+
+def warnings_of(scene: Scene) -> tuple[str, ...]:
+    """What to know of a scene without open choices: that Newton's law, also the default, is on several modes."""
+    if not (isinstance(scene.structure, Rom) and isinstance(scene.contact, Newton) and scene.damper):
+        return ()
+    size = reduced_model(scene.structure).size
+    if size == 1:
+        return ()
+    return (
+        f"contact: Newton's law, the default, has no limit as modes are added, and the answer is that of {size} "
+        'coordinates; take law = "compliant" with a stiffness, residual = true or both, or one natural mode '
+        "(structure.modes = 1, natural = true)",
+    )
+
+
+def _shared(scene: Scene, structure: Rom) -> float:
+    """Largest flexibility that two walls have in common which can be touched at once, relative to their own."""
+    law = scene.contact
+    if isinstance(law, Newton) or (isinstance(law, Compliant) and not law.residual):
+        return 0.0
+    model = reduced_model(structure)
+    residual = model.residual_flexibility
+    if residual is None:
+        return 0.0
+    own = 0.0 if isinstance(law, Massless) or law.stiffness is None else 1.0 / law.stiffness
+    largest = 0.0
+    for (one, first), (other, second) in itertools.combinations(_touched(scene, model), 2):
+        if one != other:
+            size = math.sqrt((residual[first, first] + own) * (residual[second, second] + own))
+            largest = max(largest, abs(float(residual[first, second])) / size if size > 0.0 else 0.0)
+    return largest
+
+
+def _touched(scene: Scene, model: ReducedModel) -> list[tuple[int, int]]:
+    """(body, wall's place in the interface) of all contacts of bodies with walls."""
+    found = []
+    for cavity in scene.cavity:
+        bodies = [index for index, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
+        ends = zip(bodies[:1] + bodies[-1:], cavity.labels()[:2], strict=False)
+        found += [(body, model.interface.index(label)) for body, label in ends if label in model.interface]
+    return found
+
+
+def _warning(shared: float) -> dict[str, Any] | None:
+    if shared <= _SHARED:
+        return None
+    return {
+        "shared_flexibility": shared,
+        "sentence": f"walls have up to {100 * shared:.0f} % of their residual flexibility in common, which contacts "
+        "closed at the same time do not feel; more modes lessen it",
+    }
+
+
+def _choice(scenes: Sequence[Scene]) -> Choice:
+    """The fewest natural modes for all of these scenes, which have one model."""
+    first = scenes[0]
+    structure, at = first.structure, first.excitation.at
+    assert isinstance(structure, Rom) and at is not None
+    model = reduced_model(replace(structure, modes=None))
+    labels = list(dict.fromkeys([at, *(label for scene in scenes for label in _surfaces(scene))]))
+    for label in labels:
+        if label not in model.interface:
+            raise InputError(f"structure: no interface label '{label}'; it has {', '.join(model.interface)}")
+    driven = [scene.excitation.frequency for scene in scenes]
+    frequencies = grid(model, min(driven), max(driven))
+
+    def collisions(smaller: ReducedModel) -> list[Collision]:
+        if any(map(_needs_residual, scenes)) and not _yields(smaller):
+            return []  # it has no boundary without mass
+        return list(dict.fromkeys(item for scene in scenes for item in _collisions(scene, smaller)))
+
+    share = min(1.0, _IMPACTS * max(_influence(scene, model, frequencies) for scene in scenes))
+    share = _SAFETY * min(share, _CAUTION * _sensitivity(scenes, model, frequencies))
+    rigid = float(rigid_errors(model, frequencies, at, labels, [at]).max())
+    choices = []
+    for attached in (False, True):
+        rungs = natural_ladder(model, frequencies, labels, [at], collisions, attached)
+        rungs = [replace(rung, collision=share * rung.collision) for rung in rungs]
+        choices.append(choose(rungs, structure.tolerance, rigid))
+    # the first of equals: natural modes alone
+    choice = min(choices, key=lambda item: (not item.met, item.chosen.size))
+    if not choice.met:
+        raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
+    if any(isinstance(scene.contact, Newton) for scene in scenes):
+        choice = replace(choice, sentence=choice.sentence + _NEWTON)
+    return choice
+
+
+def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
+    """How much the bodies can change the response: between loose and glued to their floors, relative to the larger."""
+    at = str(scene.excitation.at)
+    loose, glued = (item.frf(frequencies, at, at) for item in (model, _glued(scene, model)))
+    return float((np.abs(glued - loose) / np.maximum(np.abs(loose), np.abs(glued))).max())
+
+
+def _glued(scene: Scene, model: ReducedModel) -> ReducedModel:
+    """The model with every body glued to its cavity's floor."""
+    floors = {cavity.name: cavity.labels()[2] for cavity in scene.cavity}
+    mass = np.array(model.mass)
+    for damper in scene.damper:
+        row = model.row(str(floors[damper.cavity]))
+        mass += damper.mass * np.outer(row, row)
+    return replace(model, mass=mass)
+
+
+def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.ndarray) -> float:
+    """The largest over collisions, of scenes that differ in more than their frequency; 1 where none can be told."""
+    squares, shapes = spectrum(model.mass, model.stiffness)
+    apart = list({_but_for_frequency(scene): scene for scene in scenes}.values())
+    worst, met = 0.0, False
+    for scene in (apart[place] for place in np.unique(np.linspace(0, len(apart) - 1, _SCENES).astype(int))):
+        smaller = model if not _needs_residual(scene) or _yields(model) else massless(model, model.size - 1)
+        collisions = list(dict.fromkeys(_collisions(scene, smaller)))
+        if not collisions:
+            continue
+        met = True
+        trials, modes = _trials(scene, model, frequencies)
+        undamped = _undamped(scene, model, frequencies)
+        if not undamped > 0.0:
+            return 1.0
+        for collision in collisions:
+            row = (model.row(collision.label) @ shapes)[: smaller.size]
+            felt = pulse(squares[: smaller.size], row, collision, float(np.median(trials)))
+            worst = max(worst, sensitivity(scene, trials, collision, float(row[0]), felt, modes, undamped))
+    return worst if met else 1.0
+
+
+def _but_for_frequency(scene: Scene) -> tuple[Any, ...]:
+    """What tells scenes of one model apart, other than their frequency."""
+    drive = replace(scene.excitation, frequency=1.0)
+    return (drive, scene.cavity, scene.damper, scene.friction_damper, scene.gravity, scene.contact)
+
+
+def _trials(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> tuple[list[float], int]:
+    """Frequencies at which bodies collide if they do anywhere in the range, Hz, and the natural modes that this takes.
+
+    The highest resonances in the range, from that of the loose to that of the glued bodies, between which a damped peak
+    lies; without one, the ends and the middle of the range.
+    """
+    at, low, high = str(scene.excitation.at), float(frequencies[0]), float(frequencies[-1])
+    loose = model.natural_frequencies_hz
+    glued = _glued(scene, model).natural_frequencies_hz
+    inside = [k for k in range(model.rigid_modes, len(loose)) if loose[k] >= low and glued[k] <= high]
+    heights = np.abs(model.frf(loose, at, at))
+    chosen = sorted(inside, key=lambda k: -heights[k])[:_RESONANCES]
+    chosen = [k for k in chosen if heights[k] > _SEEN * heights[chosen[0]]]
+    if not chosen:
+        return [low, 0.5 * (low + high), high], max(1, model.rigid_modes)
+    places = [loose[k] + share * (glued[k] - loose[k]) for k in chosen for share in _PLACES]
+    return [float(np.clip(place, low, high)) for place in places], max(chosen) + 1
+
+
+def _undamped(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
+    """Largest amplitude without bodies in the range, m; 0 where no force drives it."""
+    assert isinstance(scene.structure, Rom)
+    force = excitation_force(replace(scene, structure=replace(scene.structure, modes=None)))
+    at = str(scene.excitation.at)
+    return force * float(np.abs(model.frf(frequencies, at, at)).max())
+
+
+def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
+    """Contacts of bodies with walls as they are on a model; none for rigid contacts. Raises InputError."""
+    if isinstance(scene.contact, Newton):
+        return []
+    first = spectrum(model.mass, model.stiffness)[1][:, 0]
+    flexibility = model.residual_flexibility
+    own = np.zeros(len(model.interface)) if flexibility is None else np.diag(flexibility)
+    found = []
+    for damper in scene.damper:
+        cavity = next(item for item in scene.cavity if item.name == damper.cavity)
+        for label in dict.fromkeys(filter(None, cavity.labels()[:2])):
+            reduced = 1.0 / (1.0 / damper.mass + float(model.row(label) @ first) ** 2)
+            lost = float(own[model.interface.index(label)])
+            element = scene.contact.element(damper.restitution, reduced, lost)
+            found.append(Collision(label, damper.mass, element.stiffness, element.dashpot))
+    return found
+
+
+def _needs_residual(scene: Scene) -> bool:
+    """Whether a contact is nothing but the flexibility that modes lack."""
+    return isinstance(scene.contact, Massless) or (
+        isinstance(scene.contact, Compliant) and scene.contact.stiffness is None
+    )
+
+
+def _yields(model: ReducedModel) -> bool:
+    return model.residual_flexibility is not None and bool(np.diag(model.residual_flexibility).max() > 0.0)
+
+
+def _surfaces(scene: Scene) -> list[str]:
+    return [label for cavity in scene.cavity for label in cavity.labels() if label is not None]

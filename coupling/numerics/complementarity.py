@@ -1,0 +1,230 @@
+"""The complementarity problem of contact and friction, solved exactly.
+
+Accelerations (or velocities) of rows are a = A f + b with A symmetric and positive semidefinite, and each force obeys
+
+    a_i = 0 with low_i <= f_i <= high_i,    a_i > 0 with f_i = low_i,    a_i < 0 with f_i = high_i.
+
+A contact has low = 0, high = inf; Coulomb friction at zero slip has low = -mu N, high = mu N (Pfeiffer and Glocker,
+1996). The principal pivoting of Dantzig and of Baraff (1994) brings in one row after the other and never loses a
+condition. Rows may depend on each other (a body that a wall and the floor's friction both hold): then accelerations
+are unique, and one of the possible sets of forces is found.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.numerics.jit import entry, kernel
+
+OUT, FREE, AT_LOW, AT_HIGH, DEPENDENT = np.arange(5)
+NONE = np.int64(-1)
+_ROUND_OFF = 1e-12
+_DEPENDENCE = 1e-9
+
+
+@entry
+def solve_box(problem, k, scale):
+    """Solve the first k rows in place: forces, accelerations, and states FREE, AT_LOW, AT_HIGH or DEPENDENT.
+
+    scale: size of the terms that b is the sum of, which sets what counts as round-off.
+    problem.forced: 0, or AT_LOW / AT_HIGH for a row whose force has just reached that bound on its way out: it stays
+    there unless its acceleration then contradicts (forced becomes 0). Rows found at a bound without acceleration are
+    marked in the same way.
+    DEPENDENT rows are at rest because FREE rows hold them; their force keeps a value within its bounds.
+    Returns False if the budget of pivots is spent (a guard: positive semidefinite problems end).
+    """
+    f, a, state, forced = problem.force, problem.acceleration, problem.state, problem.forced
+    for i in range(k):
+        f[i], state[i] = 0.0, OUT
+        if forced[i] == AT_LOW:
+            f[i], state[i] = problem.low[i], AT_LOW
+        elif forced[i] == AT_HIGH:
+            f[i], state[i] = problem.high[i], AT_HIGH
+    for i in range(k):
+        a[i] = problem.b[i]
+        for j in range(k):
+            a[i] += problem.matrix[i, j] * f[j]
+        scale = max(scale, abs(a[i]), abs(problem.b[i]))
+    tolerance = _ROUND_OFF * scale
+    for i in range(k):
+        if state[i] == OUT and not _drive(problem, k, i, tolerance):
+            return False
+    for i in range(k):
+        # a row forced to its bound stays there only as long as its acceleration agrees
+        if forced[i] != 0 and (
+            (state[i] == AT_LOW and a[i] < -tolerance) or (state[i] == AT_HIGH and a[i] > tolerance)
+        ):
+            forced[i], state[i] = 0, OUT
+            if not _drive(problem, k, i, tolerance):
+                return False
+    for i in range(k):
+        if state[i] != FREE and abs(a[i]) <= tolerance:
+            if _dependent(problem, k, i):
+                state[i] = DEPENDENT
+            elif state[i] != DEPENDENT:
+                forced[i] = state[i]
+    return True
+
+
+@kernel
+def _drive(problem, k, i, tolerance):
+    """Move f_i until row i obeys its condition, keeping the conditions of all rows that are in."""
+    f, a, state = problem.force, problem.acceleration, problem.state
+    df, da = problem.d_force, problem.d_acceleration
+    for _ in range(50 + 20 * k):
+        if abs(a[i]) <= tolerance:
+            state[i] = DEPENDENT if _dependent(problem, k, i) else FREE
+            a[i] = 0.0
+            return True
+        way = 1.0 if a[i] < 0.0 else -1.0
+        bound = problem.high[i] if way > 0.0 else problem.low[i]
+        if f[i] == bound:
+            state[i] = AT_HIGH if way > 0.0 else AT_LOW
+            return True
+        _respond(problem, k, i, way)
+        step, who, at_bound = (bound - f[i]) * way, i, True
+        if da[i] * way > 0.0 and -a[i] / da[i] <= step:
+            step, at_bound = -a[i] / da[i], False
+        for j in range(k):
+            if j == i or state[j] == OUT:
+                continue
+            if state[j] == FREE:
+                if df[j] != 0.0:
+                    room = ((problem.high[j] if df[j] > 0.0 else problem.low[j]) - f[j]) / df[j]
+                    if room < step:
+                        step, who, at_bound = max(room, 0.0), j, True
+            elif state[j] == DEPENDENT:
+                # a row that FREE rows held takes over at once when they no longer do
+                if abs(da[j]) > _DEPENDENCE * np.sqrt(problem.matrix[i, i] * problem.matrix[j, j]):
+                    step, who, at_bound = 0.0, j, False
+            elif problem.forced[j] == 0 and (
+                (state[j] == AT_LOW and da[j] < 0.0) or (state[j] == AT_HIGH and da[j] > 0.0)
+            ):
+                room = max(-a[j] / da[j], 0.0)
+                if room < step and not _dependent_beside(problem, k, j, i):
+                    step, who, at_bound = room, j, False
+        if step == np.inf:
+            return False
+        for j in range(k):
+            f[j] += step * df[j]
+            a[j] += step * da[j]
+        if not at_bound:
+            state[who], a[who] = FREE, 0.0
+        else:
+            high = df[who] > 0.0
+            state[who] = AT_HIGH if high else AT_LOW
+            f[who] = problem.high[who] if high else problem.low[who]
+        if who == i:
+            return True
+    return False
+
+
+@kernel
+def _respond(problem, k, i, way):
+    """Change of all forces and accelerations as f_i moves by `way` and the FREE rows keep their acceleration."""
+    df, da = problem.d_force, problem.d_acceleration
+    for j in range(k):
+        df[j] = 0.0
+    df[i] = way
+    count = _free_rows(problem, k, i, NONE)
+    _solve(problem, count, i)
+    for p in range(count):
+        df[problem.free[p]] = -way * problem.solution[p]
+    for j in range(k):
+        da[j], size = 0.0, 0.0
+        for l in range(k):
+            da[j] += problem.matrix[j, l] * df[l]
+            size += abs(problem.matrix[j, l] * df[l])
+        if abs(da[j]) <= _ROUND_OFF * size:
+            da[j] = 0.0  # a row that FREE rows hold: it would come in and go out for ever
+    for p in range(count):
+        da[problem.free[p]] = 0.0
+    if da[i] * way <= _DEPENDENCE * problem.matrix[i, i]:
+        da[i] = 0.0
+
+
+@kernel
+def _free_rows(problem, k, but, also):
+    """List the FREE rows except `but`, and the row `also` (NONE: none). Returns how many."""
+    count = 0
+    for j in range(k):
+        if j != but and (problem.state[j] == FREE or j == also):
+            problem.free[count] = j
+            count += 1
+    return count
+
+
+@kernel
+def _dependent(problem, k, i):
+    """Whether the FREE rows determine the acceleration of row i."""
+    return _rest(problem, _free_rows(problem, k, i, NONE), i) <= _DEPENDENCE * problem.matrix[i, i]
+
+
+@kernel
+def _dependent_beside(problem, k, j, i):
+    """Whether the FREE rows together with row i determine the acceleration of row j."""
+    also = NONE if _dependent(problem, k, i) else i
+    return _rest(problem, _free_rows(problem, k, j, also), j) <= _DEPENDENCE * problem.matrix[j, j]
+
+
+@kernel
+def _rest(problem, count, i):
+    """Schur complement of row i after the `count` listed free rows."""
+    _solve(problem, count, i)
+    rest = problem.matrix[i, i]
+    for p in range(count):
+        rest -= problem.matrix[i, problem.free[p]] * problem.solution[p]
+    return rest
+
+
+@kernel
+def _solve(problem, count, i):
+    """Solve A_ff x = A_fi for the listed free rows by Cholesky; they are independent by construction."""
+    a_matrix, free, factor, x = problem.matrix, problem.free, problem.factor, problem.solution
+    for p in range(count):
+        for q in range(p + 1):
+            total = a_matrix[free[p], free[q]]
+            for l in range(q):
+                total -= factor[p, l] * factor[q, l]
+            factor[p, q] = np.sqrt(max(total, 1e-300)) if p == q else total / factor[q, q]
+        total = a_matrix[free[p], i]
+        for l in range(p):
+            total -= factor[p, l] * x[l]
+        x[p] = total / factor[p, p]
+    for p in range(count - 1, -1, -1):
+        total = x[p]
+        for l in range(p + 1, count):
+            total -= factor[l, p] * x[l]
+        x[p] = total / factor[p, p]
+
+
+class Problem(NamedTuple):
+    """A complementarity problem of up to r rows with the space to solve it (numerics.complementarity)."""
+
+    matrix: np.ndarray  # (r, r)
+    b: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    forced: np.ndarray
+    force: np.ndarray
+    acceleration: np.ndarray
+    state: np.ndarray
+    restitution: np.ndarray
+    d_force: np.ndarray
+    d_acceleration: np.ndarray
+    free: np.ndarray
+    factor: np.ndarray  # (r, r)
+    solution: np.ndarray
+
+
+def new_problem(r: int) -> Problem:
+    """Room for a complementarity problem of r rows."""
+    reals, integers = iter(np.zeros((9, r))), iter(np.zeros((3, r), np.int64))
+    return Problem(
+        matrix=np.zeros((r, r)), b=next(reals), low=next(reals), high=next(reals), forced=next(integers),
+        force=next(reals), acceleration=next(reals), state=next(integers), restitution=next(reals),
+        d_force=next(reals), d_acceleration=next(reals), free=next(integers), factor=np.zeros((r, r)),
+        solution=next(reals),
+    )  # fmt: skip

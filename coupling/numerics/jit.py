@@ -1,0 +1,89 @@
+"""The decorators of compiled functions.
+
+Cached on disk between processes; divisions by zero give inf as in C; a product and a sum may be one instruction; no
+reference counting, which would cost more than the arithmetic: a compiled function allocates nothing and works in the
+arrays that it is given (exact.state.Scratch).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import config, njit
+
+#: start of a counter: a literal 0 has a type of its own, for which numba would compile all that it is handed to again
+ZERO = np.int64(0)
+
+# what a file of compiled functions holds
+_MARKS = ("@entry", "@kernel", "@inlined")
+_PACKAGE = Path(__file__).parents[2]
+
+
+class CacheError(ValueError):
+    """Compiled functions have no folder to be kept in: every process would compile them again, for a minute."""
+
+
+def entry(function: Callable[..., Any]) -> Any:
+    """Compile a function of the engine that Python calls."""
+    return _compile(function, no_cfunc_wrapper=True)
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function of the engine that compiled functions alone may call.
+
+    Unpacking the records' arrays for Python would take longer to compile than most functions themselves.
+    """
+    return _compile(function, no_cfunc_wrapper=True, no_cpython_wrapper=True)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a function of the engine into its callers, compiled ones: for what every segment runs.
+
+    A call hands over every array of its records, some 5 kB: it costs as much as a handful of exponentials.
+    """
+    return _compile(function, no_cfunc_wrapper=True, no_cpython_wrapper=True, forceinline=True)
+
+
+def _compile(function: Callable[..., Any], **options: bool) -> Any:
+    try:
+        compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)  # type: ignore[call-overload]
+    except RuntimeError as error:  # numba has found no folder that it can write to
+        folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
+        raise CacheError(
+            f"compiled functions have no folder that can be written to, of {folders} and the user's cache: "
+            "set NUMBA_CACHE_DIR to one"
+        ) from error
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
+        return compiled
+    # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls
+    compiled._cache._cache_file._source_stamp = _sources(Path(function.__code__.co_filename))
+    return compiled
+
+
+@cache
+def _sources(file: Path) -> str:
+    """Digest of a file of compiled functions and of those that it imports, through files with such functions alone.
+
+    What the others import (scenes, rows) is data: it does not enter the code.
+    """
+    texts: dict[Path, str] = {}
+    waiting = [file]
+    while waiting:
+        path = waiting.pop()
+        if path in texts:
+            continue
+        texts[path] = path.read_text(encoding="utf-8")
+        if any(mark in texts[path] for mark in _MARKS):
+            names = re.findall(r"^from vanedamp\.([\w.]+) import", texts[path], re.MULTILINE)
+            files = [_PACKAGE / f"{name.replace('.', '/')}.py" for name in names]
+            waiting += [name for name in files if name.is_file()]
+    digest = hashlib.sha256()
+    for path in sorted(texts):
+        digest.update(texts[path].encode())
+    return digest.hexdigest()

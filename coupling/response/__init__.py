@@ -1,0 +1,1 @@
+"""From records of a run to its response, for every method."""

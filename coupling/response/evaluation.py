@@ -1,0 +1,226 @@
+"""From what a run has recorded to its response: means, harmonic, ledger, attached mass, list of events.
+
+Every method leaves the same records behind, so that figures of different methods mean the same.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from vanedamp.coupling.response import records as recs
+from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.response import Event, Response, Status, classify
+from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.transient import outlasted
+
+#: periods between two looks at whether the response is steady
+_CHUNK = 100
+#: share of the energy there is that counts as flow in any case
+_CARRIED = 1e-3
+
+
+class Run(Protocol):
+    """A run of any method that can be continued."""
+
+    def advance_to(self, periods: int) -> Status:
+        """Continue to the end of so many periods, or to what ends the run."""
+
+    def outcome(self) -> Outcome:
+        """What the run leaves behind."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run leaves behind: records of `periods` periods, counters, chunks of its log.
+
+    open_ledger: energy residual above which the method's figures are not to be used; penetration: relative to the
+    free travel.
+    """
+
+    rows: Rows
+    records: Records
+    periods: int
+    events: int
+    open_ledger: float
+    counters: dict[str, int]
+    log: Sequence[np.ndarray]
+    penetration: float = 0.0
+
+
+def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | None = None) -> tuple[Status, int]:
+    """Run all periods, or until the mean amplitude is known well enough. Returns status and length of the transient.
+
+    progress: called with the number of periods done and of those to do.
+    """
+    status, dropped = Status.NOT_STEADY, scene.time.dropped
+    for periods in range(_CHUNK, scene.time.simulated + _CHUNK, _CHUNK):
+        # compiled functions hear of no interrupt before they return
+        ended = run.advance_to(min(periods, scene.time.simulated))
+        if ended is not Status.OK:
+            return ended, dropped
+        if progress is not None:
+            progress(min(periods, scene.time.simulated), scene.time.simulated)
+        if scene.time.steady != "auto":
+            continue
+        outcome = run.outcome()
+        peaks = outcome.records.peak[: outcome.periods]
+        transient = transient_length(peaks)
+        if transient is None:
+            status, dropped = Status.NOT_STEADY, scene.time.dropped
+            continue
+        confidence = mean_confidence(peaks[transient:])
+        if confidence is not None and confidence <= scene.time.tolerance * peaks[transient:].mean():
+            return Status.OK, transient
+        status, dropped = Status.UNCERTAIN, transient
+    if scene.time.steady != "auto":
+        records, window = run.outcome().records, slice(dropped, scene.time.simulated)
+        steady = not dropped or outlasted(scene, records.peak[window], records.impacts[window])
+        status = Status.OK if steady else Status.NOT_STEADY
+    return status, dropped
+
+
+def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started: float) -> Response:
+    """The response of a run that began at `started` (time.perf_counter) and dropped `transient` periods."""
+    rows, records, done = run.rows, run.records, run.periods
+    first = min(transient, max(done - 1, 0))
+    window = slice(first, done)
+    span = max(done - first, 1) * rows.period
+    ledger = records.ledger[: done + 1] - records.ledger[first]
+    b = len(rows.mass)
+    section = records.section[: done + 1]
+    harmonic = 2 / span * records.harmonic[window].sum()
+    evaluated = {name: float(value) for name, value in zip(recs.ENERGIES, ledger[-1], strict=True)}
+    peaks = records.peak[window]
+    balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(rows, records))
+    if not balance <= run.open_ledger and status in (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN):
+        status = Status.ENERGY
+    samples = len(records.samples) // scene.time.simulated
+    return Response(
+        status=status,
+        frequency=scene.excitation.frequency,
+        amplitude_max=float(peaks.max(initial=0.0)),
+        amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
+        amplitude_mean_confidence=mean_confidence(peaks),
+        amplitude_rms=float(np.sqrt(max(records.square[window].sum() / span, 0.0))),
+        amplitude_harmonic=float(abs(harmonic)),
+        phase=float(np.angle(1j * harmonic)),
+        impacts_per_period=float(records.impacts[window].sum() / max(done - first, 1)),
+        events=run.events,
+        classification=classify(
+            section[first:],
+            _state_scale(rows, section[first:]),
+            records.impacts[window],
+            evaluated["friction"],
+        ),
+        energy=evaluated,
+        energy_residual=balance,
+        attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
+        wall_time_s=time.perf_counter() - started,
+        periods=done,
+        transient=first,
+        counters=run.counters,
+        peak=records.peak[:done].copy(),
+        section=section[:, :2].copy(),
+        slip=section[:, 3 : 3 + b].copy(),
+        slip_velocity=section[:, 3 + b :].copy(),
+        event_list=events_of(rows, run.log),
+        time=np.arange(done * samples) * (rows.period / max(samples, 1)),
+        displacement=records.samples[: done * samples, 0].copy(),
+        body_displacement=records.samples[: done * samples, 1:].copy(),
+        penetration=run.penetration,
+    )
+
+
+def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> float:
+    """Imbalance of the energy ledger (periods + 1, 6), relative to the energy that flowed.
+
+    That is the largest of its terms, stored energy by its parts (periods + 1, 1 + b): what a heavy body only carries
+    along is no flow. `exchanged` (J) is what comes and goes within a period. A thousandth of the energy there is always
+    counts: below it the ledger would be judged by the round-off of what is only carried along.
+    """
+    change = ledger - ledger[0]
+    imbalance = change[-1, recs.EXCITATION] - change[-1, recs.VISCOUS :].sum()
+    swing = np.ptp(parts, axis=0).sum()
+    flowed = max(np.abs(change[:, : recs.STORED]).max(), swing, exchanged, _CARRIED * np.abs(parts).sum(axis=1).max())
+    return 0.0 if flowed == 0.0 else float(abs(imbalance) / flowed)
+
+
+def _exchanged(rows: Rows, records: Records) -> float:
+    """Energy that comes and goes within a period, J: in collisions, and what the loads lend to each mode and body."""
+    modes = np.abs(rows.force) ** 2 / np.maximum(rows.stiffness, rows.omega**2)
+    bodies = np.abs(rows.inertia) ** 2 / (rows.mass * rows.omega**2)
+    return float(max(records.collided.max(), (modes.sum() + bodies.sum()) / 2))
+
+
+def _state_scale(rows: Rows, section: np.ndarray) -> np.ndarray:
+    """(states,) what each state of the section is to be measured by.
+
+    A displacement and its velocity have one scale, because either may vanish at the period's start. The bodies'
+    momentum is measured by what it would be at the largest speed: beside a heavy body, which all but rests, it is a
+    small difference of the slip's speed and the structure's, and its slow drift is nothing that the motion in the
+    cavity feels.
+    """
+    largest, b = np.abs(section).max(axis=0), len(rows.mass)
+    x = max(largest[0], largest[1] / rows.omega)
+    slips = np.maximum(largest[3 : 3 + b], largest[3 + b :] / rows.omega)
+    momentum = rows.mass.sum() * rows.omega * max(x, slips.max(initial=0.0))
+    return np.array([x, rows.omega * x, momentum, *slips, *(rows.omega * slips)]) + np.finfo(float).tiny
+
+
+def _attached(
+    rows: Rows, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
+) -> float | None:
+    """Share of the bodies' mass that the structure feels: Re(F / (omega^2 X)) / sum m, F all contact forces on it."""
+    # a structure that does not move feels no mass: its harmonic is 0, or what damping has left of the start
+    if not len(rows.mass) or abs(harmonic) <= np.sqrt(np.finfo(float).tiny) or len(section) <= first + 1:
+        return None
+    change = section[-1, 2] - section[first, 2]
+    on_bodies = 2 / span * (change + 1j * rows.omega * momentum) - rows.inertia.sum()
+    return float((-on_bodies / (rows.omega**2 * harmonic)).real / rows.mass.sum())
+
+
+def events_of(rows: Rows, chunks: Sequence[np.ndarray]) -> list[Event]:
+    """The events of a compiled log: chunks of entries time, kind, row, velocity before and after, impulse."""
+    events = []
+    entries = np.concatenate(chunks) if chunks else np.zeros((0, 6))
+    _complete(rows, entries)
+    for entry in entries:
+        row = int(entry[2])
+        body, side = _place(rows, row)
+        # speeds of the gap, turned into speeds of the body relative to what it meets
+        sign = -1.0 if side in ("right", "body") else 1.0
+        before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
+        events.append(Event(float(entry[0]), recs.KINDS[int(entry[1])], body, side, before, after, impulse))
+    return events
+
+
+def _complete(rows: Rows, entries: np.ndarray) -> None:
+    """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end brought."""
+    begun: dict[int, np.ndarray] = {}
+    for entry in entries:
+        kind, row = int(entry[1]), int(entry[2])
+        if not np.isfinite(rows.spring[row]):
+            continue
+        if kind == recs.IMPACT:
+            begun[row] = entry
+        elif kind == recs.DETACHES and row in begun:
+            begun[row][4:6] = entry[4:6]
+
+
+def _place(rows: Rows, row: int) -> tuple[int, str]:
+    """Number of the body (or of the friction damper, side "casing") and the side on which a row acts."""
+    if len(rows.mass) <= row < rows.friction_rows:
+        return row - len(rows.mass), "casing"
+    bodies = np.flatnonzero(rows.bodies[row])
+    if row < rows.friction_rows:
+        return int(bodies[0]), "floor"
+    if len(bodies) == 2:
+        return int(bodies[0]), "body"
+    return int(bodies[0]), "left" if rows.bodies[row, bodies[0]] > 0 else "right"

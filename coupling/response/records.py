@@ -1,0 +1,43 @@
+"""What a run of any method records: sections, energies, samples, events, and the codes of these."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.system.constraints import Rows
+
+KINDS = ("impact", "stick", "slip", "detach", "rest")
+IMPACT, STICKS, SLIPS, DETACHES, RESTS = np.arange(len(KINDS))
+#: entries of the energy ledger, J
+ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
+EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES))
+
+
+class Records(NamedTuple):
+    """What a run leaves behind. One entry a period unless said otherwise."""
+
+    peak: np.ndarray  # largest |x|, m
+    harmonic: np.ndarray  # complex integral of x exp(-i omega t), m s
+    square: np.ndarray  # integral of x^2, m^2 s
+    momentum: np.ndarray  # complex integral of the bodies' momentum times exp(-i omega t), N s^2
+    impacts: np.ndarray
+    section: np.ndarray  # (periods + 1, 3 + 2b): x, x', bodies' momentum, slips, slip velocities at the period's start
+    ledger: np.ndarray  # (periods + 1, 6) cumulative, J
+    parts: np.ndarray  # (periods + 1, 1 + b): energy of the structure with all springs, and of each body, J
+    collided: np.ndarray  # energy of the relative motion that impacts turned round or took, J
+    samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples a period
+    log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
+
+
+def new_records(rows: Rows, periods: int, samples: int) -> Records:
+    """Room for `periods` periods with `samples` samples each."""
+    b = len(rows.mass)
+    return Records(
+        peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
+        momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),
+        section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
+        parts=np.zeros((periods + 1, 1 + b)), collided=np.zeros(periods + 1),
+        samples=np.zeros((periods * samples, 1 + b)), log=np.zeros((4096 + 4 * len(rows.delassus), 6)),
+    )  # fmt: skip

@@ -1,0 +1,167 @@
+"""The answer of a run: amplitudes, classification, energy ledger, events and samples (SI units)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.files.store import Variable, save
+
+
+class Status(StrEnum):
+    """How a run ended.
+
+    PENETRATION: a body is deeper in a wall than `solver.penetration` allows, an impact was missed; DIVERGED: the motion
+    grew beyond all bounds; ENERGY: the ledger is open by more than the method's bound, its figures are not to be used.
+    ILL_CONDITIONED: while some contacts are closed, modes are critically damped to round-off or masses and stiffnesses
+    so far apart that doubles cannot resolve the motion; change a damping, a mass or a stiffness.
+    NOT_STEADY: no end of the transient in sight, or `time.transient` is too short for it; UNCERTAIN: the mean's
+    confidence interval is still too wide. The other troubles mean that the figures cover only the periods that were
+    completed.
+    """
+
+    OK = "ok"
+    EVENT_BUDGET = "event_budget"
+    ACCURACY_LOST = "accuracy_lost"
+    UNDECIDED = "undecided_contact"
+    ILL_CONDITIONED = "ill_conditioned"
+    PENETRATION = "penetration"
+    DIVERGED = "diverged"
+    ENERGY = "energy_not_balanced"
+    NOT_STEADY = "not_steady"
+    UNCERTAIN = "confidence_not_reached"
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event: time (s), kind, number of the body, side, speeds (m/s) and impulse (N s).
+
+    side: "left", "right" (walls), "body" (the next body to the right), "floor"; "casing" for a friction damper, whose
+    number is then meant. Speeds are the body's relative to what it meets.
+    """
+
+    time: float
+    kind: str
+    damper: int
+    side: str
+    relative_velocity_before: float
+    relative_velocity_after: float
+    impulse: float
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a structure with loose bodies did. Amplitudes and energies are those of the evaluated periods.
+
+    amplitude_*: of the displacement at excitation.at (m), with the half width of the mean's 95 % confidence interval
+    (None if there are too few periods); energy: J over the evaluated time, `stored` its change;
+    energy_residual: imbalance of the whole run's ledger relative to its largest term; attached_mass_fraction: share
+    of the bodies' mass that the structure feels (None without bodies or motion); peak: (periods,) largest |x| of each
+    period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
+    time, displacement, body_displacement: samples, empty if none were asked for; penetration: deepest overlap of bodies
+    and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model
+    whose number of modes was chosen automatically (model_order.selection), None otherwise; warnings: what to know of
+    the scene before its figures are used; final: the state at its end, with which another run can begin, None for one
+    that ended within a period or by another method than the exact one.
+    """
+
+    status: Status
+    frequency: float
+    amplitude_max: float
+    amplitude_mean: float
+    amplitude_mean_confidence: float | None
+    amplitude_rms: float
+    amplitude_harmonic: float
+    phase: float
+    impacts_per_period: float
+    events: int
+    classification: str
+    energy: dict[str, float]
+    energy_residual: float
+    attached_mass_fraction: float | None
+    wall_time_s: float
+    periods: int
+    transient: int
+    counters: dict[str, int]
+    peak: np.ndarray
+    section: np.ndarray
+    slip: np.ndarray
+    slip_velocity: np.ndarray
+    event_list: Sequence[Event]
+    time: np.ndarray
+    displacement: np.ndarray
+    body_displacement: np.ndarray
+    penetration: float = 0.0
+    estimate: dict[str, Any] | None = None
+    final: Handover | None = None
+    warnings: tuple[str, ...] = ()
+
+    def to_json(self, events: bool = False) -> dict[str, Any]:
+        """The result as plain data, with the list of events if wanted."""
+        names = (
+            "frequency", "amplitude_max", "amplitude_mean", "amplitude_mean_confidence", "amplitude_rms",
+            "amplitude_harmonic", "phase",
+            "impacts_per_period", "events", "classification", "energy", "energy_residual", "attached_mass_fraction",
+            "wall_time_s", "periods", "transient", "counters", "penetration",
+        )  # fmt: skip
+        data: dict[str, Any] = {"status": self.status.value} | {name: getattr(self, name) for name in names}
+        data["warnings"] = list(self.warnings)
+        if self.estimate is not None:
+            data["estimate"] = self.estimate
+        if events:
+            data["event_list"] = [vars(event) for event in self.event_list]
+        return data
+
+    def save(self, path: str | Path, provenance: dict[str, Any] | None = None) -> None:
+        """Write HDF5 that xarray opens: per-period series, samples and events."""
+        variables = {
+            "period": Variable(np.arange(len(self.section)), ("period",)),
+            "section": Variable(self.section, ("period", "state"), "m, m/s"),
+            "slip": Variable(self.slip, ("period", "damper"), "m"),
+            "slip_velocity": Variable(self.slip_velocity, ("period", "damper"), "m/s"),
+            "peak": Variable(self.peak, ("full_period",), "m"),
+        }
+        if len(self.time):
+            variables["time"] = Variable(self.time, ("time",), "s")
+            variables["displacement"] = Variable(self.displacement, ("time",), "m")
+            variables["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
+        if self.event_list:
+            variables |= self._event_variables()
+        attributes = {k: v for k, v in self.to_json().items() if v is not None}
+        save(path, "response", variables, attributes | {"provenance": provenance or {}})
+
+    def _event_variables(self) -> dict[str, Variable]:
+        units = {"time": "s", "relative_velocity_before": "m/s", "relative_velocity_after": "m/s", "impulse": "N s"}
+        return {
+            f"event_{name}": Variable(
+                [getattr(event, name) for event in self.event_list], ("event",), units.get(name, "1")
+            )
+            for name in Event.__dataclass_fields__
+        }
+
+
+def classify(
+    section: np.ndarray, scale: np.ndarray, impacts: np.ndarray, friction_loss: float, longest: int = 16
+) -> str:
+    """ "periodic-k", "non-periodic", "no-contact" or "stuck" from the section (periods + 1, states) of a steady state.
+
+    A response has period k if the last section equals those k, 2k, ... periods before it within 1e-6 of each
+    state's scale (states,), over at least 8 repetitions or half of what there is.
+    """
+    if not impacts.any():
+        return "no-contact" if friction_loss > 0 else "stuck"
+    available = len(section) - 1
+    for k in range(1, longest + 1):
+        span = min(8 * k, available - k)
+        if span < k:
+            break
+        late, early = section[-span:], section[-span - k : -k]
+        if np.all(np.abs(late - early) < 1e-6 * scale):
+            return f"periodic-{k}"
+    return "non-periodic"

@@ -1,0 +1,75 @@
+"""Loads of a scene: the excitation, and gravity."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, Real
+
+
+@dataclass(frozen=True, config=STRICT)
+class Excitation:
+    """Harmonic excitation at `frequency` (Hz): one of force (N), base_acceleration (m/s^2), resonance_amplitude (m).
+
+    resonance_amplitude is the displacement to which the force brings a resonance of the structure without bodies: of a
+    model with several, the one that responds most within `resonance_near`, a frequency or [lowest, highest] (Hz);
+    default: the excitation's frequency, or the range over which it is swept.
+    `at` is the interface label of force and response on a reduced model; the base moves in its direction.
+    """
+
+    frequency: Positive
+    force: NonNegative | None = None
+    base_acceleration: NonNegative | None = None
+    resonance_amplitude: Positive | None = None
+    resonance_near: Positive | tuple[Positive, Positive] | None = None
+    at: str | None = None
+
+    def __post_init__(self) -> None:
+        given = [self.force, self.base_acceleration, self.resonance_amplitude]
+        if sum(value is not None for value in given) > 1:
+            raise ValueError("give at most one of force, base_acceleration and resonance_amplitude")
+        low, high = self.resonance_range
+        if low > high:
+            raise ValueError(f"resonance_near: expected [lowest, highest], not [{low:g}, {high:g}]")
+
+    @property
+    def resonance_range(self) -> tuple[float, float]:
+        """Lowest and highest frequency, Hz, near which the resonance of resonance_amplitude is sought."""
+        near = self.frequency if self.resonance_near is None else self.resonance_near
+        return near if isinstance(near, tuple) else (near, near)
+
+
+@dataclass(frozen=True, config=STRICT)
+class Gravity:
+    """Gravity, by its angle to all cavities, or by its `direction` in space (of any length), which a reduced model's
+    cavities have too.
+
+    orientation_deg: 0 presses the bodies on the floor, 90 pulls them along the cavity to its left wall.
+    """
+
+    acceleration: NonNegative = 9.81
+    orientation_deg: Real = 0.0
+    direction: Direction | None = None
+
+    def __post_init__(self) -> None:
+        if self.direction is not None and self.orientation_deg != 0.0:
+            raise ValueError("give one of orientation_deg and direction")
+
+    def components(self, cavity: np.ndarray) -> tuple[float, float]:
+        """Acceleration (m/s^2) along a cavity, positive to the right, and across it, pressing on its floor.
+
+        cavity: (3,) unit vector from its left wall to its right one; without meaning for gravity by an angle. What
+        gravity by a direction presses a body on is floor, whichever side that is.
+        """
+        if self.direction is None:
+            angle = math.radians(self.orientation_deg)
+            along, across = -math.sin(angle), math.cos(angle)
+        else:
+            down = np.array(self.direction) / np.linalg.norm(self.direction)
+            along, across = float(down @ cavity), float(np.linalg.norm(np.cross(down, cavity)))
+        if abs(across) < 1e-15:  # upright is upright
+            across = 0.0
+        return self.acceleration * along, self.acceleration * across

@@ -1,0 +1,61 @@
+"""Dotted paths to the numbers of a scene, and ranges of their values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from vanedamp.files.toml_input import STRICT, InputError, Real, Whole, nearest
+
+
+@dataclass(frozen=True, config=STRICT)
+class Range:
+    """`num` values from start to stop, both included."""
+
+    start: Real
+    stop: Real
+    num: Annotated[Whole, Field(gt=0)]
+
+
+def axis_values(values: Range | Sequence[Any]) -> list[Any]:
+    """The values of one axis of the [sweep] table."""
+    if isinstance(values, Range):
+        return [float(value) for value in np.linspace(values.start, values.stop, values.num)]
+    return list(values)
+
+
+def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
+    """Change plain scene data at the end of `steps`, which stand in `path`. Raises InputError for an unknown place."""
+    if not steps:
+        raise InputError(f"scene: {path}: names a table, not a value")
+    head, rest = steps[0], steps[1:]
+    if not isinstance(node, dict) and not (isinstance(node, list) and all(isinstance(entry, dict) for entry in node)):
+        raise InputError(f"scene: {path}: no table holds '{head}'; leave it out and give the whole value")
+    if isinstance(node, list):
+        entries, rest = _entries(node, head, steps, path)
+        for entry in entries:
+            assign(entry, rest, value, path)
+    elif rest:
+        if head not in node:
+            raise InputError(f"scene: {path}: no table '{head}'; {nearest(head, list(node))}")
+        assign(node[head], rest, value, path)
+    else:
+        node[head] = value
+
+
+def _entries(nodes: list[Any], head: str, steps: list[str], path: str) -> tuple[list[Any], list[str]]:
+    if head.isdecimal():
+        if int(head) >= len(nodes):
+            raise InputError(f"scene: {path}: there are only {len(nodes)} entries, counted from 0")
+        return [nodes[int(head)]], steps[1:]
+    named = [node for node in nodes if node.get("name") == head]
+    if named:
+        return named, steps[1:]
+    if len(steps) > 1:
+        names = [str(node["name"]) for node in nodes if "name" in node]
+        raise InputError(f"scene: {path}: no entry '{head}'; {nearest(head, names) if names else 'use its index'}")
+    return nodes, steps

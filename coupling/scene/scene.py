@@ -1,0 +1,243 @@
+"""The scene: a structure, its cavities, the loose bodies in them and what excites it all (SI units throughout)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter
+from pydantic.dataclasses import dataclass
+
+from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper
+from vanedamp.coupling.scene.contact_laws import Compliant, Contact, Massless, Newton
+from vanedamp.coupling.scene.excitation import Excitation, Gravity
+from vanedamp.coupling.scene.paths import Range, assign, axis_values
+from vanedamp.coupling.scene.solver_options import Solver
+from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
+from vanedamp.files.toml_input import (
+    STRICT,
+    InputError,
+    Real,
+    Whole,
+    nearest,
+    read_toml,
+    validate,
+)
+
+
+@dataclass(frozen=True, config=STRICT)
+class Time:
+    """Excitation periods simulated, and how many of the first are left out of the evaluation.
+
+    Neither given: 1500 and 1000, or a longer transient where the structure's damping leaves more than `tolerance` of
+    the steady response (system.transient). transient = 0 evaluates the motion from the start, whatever it is.
+    steady = "auto" instead drops the transient by a statistical rule and ends the run, within `periods`, once the 95 %
+    confidence interval of the mean amplitude is narrower than `tolerance` of it on either side.
+    """
+
+    periods: Annotated[Whole, Field(gt=0)] | None = None
+    transient: Annotated[Whole, Field(ge=0)] | None = None
+    steady: Literal["auto"] | None = None
+    tolerance: Annotated[Real, Field(gt=0, lt=1)] = 0.01
+
+    def __post_init__(self) -> None:
+        if self.steady is not None and self.transient is not None:
+            raise ValueError("give one of transient and steady")
+        if self.transient is not None and self.transient >= self.simulated:
+            raise ValueError(f"transient ({self.transient}) must be less than periods ({self.simulated})")
+
+    @property
+    def simulated(self) -> int:
+        """Periods simulated, at most: 1500 if nothing was said."""
+        return 1500 if self.periods is None else self.periods
+
+    @property
+    def dropped(self) -> int:
+        """Periods left out of the evaluation unless the state tells: two thirds if nothing was said."""
+        return self.simulated * 2 // 3 if self.transient is None else self.transient
+
+
+def _several(axis: Any) -> Any:
+    if not isinstance(axis, Mapping | list | tuple | Range):
+        raise ValueError("a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}")
+    return axis
+
+
+def _form(axis: Any) -> str:
+    return "list" if isinstance(axis, list | tuple) else "range"
+
+
+#: the values of one axis of a sweep
+Axis = Annotated[
+    Annotated[Range, Tag("range")] | Annotated[tuple[Real | Whole | str, ...], Field(min_length=1), Tag("list")],
+    Discriminator(_form),
+    BeforeValidator(_several),
+]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Continuation:
+    """How the runs of a sweep begin: each from its own initial state ("independent"), or from its neighbour's last one.
+
+    The neighbour is the next lower ("up") or higher ("down") value of the axis `along`, by default the excitation
+    frequency or the only axis. The phase of the excitation goes on.
+    """
+
+    direction: Literal["independent", "up", "down"] = "independent"
+    along: str | None = None
+
+
+@dataclass(frozen=True, config=STRICT)
+class Scene:
+    """Everything one run needs. Change a scene by making another: `scene.replace({"cavity.c1.gap": 1e-5})`."""
+
+    structure: Structure
+    excitation: Excitation
+    cavity: tuple[Cavity, ...] = ()
+    damper: tuple[Damper, ...] = ()
+    friction_damper: tuple[FrictionDamper, ...] = ()
+    initial: Initial = field(default_factory=Initial)
+    gravity: Gravity = field(default_factory=Gravity)
+    contact: Contact = field(default_factory=Newton)
+    time: Time = field(default_factory=Time)
+    solver: Solver = field(default_factory=Solver)
+    continuation: Continuation = field(default_factory=Continuation)
+    sweep: dict[str, Axis] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        names = [cavity.name for cavity in self.cavity]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"cavity: the name '{name}' is used twice; names must differ")
+        for index, damper in enumerate(self.damper):
+            if damper.cavity not in names:
+                raise ValueError(
+                    f"damper[{index}].cavity: no cavity '{damper.cavity}'; {nearest(damper.cavity, names)}"
+                )
+            self._check_load(index, damper)
+            try:
+                self.contact.element(damper.restitution, damper.mass)
+            except InputError as error:
+                raise ValueError(f"damper[{index}].{error}") from None
+        for cavity in self.cavity:
+            self._check_row(cavity)
+        self._check_structure()
+
+    def _check_load(self, index: int, damper: Damper) -> None:
+        if damper.normal_load is not None or damper.friction == 0 or self.gravity.direction is not None:
+            return
+        if math.cos(math.radians(self.gravity.orientation_deg)) < -1e-12 and self.gravity.acceleration > 0:
+            raise ValueError(
+                f"damper[{index}]: gravity lifts the body off the floor at gravity.orientation_deg = "
+                f"{self.gravity.orientation_deg:g}; give normal_load or turn it to -90..90"
+            )
+
+    def _check_row(self, cavity: Cavity) -> None:
+        row = [(index, damper.position) for index, damper in enumerate(self.damper) if damper.cavity == cavity.name]
+        for index, position in row:
+            if abs(position) > cavity.gap / 2:
+                raise ValueError(
+                    f"damper[{index}].position: {position:g} lies outside cavity '{cavity.name}'; "
+                    f"its free travel is -{cavity.gap / 2:g} to {cavity.gap / 2:g}"
+                )
+        for (_, left), (index, right) in itertools.pairwise(row):
+            if right < left:
+                raise ValueError(
+                    f"damper[{index}].position: overlaps the body before it in cavity '{cavity.name}'; "
+                    "bodies stand in file order from left to right"
+                )
+
+    def _check_structure(self) -> None:
+        if isinstance(self.structure, Rom):
+            if self.excitation.at is None:
+                raise ValueError("excitation.at: name the interface label of force and response on the reduced model")
+            for index, cavity in enumerate(self.cavity):
+                if cavity.labels()[2] is None:
+                    raise ValueError(f"cavity[{index}].floor: name an interface label of the reduced model")
+            if self.initial != Initial():
+                raise ValueError("initial: an initial state is for rigid structures; a reduced model starts at rest")
+        elif self.gravity.direction is not None:
+            raise ValueError(
+                "gravity.direction: a direction in space is for a reduced model, whose interface has directions; "
+                "give orientation_deg"
+            )
+        elif isinstance(self.contact, Massless) or (isinstance(self.contact, Compliant) and self.contact.residual):
+            raise ValueError(
+                'contact: the residual flexibility is that of a reduced model; take structure.model = "rom"'
+            )
+        if isinstance(self.structure, Prescribed):
+            excitation = self.excitation
+            if excitation.force or excitation.base_acceleration or excitation.resonance_amplitude:
+                raise ValueError("excitation: a prescribed motion takes frequency alone; structure sets the amplitude")
+            if self.friction_damper:
+                raise ValueError("friction_damper: a prescribed motion feels no force; remove it")
+            if self.initial != Initial():
+                raise ValueError("initial: a prescribed motion has no initial state; remove the table")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Scene:
+        """The scene in a TOML file; a reduced model's file is taken relative to it. Raises InputError."""
+        return cls.of(read_toml(path), path)
+
+    @classmethod
+    def of(cls, data: dict[str, Any], path: str | Path) -> Scene:
+        """The scene in the tables of a TOML file that lies at `path`."""
+        structure = data.get("structure")
+        if isinstance(structure, dict) and isinstance(structure.get("file"), str):
+            structure["file"] = str(Path(path).parent / structure["file"])
+        return validate(cls, data, str(path))
+
+    @property
+    def files(self) -> list[str]:
+        """The reduced models that the scene and its sweep name."""
+        swept = self.sweep.get("structure.file", ())
+        return [
+            *([self.structure.file] if isinstance(self.structure, Rom) else []),
+            *(() if isinstance(swept, Range) else map(str, swept)),
+        ]
+
+    @property
+    def points(self) -> int:
+        """Points of the grid of its sweep."""
+        return math.prod(axis.num if isinstance(axis, Range) else len(axis) for axis in self.sweep.values())
+
+    @property
+    def moved(self) -> bool:
+        """Whether anything is said that moves the structure or the bodies, here or in an axis of the sweep."""
+        given = self.excitation.force, self.excitation.base_acceleration, self.excitation.resonance_amplitude
+        swept = {path.split(".")[0] for path in self.sweep if path != "excitation.frequency"}
+        return (
+            isinstance(self.structure, Prescribed)
+            or any(value is not None for value in given)
+            or self.initial != Initial()
+            or any(damper.velocity for damper in self.damper)
+            or self.gravity.orientation_deg != 0.0
+            or self.gravity.direction is not None
+            or not swept.isdisjoint({"structure", "excitation", "initial", "damper", "gravity"})
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain nested data as in the file, without what is None."""
+        data: dict[str, Any] = TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
+        return data
+
+    def replace(self, values: Mapping[str, Any]) -> Scene:
+        """Another scene with some values changed, by their dotted paths ("cavity.c1.gap", "damper.0.mass").
+
+        A path that names a list without index ("damper.mass") changes every entry. Raises InputError.
+        """
+        data = self.to_dict()
+        for path, value in values.items():
+            assign(data, path.split("."), value, path)
+        return validate(Scene, data, "scene")
+
+    def sweep_points(self) -> tuple[dict[str, np.ndarray], Iterator[dict[str, Any]]]:
+        """The grid of the [sweep] table: (axes by path, the points of their product with the last axis fastest)."""
+        axes = {path: axis_values(values) for path, values in self.sweep.items()}
+        points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
+        return {path: np.asarray(values) for path, values in axes.items()}, points

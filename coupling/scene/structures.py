@@ -1,0 +1,73 @@
+"""Structures of a scene."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Real, Whole
+
+
+@dataclass(frozen=True, config=STRICT)
+class Prescribed:
+    """A shaker table: x = displacement_amplitude sin(2 pi f t), whatever the bodies do."""
+
+    model: Literal["prescribed"]
+    displacement_amplitude: Positive
+
+
+@dataclass(frozen=True, config=STRICT)
+class Rigid:
+    """One mode: mass (kg) on a spring (N/m) with viscous damping (ratio, or N s/m)."""
+
+    model: Literal["rigid"]
+    mass: Positive
+    stiffness: Positive
+    damping_ratio: NonNegative | None = None
+    damping: NonNegative | None = None
+
+    def __post_init__(self) -> None:
+        if (self.damping_ratio is None) == (self.damping is None):
+            raise ValueError("give one of damping_ratio and damping")
+
+    @property
+    def viscous(self) -> float:
+        """Viscous damping, N s/m."""
+        if self.damping is not None:
+            return self.damping
+        return 2 * (self.damping_ratio or 0.0) * math.sqrt(self.mass * self.stiffness)
+
+
+@dataclass(frozen=True, config=STRICT)
+class Rom:
+    """A reduced model from a file (`vanedamp reduce`), with the first `modes` of its modes (default: all).
+
+    natural: take the model's own lowest natural modes instead of those of its basis; attached: with residual attachment
+    modes, which keep its flexibility. modes = "auto": as many natural modes as keep the estimated error within
+    `tolerance`, attached where that is smaller.
+    """
+
+    model: Literal["rom"]
+    file: str
+    modes: Annotated[Whole, Field(ge=0)] | Literal["auto"] | None = None
+    natural: bool = False
+    attached: bool = False
+    tolerance: Annotated[Real, Field(gt=0, lt=1)] = 0.01
+
+    def __post_init__(self) -> None:
+        if self.attached and not (self.natural and isinstance(self.modes, int)):
+            raise ValueError("attached: attachment modes go with natural = true and a number of modes")
+
+
+Structure = Annotated[Prescribed | Rigid | Rom, Field(discriminator="model")]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Initial:
+    """Displacement (m) and velocity (m/s) of a rigid structure at time zero."""
+
+    displacement: Real = 0.0
+    velocity: Real = 0.0

@@ -1,0 +1,1 @@
+"""Sweeps: grids of scenes, workers, checkpoints, one record of results."""

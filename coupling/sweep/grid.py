@@ -1,0 +1,193 @@
+"""The grid of a sweep: its axes, its points as scenes, made when they are wanted, and the chains that runs form."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.model_order.selection import Choices, choices_of, is_open, settled, warnings_of
+from vanedamp.coupling.scene.paths import assign, axis_values
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.files.toml_input import InputError, nearest, validate
+
+FREQUENCY = "excitation.frequency"
+_DIRECTION, _ALONG = "continuation.direction", "continuation.along"
+#: what cannot change from one run to the next: their states would not fit
+_FIXED = ("structure.model", "structure.file", "structure.modes", "structure.natural", "structure.tolerance")
+
+
+class Points:
+    """Scenes of a grid from the values of their axes: little to send to a worker, however large the grid."""
+
+    def __init__(self, base: Scene, choices: Choices) -> None:
+        """base: a scene without sweep; choices: those of its numbers of modes."""
+        self.base, self.choices = base, choices
+        self._data = base.to_dict()
+
+    def scene(self, values: Mapping[str, Any]) -> Scene:
+        """The scene at a point, without open choices. Raises InputError for a point that is no scene."""
+        return settled(self.raw(values), self.choices).scene
+
+    def raw(self, values: Mapping[str, Any]) -> Scene:
+        """The same with its choices open."""
+        try:
+            for path, value in values.items():  # each point sets the same places
+                assign(self._data, path.split("."), value, path)
+            return validate(Scene, self._data, "scene")
+        except InputError as error:
+            point = ", ".join(f"{path} = {value!r}" for path, value in values.items())
+            raise InputError(f"sweep: at {point}: {str(error).removeprefix('scene: ')}") from None
+
+
+class Chain(NamedTuple):
+    """Points in the order in which they run; each begins with the state of the one before if they are `linked`."""
+
+    points: Sequence[int]
+    linked: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The product of the axes of a [sweep] table, the last axis fastest.
+
+    scene     the scene with its [sweep] table
+    axes      dotted path -> the values as the scene has them
+    base      the scene without its sweep
+    choices   numbers of modes that suit all points, where they were left open
+    estimate  of the model chosen, None where there was no choice
+    warnings  what to know of the first point's scene before figures are used
+    along     the axis along which runs are linked, None if they are not
+    """
+
+    scene: Scene
+    axes: Mapping[str, Sequence[Any]]
+    base: Scene
+    choices: Choices
+    estimate: dict[str, Any] | None
+    along: str | None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Points along each axis."""
+        return tuple(len(values) for values in self.axes.values())
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return math.prod(self.shape)
+
+    def values(self, index: int) -> dict[str, Any]:
+        """Values of the axes at a point, counted from 0 with the last axis fastest."""
+        places = np.unravel_index(index, self.shape)
+        return {path: values[int(place)] for (path, values), place in zip(self.axes.items(), places, strict=True)}
+
+    def chains(self) -> Iterator[Chain]:
+        """All points, in chains that can run side by side."""
+        if self.along is None:
+            yield Chain(range(self.size), False)
+            return
+        numbers = np.arange(self.size).reshape(self.shape)
+        lines = np.moveaxis(numbers, list(self.axes).index(self.along), -1)
+        rising = np.argsort(self.axes[self.along], kind="stable")
+        for line in lines.reshape(-1, len(rising)):
+            direction = self.values(int(line[0])).get(_DIRECTION, self.base.continuation.direction)
+            order = rising[::-1] if direction == "down" else rising
+            yield Chain([int(point) for point in line[order]], direction != "independent")
+
+
+class PointList:
+    """Points in any places, to be run like those of a grid; `base` leaves no number of modes open."""
+
+    def __init__(self, base: Scene, points: Sequence[Mapping[str, Any]]) -> None:
+        self.base, self.size, self._points = base, len(points), points
+        self.choices: Choices = {}
+
+    def values(self, index: int) -> Mapping[str, Any]:
+        """What a point changes in the base."""
+        return self._points[index]
+
+    def chains(self) -> Iterator[Chain]:
+        """All points, in one go."""
+        yield Chain(range(self.size), False)
+
+
+def grid(scene: Scene) -> Grid:
+    """The grid of a scene's [sweep] table. Raises InputError for a point that is no scene, before any run."""
+    axes = {path: axis_values(values) for path, values in scene.sweep.items()}
+    if not axes:
+        raise InputError(
+            'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
+        )
+    points = Points(replace(scene, sweep={}), {})
+    first, linked, leaves_open = None, False, False
+    for values in _telling(axes):
+        made = points.raw(values)
+        first = first or made
+        linked = linked or made.continuation.direction != "independent"
+        leaves_open = leaves_open or is_open(made)
+        _check_method(made)
+    assert first is not None
+    along = _along(scene, axes) if linked else None
+    base = _with_range(points.base, axes)
+    points = Points(base, {})
+    choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if leaves_open else {}
+    start = settled(first, choices)
+    linear_structure(start.scene)
+    return Grid(scene, axes, base, choices, start.estimate, along, warnings_of(start.scene))
+
+
+def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
+    """The scene whose level is that of one resonance for all of the swept frequencies."""
+    swept = axes.get(FREQUENCY)
+    if swept is None or not _ordered(swept) or scene.excitation.resonance_near is not None:
+        return scene
+    return replace(scene, excitation=replace(scene.excitation, resonance_near=(float(min(swept)), float(max(swept)))))
+
+
+def _telling(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
+    """Points that tell whether all are scenes: a frequency is good or bad whatever the other values are."""
+    first = {path: values[0] for path, values in axes.items()}
+    others = {path: values for path, values in axes.items() if path != FREQUENCY}
+    for values in itertools.product(*others.values()):
+        yield first | dict(zip(others, values, strict=True))
+    for frequency in axes.get(FREQUENCY, ()):
+        yield first | {FREQUENCY: frequency}
+
+
+def _check_method(scene: Scene) -> None:
+    if scene.continuation.direction != "independent" and scene.solver.method != "exact":
+        raise InputError(
+            f'continuation.direction: "{scene.continuation.direction}" is for solver.method exact, not '
+            f'{scene.solver.method}; take "independent"'
+        )
+
+
+def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:
+    """The axis along which runs are linked. Raises InputError where there is none or where states would not fit."""
+    along = scene.continuation.along
+    if along is None:
+        numeric = [path for path, values in axes.items() if _ordered(values)]
+        if FREQUENCY not in axes and len(numeric) != 1:
+            raise InputError(f"continuation.along: name the axis of the sweep, one of {', '.join(numeric) or 'none'}")
+        along = FREQUENCY if FREQUENCY in axes else numeric[0]
+    if along not in axes:
+        raise InputError(f"continuation.along: the sweep has no axis '{along}'; {nearest(along, list(axes))}")
+    if not _ordered(axes[along]):
+        raise InputError(f"continuation.along: the values of {along} are no numbers, which alone have neighbours")
+    fixed = isinstance(scene.structure, Rom) and along.startswith("structure.")
+    if fixed or along in _FIXED or _ALONG in axes:
+        path = _ALONG if _ALONG in axes else along
+        raise InputError(f"continuation.along: a run cannot begin with the state of another {path}; take another axis")
+    return along
+
+
+def _ordered(values: Sequence[Any]) -> bool:
+    return all(isinstance(value, int | float) for value in values)

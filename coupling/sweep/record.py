@@ -1,0 +1,128 @@
+"""The record of a sweep."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.grid import FREQUENCY
+from vanedamp.coupling.sweep.worker import LOSSES, MEASURES
+from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.toml_input import validate
+
+_KIND = "sweep"
+_UNITS = {
+    "frequency": "Hz", "gap": "m", "mass": "kg", "stiffness": "N/m", "damping": "N s/m", "force": "N",
+    "base_acceleration": "m/s^2", "acceleration": "m/s^2", "resonance_amplitude": "m", "displacement_amplitude": "m",
+    "position": "m", "displacement": "m", "velocity": "m/s", "normal_load": "N", "normal_force": "N",
+    "orientation_deg": "degree",
+}  # fmt: skip
+#: tops of the linear curves over the swept frequencies and their units, each an array over the other axes
+PEAKS = {
+    "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
+    "fixed_peak": "m", "fixed_peak_frequency": "Hz",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Responses over the product of the axes; every array has the shape of the grid, in the axes' order.
+
+    scene                 the scene of the sweep, with its [sweep] table
+    axes                  dotted path -> values
+    amplitude_*           m, of the displacement at excitation.at; `undamped` and `fixed` are those of the linear
+                          structure without bodies and with every body glued to its cavity; `mean_confidence` is the
+                          half width of the mean's 95 % confidence interval, nan where there are too few periods
+    attached_mass_fraction  share of the bodies' mass that the structure feels; nan without bodies or motion
+    energy_share          (*grid, 4) share of viscous, friction, impact and contact loss; nan where nothing is lost
+    status                "ok", another response.response.Status, or "error: ..." for a run that broke, without measures
+    peaks                 by the names of PEAKS: tops of `undamped` and `fixed` from the lowest to the highest
+                          frequency, between the points as well, their frequencies, and the half-power width of the
+                          undamped one, over the axes other than the frequency; empty for a sweep at one frequency
+    A point of the grid is the same whoever ran it, and whenever: no time is taken.
+    provenance            versions and whatever else the caller knows (JSON-able)
+    """
+
+    scene: Scene
+    axes: Mapping[str, np.ndarray]
+    amplitude_max: np.ndarray
+    amplitude_mean: np.ndarray
+    amplitude_mean_confidence: np.ndarray
+    amplitude_rms: np.ndarray
+    amplitude_harmonic: np.ndarray
+    amplitude_undamped: np.ndarray
+    amplitude_fixed: np.ndarray
+    impacts_per_period: np.ndarray
+    attached_mass_fraction: np.ndarray
+    energy_share: np.ndarray
+    energy_residual: np.ndarray
+    status: np.ndarray
+    classification: np.ndarray
+    peaks: Mapping[str, np.ndarray] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the grid."""
+        return self.status.shape
+
+    def units(self) -> dict[str, str]:
+        """Unit of every axis by its path."""
+        return {path: _UNITS.get(path.rsplit(".", 1)[-1], "1") for path in self.axes}
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data: axes and units by path, measures as nested lists (nan where there is none)."""
+        names = (*MEASURES, "energy_share", "status", "classification")
+        estimate = self.provenance.get("estimate")
+        told = {"warnings": list(self.provenance.get("warnings", ()))}
+        told |= {} if estimate is None else {"estimate": estimate}
+        axes = {path: values.tolist() for path, values in self.axes.items()}
+        return (
+            {"axes": axes, "units": self.units() | MEASURES | {name: PEAKS[name] for name in self.peaks}}
+            | {"loss": list(LOSSES)}
+            | told
+            | {name: getattr(self, name).tolist() for name in names}
+            | {name: values.tolist() for name, values in self.peaks.items()}
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write HDF5 that xarray opens. Dimensions are the axes' paths with _ for dots."""
+        dims = tuple(_dimension(axis) for axis in self.axes)
+        units = self.units()
+        variables = {_dimension(axis): Variable(v, (_dimension(axis),), units[axis]) for axis, v in self.axes.items()}
+        variables["loss"] = Variable(np.array(LOSSES, dtype=object), ("loss",))
+        variables["energy_share"] = Variable(self.energy_share, (*dims, "loss"))
+        for name, unit in (MEASURES | {"status": "1", "classification": "1"}).items():
+            variables[name] = Variable(getattr(self, name), dims, unit)
+        others = tuple(_dimension(axis) for axis in self.axes if axis != FREQUENCY)
+        variables |= {name: Variable(values, others, PEAKS[name]) for name, values in self.peaks.items()}
+        attributes = {
+            "axes": list(self.axes),
+            "scene": self.scene.to_dict(),
+            "provenance": dict(self.provenance),
+        }
+        save(path, _KIND, variables, attributes)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Sweep:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        values, attributes = load(path, _KIND)
+        axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
+        return cls(
+            scene=validate(Scene, json.loads(attributes["scene"]), str(path)),
+            axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
+            **{name: frozen(values[name]) for name in (*MEASURES, "energy_share")},
+            **{name: frozen(values[name], object) for name in ("status", "classification")},
+            peaks={name: frozen(values[name]) for name in PEAKS if name in values},
+            provenance=json.loads(attributes["provenance"]),
+        )
+
+
+def _dimension(path: str) -> str:
+    return path.replace(".", "_")

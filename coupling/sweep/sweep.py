@@ -1,0 +1,130 @@
+"""Sweeps: a run at every point of a scene's [sweep] grid, on any executor of concurrent.futures."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.checkpoint import Checkpoint
+from vanedamp.coupling.sweep.grid import FREQUENCY, Grid, PointList, Points
+from vanedamp.coupling.sweep.grid import grid as grid_of
+from vanedamp.coupling.sweep.record import PEAKS, Sweep
+from vanedamp.coupling.sweep.schedule import _run
+from vanedamp.coupling.sweep.worker import (
+    COLUMNS,
+    LOSSES,
+    MEASURES,
+    TEXTS,
+    Finished,
+)
+from vanedamp.coupling.system.linear_response import LinearPeak, linear_responses
+from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import InputError, validate
+
+
+def sweep(
+    scene: Scene | Grid,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    checkpoint: str | Path | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Sweep:
+    """Run every point of the scene's [sweep] table, in this process or on an executor.
+
+    scene: with its grid, if the caller has made it; progress: called with the number of points done and their total, at
+    the beginning, too; checkpoint: a file to which finished points are written and from which a sweep that was killed
+    goes on; the caller removes it once the result is safe (sweep.checkpoint.clear).
+    Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks, or
+    takes its worker with it, is a point with the status "error: ...". Raises StoreError when the checkpoint cannot be
+    written, SweepError when the executor has lost its workers for good.
+    """
+    grid = scene if isinstance(scene, Grid) else grid_of(scene)
+    provenance = dict(provenance or {})
+    with Checkpoint(checkpoint, grid.scene, grid.size, provenance) as kept:
+        finished = kept.finished
+        if progress is not None:
+            progress(finished.count, grid.size)
+        for task, rest, block in _run(grid, finished, executor):
+            kept.add(task, block, bool(rest))
+            if progress is not None:
+                progress(finished.count, grid.size)
+    return _result(grid, finished, provenance)
+
+
+def run_list(
+    base: Scene,
+    points: Sequence[Mapping[str, Any]],
+    executor: Executor | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Finished:
+    """Runs of scenes that differ from `base` in some values, by their paths; all points name the same paths.
+
+    progress: called with the number of points done.
+    """
+    listed = PointList(base, points)
+    finished = Finished(listed.size)
+    for task, rest, block in _run(listed, finished, executor):
+        finished.add(task, block, bool(rest))
+        if progress is not None:
+            progress(finished.count)
+    return finished
+
+
+def _result(grid: Grid, finished: Finished, provenance: dict[str, Any]) -> Sweep:
+    columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
+    return Sweep(
+        scene=grid.scene,
+        axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
+        energy_share=frozen(np.stack([columns[name] for name in LOSSES], axis=-1)),
+        **{name: frozen(columns[name]) for name in MEASURES},
+        **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
+        peaks=_peaks(grid),
+        provenance=provenance
+        | ({"warnings": list(grid.warnings)} if grid.warnings else {})
+        | ({} if grid.estimate is None else {"estimate": grid.estimate}),
+    )
+
+
+def _peaks(grid: Grid) -> dict[str, np.ndarray]:
+    """Tops of the linear curves over the swept frequencies; nan at a combination of the other axes that is no scene."""
+    others = {path: values for path, values in grid.axes.items() if path != FREQUENCY}
+    if len(set(grid.axes.get(FREQUENCY, ()))) < 2:
+        return {}
+    low, high = min(grid.axes[FREQUENCY]), max(grid.axes[FREQUENCY])
+    points, found = Points(grid.base, grid.choices), []
+    for values in itertools.product(*others.values()):
+        try:
+            scene = points.scene({**dict(zip(others, values, strict=True)), FREQUENCY: low})
+            found.append(tops(*(response.peak(low, high) for response in linear_responses(scene))))
+        except InputError:  # told as the status of its points
+            found.append(dict.fromkeys(PEAKS, np.nan))
+    shape = tuple(len(values) for values in others.values())
+    return {name: frozen(np.reshape([item[name] for item in found], shape)) for name in PEAKS}
+
+
+def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:
+    """Tops of both linear curves by the names of PEAKS."""
+    values = (undamped.amplitude, undamped.frequency, undamped.width, fixed.amplitude, fixed.frequency)
+    return dict(zip(PEAKS, values, strict=True))
+
+
+def warm_up() -> None:
+    """Compile the engine, or load it from the disk cache: once, before many processes would do it side by side."""
+    simulate(validate(Scene, _SMALLEST, "warm-up"))
+
+
+_SMALLEST = {
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.01},
+    "excitation": {"frequency": 0.16, "force": 1.0},
+    "cavity": [{"name": "c", "gap": 1.0}],
+    "damper": [{"cavity": "c", "mass": 0.1, "friction": 0.1, "restitution": 0.5}],
+    "gravity": {"acceleration": 1.0},
+    "time": {"periods": 4, "transient": 1},
+}

@@ -1,0 +1,158 @@
+"""Runs of a sweep's points: what a worker does, and the finished points in arrays."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.grid import Grid, PointList, Points
+from vanedamp.coupling.system.linear_response import linear_responses
+
+#: measures of a run and their units, each an array over the grid
+MEASURES = {
+    "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m", "amplitude_rms": "m",
+    "amplitude_harmonic": "m", "amplitude_undamped": "m", "amplitude_fixed": "m",
+    "impacts_per_period": "1", "attached_mass_fraction": "1", "energy_residual": "1",
+}  # fmt: skip
+#: what takes the energy, the last axis of `energy_share`
+LOSSES = ("viscous", "friction", "impact", "contact")
+TEXTS = ("status", "classification")
+#: all columns of a point: measures, then shares of the losses
+COLUMNS = (*MEASURES, *LOSSES)
+_LINEAR = [COLUMNS.index(name) for name in ("amplitude_undamped", "amplitude_fixed")]
+_OF_RUN = [(name, place) for place, name in enumerate(MEASURES) if place not in _LINEAR]
+
+
+class Task(NamedTuple):
+    """Points that one worker runs one after the other; linked ones begin with `start` (None: as the scene says)."""
+
+    points: Sequence[int]
+    linked: bool = False
+    start: Handover | None = None
+    chain: int = 0
+
+
+class Block(NamedTuple):
+    """What a task leaves: values (k, columns), nan where there is none, texts (k, 2), and the last state."""
+
+    values: np.ndarray
+    texts: list[tuple[str, str]]
+    final: Handover | None
+
+
+def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> Block:
+    """The task of a worker: the runs of some points, given by the values of the axes."""
+    maker, state = Points(base, choices), task.start
+    values = np.full((len(points), len(COLUMNS)), np.nan)
+    texts: list[tuple[str, str]] = []
+    for row, point in zip(values, points, strict=True):
+        final = _run(maker, point, state if task.linked else None, row, texts)
+        # a run that broke off within a period leaves the state that it began with
+        state = state if final is None else final
+    return Block(values, texts, state if task.linked else None)
+
+
+def broken(error: BaseException) -> Block:
+    """A point whose run has broken, or has broken its worker."""
+    told = " ".join(f"error: {type(error).__name__}: {error}".split())
+    if isinstance(error, BrokenExecutor):
+        told = "error: the worker process ended abruptly (killed, or out of memory)"
+    return Block(np.full((1, len(COLUMNS)), np.nan), [(told, "")], None)
+
+
+class Finished:
+    """The finished points of a grid: some 120 bytes each.
+
+    values: (points, columns); codes: (points, 2) places of the texts in `texts`; done: (points,);
+    states: the state that the next run of an unfinished chain begins with.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.values = np.full((size, len(COLUMNS)), np.nan)
+        self.codes = np.zeros((size, len(TEXTS)), np.int32)
+        self.done = np.zeros(size, bool)
+        self.states: dict[int, Handover] = {}
+        self._places: dict[str, int] = {}
+        self.count = 0
+
+    @property
+    def texts(self) -> list[str]:
+        """Every status and classification, once."""
+        return list(self._places)
+
+    def add(self, task: Task, block: Block, more: bool) -> None:
+        """Take over what a task has left; more: whether its chain goes on."""
+        where = list(task.points)
+        codes = [[self._places.setdefault(text, len(self._places)) for text in pair] for pair in block.texts]
+        self.put(where, block.values, np.array(codes))
+        self.states.pop(task.chain, None)
+        if more and task.linked and block.final is not None:
+            self.states[task.chain] = block.final
+
+    def put(self, where: Any, values: np.ndarray, codes: np.ndarray, texts: Sequence[str] | None = None) -> None:
+        """Set points, with codes that refer to `texts` (default: those of this record)."""
+        if texts is not None:
+            own = np.array([self._places.setdefault(text, len(self._places)) for text in texts], np.int32)
+            codes = own[codes]
+        self.values[where], self.codes[where] = values, codes
+        self.done[where] = True
+        self.count = int(np.count_nonzero(self.done))
+
+    def text(self, name: str) -> np.ndarray:
+        """Status or classification of every point, objects (points,)."""
+        return np.array(self.texts, object)[self.codes[:, TEXTS.index(name)]]
+
+
+def _run(
+    maker: Points, point: Mapping[str, Any], start: Handover | None, row: np.ndarray, texts: list[tuple[str, str]]
+) -> Handover | None:
+    """Run one point into its row and its texts. Returns its last state."""
+    try:
+        scene = maker.scene(point)
+        row[_LINEAR] = _linear(scene)
+        response = simulate(scene, start=start)
+    except Exception as error:  # one broken point must not cost the others
+        texts.extend(broken(error).texts)
+        return None
+    for name, place in _OF_RUN:
+        value = getattr(response, name)
+        row[place] = np.nan if value is None else value
+    row[len(MEASURES) :] = _shares(response)
+    texts.append((response.status.value, response.classification))
+    return response.final
+
+
+def _shares(response: Response) -> np.ndarray:
+    losses = np.array([response.energy[name] for name in LOSSES])
+    total = losses.sum()
+    return losses / total if total > 0 else np.full(len(LOSSES), np.nan)
+
+
+def _linear(scene: Scene) -> list[float]:
+    """Amplitude of the response without bodies, and with every body glued to its cavity's floor, m."""
+    frequency = np.array([scene.excitation.frequency])
+    return [float(response.amplitude(frequency)[0]) for response in linear_responses(scene)]
+
+
+def tasks_of(grid: Grid | PointList, finished: Finished, most: int) -> Iterator[tuple[Task, Sequence[int]]]:
+    """Tasks of at most so many points that can run side by side, each with the rest of its chain.
+
+    All tasks of chains that are not linked, and the first of those that are; of points that are not done.
+    """
+    for number, chain in enumerate(grid.chains()):
+        if chain.linked:
+            rest = [point for point in chain.points if not finished.done[point]]
+            if rest:
+                yield Task(rest[:most], True, finished.states.get(number), number), rest[most:]
+            continue
+        points = (point for point in chain.points if not finished.done[point])
+        while some := list(itertools.islice(points, most)):
+            yield Task(some, chain=number), []

@@ -1,0 +1,1 @@
+"""The scene as matrices, once for every method."""

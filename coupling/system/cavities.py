@@ -1,0 +1,94 @@
+"""Directions of cavities in space: what a reduced model says of them, and what does not fit together.
+
+Left wall, right wall and floor of a cavity have one direction, that of the body's motion from the left wall to the
+right one. Along it the body feels gravity and the base's motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from vanedamp.coupling.scene.bodies import Cavity
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError
+
+#: degrees between the directions of one cavity's surfaces, for walls that open like a wedge, and off a wall's normal
+_PARALLEL, _ALONG = 5.0, 45.0
+
+Vectors = Mapping[str, np.ndarray]
+
+
+def check_known(scene: Scene, directions: Vectors) -> None:
+    """Raise InputError where base acceleration or gravity need a direction that the reduced model does not know."""
+    excitation, gravity = scene.excitation, scene.gravity
+    reasons = ["excitation.base_acceleration"] if excitation.base_acceleration else []
+    wanted = {"excitation.at": excitation.at} if reasons else {}
+    if gravity.direction is not None and gravity.acceleration:
+        reasons.append("gravity.direction")
+    if reasons:
+        used = {damper.cavity for damper in scene.damper}
+        cavities = [(index, cavity) for index, cavity in enumerate(scene.cavity) if cavity.name in used]
+        wanted |= {f"cavity[{index}].floor": cavity.labels()[2] for index, cavity in cavities}
+    for key, label in wanted.items():
+        if not directions[str(label)].any():
+            raise InputError(
+                f"{key}: the reduced model knows no direction of '{label}', which {reasons[0]} needs; give the "
+                "interface coordinate a direction and reduce or import again"
+            )
+
+
+def check_surfaces(cavities: Sequence[Cavity], directions: Vectors, normals: Vectors) -> None:
+    """Raise InputError for a cavity whose walls and floor have several directions, or whose walls do not face it.
+
+    directions, normals: of interface labels; zeros where unknown, which is left unchecked.
+    """
+    for index, cavity in enumerate(cavities):
+        _check_parallel(cavity, f"cavity[{index}]", directions)
+        _check_walls(cavity, f"cavity[{index}]", directions, normals)
+
+
+def _check_parallel(cavity: Cavity, key: str, directions: Vectors) -> None:
+    left, right, floor = map(str, cavity.labels())
+    for side, label, other in (("right", right, left), ("left", left, floor), ("right", right, floor)):
+        angle = _angle(directions[label], directions[other])
+        if angle > _PARALLEL:
+            fault = "against" if angle > 180.0 - _PARALLEL else f"at {angle:.0f} degrees to"
+            raise InputError(
+                f"{key}.{side}: '{label}' points {fault} '{other}', {_shown(directions[label])} and "
+                f"{_shown(directions[other])}: both walls and the floor take the one direction from the left wall to "
+                "the right one; mend the interface's directions and reduce again"
+            )
+
+
+def _check_walls(cavity: Cavity, key: str, directions: Vectors, normals: Vectors) -> None:
+    """One label for a whole cavity may be any surface, and a wall that is floor too follows the floor."""
+    if len(set(cavity.labels())) == 1:
+        return
+    for side, label, opposite in (("left", cavity.left, cavity.right), ("right", cavity.right, cavity.left)):
+        if label is None or label == cavity.floor or not (normals[label].any() and directions[label].any()):
+            continue
+        angle = _angle(directions[label], normals[label])
+        along = normals[label] if side == "left" else -normals[label]
+        if _ALONG < angle < 180.0 - _ALONG:
+            raise InputError(
+                f"{key}.{side}: '{label}' has a direction {_shown(directions[label])} at {angle:.0f} degrees to its "
+                f"wall's normal, so that bodies would slide along the wall; give the interface the direction "
+                f"{_shown(along)} and reduce again"
+            )
+        if opposite is not None and opposite != label and (angle > 90.0) == (side == "left"):
+            raise InputError(
+                f"{key}.{side}: along its direction {_shown(directions[label])} '{label}' is the wall at the other end "
+                f"(its material's outward normal is {_shown(normals[label])}): swap left and right, or turn the "
+                "directions of both walls and the floor round and reduce again"
+            )
+
+
+def _angle(first: np.ndarray, second: np.ndarray) -> float:
+    """Angle of two vectors, degrees; 0 where one is zero."""
+    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second)))
+
+
+def _shown(vector: np.ndarray) -> str:
+    return "[" + ", ".join(f"{round(value, 3) + 0.0:g}" for value in vector) + "]"

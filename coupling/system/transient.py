@@ -1,0 +1,93 @@
+"""The structure's own transient: how long it lasts is known before a run, whether it has ended is seen after it.
+
+From rest, each mode starts with what it lacks to its steady amplitude and loses it as exp(-zeta omega t); bodies that
+take energy only shorten that. At its resonance a mode of damping ratio zeta has exp(-2 pi zeta n) left after n periods.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import replace
+
+import numpy as np
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Prescribed
+from vanedamp.coupling.system.modal_structure import LinearStructure, linear_structure
+
+#: longest transient that is taken without being asked for, in periods
+LIMIT = 10_000
+#: batches of each half of a window with impacts, their fewest periods, and standard errors beyond which the halves'
+#: means differ: of windows of chaotic responses without a transient, 7 in 1000 do
+_BATCHES, _SHORTEST, _CERTAIN = 10, 25, 5.0
+
+
+def left_over(structure: LinearStructure, periods: float) -> float:
+    """Share of the steady response that the transient of the excited modes still has after so many periods, at most.
+
+    0 for a structure that nothing excites.
+    """
+    if not structure.force.any():
+        return 0.0
+    own, dashpot = np.sqrt(structure.stiffness), np.diag(structure.damping)
+    dynamic = structure.stiffness - structure.omega**2 + 1j * structure.omega * dashpot
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steady = structure.response * structure.force / dynamic
+        # displacement or velocity to make up for, and the initial state
+        begun = np.abs(steady) * np.maximum(1.0, structure.omega / own)
+        begun += np.abs(structure.response) * (np.abs(structure.displacement) + np.abs(structure.velocity) / own)
+        # the slower one of an overdamped mode's two
+        rates = dashpot / 2 - np.sqrt(np.maximum(dashpot**2 / 4 - structure.stiffness, 0.0))
+        decay = np.exp(-rates * 2 * np.pi / structure.omega * periods)
+        share = np.nansum(begun * decay) / abs(np.nansum(steady))
+    return float(share) if np.isfinite(share) else np.inf
+
+
+def timed(scene: Scene) -> Scene:
+    """The scene with a transient that suits its damping, where it leaves the number of periods open.
+
+    As many periods as leave `time.tolerance` of the steady response, at least the default; the default too where LIMIT
+    would not do: then nothing but the bodies can end the transient in time.
+    """
+    if scene.time.periods is not None or scene.time.transient is not None or isinstance(scene.structure, Prescribed):
+        return scene
+    structure, default = linear_structure(scene), scene.time
+    lengths = range(default.dropped, LIMIT + 1)
+    if left_over(structure, lengths[0]) <= default.tolerance or left_over(structure, lengths[-1]) > default.tolerance:
+        return scene
+    enough = lengths[bisect_left(lengths, True, key=lambda n: left_over(structure, n) <= default.tolerance)]
+    periods = enough + default.simulated - default.dropped
+    chosen = replace(default, periods=periods, transient=None if default.steady else enough)
+    return replace(scene, time=chosen)
+
+
+def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray) -> bool:
+    """Whether the transient that a scene leaves out was long enough; peaks, impacts: (n,) of the periods evaluated.
+
+    It was where the structure alone leaves less than `time.tolerance`. Otherwise bodies may have ended it, which the
+    peaks tell. Without impacts the motion is linear but for friction: peaks that spread or, extrapolated with the
+    slowest decay, are off by more than the tolerance belong to a transient. With impacts peaks spread anyway: from 500
+    periods on, the means of both halves must agree within the tolerance or the scatter.
+    """
+    structure, tolerance = linear_structure(scene), scene.time.tolerance
+    if left_over(structure, scene.time.dropped) <= tolerance or not peaks.any():
+        return True
+    if impacts.any():
+        return not _drifts(peaks, tolerance)
+    if len(peaks) < 2:
+        return False
+    rate = float(np.diag(structure.damping).min()) * np.pi / structure.omega
+    remaining = abs(peaks[-1] - peaks[0]) / max(-np.expm1(-rate * (len(peaks) - 1)), tolerance)
+    return bool(max(np.ptp(peaks), remaining) <= tolerance * peaks.mean())
+
+
+def _drifts(peaks: np.ndarray, tolerance: float) -> bool:
+    """Whether the means of both halves differ by more than the tolerance and what the second half's batches explain."""
+    half = len(peaks) // 2
+    size = half // _BATCHES
+    if size < _SHORTEST:
+        return False
+    late = peaks[-size * _BATCHES :].reshape(_BATCHES, size).mean(axis=1)
+    apart = abs(peaks[:half].mean() - peaks[half:].mean())
+    error = np.sqrt(2 / _BATCHES) * late.std(ddof=1)
+    return bool(apart > tolerance * peaks.mean() and apart > _CERTAIN * error)

@@ -1,0 +1,1 @@
+"""Ground: files of records, validated TOML, provenance."""

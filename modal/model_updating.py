@@ -1,0 +1,266 @@
+"""Moduli and support stiffnesses that bring natural frequencies to measured ones.
+
+The stiffness is a sum of parts, K = sum p_j K_j, whose factors p_j start at one; `modal.elasticity.Solid` gives the
+parts of a mesh, but any symmetric matrices do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.optimize import least_squares
+
+from vanedamp.files.store import frozen
+from vanedamp.modal.correlation import LEAST_MAC, MeasuredShapes, Pairing, measured_mac, modal_assurance, pair_modes
+from vanedamp.modal.eigen import Modes, solve_modes
+from vanedamp.modal.matrices import SystemMatrices
+
+#: factors stay between this and its inverse
+LIMIT = 0.02
+#: relative error of the measured frequencies for which deviations of the factors are given
+FREQUENCY_ERROR = 1e-3
+# further modes that are computed, so that one that moves up is not lost
+_SPARE = 4
+# of the largest singular value of the sensitivities: below it two factors do the same to all frequencies
+_ALIKE = 1e-6
+
+
+class TuningError(ValueError):
+    """Parts, targets or modes that determine no factors; the message names what and the remedy."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tuning:
+    """Factors on parts of the stiffness, and what they do to the frequencies.
+
+    names          (p,) of the parts
+    factors        (p,) on each part
+    deviations     (p,) relative standard deviations of the factors if the measured frequencies err by 0.1 % each;
+                   large values mean that these frequencies do not tell the factors apart
+    target_hz      (n,) measured frequencies
+    before_hz, after_hz   (n,) those of their partners among the computed modes
+    modes_before, modes_after  (n,) indices of these partners
+    mac_before, mac_after      (n,) MAC with the measured shapes, or with the untuned modes where none were given
+    sensitivities  (n, p) d log f / d log factor, after tuning: the share of strain energy of a part, halved
+    evaluations    eigenvalue problems solved
+    matrices       the tuned system
+    """
+
+    names: tuple[str, ...]
+    factors: np.ndarray
+    deviations: np.ndarray
+    target_hz: np.ndarray
+    before_hz: np.ndarray
+    after_hz: np.ndarray
+    modes_before: np.ndarray
+    modes_after: np.ndarray
+    mac_before: np.ndarray
+    mac_after: np.ndarray
+    sensitivities: np.ndarray
+    evaluations: int
+    matrices: SystemMatrices
+
+
+def sensitivities(
+    modes: Modes, parts: Mapping[str, sparse.csr_array], indices: Sequence[int] | np.ndarray | None = None
+) -> np.ndarray:
+    """(n, p) d log f_i / d log p_j = phi_i^T (p_j K_j) phi_i / (2 lambda_i) of mass-normalised modes.
+
+    parts are the p_j K_j. Fox and Kapoor (1968, AIAA J. 6): d lambda = phi^T dK phi, for modes of distinct frequencies.
+    """
+    chosen = np.arange(len(modes)) if indices is None else np.asarray(indices)
+    shapes, eigenvalues = modes.shapes[chosen], modes.angular_frequencies[chosen] ** 2
+    energies = [np.einsum("ij,ij->i", shapes, shapes @ part) for part in parts.values()]
+    return np.column_stack(energies) / (2.0 * eigenvalues[:, None])
+
+
+def tune(
+    matrices: SystemMatrices,
+    parts: Mapping[str, sparse.csr_array],
+    target_hz: Sequence[float] | np.ndarray,
+    measured: MeasuredShapes | None = None,
+    modes: Sequence[int] | None = None,
+    least_mac: float = LEAST_MAC,
+    starts: int = 1,
+) -> Tuning:
+    """Factors on parts of the stiffness that bring modes to target frequencies, in the least-squares sense of log f.
+
+    parts      the parts that may change, name -> (N, N); the rest of the stiffness stays
+    target_hz  (n,) measured frequencies
+    measured   (n) measured shapes: every target belongs to the mode that pairs with its shape
+    modes      (n,) or else the indices of the modes meant, of the untuned system; left out: the first n
+
+    starts     where modes veer, frequencies can be met nearly by several sets of factors: 1 searches from the system as
+               it is, more from as many further points between half and twice its factors, and the best is kept
+
+    Least squares on the logarithms of the factors (Gauss-Newton in a trust region) with exact sensitivities; the modes
+    are tracked by their MAC, so that they may cross. Raises TuningError.
+    """
+    problem = _Problem(matrices, dict(parts), np.asarray(target_hz, dtype=float), measured, modes, least_mac)
+    start = np.zeros(len(problem.parts))
+    before = problem.at(start)
+    problem.check_pairs(before)
+    _check_rank(before.jacobian, problem)
+    bound = -np.log(LIMIT)
+    found = _fit(problem, start, bound)
+    for point in np.random.default_rng(0).uniform(-np.log(2.0), np.log(2.0), (starts - 1, start.size)):
+        problem.follow_anew()
+        other = _fit(problem, point, bound)
+        found = other if other.cost < found.cost else found
+    problem.follow_anew()
+    after = problem.at(found.x)
+    problem.check_pairs(after)
+    stuck = np.flatnonzero(np.abs(found.x) > 0.999 * bound)
+    if stuck.size:
+        name = list(problem.parts)[stuck[0]]
+        raise TuningError(
+            f"{name}: its factor runs to {np.exp(found.x[stuck[0]]):.3g} and the frequencies still do not meet "
+            f"{problem.target.tolist()} Hz; check which modes these belong to, and vary another part"
+        )
+    spread = np.linalg.pinv(after.jacobian)
+    return Tuning(
+        names=tuple(problem.parts),
+        factors=frozen(np.exp(found.x)),
+        deviations=frozen(FREQUENCY_ERROR * np.linalg.norm(spread, axis=1)),
+        target_hz=frozen(problem.target),
+        before_hz=frozen(before.frequencies),
+        after_hz=frozen(after.frequencies),
+        modes_before=frozen(before.indices, np.int64),
+        modes_after=frozen(after.indices, np.int64),
+        mac_before=frozen(before.mac),
+        mac_after=frozen(after.mac),
+        sensitivities=frozen(after.jacobian),
+        evaluations=problem.evaluations,
+        matrices=problem.system(found.x),
+    )
+
+
+def _fit(problem: _Problem, start: np.ndarray, bound: float) -> Any:
+    return least_squares(
+        lambda x: problem.at(x).residual, start, jac=lambda x: problem.at(x).jacobian, bounds=(-bound, bound),
+        xtol=1e-10, ftol=1e-12, gtol=1e-12, max_nfev=50,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """The paired modes at one set of factors."""
+
+    frequencies: np.ndarray
+    indices: np.ndarray
+    mac: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+
+
+class _Problem:
+    """Residuals and Jacobian at logarithms of factors; keeps the last state, and follows the modes."""
+
+    def __init__(
+        self,
+        matrices: SystemMatrices,
+        parts: dict[str, sparse.csr_array],
+        target: np.ndarray,
+        measured: MeasuredShapes | None,
+        modes: Sequence[int] | None,
+        least_mac: float,
+    ) -> None:
+        self.matrices, self.parts, self.target = matrices, parts, target
+        self.measured, self.least = measured, least_mac
+        self.evaluations = 0
+        self._point: np.ndarray | None = None
+        self._state: _State | None = None
+        self._origin: np.ndarray | None = None
+        self._followed: np.ndarray | None = None
+        self._check(modes)
+        self.meant = np.arange(target.size) if modes is None else np.asarray(modes, dtype=int)
+        self.count = min(int(self.meant.max()) + 1 + _SPARE, matrices.free.size)
+
+    def system(self, point: np.ndarray) -> SystemMatrices:
+        """The matrices with these factors."""
+        stiffness = self.matrices.stiffness
+        for factor, part in zip(np.exp(point), self.parts.values(), strict=True):
+            stiffness = stiffness + (factor - 1.0) * part
+        return replace(self.matrices, stiffness=sparse.csr_array(stiffness))
+
+    def at(self, point: np.ndarray) -> _State:
+        """The state at logarithms of the factors; computed once for residual and Jacobian."""
+        if self._state is None or self._point is None or not np.array_equal(point, self._point):
+            self._state, self._point = self._evaluate(point), np.array(point)
+        return self._state
+
+    def check_pairs(self, state: _State) -> None:
+        """Raise TuningError for a measured shape that no computed mode is like."""
+        worst = int(np.argmin(state.mac))
+        if self.measured is not None and state.mac[worst] < self.least:
+            raise TuningError(
+                f"measured: no computed mode pairs with target {worst} ({self.target[worst]:.6g} Hz), the best MAC is "
+                f"{state.mac[worst]:.2g}; give shapes at more points, or leave this frequency out"
+            )
+
+    def follow_anew(self) -> None:
+        """Forget where the modes were followed to; the next ones are told by the untuned ones."""
+        self._state, self._followed = None, self._origin
+
+    def _evaluate(self, point: np.ndarray) -> _State:
+        self.evaluations += 1
+        modes = solve_modes(self.system(point), self.count)
+        pairing = self._pair(modes)
+        indices = pairing.second
+        frequencies = modes.frequencies_hz[indices]
+        scaled = {n: f * k for f, (n, k) in zip(np.exp(point), self.parts.items(), strict=True)}
+        if self.measured is None:
+            self._followed = modes.shapes[indices]
+            if self._origin is None:
+                self._origin = self._followed
+            mac = np.diag(modal_assurance(self._origin, self._followed, self.matrices.mass))
+        else:
+            mac = pairing.pair_mac
+        return _State(
+            frequencies,
+            indices,
+            np.array(mac),
+            np.log(frequencies / self.target),
+            sensitivities(modes, scaled, indices),
+        )
+
+    def _pair(self, modes: Modes) -> Pairing:
+        """Targets (first) with computed modes (second), all of them: a search may pass where they are hard to tell."""
+        if self.measured is not None:
+            return pair_modes(measured_mac(modes, self.matrices, self.measured).T, least=0.0)
+        if self._followed is None:
+            self._followed = modes.shapes[self.meant]
+        return pair_modes(modal_assurance(self._followed, modes.shapes, self.matrices.mass), least=0.0)
+
+    def _check(self, modes: Sequence[int] | None) -> None:
+        count, size = self.target.size, self.matrices.size
+        if count == 0 or self.target.ndim != 1 or not np.all(np.isfinite(self.target)) or self.target.min() <= 0.0:
+            raise TuningError(f"target_hz: expected positive frequencies in Hz, not {self.target.tolist()}")
+        if not self.parts or len(self.parts) > count:
+            raise TuningError(
+                f"parts: {len(self.parts)} factors ({', '.join(self.parts) or 'none'}) from {count} frequencies; "
+                "name at least one part, and at most as many as frequencies"
+            )
+        for name, part in self.parts.items():
+            if part.shape != (size, size):
+                raise TuningError(f"{name}: shape {part.shape}, expected {(size, size)} as the stiffness")
+        if self.measured is not None and len(self.measured) != count:
+            raise TuningError(f"measured: {len(self.measured)} shapes for {count} target frequencies")
+        if modes is not None and (len(set(modes)) != count or len(modes) != count or min(modes) < 0):
+            raise TuningError(f"modes: expected {count} different indices from 0, one a target, not {list(modes)}")
+
+
+def _check_rank(jacobian: np.ndarray, problem: _Problem) -> None:
+    if not np.all(np.isfinite(jacobian)):
+        raise TuningError("modes: a target belongs to a rigid mode, which no stiffness changes; choose others")
+    names = list(problem.parts)
+    largest = np.abs(jacobian).max(axis=0)
+    if largest.min() < _ALIKE:
+        raise TuningError(f"{names[int(largest.argmin())]}: does not change these frequencies; vary another part")
+    singular = np.linalg.svd(jacobian / largest, compute_uv=False)
+    if singular[-1] < _ALIKE * singular[0]:
+        raise TuningError(f"parts: {', '.join(names)} change the frequencies in the same way; vary fewer of them")

@@ -1,0 +1,83 @@
+"""From one mode to the rigid model, and from a fatigue strength to its excitation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vanedamp.modal.eigen import Modes
+
+FATIGUE_SHARE = 0.7
+
+
+class CalibrationError(ValueError):
+    """A mode or a strength that gives no rigid model; the message names the quantity and the remedy."""
+
+
+@dataclass(frozen=True)
+class RigidModel:
+    """The mode as one mass on a spring, seen at one interface coordinate: m x'' + d x' + c x = force there.
+
+    mass, stiffness, damping  kg, N/m, N s/m
+    damping_ratio             of the mode
+    at                        label of the interface coordinate
+    frequency_hz              of the undamped mode
+    """
+
+    mass: float
+    stiffness: float
+    damping: float
+    damping_ratio: float
+    at: str
+    frequency_hz: float
+
+    def resonance_force(self, amplitude: float) -> float:
+        """Force amplitude, N, that brings the resonance to a displacement amplitude, m: d w_1 X = 2 zeta c X."""
+        return 2.0 * self.damping_ratio * self.stiffness * amplitude
+
+
+def rigid_model(modes: Modes, mode: int, functional: np.ndarray, at: str, damping_ratio: float) -> RigidModel:
+    """Rigid model of a mode at the interface coordinate u = functional^T q, with functional (N,).
+
+    m = phi^T M phi / (w^T phi)^2, c = w_1^2 m, d = 2 zeta w_1 m. Raises CalibrationError when the mode does not move
+    the interface coordinate, or has no frequency.
+    """
+    shape, frequency = modes.shapes[mode], modes.angular_frequencies[mode]
+    displacement = float(functional @ shape)
+    # an average over a patch that moves has a displacement of the order of the shape's own
+    if abs(displacement) < 1e-9 * np.abs(functional).sum() * np.abs(shape).max() or displacement == 0.0:
+        found = f"mode {mode} ({modes.frequencies_hz[mode]:.5g} Hz)"
+        raise CalibrationError(f"at: {found} does not move {at!r}; name another interface coordinate")
+    if frequency <= 0.0:
+        raise CalibrationError(f"mode: mode {mode} is a rigid motion without stiffness; hold the structure")
+    mass = 1.0 / displacement**2
+    return RigidModel(
+        mass=mass,
+        stiffness=float(frequency**2) * mass,
+        damping=2.0 * damping_ratio * float(frequency) * mass,
+        damping_ratio=damping_ratio,
+        at=at,
+        frequency_hz=float(modes.frequencies_hz[mode]),
+    )
+
+
+def fatigue_amplitude(
+    modes: Modes,
+    mode: int,
+    functional: np.ndarray,
+    peak_stress: float,
+    fatigue_strength: float,
+    share: float = FATIGUE_SHARE,
+) -> float:
+    """Displacement amplitude, m, of an interface coordinate at which a mode's stress reaches a share of the strength.
+
+    peak_stress       Pa, largest von Mises stress of the mode's shape as it is stored (Solid.von_mises(shape).max()).
+                      Sharp corners are singular points of elasticity: their stress grows with mesh refinement
+    fatigue_strength  Pa
+    """
+    for name, value in (("peak_stress", peak_stress), ("fatigue_strength", fatigue_strength), ("share", share)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise CalibrationError(f"{name}: expected a positive number, not {value}")
+    return share * fatigue_strength / peak_stress * abs(float(functional @ modes.shapes[mode]))

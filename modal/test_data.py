@@ -1,0 +1,355 @@
+"""Shapes and frequency responses from and for other programs: CSV, and universal files (UFF 15, 55, 58) by pyuff.
+
+Universal files are read and written in SI units and in the global frame; pyuff is an optional dependency.
+"""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files.store import replacing, write_csv
+from vanedamp.modal.correlation import MeasuredShapes
+from vanedamp.modal.frf import Frf, FrfError
+
+_UNIVERSAL = (".uff", ".unv", ".ufb", ".bunv")
+#: what the two columns of a response in a CSV may be
+COLUMNS = ("real-imaginary", "magnitude-degrees", "magnitude-radians")
+_PLACE = ("x", "y", "z", "dx", "dy", "dz")
+# specific data types of UFF 58, record 9
+_QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
+_NORMAL_MODE, _COMPLEX_MODE, _FRF = 2, 3, 4
+
+
+class ExchangeError(ValueError):
+    """A file of shapes or responses that cannot be read or written; the message names the file and the remedy."""
+
+
+def read_shapes(path: str | os.PathLike[str]) -> MeasuredShapes:
+    """Measured mode shapes from a CSV or universal file.
+
+    CSV: a header `x, y, z, dx, dy, dz, <mode>, ...`, then a row for every measured displacement: its point (m), its
+    direction, and its value in every mode, as 0.5 or 0.5+0.1j; a mode's name is its frequency in Hz, if it is a number.
+    Universal: datasets 15 (nodes) and 55 (normal or complex modes). Raises ExchangeError.
+    """
+    file = _existing(path)
+    return _shapes_of_universal(file) if file.suffix.lower() in _UNIVERSAL else _shapes_of_csv(file)
+
+
+def write_shapes(shapes: MeasuredShapes, path: str | os.PathLike[str]) -> None:
+    """Write shapes as `read_shapes` reads them; the suffix chooses (.csv, .uff, .unv).
+
+    A universal file holds points with displacements along x, y and z, so shapes measured along other directions are
+    refused there, as are two values for one point and axis.
+    """
+    target = Path(path)
+    if target.suffix.lower() in _UNIVERSAL:
+        _shapes_to_universal(shapes, target)
+        return
+    names = [f"mode {i + 1}" if np.isnan(f) else repr(float(f)) for i, f in enumerate(shapes.frequencies_hz)]
+    rows = (
+        [*point.tolist(), *direction.tolist(), *(str(v).strip("()") for v in values.tolist())]
+        for point, direction, values in zip(shapes.points, shapes.directions, shapes.shapes.T, strict=True)
+    )
+    write_csv(target, [*_PLACE, *names], rows)
+
+
+def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns: str | None = None) -> Frf:
+    """A frequency response from a CSV or universal file (dataset 58, function type 4).
+
+    CSV: the frequency (Hz), then two columns for every response; `quantity` says what they are. A universal file says
+    itself.
+
+    columns  one of COLUMNS; left out: as the words of the header line tell (real, imag; magnitude, phase in deg or
+             rad), or else real and imaginary parts. Columns that look like magnitude and phase, without a word that
+             says so, are refused
+
+    Raises ExchangeError.
+    """
+    file = _existing(path)
+    if file.suffix.lower() in _UNIVERSAL:
+        return _frf_of_universal(file)
+    header, rows = _numbers(file)
+    if rows.shape[1] < 3 or rows.shape[1] % 2 == 0:
+        raise ExchangeError(
+            f"{file}: expected the columns frequency, real part, imaginary part (or magnitude and phase; and more "
+            f"pairs), not {rows.shape[1]}"
+        )
+    try:
+        first, second = rows[:, 1::2].T, rows[:, 2::2].T
+        frf = Frf(rows[:, 0], first + 1j * second, quantity)
+        kind = _columns(columns, header, first, second)
+        if kind == "real-imaginary":
+            return frf
+        angle = np.radians(second) if kind == "magnitude-degrees" else second
+        return Frf(rows[:, 0], first * np.exp(1j * angle), quantity)
+    except (ExchangeError, FrfError) as error:
+        raise ExchangeError(f"{file}: {error}") from error
+
+
+def _columns(given: str | None, header: Sequence[str], first: np.ndarray, second: np.ndarray) -> str:
+    """Which of COLUMNS the pairs (k, n) of a CSV are."""
+    if given is not None and given not in COLUMNS:
+        raise ExchangeError(f"columns: expected one of {', '.join(COLUMNS)}, not {given!r}")
+    told = given or _told(header, second)
+    if told is None:
+        one_sign = np.all(first > 0.0, axis=1) | np.all(first < 0.0, axis=1)
+        turns = (np.abs(second).max(axis=1) <= 361.0) & (np.ptp(second, axis=1) > 0.1)
+        if np.any(one_sign & turns):
+            raise ExchangeError(
+                "columns: a response's first column keeps its sign, its second one looks like a phase; say what they "
+                f"are by a header line or by columns = one of {', '.join(COLUMNS)}"
+            )
+        told = "real-imaginary"
+    if told != "real-imaginary" and np.any(first < 0.0):
+        raise ExchangeError("columns: a magnitude is negative; expected linear magnitudes, not decibels")
+    return told
+
+
+def _told(header: Sequence[str], second: np.ndarray) -> str | None:
+    """What the words of a header line say of the first pair of columns; None where they say nothing."""
+    if len(header) < 3:
+        return None
+    one, other = header[1].lower(), header[2].lower()
+    if re.search(r"\bdb\b|_db|decibel", one):
+        raise ExchangeError(f"columns: {header[1]!r}: expected linear magnitudes, not decibels")
+    if re.search(r"phase|\barg|angle", other):
+        if re.search(r"deg|\u00b0", other):
+            return "magnitude-degrees"
+        if "rad" in other:
+            return "magnitude-radians"
+        if np.abs(second).max() > 2.02 * np.pi:
+            return "magnitude-degrees"
+        raise ExchangeError(
+            f"columns: {header[2]!r}: in degrees or radians? Say so there, or by columns = magnitude-degrees or "
+            "magnitude-radians"
+        )
+    return "real-imaginary" if re.match(r"re", one) and re.match(r"im", other) else None
+
+
+def write_frf(frf: Frf, path: str | os.PathLike[str]) -> None:
+    """Write a frequency response as `read_frf` reads it; the suffix chooses (.csv, .uff, .unv)."""
+    target = Path(path)
+    if target.suffix.lower() in _UNIVERSAL:
+        _frf_to_universal(frf, target)
+        return
+    columns = [frf.frequencies_hz, *(part for response in frf.values for part in (response.real, response.imag))]
+    names = ["frequency_hz", *(f"{part}_{i}" for i in range(len(frf.values)) for part in ("real", "imag"))]
+    write_csv(target, names, np.column_stack(columns).tolist())
+
+
+def _existing(path: str | os.PathLike[str]) -> Path:
+    file = Path(path)
+    if not file.is_file():
+        raise ExchangeError(f"{file}: no such file")
+    return file
+
+
+def _shapes_of_csv(file: Path) -> MeasuredShapes:
+    rows = _table(file)
+    if not rows or [word.strip() for word in rows[0][:6]] != list(_PLACE) or len(rows[0]) < 7:
+        raise ExchangeError(f"{file}: expected the header {','.join(_PLACE)},<mode>,... in the first line")
+    names, body = rows[0][6:], rows[1:]
+    values = np.empty((len(body), len(rows[0])), dtype=complex)
+    for number, row in enumerate(body, start=2):
+        if len(row) != len(rows[0]):
+            raise ExchangeError(f"{file}: line {number} has {len(row)} columns, the header has {len(rows[0])}")
+        try:
+            values[number - 2] = [complex(word.replace(" ", "")) for word in row]
+        except ValueError as error:
+            raise ExchangeError(f"{file}: line {number}: expected numbers ({error})") from error
+    shapes = values[:, 6:].T
+    return _measured(
+        file,
+        points=values[:, :3].real,
+        directions=values[:, 3:6].real,
+        shapes=shapes if np.any(shapes.imag) else shapes.real,
+        frequencies_hz=[_number(name) for name in names],
+    )
+
+
+def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
+    """The words of a header line, if there is one, and the rows of numbers of a CSV file."""
+    rows, header = _table(file), []
+    if rows and np.isnan(_number(rows[0][0])):
+        header, rows = [word.strip() for word in rows[0]], rows[1:]
+    try:
+        values = np.array([[float(word) for word in row] for row in rows])
+    except ValueError as error:
+        raise ExchangeError(f"{file}: expected rows of numbers, all of the same length ({error})") from error
+    if values.ndim != 2:
+        raise ExchangeError(f"{file}: holds no rows of numbers")
+    return header, values
+
+
+def _table(file: Path) -> list[list[str]]:
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ExchangeError(f"{file}: not a text file ({error})") from error
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    return list(csv.reader(lines))
+
+
+def _number(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return float("nan")
+
+
+def _measured(file: Path, **values: Any) -> MeasuredShapes:
+    try:
+        return MeasuredShapes(**values)
+    except ValueError as error:
+        raise ExchangeError(f"{file}: {error}") from error
+
+
+def _pyuff() -> Any:
+    try:
+        return importlib.import_module("pyuff")
+    except ImportError as error:
+        raise ExchangeError("universal files need pyuff: pip install pyuff; CSV files need nothing") from error
+
+
+def _datasets(file: Path) -> list[dict[str, Any]]:
+    universal = _pyuff().UFF(str(file))
+    try:
+        kinds = universal.get_set_types()
+        wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58)))
+        return [universal.read_sets(int(index)) for index in wanted]
+    except Exception as error:  # pyuff raises what its parsing meets
+        raise ExchangeError(f"{file}: not a universal file that pyuff can read ({error})") from error
+
+
+def _shapes_of_universal(file: Path) -> MeasuredShapes:
+    datasets = _datasets(file)
+    nodes: dict[int, np.ndarray] = {}
+    for dataset in datasets:
+        if dataset["type"] == 15:
+            points = np.column_stack([dataset["x"], dataset["y"], dataset["z"]])
+            nodes |= dict(zip(np.asarray(dataset["node_nums"], dtype=int).tolist(), points, strict=True))
+    modes = [d for d in datasets if d["type"] == 55 and d["analysis_type"] in (_NORMAL_MODE, _COMPLEX_MODE)]
+    if not nodes or not modes:
+        raise ExchangeError(f"{file}: holds no nodes (dataset 15) or no mode shapes (dataset 55)")
+    numbers = np.asarray(modes[0]["node_nums"], dtype=int)
+    for mode in modes:
+        if not np.array_equal(np.asarray(mode["node_nums"], dtype=int), numbers):
+            raise ExchangeError(f"{file}: the modes are given at different nodes; give all of them at the same")
+    missing = sorted(set(numbers.tolist()) - set(nodes))
+    if missing:
+        raise ExchangeError(f"{file}: node {missing[0]} of the shapes has no coordinates in dataset 15")
+    shapes = np.array([np.column_stack([mode["r1"], mode["r2"], mode["r3"]]).ravel() for mode in modes])
+    frequencies = [m["freq"] if "freq" in m else abs(m["eig"]) / (2 * np.pi) for m in modes]
+    # exact zeros in every mode are axes that no sensor looked along
+    seen = np.abs(shapes).max(axis=0) > 0.0
+    return _measured(
+        file,
+        points=np.repeat([nodes[n] for n in numbers.tolist()], 3, axis=0)[seen],
+        directions=np.tile(np.eye(3), (len(numbers), 1))[seen],
+        shapes=shapes[:, seen],
+        frequencies_hz=frequencies,
+        damping_ratios=[float(m.get("modal_damp_vis", np.nan)) for m in modes],
+    )
+
+
+def _shapes_to_universal(shapes: MeasuredShapes, target: Path) -> None:
+    axes = np.abs(shapes.directions).argmax(axis=1)
+    signs = np.take_along_axis(shapes.directions, axes[:, None], axis=1)[:, 0]
+    if not np.allclose(np.abs(signs), 1.0, rtol=0.0, atol=1e-12):
+        raise ExchangeError(f"{target}: a universal file holds displacements along x, y and z alone; write CSV instead")
+    points, number = np.unique(shapes.points, axis=0, return_inverse=True)
+    number = number.ravel()
+    if len(np.unique(3 * number + axes)) < len(axes):
+        raise ExchangeError(f"{target}: two values for one point and axis; a universal file holds one")
+    labels = np.arange(1, len(points) + 1)
+    prepare = _pyuff()
+    zero = np.zeros(len(points), dtype=int)
+    sets = [
+        prepare.prepare_15(
+            node_nums=labels, def_cs=zero, disp_cs=zero, color=zero, x=points[:, 0], y=points[:, 1], z=points[:, 2]
+        )
+    ]
+    complex_valued = np.iscomplexobj(shapes.shapes)
+    for index, shape in enumerate(shapes.shapes):
+        field = np.zeros((len(points), 3), dtype=shape.dtype)
+        field[number, axes] = signs * shape
+        sets.append(_mode_dataset(prepare, shapes, index, labels, field, complex_valued))
+    _write_universal(prepare, sets, target)
+
+
+def _mode_dataset(
+    prepare: Any, shapes: MeasuredShapes, index: int, labels: np.ndarray, field: np.ndarray, complex_valued: bool
+) -> Any:
+    frequency, ratio = (float(np.nan_to_num(v[index])) for v in (shapes.frequencies_hz, shapes.damping_ratios))
+    common: dict[str, Any] = {
+        "id1": f"mode {index + 1}",
+        "id2": "displacement",
+        "id3": "NONE",
+        "id4": "NONE",
+        "id5": "NONE",
+    }
+    common |= {"model_type": 1, "data_ch": 2, "spec_data_type": 8, "n_data_per_node": 3, "load_case": 1}
+    common |= {"mode_n": index + 1, "node_nums": labels, "r1": field[:, 0], "r2": field[:, 1], "r3": field[:, 2]}
+    if complex_valued:
+        eigenvalue = 2 * np.pi * frequency * complex(-ratio, np.sqrt(1 - ratio**2))
+        kind: dict[str, Any] = {
+            "analysis_type": _COMPLEX_MODE,
+            "data_type": 5,
+            "eig": eigenvalue,
+            "modal_a": 0j,
+            "modal_b": 0j,
+        }
+    else:
+        kind = {"analysis_type": _NORMAL_MODE, "data_type": 2, "freq": frequency, "modal_m": 0.0}
+        kind |= {"modal_damp_vis": ratio, "modal_damp_his": 0.0}
+    return prepare.prepare_55(**common, **kind)
+
+
+def _frf_of_universal(file: Path) -> Frf:
+    found = [d for d in _datasets(file) if d["type"] == 58 and d["func_type"] == _FRF]
+    if not found:
+        raise ExchangeError(f"{file}: holds no frequency response (dataset 58, function type {_FRF})")
+    kinds = {int(d["ordinate_spec_data_type"]) for d in found}
+    if len(kinds) > 1 or not kinds <= set(_QUANTITIES):
+        raise ExchangeError(
+            f"{file}: expected responses of one kind, displacement (8), velocity (11) or acceleration (12)"
+        )
+    frequencies = np.asarray(found[0]["x"], dtype=float)
+    for dataset in found:
+        if not np.array_equal(np.asarray(dataset["x"], dtype=float), frequencies):
+            raise ExchangeError(f"{file}: the responses have different frequencies; export them over one axis")
+    labels = tuple(f"{d['rsp_node']}:{d['rsp_dir']}/{d['ref_node']}:{d['ref_dir']}" for d in found)
+    try:
+        return Frf(frequencies, np.array([d["data"] for d in found]), _QUANTITIES[kinds.pop()], labels)
+    except FrfError as error:
+        raise ExchangeError(f"{file}: {error}") from error
+
+
+def _frf_to_universal(frf: Frf, target: Path) -> None:
+    prepare = _pyuff()
+    kind = next(number for number, name in _QUANTITIES.items() if name == frf.quantity)
+    sets = [
+        prepare.prepare_58(
+            binary=1, func_type=_FRF, rsp_node=index + 1, rsp_dir=3, ref_node=1, ref_dir=3, data=values,
+            x=frf.frequencies_hz, id1=label[:80], rsp_ent_name="NONE", ref_ent_name="NONE", abscissa_spacing=0,
+            abscissa_spec_data_type=18, ordinate_spec_data_type=kind, orddenom_spec_data_type=13, ver_num=0,
+            load_case_id=0, z_axis_value=0.0,
+        )
+        for index, (values, label) in enumerate(zip(frf.values, frf.labels, strict=True))
+    ]  # fmt: skip
+    _write_universal(prepare, sets, target)
+
+
+def _write_universal(prepare: Any, sets: Sequence[Any], target: Path) -> None:
+    with replacing(target) as temporary:
+        temporary.unlink()  # pyuff appends
+        universal = prepare.UFF(str(temporary))
+        universal.write_sets(list(sets), "add")

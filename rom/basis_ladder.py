@@ -1,0 +1,60 @@
+"""How many modes a reduction needs: the models of a basis with the estimate of each, out of one reduction.
+
+The estimate is that of rom.error_estimate: the residual's response in the basis with two more blocks of quasi-static
+modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.rom.error_estimate import Rung, frf_errors
+from vanedamp.rom.interface import Interface
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.reduction import BASES, Factorize, reduce, superlu
+from vanedamp.rom.truncation import massless, truncated
+
+#: blocks of quasi-static coordinates beyond those of a model that its estimate needs
+BLOCKS = 2
+
+
+def rich_model(
+    matrices: SystemMatrices,
+    interface: Interface,
+    basis: str,
+    modes: int,
+    factorize: Factorize = superlu,
+    **others: Any,
+) -> ReducedModel:
+    """The reduction that has every model of a basis up to so many modes in it, and what their estimates need.
+
+    Craig-Bampton models are those with one block of quasi-static modes. Other arguments: those of rom.reduction.reduce.
+    """
+    if basis in ("craig-bampton", "massless"):
+        return reduce(matrices, interface, "craig-bampton", modes, factorize, quasi_static=1 + BLOCKS, **others)
+    reduction_basis = "rubin" if basis in BASES else basis
+    return reduce(matrices, interface, reduction_basis, modes, factorize, quasi_static=BLOCKS, **others)
+
+
+def basis_model(rich: ReducedModel, basis: str, modes: int) -> ReducedModel:
+    """The model of a basis with so many modes, out of `rich_model`."""
+    if basis in ("macneal", "massless"):
+        return massless(rich, modes)
+    return truncated(rich, modes, 0 if basis == "truncated" else 1)
+
+
+def basis_ladder(
+    rich: ReducedModel, basis: str, frequencies_hz: np.ndarray, labels: Sequence[str] | None = None
+) -> list[Rung]:
+    """All models of a basis out of `rich_model`, each against that."""
+    least = 0 if basis == "craig-bampton" else max(rich.rigid_modes, int(basis != "rubin"))
+    rungs = []
+    for modes in range(least, rich.modes + 1):
+        model = basis_model(rich, basis, modes)
+        errors = frf_errors(model, rich, frequencies_hz, labels)
+        rungs.append(Rung(modes, model.size, float(errors.max()), 0.0))
+    return rungs

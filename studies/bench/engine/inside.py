@@ -1,0 +1,90 @@
+"""What only the engine's inside can tell a benchmark: modes that are awake, time of a period and of its parts.
+
+The one file of `studies` that reaches behind `coupling.engine.simulate`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from vanedamp.coupling.exact import automaton, state
+from vanedamp.coupling.exact.energy_balance import account
+from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.exact.event_functions import next_event
+from vanedamp.coupling.methods.registry import run_of
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.studies.bench.timing import seconds
+
+_REPEATS = 20_000
+
+
+def awake_modes(scene: Scene, first: int, last: int) -> float:
+    """Mean number of the structure's modes that are awake at the starts of the periods first ... last - 1."""
+    run = _begun(scene, last)
+    total = 0
+    for period in range(first, last):
+        run.advance(period, scene.solver.max_events)
+        total += int(run.state.counters[state.AWAKE]) - 1  # the first is the excitation
+    return total / (last - first)
+
+
+def time_of_a_period(scene: Scene, lengths: tuple[int, int]) -> float:
+    """Mean seconds of the periods from the first to the second of two, in one run of the scene's method."""
+    first, last = lengths
+    run = run_of(scene.replace({"time.periods": last, "time.transient": 0}), False, 0)
+    run.advance_to(first)
+    return seconds(run.advance_to, last) / (last - first)
+
+
+def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
+    """Seconds that the search and the account take in all segments of one period, medians over the rounds.
+
+    Each is repeated on the same state, so that its data and branches are warm: a lower bound.
+    """
+    run = _begun(scene, period + 1)
+    code = run.advance(period, scene.solver.max_events)
+    search, accounting = np.zeros(rounds), np.zeros(rounds)
+    while True:
+        tau = _search(run.rows, run.flows, run.state, run.channels, 1)
+        _amplitudes(run.flows, run.state, run.scratch, tau)
+        for turn in range(-1, rounds):  # the first compiles
+            one = seconds(_search, run.rows, run.flows, run.state, run.channels, _REPEATS)
+            two = seconds(_account, run.rows, run.flows, run.state, run.records, run.scratch, tau, _REPEATS)
+            if turn >= 0:
+                search[turn] += one / _REPEATS
+                accounting[turn] += two / _REPEATS
+        code = run.advance(period + 1, int(run.state.counters[state.EVENTS]) + 1)
+        if code != automaton.EVENT_BUDGET:
+            return {"search": float(np.median(search)), "account": float(np.median(accounting))}
+
+
+def _begun(scene: Scene, periods: int) -> EngineRun:
+    run = EngineRun(scene.replace({"time.periods": periods}), False, 0)
+    run.begin(scene.solver.max_events)
+    return run
+
+
+@njit(error_model="numpy")
+def _search(rows: Any, flows: Any, st: Any, channels: Any, times: int) -> float:
+    tau = 0.0
+    for _ in range(times):
+        st.counters[state.CARRIED] = 0  # what is known from the period before would save it
+        tau, _ = next_event(rows, flows, st, channels)
+    return tau
+
+
+@njit(error_model="numpy")
+def _amplitudes(flows: Any, st: Any, scratch: Any, tau: float) -> None:
+    automaton._amplitudes(flows, st, scratch, tau)
+
+
+@njit(error_model="numpy")
+def _account(rows: Any, flows: Any, st: Any, records: Any, scratch: Any, tau: float, times: int) -> None:
+    period = st.counters[state.PERIOD]
+    peak = records.peak[period]
+    for _ in range(times):
+        records.peak[period] = peak  # or the search for the peak would be needless the second time
+        account(rows, flows, st, records, scratch, tau)

@@ -1,0 +1,72 @@
+"""Siconos: Moreau-Jean time stepping with its own solvers (Acary and Brogliato 2008).
+
+Newton's law at rigid contacts; Coulomb friction of constant normal load is a relay on velocities, solved with the
+contacts as one generic mechanical problem. Loads are taken at the middle of each step.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.bench.methods.peers import Coupled, PeerRun, coupled, tracked
+
+
+def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
+    """Run with `setting` steps a period. Raises InputError for springs at contacts or before sliders."""
+    if scene.contact.law != "newton" or any(damper.stiffness is not None for damper in scene.friction_damper):
+        raise InputError("Siconos: its kernel has no law of a unilateral spring with a dashpot for Lagrangian systems")
+    steps = round(setting)
+    made = coupled(scene, steps)
+    simulation, structure, kept = _model(made, periods)
+    system, h = made.system, made.system.step
+    angle = system.omega * h * (np.arange(steps) + 0.5)
+    loads = np.outer(np.cos(angle), system.load[:, 0]) - np.outer(np.sin(angle), system.load[:, 1]) + system.weight
+    # views of its own memory, taken once: each call would leave one behind
+    force, place = structure.fExt(), structure.q()
+    q = np.zeros((periods * steps + 1, len(system.mass)))
+    q[0] = made.motion.q
+    started = time.thread_time()
+    for k in range(periods * steps):
+        force[:] = loads[k % steps]
+        simulation.computeOneStep()
+        simulation.nextStep()
+        q[k + 1] = place
+    seconds = time.thread_time() - started
+    del kept
+    return tracked(made, q, samples, seconds)
+
+
+def _model(made: Coupled, periods: int) -> tuple[Any, Any, list[Any]]:
+    """Simulation, dynamical system, and what must live as long as they do."""
+    import siconos.kernel as kernel
+
+    system, motion = made.system, made.motion
+    h = system.step
+    structure = kernel.LagrangianLinearTIDS(
+        motion.q.copy(), motion.v.copy(), np.diag(system.mass), np.diag(system.stiffness), system.damping.copy()
+    )
+    structure.setFExtPtr(np.zeros(len(motion.q)))
+    world = kernel.NonSmoothDynamicalSystem(0.0, (periods + 1) * made.rows.period)
+    world.insertDynamicalSystem(structure)
+    kept: list[Any] = [world]
+    friction = False
+    for r, row in enumerate(system.J):
+        if r < system.friction_rows:
+            if system.limit[r] == 0:
+                continue
+            friction, bound = True, h * float(system.limit[r])
+            law, relation = kernel.RelayNSL(1, -bound, bound), kernel.LagrangianLinearTIR(row[None].copy())
+        else:
+            law = kernel.NewtonImpactNSL(float(system.restitution[r]))
+            relation = kernel.LagrangianLinearTIR(row[None].copy(), np.array([system.offset[r]]))
+        interaction = kernel.Interaction(law, relation)
+        world.link(interaction, structure)
+        kept += [law, relation, interaction]
+    problem = kernel.GenericMechanical() if friction else kernel.LCP()
+    scheme, clock = kernel.MoreauJeanOSI(0.5), kernel.TimeDiscretisation(0.0, h)
+    return kernel.TimeStepping(world, clock, scheme, problem), structure, [*kept, problem, scheme, clock]

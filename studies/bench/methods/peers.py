@@ -1,0 +1,110 @@
+"""Other programs on the same scenes: SUNDIALS CVODE, Exudyn and Siconos, each if it is installed.
+
+A peer takes a scene, periods and its setting (a tolerance, or steps a period) and returns a PeerRun. What it cannot
+express, or that it is not installed, it says by an InputError, which charts and tables pass on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.methods import equations_of_motion as sy
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.constraints import Rows, rows_of
+from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.files.toml_input import InputError
+
+#: share of the free travel by which a body may overlap a wall, as for our methods
+_DEEPEST = 0.1
+
+
+@dataclass(frozen=True)
+class PeerRun:
+    """What a peer leaves behind.
+
+    status: words of coupling.response.response.Status; peak (periods,): largest |x|, m; samples (k, 1 + b):
+    displacement and slips at equidistant times, m; penetration relative to the free travel; seconds: CPU time of the
+    steps, no set-up.
+    """
+
+    status: str
+    peak: np.ndarray
+    samples: np.ndarray
+    penetration: float
+    seconds: float
+
+
+class Peer(NamedTuple):
+    """A program: module of studies, what to import, how to get it, whether its setting is a tolerance (or steps)."""
+
+    module: str
+    needs: str
+    remedy: str
+    tolerance: bool
+
+
+PEERS = {
+    "SUNDIALS CVODE": Peer("peer_cvode", "sksundae", "pip install vanedamp[peers]", True),
+    "Exudyn": Peer("peer_exudyn", "exudyn", "pip install vanedamp[peers]", False),
+    "Siconos": Peer("peer_siconos", "siconos.kernel", "apt install python3-siconos", False),
+}
+
+
+def run_peer(name: str, scene: Scene, periods: int, setting: float, samples: int = 0) -> PeerRun:
+    """Run a scene over so many periods, with that many samples of each.
+
+    Raises InputError where the peer is not installed or cannot express the scene.
+    """
+    peer = PEERS[name]
+    try:
+        import_module(peer.needs)
+    except ImportError:
+        raise InputError(f"{name}: not installed; {peer.remedy}") from None
+    run: Callable[[Scene, int, float, int], PeerRun] = import_module(
+        f"vanedamp.studies.bench.methods.{peer.module}"
+    ).run
+    return run(scene, periods, setting, samples)
+
+
+class Coupled(NamedTuple):
+    """A scene as M q'' + C q' + K q = loads + J^T lambda, and its state at time zero."""
+
+    system: sy.System
+    rows: Rows
+    motion: sy.Motion
+
+
+def coupled(scene: Scene, steps: int) -> Coupled:
+    """The matrices that our own stepping methods use, with so many steps a period."""
+    structure = linear_structure(scene)
+    rows, displacement, velocity = rows_of(scene, structure)
+    stepped = scene.replace({"solver.method": "moreau", "solver.steps_per_period": steps})
+    system, motion = sy.start(
+        sy.system_of(stepped, rows), rows, displacement, velocity, structure.displacement, structure.velocity
+    )
+    return Coupled(system, rows, motion)
+
+
+def tracked(made: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:
+    """What a run of equal steps leaves behind. q: (periods * steps + 1, N) coordinates at the steps."""
+    system, steps = made.system, len(made.system.phase) - 1
+    periods = (len(q) - 1) // steps
+    phase = np.tile(system.phase[:-1], (periods, 1))
+    x = q[:-1] @ system.response + system.table[0] * phase[:, 0] - system.table[1] * phase[:, 1]
+    every = np.arange(0, periods * steps, steps // samples) if samples else np.zeros(0, int)
+    slips = q[every] @ system.J[: len(made.rows.mass)].T
+    gaps = system.J @ q.T + system.offset[:, None]
+    # no number is deeper than any
+    deep = float(np.nan_to_num((-gaps / system.gap[:, None]).max(initial=0.0), nan=np.inf))
+    status = Status.OK if deep <= _DEEPEST else Status.PENETRATION
+    if not np.isfinite(q).all():
+        status = Status.DIVERGED
+    return PeerRun(
+        status.value, np.abs(x).reshape(periods, steps).max(axis=1), np.column_stack([x[every], slips]), deep, seconds
+    )

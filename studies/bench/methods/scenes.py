@@ -1,0 +1,151 @@
+"""Scenes and methods of the comparison of methods: speed against accuracy, and where methods fail."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
+from vanedamp.studies.bench.engine import scenes as bench_scenes
+
+if TYPE_CHECKING:
+    from vanedamp.modal.matrices import SystemMatrices
+    from vanedamp.rom.interface import Interface
+
+#: methods by the name in charts: options of [solver] besides the number of steps
+STEPPING: dict[str, dict[str, Any]] = {
+    "Moreau-Jean": {"method": "moreau"},
+    "penalty, central differences": {"method": "penalty"},
+    "penalty, Newmark": {"method": "penalty", "scheme": "newmark"},
+    "penalty, HHT": {"method": "penalty", "scheme": "hht"},
+    "co-simulation, Jacobi, hold 0": {"method": "cosim", "exchange": "jacobi", "hold": 0},
+    "co-simulation, Gauss-Seidel, hold 1": {"method": "cosim", "exchange": "gauss_seidel", "hold": 1},
+}
+
+
+def by(scene: Scene, **solver: Any) -> Scene:
+    """The scene with another [solver] table."""
+    return validate(Scene, scene.to_dict() | {"solver": solver}, "scene")
+
+
+def periodic(settle: int) -> Scene:
+    """One mode, one body, two impacts a period, settled."""
+    return bench_scenes.settled(bench_scenes.one_mode(), settle)
+
+
+def chatter() -> Scene:
+    """A ball on a shaken plate that comes to rest and is thrown up in every period."""
+    data = {
+        "structure": {"model": "prescribed", "displacement_amplitude": 1e-3},
+        "excitation": {"frequency": 17.0},
+        "gravity": {"orientation_deg": 90.0},
+        "cavity": [{"name": "c", "gap": 0.1}],
+        "damper": [{"cavity": "c", "mass": 1.0, "restitution": 0.5, "position": -0.0495}],
+    }
+    return validate(Scene, data, "scene")
+
+
+def single() -> Scene:
+    """One mode, one body with friction, below resonance: a response that never repeats."""
+    changes = {"damper.0.friction": 0.1, "gravity.acceleration": 9.81}
+    return bench_scenes.one_mode(0.99, 1.0).replace(changes)
+
+
+def double() -> Scene:
+    """Two bodies in a row that share the cavity of the single one."""
+    data = single().to_dict()
+    body = data["damper"][0] | {"mass": data["damper"][0]["mass"] / 2}
+    data["damper"] = [body | {"position": -data["cavity"][0]["gap"] / 4}, body]
+    return validate(Scene, data, "scene")
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A cluster of linear elements in a folder: its mesh, and reduced models of it with a body on soft walls.
+
+    size: of the elements, m (None: the shipped mesh); lumped: reduce the mesh with the row sums of its mass.
+    """
+
+    folder: Path
+    size: float | None = None
+    lumped: bool = False
+
+    def scene(self, modes: int) -> Scene:
+        """One body at the first natural frequency of the model with so many fixed-interface modes."""
+        file = self.folder / f"cluster_{modes}.h5"
+        if not file.is_file():
+            self._reduce(file, modes)
+        data = {
+            "structure": {"model": "rom", "file": str(file)},
+            "excitation": {
+                "frequency": _first(file), "at": "shroud", "resonance_amplitude": bench_scenes.AMPLITUDE
+            },
+            "gravity": {"acceleration": 0.0},
+            "contact": {"law": "compliant", "stiffness": 3e7},
+            "cavity": [{"name": "c1", "gap": 0.2 * bench_scenes.AMPLITUDE, "floor": "c1_floor"}],
+            "damper": [{"cavity": "c1", "mass": 0.003, "restitution": 0.7}],
+        }  # fmt: skip
+        return validate(Scene, data, "scene")
+
+    def elements(self) -> tuple[SystemMatrices, Interface]:
+        """The mesh without reduction: its matrices, as they are, and the interface."""
+        from vanedamp.studies.case.stages import assemble, interface
+        from vanedamp.studies.case.tables import Case
+
+        case = Case.load(self._case())
+        matrices = assemble(case).matrices
+        return matrices, interface(case, matrices)
+
+    def _case(self) -> Path:
+        """The case file, written with its mesh on the first call."""
+        case = self.folder / "cluster.toml"
+        if not case.is_file():
+            from vanedamp.meshes.parameters import VaneCluster
+            from vanedamp.meshes.vane_cluster import SHIPPED, build
+            from vanedamp.studies.case.tables import DEMO_CASE
+
+            self.folder.mkdir(parents=True, exist_ok=True)
+            mesh = self.folder / "vane_cluster.msh"
+            if self.size is None:
+                shutil.copy(SHIPPED, mesh)
+            else:
+                build(VaneCluster(element_size=self.size), mesh)
+            text = DEMO_CASE.read_text(encoding="utf-8")
+            case.write_text(text.replace("degree = 2", "degree = 1"), encoding="utf-8")
+        return case
+
+    def _reduce(self, file: Path, modes: int) -> None:
+        from vanedamp.rom.bases.craig_bampton import reduce
+        from vanedamp.studies.bench.methods.full_mesh_run import lumped
+
+        matrices, interface = self.elements()
+        reduce(lumped(matrices) if self.lumped else matrices, interface, modes).save(file)
+
+
+def _first(file: Path) -> float:
+    from vanedamp.rom.reduced import ReducedModel
+
+    return float(ReducedModel.load(file).natural_frequencies_hz[0])
+
+
+def rod(folder: Path, modes: int) -> Path:
+    """Craig-Bampton model of a clamped unit rod (mass, length, stiffness 1) in closed form, interface "tip"."""
+    import numpy as np
+
+    from vanedamp.rom.reduced import ReducedModel
+
+    k = np.arange(1, modes + 1)
+    mass, stiffness = np.eye(modes + 1), np.diag(np.r_[1.0, (k * math.pi) ** 2])
+    mass[0, 0] = 1 / 3
+    mass[0, 1:] = mass[1:, 0] = math.sqrt(2) * (-1.0) ** (k + 1) / (k * math.pi)
+    file = folder / f"rod_{modes}.h5"
+    # damping in proportion to stiffness: 1 % in the first mode
+    model = ReducedModel.from_matrices(
+        mass, stiffness, {"tip": np.eye(modes + 1)[0]}, damping=0.02 / (math.pi / 2) * stiffness
+    )
+    model.save(file)
+    return file

@@ -1,0 +1,1 @@
+"""Model order: the ladder, and trials of the automatic choice."""

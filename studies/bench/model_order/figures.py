@@ -1,0 +1,108 @@
+"""Figures of the ladder of models."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from vanedamp.files.store import replacing
+
+_COLOURS = {
+    "newton": "#c2410c",
+    "compliant": "#1d4f91",
+    "compliant and residual": "#15803d",
+    "residual alone": "#6d28d9",
+    "massless": "#a16207",
+}
+_MARKERS = dict(zip(_COLOURS, "osDv^", strict=True))
+
+
+def bar_figure(bar: Mapping[str, Any], path: Path) -> None:
+    """Errors of the falling bar against the number of its modes."""
+    figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained")
+    modes = np.array(bar["modes"])
+    for axis, what in zip(axes, ("time", "height"), strict=True):
+        for law, errors in bar[what].items():
+            values = np.maximum(np.array(errors, dtype=float), 1e-16)
+            shown = modes > 1  # one mode bounces as a rigid body, whose height is exact by energy
+            axis.loglog(modes[shown], values[shown], "-", color=_COLOURS[law], marker=_MARKERS[law], label=law)
+        axis.set_xlabel("modes of the bar")
+        axis.set_ylabel(f"error of the second apex's {what}, relative")
+        axis.grid(True, which="major", color="#e2e8f0")
+    axes[0].loglog(modes, 0.02 / modes, "--", color="#7a7f87", label="first order")
+    axes[0].legend()
+    figure.suptitle("elastic bar on a wall (Doyen, Ern and Piperno 2011), restitution 1")
+    _save(figure, path)
+
+
+def cluster_figure(cluster: Mapping[str, Any], path: Path) -> None:
+    """Error of the damped response against its cost, all laws against one model, and the responses with most modes."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12.5, 5.0), layout="constrained")
+    reference = cluster["reference"]
+    noise = np.linalg.norm(cluster["laws"][reference["law"]]["confidence"][-1]) / cluster["undamped"]
+    noise /= np.sqrt(len(cluster["frequencies_hz"]))
+    for law, entry in cluster["laws"].items():
+        style = {"color": _COLOURS[law], "marker": _MARKERS[law]}
+        shown = slice(0, -1 if law == reference["law"] else None)
+        cost, errors = 1e6 * np.array(entry["seconds_per_period"])[shown], np.array(entry["error"])[shown]
+        left.loglog(cost, errors, "-", label=law, **style)
+        for modes, x, y in zip(cluster["modes"], cost, errors, strict=False):
+            left.annotate(str(modes), (x, y), (4, 4), textcoords="offset points", fontsize=8, color=_COLOURS[law])
+        right.plot(
+            cluster["frequencies_hz"], np.array(entry["amplitude"][-1]) / cluster["undamped"], "-",
+            label=f"{law}, {cluster['modes'][-1]} modes", **style,
+        )  # fmt: skip
+    if noise > 0.0:
+        left.axhline(noise, ls=":", color="#7a7f87", label="95 % confidence of the reference")
+    left.set_xlabel("CPU time per excitation period, µs")
+    left.set_ylabel("rms error of the mean amplitude, of the undamped peak")
+    left.set_title(f"against one model: {reference['law']}, {reference['modes']} modes; figures: modes", fontsize=10)
+    right.set_xlabel("excitation frequency, Hz")
+    right.set_ylabel("mean amplitude, of the undamped peak")
+    for axis in (left, right):
+        axis.grid(True, which="major", color="#e2e8f0")
+    right.legend(fontsize=8)
+    if noise > 0.0:
+        left.legend(*([item[-1]] for item in left.get_legend_handles_labels()), fontsize=8, loc="lower right")
+    _save(figure, path)
+
+
+def auto_figure(auto: Mapping[str, Any], path: Path) -> None:
+    """The automatic choice: true error against the tolerance, and cost against that of the cheapest model."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.5, 4.8), layout="constrained")
+    kinds = list(dict.fromkeys(row["scene"].split()[0] for row in auto["verdicts"]))
+    for kind, colour, marker in zip(kinds, _COLOURS.values(), "osD", strict=False):
+        rows = [row for row in auto["verdicts"] if row["scene"].startswith(kind)]
+        # apart from each other, so that scenes of one tolerance can be told
+        apart = np.array([1.0 + 0.05 * (int(row["scene"].split()[1]) - 5) for row in rows])
+        tolerances = np.array([row["tolerance"] for row in rows])
+        places = apart * tolerances
+        errors, bars = (np.array([row[what] for row in rows]) / tolerances for what in ("error", "confidence"))
+        left.errorbar(places, errors, bars, fmt=marker, color=colour, label=kind, elinewidth=0.8, ms=5)
+        right.semilogx(places, [row["ratio"] for row in rows], marker, color=colour, label=kind, ms=5)
+    left.axhline(1.0, ls="--", color="#7a7f87", label="tolerance")
+    left.set_xscale("log")
+    left.set_ylim(bottom=0.0)
+    left.set_ylabel("true error over tolerance (bars: 95 %)")
+    right.axhline(2.0, ls="--", color="#7a7f87", label="twice the cheapest")
+    right.set_ylim(bottom=0.0)
+    right.set_ylabel("cost over that of the cheapest model within the tolerance")
+    for axis in (left, right):
+        axis.set_xlabel("tolerance, of the undamped peak (scenes side by side)")
+        axis.grid(True, which="major", color="#e2e8f0")
+        axis.legend(fontsize=8)
+    _save(figure, path)
+
+
+def _save(figure: Figure, path: Path) -> None:
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=130)
+    plt.close(figure)

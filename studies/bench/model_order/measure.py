@@ -1,0 +1,176 @@
+"""The ladder of models, charted: contact laws against the number of modes, error against cost.
+
+A bar on a wall, which has an exact solution; the shipped cluster with a loose body, all laws against one finest model;
+and the automatic choice of a model on trial.
+
+The finest model of the cluster is the one with the most modes and a contact that yields by its own spring and by what
+these modes lack of the wall's flexibility. Its contact has a limit as modes are added, and a loss that is given;
+Newton's law has no limit, and a massless boundary without loss is another contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.sweep import warm_up
+from vanedamp.files.store import finite, write_json
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.truncation import massless
+from vanedamp.studies.bench.engine.inside import time_of_a_period
+from vanedamp.studies.bench.model_order.bar_on_wall import LAWS as BAR_LAWS
+from vanedamp.studies.bench.model_order.bar_on_wall import bounce
+from vanedamp.studies.bench.model_order.scenes import SEED
+from vanedamp.studies.bench.model_order.structures import cluster_model
+from vanedamp.studies.bench.model_order.trial import run_trial, summary, tell_trial
+from vanedamp.studies.bench.timing import Clock, in_turns, machine
+from vanedamp.studies.terminal import progress
+
+#: contact tables of the cluster's scenes; stiffness: shorter contacts than the first 25 modes can follow
+LAWS: dict[str, dict[str, Any]] = {
+    "newton": {"law": "newton"},
+    "compliant": {"law": "compliant", "stiffness": 1e8},
+    "compliant and residual": {"law": "compliant", "stiffness": 1e8, "residual": True},
+    "residual alone": {"law": "compliant", "residual": True},
+    "massless": {"law": "massless"},
+}
+#: the law of the finest model, against which all are measured
+REFERENCE = "compliant and residual"
+# share of the structure's mass in the body, of the undamped maximum in the gap, and restitution where a law has one
+_BODY, _GAP, _RESTITUTION = 0.02, 0.5, 0.7
+_AMPLITUDE = 3e-5
+# where a body starts, of its gap: several steady states can exist
+_STARTS = (0.0, 0.3)
+# rounds of the clocks, and between which periods of a run they measure
+_ROUNDS, _LENGTHS = 3, (50, 150)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is computed."""
+
+    degree: int
+    modes: tuple[int, ...]
+    frequencies: int
+    periods: int
+    bar_modes: tuple[int, ...]
+    trials: dict[str, int]
+    trial_periods: int
+
+
+FULL = Effort(
+    2, (1, 2, 3, 6, 12, 25, 60), 9, 1500, (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30),
+    {"cluster": 4, "rod": 3, "beam": 3}, 2000,
+)  # fmt: skip
+QUICK = Effort(1, (1, 2, 3, 6, 12), 3, 150, (1, 2, 4, 8), {"cluster": 1, "beam": 1}, 200)
+
+
+def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
+    """Measure, and write ladder.json with its two figures to the folder, made if need be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--output {folder}: cannot be made ({error.strerror})") from error
+    file = folder / "ladder_rom.h5"
+    cluster_model(effort.degree, max(effort.modes)).save(file)
+    result: dict[str, Any] = {"machine": machine(), "bar": bar_errors(effort.bar_modes)}
+    with progress("laws") as report:
+        result["cluster"] = cluster_curves(file, effort, report)
+    with progress("automatic choice") as report:
+        result["auto"] = summary(run_trial(folder, SEED, effort.trials, effort.trial_periods, report))
+    write_json(folder / "ladder.json", finite(result))
+    from vanedamp.studies.bench.model_order.figures import auto_figure, bar_figure, cluster_figure
+
+    bar_figure(result["bar"], folder / "ladder_bar.png")
+    cluster_figure(result["cluster"], folder / "ladder_cluster.png")
+    auto_figure(result["auto"], folder / "ladder_auto.png")
+    return result
+
+
+def bar_errors(counts: tuple[int, ...]) -> dict[str, Any]:
+    """Errors of the bar's second apex, in time and height, for each law and number of modes."""
+    runs = {law: [bounce(modes, law) for modes in counts] for law in BAR_LAWS}
+    return {
+        "modes": list(counts),
+        "time": {law: [run.time for run in of] for law, of in runs.items()},
+        "height": {law: [run.height for run in of] for law, of in runs.items()},
+        "energy": max(run.energy for of in runs.values() for run in of),
+    }
+
+
+def cluster_curves(file: Path, effort: Effort, report: Callable[[int, int], None]) -> dict[str, Any]:
+    """Mean amplitudes over the frequencies, their error and the cost, of each law and number of natural modes."""
+    model = ReducedModel.load(file)
+    first = float(model.natural_frequencies_hz[0])
+    mass = 1.0 / float((massless(model, 1).row("shroud") ** 2)[0])
+    frequencies = first * np.linspace(0.975, 1.005, effort.frequencies)
+    curves: dict[str, Any] = {}
+    clocks: dict[str, Clock] = {}
+    warm_up()
+    done, total = 0, len(LAWS) * len(effort.modes)
+    for law, contact in LAWS.items():
+        entry = curves[law] = {"amplitude": [], "confidence": [], "status": []}
+        for modes in effort.modes:
+            scenes = [_scene(file, modes, contact, mass, frequency, effort) for frequency in frequencies]
+            runs = [[simulate(_from(scene, start)) for start in _STARTS] for scene in scenes]
+            entry["amplitude"].append([float(np.mean([run.amplitude_mean for run in pair])) for pair in runs])
+            entry["confidence"].append([
+                float(np.linalg.norm([run.amplitude_mean_confidence or 0.0 for run in pair])) / len(pair)
+                for pair in runs
+            ])  # fmt: skip
+            entry["status"].append([run.status.value for pair in runs for run in pair])
+            middle = scenes[len(scenes) // 2].replace({"time.periods": _LENGTHS[1], "time.transient": 0})
+            clocks[f"{law}/{modes}"] = partial(time_of_a_period, middle, _LENGTHS)
+            done += 1
+            report(done, total)
+    times = in_turns(clocks, _ROUNDS, np.random.default_rng(0))
+    finest = np.array(curves[REFERENCE]["amplitude"][-1])
+    for law, entry in curves.items():
+        entry["seconds_per_period"] = [float(np.median(times[f"{law}/{modes}"])) for modes in effort.modes]
+        deviations = (np.array(entry["amplitude"]) - finest) / _AMPLITUDE
+        entry["error"] = np.sqrt(np.mean(deviations**2, axis=1)).tolist()
+        entry["peak_error"] = (np.max(entry["amplitude"], axis=1) / _AMPLITUDE - finest.max() / _AMPLITUDE).tolist()
+    return {
+        "modes": list(effort.modes), "frequencies_hz": frequencies.tolist(), "undamped": _AMPLITUDE, "laws": curves,
+        "periods": effort.periods, "reference": {"law": REFERENCE, "modes": effort.modes[-1]},
+    }  # fmt: skip
+
+
+def _from(scene: Scene, start: float) -> Scene:
+    return scene.replace({"damper.0.position": start * scene.cavity[0].gap})
+
+
+def _scene(file: Path, modes: int, contact: Mapping[str, Any], mass: float, frequency: float, effort: Effort) -> Scene:
+    damper = {"cavity": "c1", "mass": _BODY * mass, "friction": 0.4}
+    if contact["law"] != "massless":
+        damper["restitution"] = _RESTITUTION
+    data = {
+        "structure": {"model": "rom", "file": str(file), "modes": modes, "natural": True},
+        "excitation": {"frequency": float(frequency), "resonance_amplitude": _AMPLITUDE, "at": "shroud"},
+        "cavity": [{"name": "c1", "gap": _GAP * _AMPLITUDE, "floor": "c1_floor"}],
+        "damper": [damper],
+        "contact": dict(contact),
+        "time": {"periods": effort.periods, "transient": effort.periods // 3},
+    }
+    return validate(Scene, data, "scene")
+
+
+def tell(result: Mapping[str, Any]) -> None:
+    """Print the errors."""
+    bar, cluster = result["bar"], result["cluster"]
+    print("bar on a wall, error of the second apex's time, by modes " + ", ".join(map(str, bar["modes"])))
+    for law, errors in bar["time"].items():
+        print(f"  {law:10} " + "  ".join(f"{error:.1e}" for error in errors))
+    finest = f"{cluster['reference']['law']}, {cluster['reference']['modes']} modes"
+    print(f"cluster, error of the mean amplitude against {finest}, by modes " + ", ".join(map(str, cluster["modes"])))
+    for law, entry in cluster["laws"].items():
+        print(f"  {law:22} " + "  ".join(f"{error:.1e}" for error in entry["error"]))
+    tell_trial(result["auto"])

@@ -1,0 +1,39 @@
+"""The figure of the eigensolvers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from matplotlib import pyplot as plt
+
+from vanedamp.studies.bench.style import _BLUE, _GOLD, _GREEN, _GREY, _RED, _save
+
+
+def modal_figure(result: Mapping[str, Any], path: Path) -> None:
+    """Processor time and peak memory against the degrees of freedom, a line a solver."""
+    from vanedamp.studies.bench.modes.solvers import COUNT, NAMES
+
+    figure, panels = plt.subplots(1, 3, figsize=(14, 4.6), layout="constrained")
+    titles = ("factorisation", f"{COUNT} modes with it", "peak memory")
+    colours = dict(zip(NAMES, (_BLUE, _GREY, _RED, _GOLD, _GREEN), strict=True))
+    sizes = [entry for entry in result["sizes"] if entry["assembly"]["status"] == "ok"]
+    for axes, title, part in zip(panels, titles, ("factorisation", "modes", "peak_bytes"), strict=True):
+        for name, label in NAMES.items():
+            done = [
+                (e["assembly"]["dofs"], e["solvers"][name])
+                for e in sizes
+                if e["solvers"].get(name, {}).get("status") == "ok"
+            ]
+            values = [f[part] / 1e9 if part == "peak_bytes" else f[part]["cpu_s"] for _, f in done]
+            axes.loglog([dofs for dofs, _ in done], values, "o-", color=colours[name], label=label)
+        axes.set_title(title)
+        dofs = [entry["assembly"]["dofs"] for entry in sizes]
+        axes.set_xticks(dofs, [f"{count:,}" for count in dofs])
+        axes.set_xticks([], minor=True)
+        axes.set_xlabel("degrees of freedom")
+        axes.set_ylabel("GB" if part == "peak_bytes" else "processor time, s")
+        axes.grid(True, which="major", color="#e2e8f0")
+    panels[0].legend(fontsize=9)
+    _save(figure, path)

@@ -1,0 +1,62 @@
+"""Fair timing: CPU time of the thread, in turns, in a new random order every round, medians and quartiles."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files.provenance import versions
+
+#: measures once and returns seconds
+Clock = Callable[[], float]
+
+
+def in_turns(clocks: Mapping[str, Clock], rounds: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Seconds (rounds,) of every clock; a first round, which loads what is compiled, does not count."""
+    names = list(clocks)
+    times = {name: np.zeros(rounds) for name in names}
+    for clock in clocks.values():
+        clock()
+    for turn in range(rounds):
+        for index in rng.permutation(len(names)):
+            times[names[index]][turn] = clocks[names[index]]()
+    return times
+
+
+def seconds(task: Callable[..., Any], *arguments: Any) -> float:
+    """CPU time of the thread for a call: what else the machine does counts less than in time by the clock."""
+    started = time.thread_time()
+    task(*arguments)
+    return time.thread_time() - started
+
+
+def spread(values: np.ndarray) -> dict[str, float]:
+    """Median and quartiles of (rounds,) values. Ratios are taken round by round before."""
+    low, median, high = np.quantile(values, (0.25, 0.5, 0.75))
+    return {"median": float(median), "low": float(low), "high": float(high)}
+
+
+def shown(values: Mapping[str, float]) -> str:
+    """Median and quartiles for people."""
+    return f"{values['median']:8.3g}  ({values['low']:.3g} to {values['high']:.3g})"
+
+
+def machine() -> dict[str, Any]:
+    """What the times were taken on."""
+    information = Path("/proc/cpuinfo")
+    text = information.read_text(encoding="utf-8") if information.is_file() else ""
+    models = [line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("model name")]
+    return {
+        "processor": models[0] if models else platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "clock": "CPU time of the thread",
+        "versions": versions(),
+    }

@@ -1,0 +1,1 @@
+"""Cases: from a TOML file to modes, rigid model and reduced model."""

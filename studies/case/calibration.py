@@ -1,0 +1,270 @@
+"""From measurements to a calibrated case: stiffness, damping, rigid model and excitation, one after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from vanedamp.files.provenance import versions
+from vanedamp.files.store import Variable, save
+from vanedamp.files.toml_input import InputError, nearest
+from vanedamp.modal.frf import Frf, FrfError, Poles, identify
+from vanedamp.modal.model_updating import Tuning, tune
+from vanedamp.modal.rigid_model import RigidModel, rigid_model
+from vanedamp.modal.stress import HotSpot
+from vanedamp.modal.test_data import read_frf, read_shapes
+from vanedamp.studies.case.calibration_tables import CalibrationTable, TuneTable
+from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, modal_analysis
+from vanedamp.studies.case.tables import Case, MaterialTable
+
+# a pole farther from the computed mode than this share of its frequency belongs to another one
+_NEAR = 0.1
+# from these on, relative, a warning: distance of the pole from the computed mode, error of the fit
+_OFF, _MISSED = 0.02, 0.1
+# around the computed mode, relative: where a larger peak outside the band may be its own
+_AROUND = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A case brought to its measurements.
+
+    analysis  modes of the calibrated case
+    rigid     the first bending at the response coordinate, with the calibrated damping ratio
+    tuning    None where nothing was tuned
+    poles     of the measured response; None where the damping ratio is the case's; `pole` is the one used
+    warnings  what to look at: those of the analysis, and a response that does not look like the first bending's
+    """
+
+    case: Case
+    analysis: ModalAnalysis
+    rigid: RigidModel
+    tuning: Tuning | None
+    poles: Poles | None
+    pole: int | None
+    warnings: tuple[str, ...]
+    wall_time_s: float
+
+    @property
+    def force(self) -> float | None:
+        """N, at resonance gives the fatigue amplitude; None without a fatigue strength."""
+        amplitude = self.analysis.amplitude
+        return None if amplitude is None else self.rigid.resonance_force(amplitude)
+
+    def to_json(self) -> dict[str, Any]:
+        """The result as plain data."""
+        return {
+            "status": "ok",
+            "first_bending": self.analysis.first_bending,
+            "frequency_hz": self.analysis.modes.frequencies_hz.tolist(),
+            "rigid": asdict(self.rigid),
+            "damping": self._damping(),
+            "excitation": self._excitation(),
+            "tuning": None if self.tuning is None else _told(self.tuning, self.case),
+            "warnings": list(self.warnings),
+            "wall_time_s": self.wall_time_s,
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write an HDF5 record: the numbers as attributes, what the tuning did as arrays."""
+        result = self.to_json()
+        frequencies = self.analysis.modes.frequencies_hz
+        variables = {"frequency": Variable(frequencies, ("mode",), "Hz")}
+        if self.tuning is not None:
+            tuning = self.tuning
+            variables |= {
+                "part": Variable(np.array(tuning.names, dtype=object), ("part",)),
+                "factor": Variable(tuning.factors, ("part",)),
+                "factor_deviation": Variable(tuning.deviations, ("part",)),
+                "target_frequency": Variable(tuning.target_hz, ("target",), "Hz"),
+                "frequency_before": Variable(tuning.before_hz, ("target",), "Hz"),
+                "frequency_after": Variable(tuning.after_hz, ("target",), "Hz"),
+                "mac_before": Variable(tuning.mac_before, ("target",)),
+                "mac_after": Variable(tuning.mac_after, ("target",)),
+                "sensitivity": Variable(tuning.sensitivities, ("target", "part")),
+            }
+        attributes = {name: result[name] for name in ("first_bending", "rigid", "damping", "excitation")}
+        attributes = {name: value for name, value in attributes.items() if value is not None}
+        attributes |= {"versions": versions(), "provenance": dict(self.analysis.structure.matrices.provenance)}
+        save(path, "calibration", variables, attributes)
+
+    def _damping(self) -> dict[str, Any]:
+        told: dict[str, Any] = {"ratio": self.rigid.damping_ratio, "source": "case"}
+        if self.poles is not None and self.pole is not None:
+            told |= {
+                "source": "frf",
+                "deviation": float(self.poles.deviations[self.pole, 1]),
+                "frequency_hz": float(self.poles.frequencies_hz[self.pole]),
+                "misfit": self.poles.misfit,
+            }
+        return told
+
+    def _excitation(self) -> dict[str, Any] | None:
+        spot, amplitude = self.analysis.hot_spot, self.analysis.amplitude
+        if spot is None or amplitude is None:
+            return None
+        return {
+            "share": self.analysis.share,
+            "amplitude": amplitude,
+            "force": self.force,
+            "hot_spot": _spot(spot, self.analysis.share, amplitude),
+        }
+
+
+def calibrate(case: Case) -> Calibration:
+    """Tune the stiffness if frequencies are given, take the damping from a response if one is given, then calibrate.
+
+    Raises InputError for a case without an interface or a first bending, and the errors of the modal package for what
+    cannot be met.
+    """
+    started = time.perf_counter()
+    if case.response_label is None:
+        raise InputError("interface: missing; a rigid model needs one [interface.<label>] table to be seen at")
+    table = case.calibration or CalibrationTable()
+    structure, tuning = assemble(case), None
+    if table.tune is not None:
+        tuning = _tuned(structure, table.tune)
+        structure = assemble(tuned_case(case, dict(zip(tuning.names, tuning.factors.tolist(), strict=True)), structure))
+    analysis = modal_analysis(structure)
+    if analysis.first_bending is None or analysis.functional is None:
+        raise InputError("; ".join(analysis.warnings))
+    poles, pole, ratio, warnings = None, None, case.damping_ratio, analysis.warnings
+    frequency = float(analysis.modes.frequencies_hz[analysis.first_bending])
+    if table.damping is not None:
+        frf = read_frf(table.damping.frf, table.damping.quantity, table.damping.columns)
+        band = table.damping.band or (0.95 * frequency, 1.05 * frequency)
+        poles = _poles(frf, band, table.damping.modes, frequency)
+        pole = poles.nearest(frequency)
+        ratio = float(poles.damping_ratios[pole])
+        found = float(poles.frequencies_hz[pole])
+        _check_near(found, frequency)
+        warnings += tuple(f"calibration.damping: {told}" for told in _doubts(frf, band, poles.misfit, found, frequency))
+    rigid = rigid_model(analysis.modes, analysis.first_bending, analysis.functional, case.response_label, ratio)
+    return Calibration(structure.case, analysis, rigid, tuning, poles, pole, warnings, time.perf_counter() - started)
+
+
+def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> Case:
+    """The case with Young's moduli and support stiffnesses times their factors."""
+    material: dict[str, MaterialTable] = dict(case.material)
+    elastic = dict(case.support.elastic)
+    known = parts_by_name(case, structure.solid.domain.volumes)
+    for name, factor in factors.items():
+        for part in known[name]:
+            kind, group = part.split(".", 1)
+            if kind == "support":
+                springs = elastic[group]
+                x, y, z = (factor * value for value in springs.stiffness)
+                elastic[group] = replace(
+                    springs,
+                    stiffness=(x, y, z),
+                    normal=factor * springs.normal,
+                    tangential=factor * springs.tangential,
+                )
+            else:
+                own = material.get(group, case.material.get("default"))
+                assert own is not None
+                material[group] = replace(own, young=factor * own.young)
+    return replace(case, material=material, support=replace(case.support, elastic=elastic))
+
+
+def _tuned(structure: Structure, table: TuneTable) -> Tuning:
+    known = parts_by_name(structure.case, structure.solid.domain.volumes)
+    check_vary(table, known)
+    parts = structure.solid.stiffness_parts()
+    varied = {name: sparse.csr_array(sum(parts[part] for part in known[name])) for name in table.vary}
+    measured = None if table.shapes is None else read_shapes(table.shapes)
+    return tune(structure.matrices, varied, table.frequencies, measured, table.modes, starts=table.starts)
+
+
+def _poles(frf: Frf, band: tuple[float, float], count: int, frequency: float) -> Poles:
+    """The modes of the band. A refusal tells where the response's peak lies beside the computed mode."""
+    try:
+        return identify(frf.band(*band), count)
+    except FrfError as error:
+        peak = frf.peak_hz()
+        raise InputError(
+            f"calibration.damping: {error} (the response is largest at {peak:.6g} Hz, the first bending lies at "
+            f"{frequency:.6g} Hz)"
+        ) from error
+
+
+def _doubts(frf: Frf, band: tuple[float, float], misfit: float, found: float, computed: float) -> Iterator[str]:
+    """What is odd about the mode that was found in a band of a response."""
+    if abs(found / computed - 1.0) > _OFF:
+        yield (
+            f"the response's mode lies at {found:.6g} Hz, {found / computed - 1.0:+.1%} off the computed first bending "
+            f"({computed:.6g} Hz); tune the stiffness to measured frequencies"
+        )
+    if misfit > _MISSED:
+        yield (
+            f"the fit misses the response by {misfit:.0%} of it; check quantity and columns, narrow the band, or ask "
+            "for more modes"
+        )
+    peak = frf.peak_hz((1.0 - _AROUND) * computed, (1.0 + _AROUND) * computed)
+    if not band[0] <= peak <= band[1]:
+        yield (
+            f"the response is larger at {peak:.6g} Hz, outside the band {band[0]:.6g} to {band[1]:.6g} Hz; check that "
+            "the band holds the first bending"
+        )
+
+
+def _check_near(found: float, computed: float) -> None:
+    if abs(found / computed - 1.0) > _NEAR:
+        raise InputError(
+            f"calibration.damping: the nearest pole of the response lies at {found:.6g} Hz, the first bending at "
+            f"{computed:.6g} Hz; check the band, or tune the frequencies first"
+        )
+
+
+def _spot(spot: HotSpot, share: float, amplitude: float) -> dict[str, Any]:
+    return {
+        "stress_per_amplitude": share * spot.strength / amplitude,
+        "strength": spot.strength,
+        "coordinates": list(spot.coordinates),
+        "group": spot.group,
+    }
+
+
+def _told(tuning: Tuning, case: Case) -> dict[str, Any]:
+    return {
+        "factor": dict(zip(tuning.names, tuning.factors.tolist(), strict=True)),
+        "deviation": dict(zip(tuning.names, tuning.deviations.tolist(), strict=True)),
+        "young": {name: table.young for name, table in case.material.items()},
+        "support": {name: asdict(table) for name, table in case.support.elastic.items()},
+        "target_hz": tuning.target_hz.tolist(),
+        "before_hz": tuning.before_hz.tolist(),
+        "after_hz": tuning.after_hz.tolist(),
+        "mode_before": tuning.modes_before.tolist(),
+        "mode_after": tuning.modes_after.tolist(),
+        "mac_before": tuning.mac_before.tolist(),
+        "mac_after": tuning.mac_after.tolist(),
+        "sensitivity": tuning.sensitivities.tolist(),
+        "evaluations": tuning.evaluations,
+    }
+
+
+def parts_by_name(case: Case, volumes: Iterable[str]) -> dict[str, list[str]]:
+    """Every name that `vary` may hold, with the parts of Solid.stiffness_parts that it stands for."""
+    groups = list(volumes)
+    names = {f"material.{group}": [f"material.{group}"] for group in groups}
+    rest = [f"material.{group}" for group in groups if group not in case.material]
+    if "default" in case.material and rest:
+        names["material.default"] = rest
+    return names | {f"support.{group}": [f"support.{group}"] for group in case.support.elastic}
+
+
+def check_vary(table: TuneTable, known: dict[str, list[str]]) -> None:
+    """Raise InputError for a name in `vary` that is no part, or parts that overlap."""
+    seen: set[str] = set()
+    for name in table.vary:
+        if name not in known:
+            raise InputError(f"calibration.tune.vary: no part '{name}'; {nearest(name, list(known))}")
+        if seen & set(known[name]):
+            raise InputError(f"calibration.tune.vary: '{name}' holds a part that another name holds, too; name it once")
+        seen |= set(known[name])

@@ -1,0 +1,132 @@
+"""Import of another code's reduced model: a TOML file that says where its matrices are and what they mean."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, field
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+from scipy import linalg
+
+from vanedamp.files.provenance import versions
+from vanedamp.files.toml_input import STRICT, Direction, InputError, Real, Whole, nearest, read_toml, validate
+from vanedamp.modal.units import model_doubts
+from vanedamp.rom.external import Findings, external_model, read_matrices
+from vanedamp.rom.reduced import ReducedModel
+
+Name = Annotated[str, Field(min_length=1)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class MatricesTable:
+    """Where the matrices are: names in one `file` (npz, OP4), or files of their own (Matrix Market, npy,
+    scipy's save_npz).
+
+    damping is a matrix too; or else damping_ratio is that of every mode. base_load: (n, 3) T^T M r. mass_scale: kg a
+    unit of mass, with seconds: 1e3 for matrices in t, N and mm. It multiplies the stiffness and the damping, too.
+    """
+
+    mass: Name
+    stiffness: Name
+    file: Name | None = None
+    damping: Name | None = None
+    damping_ratio: Annotated[Real, Field(ge=0, lt=1)] | None = None
+    base_load: Name | None = None
+    mass_scale: Annotated[Real, Field(gt=0)] = 1.0
+
+    def __post_init__(self) -> None:
+        if (self.damping is None) == (self.damping_ratio is None):
+            raise ValueError("give one of damping (a matrix) and damping_ratio")
+
+
+@dataclass(frozen=True, config=STRICT)
+class CoordinateTable:
+    """An interface coordinate: the index of a coordinate, from 0, or a row over all of them; and its direction."""
+
+    coordinate: Annotated[Whole, Field(ge=0)] | None = None
+    row: tuple[Real, ...] | None = None
+    direction: Direction | None = None
+
+    def __post_init__(self) -> None:
+        if (self.coordinate is None) == (self.row is None):
+            raise ValueError("give one of coordinate and row")
+
+
+@dataclass(frozen=True, config=STRICT)
+class External:
+    """A reduced model of another code."""
+
+    matrices: MatricesTable
+    interface: Annotated[dict[str, CoordinateTable], Field(min_length=1)]
+    name: str = field(default="")
+
+    @classmethod
+    def load(cls, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
+        """The checked model that a file describes, with warnings. Raises what `read` and `model` raise."""
+        return cls.read(path).model(path)
+
+    @classmethod
+    def read(cls, path: str | Path) -> External:
+        """The tables of a TOML file. Raises InputError."""
+        return validate(cls, read_toml(path), str(path))
+
+    def files(self, path: str | Path) -> list[Path]:
+        """The files that the tables of the file `path` may name, relative to it."""
+        return [Path(path).parent / name for name in asdict(self.matrices).values() if isinstance(name, str)]
+
+    def model(self, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
+        """The checked model from the tables of the file `path`, with warnings; the files they name are relative to it.
+
+        Raises InputError, rom.external.ExternalError and rom.reduced.ReducedModelError.
+        """
+        table = self.matrices
+        folder = Path(path).parent
+        found = {} if table.file is None else read_matrices(folder / table.file)
+        names = {key: getattr(table, key) for key in ("mass", "stiffness", "damping", "base_load")}
+        matrices = {
+            key: table.mass_scale * _matrix(f"matrices.{key}", name, found, folder)
+            for key, name in names.items()
+            if name
+        }
+        damping, base_load = matrices.pop("damping", None), matrices.pop("base_load", None)
+        interface: dict[str, int | np.ndarray] = {
+            label: int(item.coordinate or 0) if item.row is None else np.array(item.row)
+            for label, item in self.interface.items()
+        }
+        directions = {label: item.direction for label, item in self.interface.items() if item.direction}
+        model, findings = external_model(
+            matrices["mass"], matrices["stiffness"], interface, damping=damping, damping_ratio=table.damping_ratio,
+            directions=directions, base_load=base_load,
+            provenance={"source": str(self.name or Path(path).name), "matrices": names, "versions": versions()},
+        )  # fmt: skip
+        return model, findings, _doubts(model)
+
+
+def _doubts(model: ReducedModel) -> tuple[str, ...]:
+    """A warning when mass or frequency of the first straining mode hint at wrong units."""
+    first = model.rigid_modes
+    if first == model.size:
+        return ()
+    eigenvalue, shape = linalg.eigh(model.stiffness, model.mass, subset_by_index=[first, first])
+    most = float(np.max((model.selection @ shape) ** 2))
+    frequency = float(np.sqrt(eigenvalue[0])) / (2.0 * np.pi)
+    return tuple(f"units: {told}" for told in model_doubts(1.0 / most if most else np.inf, frequency))
+
+
+def _matrix(key: str, name: str, found: dict[str, np.ndarray], folder: Path) -> np.ndarray:
+    if name.lower() in found:
+        return found[name.lower()]
+    if "" in found:
+        raise InputError("matrices.file: holds one matrix without a name; name the file as mass or stiffness instead")
+    if found and not Path(name).suffix:
+        raise InputError(f"{key}: no matrix {name!r} in the file; {nearest(name.lower(), list(found))}")
+    alone = {} if Path(name).suffix == "" else read_matrices(folder / name)
+    if "" not in alone:
+        raise InputError(
+            f"{key}: {name!r} is the name of a matrix, or of a file of several: name the file in matrices.file and the "
+            "matrix here; or here a file of one matrix (.mtx, .npy, scipy's save_npz)"
+        )
+    return alone[""]

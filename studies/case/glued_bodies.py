@@ -1,0 +1,121 @@
+"""Bodies glued into their cavities: meshed as a part of the cluster, against masses added to a reduced model.
+
+The second is what scenes assume of a body that sticks. It knows the tangential motion of the floor alone; the meshed
+body also moves radially and turns, and stiffens the shroud that it is glued to. The record tells one from the other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import linalg
+
+from vanedamp.files.toml_input import InputError
+from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.participation import first_bending
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.case.stages import assemble, reduction
+from vanedamp.studies.case.tables import Case, InterfaceTable, MaterialTable, VaneClusterMesh
+
+SOFTENED = 1e-2
+WEIGHTLESS = 1e-6
+_GROUP = "damper"
+
+
+@dataclass(frozen=True)
+class TiedComparison:
+    """First bending frequencies, Hz, of one cluster.
+
+    mass            kg, of all bodies
+    free_hz         without bodies
+    added_mass_hz   without bodies, their mass added to the reduced model's cavity floors, along the tangent
+    tied_hz         with meshed bodies
+    soft_hz         ... of a hundredth of their modulus: their mass counts, their stiffness hardly
+    weightless_hz   ... of a millionth of their density: their stiffness alone
+    """
+
+    mass: float
+    free_hz: float
+    added_mass_hz: float
+    tied_hz: float
+    soft_hz: float
+    weightless_hz: float
+
+    @property
+    def difference(self) -> float:
+        """Of the meshed bodies from the added masses, relative."""
+        return self.tied_hz / self.added_mass_hz - 1.0
+
+    @property
+    def stiffening(self) -> float:
+        """Rise of the frequency by the bodies' stiffness alone, relative."""
+        return self.weightless_hz / self.free_hz - 1.0
+
+
+def compare_tied(case: Case, modes: int = 12) -> TiedComparison:
+    """Compare the two models of glued bodies for a case whose generated cluster has them (`damper_width` and so on).
+
+    modes  fixed-interface modes of the reduced model. Raises InputError for a case without such bodies.
+    """
+    mesh = case.mesh
+    if not isinstance(mesh, VaneClusterMesh) or not mesh.parameters.damper_volume:
+        raise InputError(
+            "mesh.damper_width: the comparison needs the generator vane_cluster with width, height and depth of a body"
+        )
+    material = case.material.get(_GROUP) or case.material.get("default")
+    if material is None:
+        raise InputError(f"material.{_GROUP}: missing; the bodies need a material")
+    mass = material.density * mesh.parameters.damper_volume
+    floors = _floors(mesh)
+    reduced = reduction(assemble(_without_bodies(case, mesh, floors)), modes)
+    return TiedComparison(
+        mass=mass,
+        free_hz=float(reduced.natural_frequencies_hz[0]),
+        added_mass_hz=loaded_frequency(reduced, dict.fromkeys(floors, mass / len(floors))),
+        tied_hz=_first_bending_hz(case),
+        soft_hz=_first_bending_hz(_with_bodies_of(case, replace(material, young=SOFTENED * material.young))),
+        weightless_hz=_first_bending_hz(
+            _with_bodies_of(case, replace(material, density=WEIGHTLESS * material.density))
+        ),
+    )
+
+
+def loaded_frequency(model: ReducedModel, masses: Mapping[str, float]) -> float:
+    """Lowest frequency, Hz, of a reduced model with masses (kg) stuck to interface coordinates."""
+    mass = np.array(model.mass)
+    for label, value in masses.items():
+        mass += value * np.outer(model.row(label), model.row(label))
+    lowest = linalg.eigh(model.stiffness, mass, eigvals_only=True, subset_by_index=(0, 0))[0]
+    return float(math.sqrt(max(lowest, 0.0)) / (2.0 * math.pi))
+
+
+def _first_bending_hz(case: Case) -> float:
+    matrices = assemble(case).matrices
+    modes = solve_modes(matrices, case.modes.count or 3)
+    return float(modes.frequencies_hz[first_bending(modes, matrices, case.modes.direction)])
+
+
+def _with_bodies_of(case: Case, material: MaterialTable) -> Case:
+    return replace(case, material=dict(case.material) | {_GROUP: material})
+
+
+def _without_bodies(case: Case, mesh: VaneClusterMesh, floors: dict[str, InterfaceTable]) -> Case:
+    """The case with empty cavities, its interface the tangential motion of their floors."""
+    bare = replace(mesh.parameters, damper_width=0.0, damper_height=0.0, damper_depth=0.0)
+    materials = {group: table for group, table in case.material.items() if group != _GROUP}
+    return replace(
+        case,
+        mesh=replace(mesh, parameters=bare),
+        material=materials,
+        interface=floors,
+        modes=replace(case.modes, at=None),
+    )
+
+
+def _floors(mesh: VaneClusterMesh) -> dict[str, InterfaceTable]:
+    angles = enumerate(mesh.parameters.cavity_angles(), start=1)
+    tangents = {number: (0.0, math.cos(angle), -math.sin(angle)) for number, angle in angles}
+    return {f"c{number}_floor": InterfaceTable(f"c{number}_floor", tangent) for number, tangent in tangents.items()}

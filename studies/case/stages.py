@@ -1,0 +1,337 @@
+"""The stages from a case file to modes, rigid model and reduced model."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import linalg
+
+from vanedamp.files.provenance import versions
+from vanedamp.files.store import Variable
+from vanedamp.files.toml_input import InputError
+from vanedamp.modal.correlation import mode_like
+from vanedamp.modal.eigen import Modes, factorize, solve_modes
+from vanedamp.modal.elasticity import Solid
+from vanedamp.modal.matrices import SystemMatrices, unit_direction
+from vanedamp.modal.mesh_import import convert
+from vanedamp.modal.multiple import rivals, turned
+from vanedamp.modal.participation import ParticipationError, effective_masses, first_bending
+from vanedamp.modal.rigid_model import RigidModel, fatigue_amplitude, rigid_model
+from vanedamp.modal.stress import HotSpot, hot_spot
+from vanedamp.modal.test_data import read_shapes
+from vanedamp.modal.units import doubts
+from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
+from vanedamp.rom.error_estimate import LadderError, choose, grid, rigid_errors
+from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, normal_direction
+from vanedamp.rom.recovery import with_stresses
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.case.calibration_tables import CalibrationTable
+from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
+
+# a mode so near the first bending, relative, that moves its point with such a share of its compliance, is told
+_NEAR, _NOTABLE = 0.02, 0.01
+# modes at which the search for enough of them starts and gives up
+_START, _MOST = 16, 64
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """A case with its finite elements: the solid on its mesh, and the matrices."""
+
+    case: Case
+    solid: Solid
+    matrices: SystemMatrices
+
+
+def assemble(case: Case) -> Structure:
+    """Mesh, groups, matrices. Raises the errors of the modal package, and InputError for unknown groups."""
+    label = case.response_label  # an open choice is refused before the work
+    with _mesh(case) as path:
+        scale = case.mesh.scale if isinstance(case.mesh, MeshFile) else 1.0
+        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports, scale)
+        domain = solid.domain
+        case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
+        matrices = solid.assemble(case.support.clamped, case.damping_ratio)
+    if label is not None:
+        _functional(case, matrices, label)
+    return Structure(case, solid, matrices)
+
+
+@contextlib.contextmanager
+def _mesh(case: Case) -> Iterator[Path]:
+    """The mesh file, or one that the generator or the import writes for the moment."""
+    mesh = case.mesh
+    if isinstance(mesh, MeshFile) and not mesh.foreign:
+        yield Path(mesh.file)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        if isinstance(mesh, MeshFile):
+            target = Path(folder) / f"{Path(mesh.file).stem}.msh"
+            yield convert(mesh.file, target, set(case.material) - {"default"}, case.facet_groups)
+        else:
+            yield mesh.build(Path(folder) / f"{mesh.generator}.msh")
+
+
+def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
+    return interface(case, matrices, [label]).vectors[:, 0]
+
+
+def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
+    """The case's interface coordinates on its matrices, all of them or those named."""
+    tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
+    coordinates = [
+        InterfaceCoordinate(label, table.facets, _direction(label, table, matrices), table.kind, table.motion)
+        for label, table in tables.items()
+    ]
+    return Interface.on_patches(matrices, coordinates)
+
+
+def _direction(label: str, table: InterfaceTable, matrices: SystemMatrices) -> tuple[float, float, float]:
+    if table.direction != "normal":
+        return table.direction
+    try:
+        return normal_direction(matrices, table.facets)
+    except InterfaceError as error:
+        raise InputError(f"interface.{label}.direction: {error}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class ModalAnalysis:
+    """Modes and what they mean.
+
+    effective_mass  (m, 3) kg along x, y, z; movable_mass (3,) kg is what they would sum to over all modes
+    first_bending   index of the mode that carries most mass along `direction`, or is most like the case's shape; None
+                    when a free structure, or a range of frequencies, has no such mode
+    rigid           that mode as one mass on a spring, at its interface coordinate; None without either
+    functional      (N,) that coordinate; None without
+    amplitude       m, displacement there at which the mode's stress reaches a share of the fatigue strength; None
+                    without one
+    hot_spot        where it does; None without
+    share           of the fatigue strength
+    warnings        what to look at: frequencies that hint at wrong units, and why there is no first bending
+    """
+
+    structure: Structure
+    modes: Modes
+    effective_mass: np.ndarray
+    first_bending: int | None
+    rigid: RigidModel | None
+    functional: np.ndarray | None
+    amplitude: float | None
+    hot_spot: HotSpot | None
+    share: float
+    warnings: tuple[str, ...]
+    wall_time_s: float
+
+    def to_json(self) -> dict[str, Any]:
+        """The result as plain data."""
+        data: dict[str, Any] = {
+            "frequency_hz": self.modes.frequencies_hz.tolist(),
+            "effective_mass": self.effective_mass.tolist(),
+            "movable_mass": self.structure.matrices.movable_mass.tolist(),
+            "residual": self.modes.residuals.tolist(),
+            "first_bending": self.first_bending,
+            "rigid": None if self.rigid is None else asdict(self.rigid),
+            "warnings": list(self.warnings),
+            "wall_time_s": self.wall_time_s,
+        }
+        if self.amplitude is not None:
+            assert self.hot_spot is not None
+            data["fatigue"] = {
+                "strength": self.hot_spot.strength,
+                "share": self.share,
+                "amplitude": self.amplitude,
+                "coordinates": list(self.hot_spot.coordinates),
+                "group": self.hot_spot.group,
+            }
+        return data
+
+    def mesh(self) -> tuple[dict[str, Variable], int]:
+        """The nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
+        cells, types, points = self.structure.solid.vtk_mesh()
+        corners = cells.reshape(len(types), -1)[:, 1:]
+        variables = {
+            "coordinates": Variable(points, ("node", "axis"), "m"),
+            "cell": Variable(corners, ("cells", "corner")),
+        }
+        return variables, int(types[0])
+
+    def save(self, path: str | Path) -> None:
+        """Write the modes with their masses, the mesh (for pictures) and the rigid model."""
+        mesh, cell_type = self.mesh()
+        variables = {
+            "axis": Variable(np.array(["x", "y", "z"], dtype=object), ("axis",)),
+            "effective_mass": Variable(self.effective_mass, ("mode", "axis"), "kg"),
+            "movable_mass": Variable(self.structure.matrices.movable_mass, ("axis",), "kg"),
+            **mesh,
+        }
+        result = self.to_json()
+        attributes = {
+            name: result[name] for name in ("first_bending", "rigid", "fatigue") if result.get(name) is not None
+        }
+        attributes |= {"vtk_cell_type": cell_type, "versions": versions()}
+        self.modes.save(path, variables, attributes)
+
+
+def modal_analysis(structure: Structure) -> ModalAnalysis:
+    """Modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
+    started = time.perf_counter()
+    case, matrices = structure.case, structure.matrices
+    label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
+    if label is not None:
+        functional = _functional(case, matrices, label)
+    modes = _modes(case, matrices, functional)
+    bending, warnings = _first_bending(case, modes, matrices)
+    straining = modes.frequencies_hz[modes.frequencies_hz > 0.0]
+    lowest = float(straining[0]) if straining.size and not case.modes.min_frequency else None
+    warnings += unit_doubts(structure, lowest)
+    table = case.calibration or CalibrationTable()
+    if label is not None and functional is not None and bending is not None:
+        warnings += _rivals(modes, bending, functional, label)
+        rigid = rigid_model(modes, bending, functional, label, case.damping_ratio)
+        strengths = case.strengths(structure.solid.domain.volumes)
+        if strengths:
+            spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
+            amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
+    return ModalAnalysis(
+        structure, modes, effective_masses(modes, matrices), bending, rigid, functional, amplitude, spot, table.share,
+        warnings, time.perf_counter() - started,
+    )  # fmt: skip
+
+
+def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) -> Modes:
+    """The case's modes, multiple ones turned to the response coordinate, or else to the direction of the bending."""
+    table, size = case.modes, matrices.free.size
+    count = table.count or 10
+    # one more, so that the last of them is not half of a pair
+    more = count + 1 if count < size else count
+    modes = solve_modes(matrices, more, table.max_frequency, table.min_frequency)
+    inertia = matrices.mass @ (matrices.movable_translations() @ unit_direction(table.direction))
+    guides = [inertia] if functional is None else [functional, inertia]
+    modes = turned(modes, matrices, guides, table.pair_tolerance)
+    return modes if table.max_frequency is not None else modes.first(count)
+
+
+def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> tuple[str, ...]:
+    """A warning when another mode moves the response coordinate at nearly the same frequency."""
+    near = rivals(modes, bending, functional, _NEAR, _NOTABLE)
+    if not near.size:
+        return ()
+    listed = ", ".join(f"{modes.frequencies_hz[index]:.6g}" for index in near)
+    return (
+        f"modes: beside the first bending ({modes.frequencies_hz[bending]:.6g} Hz), {listed} Hz moves {label!r}, too: "
+        "one mode is no model there. Take a reduced one; or, if the mesh alone splits a pair of equal frequencies, "
+        "refine it or raise [modes] pair_tolerance",
+    )
+
+
+def bending_mode(case: Case, modes: Modes, matrices: SystemMatrices) -> int:
+    """Index of the first bending: most like the case's shape, or else with most effective mass along its direction."""
+    if case.modes.shape is not None:
+        return mode_like(modes, matrices, read_shapes(case.modes.shape))
+    return first_bending(modes, matrices, case.modes.direction)
+
+
+def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[int | None, tuple[str, ...]]:
+    """The first bending among the modes that strain the structure, or None and why there is none.
+
+    Raises ParticipationError for a held structure whose lowest modes lack it.
+    """
+    elastic = np.flatnonzero(modes.frequencies_hz > 0.0)
+    rigid = len(modes) - elastic.size
+    why = f"{rigid} rigid modes carry the mass"
+    if elastic.size:
+        chosen = Modes(modes.frequencies_hz[elastic], modes.shapes[elastic], modes.residuals[elastic])
+        try:
+            return int(elastic[bending_mode(case, chosen, matrices)]), ()
+        except ParticipationError as error:
+            if not rigid and not case.modes.min_frequency:
+                raise
+            why = why if rigid else str(error)
+    return None, (f"modes: no first bending and no rigid model: {why}",)
+
+
+def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[str, ...]:
+    """A warning when sizes, masses, sound speeds or the first straining frequency hint at wrong units."""
+    matrices = structure.matrices
+    materials = {name: (table.young, table.density) for name, table in structure.case.material.items()}
+    found = doubts(materials, float(np.ptp(matrices.coordinates, axis=0).max()), matrices.total_mass, first_hz)
+    return tuple(f"units: {told}" for told in found)
+
+
+def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:
+    """The model with the stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
+
+    A hot spot is where a natural mode of the model has its largest von Mises stress, or the largest one away from the
+    spots before it; the first `modes` modes have `spots` each. Needs a model with its recovery.
+    """
+    assert model.recovery is not None
+    solid = structure.solid
+    places = solid.stress_points()
+    apart = 0.02 * np.ptp(places, axis=0).max()
+    shapes = linalg.eigh(model.stiffness, model.mass)[1][:, :modes]
+    found: list[int] = []
+    for shape in shapes.T:
+        stress = np.array(solid.von_mises(model.recovery @ shape))
+        for place in found:
+            stress[np.linalg.norm(places - places[place], axis=1) < apart] = 0.0
+        for _ in range(spots):
+            if not stress.any():
+                raise InputError(f"hot spots: {len(found)} are all that lie 2 % of the structure's size apart")
+            found.append(int(np.argmax(stress)))
+            stress[np.linalg.norm(places - places[found[-1]], axis=1) < apart] = 0.0
+    values = np.array([solid.stress_components(column, np.array(found)) for column in model.recovery.T])
+    residual = None
+    if model.residual_recovery is not None:
+        static = np.array([solid.stress_components(column, np.array(found)) for column in model.residual_recovery.T])
+        residual = {f"hot{index + 1}": static[:, :, index].T for index in range(len(found))}
+    stresses = {f"hot{index + 1}": values[:, :, index].T for index in range(len(found))}
+    spots_at = {f"hot{index + 1}": places[place].tolist() for index, place in enumerate(found)}
+    model = replace(model, provenance=dict(model.provenance) | {"hot_spots": spots_at})
+    return with_stresses(model, stresses, residual)
+
+
+def reduction(
+    structure: Structure,
+    modes: int | None,
+    basis: str = "craig-bampton",
+    tolerance: float = 0.01,
+    max_frequency: float | None = None,
+    keep_recovery: bool = False,
+) -> ReducedModel:
+    """The case's structure at its interface, with so many modes or (None) as many as a tolerance needs.
+
+    The estimate of its error is in the model's provenance. It covers receptances of the whole interface up to
+    max_frequency, by default 1.5 times the first natural frequency. Craig-Bampton models have a block of quasi-static
+    modes. Raises LadderError when no model of up to _MOST modes meets the tolerance.
+    """
+    coordinates = interface(structure.case, structure.matrices)
+    at = structure.case.response_label or coordinates.labels[0]
+    most = min(_MOST, structure.matrices.free.size // 4)
+    asked = min(_START, most) if modes is None else modes
+    while True:
+        rich = rich_model(structure.matrices, coordinates, basis, asked, factorize, keep_recovery=keep_recovery)
+        frequencies = _of_interest(rich, max_frequency)
+        rigid = float(rigid_errors(rich, frequencies, at).max())
+        ladder = basis_ladder(rich, basis, frequencies)
+        choice = choose(ladder if modes is None else ladder[-1:], tolerance, rigid)
+        if modes is not None or choice.met:
+            break
+        if asked == most:
+            raise LadderError(f"tolerance: {choice.sentence}; raise it, or lower the highest frequency")
+        asked = min(2 * asked, most)
+    estimate = choice.to_json() | {"frequencies_hz": [float(frequencies[0]), float(frequencies[-1])]}
+    model = basis_model(rich, basis, choice.chosen.modes)
+    return replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
+
+
+def _of_interest(model: ReducedModel, max_frequency: float | None) -> np.ndarray:
+    top = max_frequency or 1.5 * float(model.natural_frequencies_hz[model.rigid_modes])
+    return grid(model, 0.05 * top if model.rigid_modes else 0.0, top)

@@ -1,0 +1,384 @@
+"""The case file: mesh, materials, supports, modes and interface of a structure (SI units), as frozen records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic.dataclasses import dataclass
+
+from vanedamp.files.toml_input import (
+    STRICT,
+    Direction,
+    InputError,
+    NonNegative,
+    Positive,
+    Real,
+    Whole,
+    nearest,
+    read_toml,
+    validate,
+)
+from vanedamp.meshes import benchmarks, vane_cluster
+from vanedamp.meshes.benchmarks import Block
+from vanedamp.meshes.parameters import VaneCluster
+from vanedamp.modal.units import absurdity
+from vanedamp.studies.case.calibration_tables import CalibrationTable
+
+if TYPE_CHECKING:
+    from vanedamp.modal.elasticity import ElasticSupport, Material
+
+#: the case of `vanedamp demo`, whose mesh is the shipped one
+DEMO_CASE = Path(__file__).with_name("demo_case.toml")
+
+Ratio = Annotated[Real, Field(ge=0, lt=1)]
+Degree = Annotated[Whole, Field(ge=1, le=3)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class MeshFile:
+    """A mesh, and the polynomial degree of the displacements on it.
+
+    A gmsh file (.msh) or one of another program (.inp, .bdf ...); `scale` metres are its unit of length.
+    """
+
+    file: str
+    degree: Degree = 2
+    scale: Positive = 1.0
+
+    @property
+    def foreign(self) -> bool:
+        """Whether another program than gmsh wrote it."""
+        return not self.file.lower().endswith(".msh")
+
+
+@dataclass(frozen=True, config=STRICT)
+class VaneClusterMesh:
+    """The parametric vane cluster; in the file its parameters are keys of [mesh]."""
+
+    generator: Literal["vane_cluster"]
+    parameters: VaneCluster
+    degree: Degree = 2
+
+    def build(self, path: str | Path) -> Path:
+        """Write the mesh. Raises what meshes.vane_cluster.build raises."""
+        return vane_cluster.build(self.parameters, path)
+
+
+@dataclass(frozen=True, config=STRICT)
+class BlockMesh:
+    """A block for verification; in the file its parameters are keys of [mesh]."""
+
+    generator: Literal["block"]
+    parameters: Block
+    degree: Degree = 2
+
+    def build(self, path: str | Path) -> Path:
+        """Write the mesh. Raises what meshes.benchmarks.build raises."""
+        return benchmarks.build(self.parameters, path)
+
+
+#: keys that name a file of measurements
+_FILES = (("modes", "shape"), ("calibration", "damping", "frf"), ("calibration", "tune", "shapes"))
+
+#: the records of the generators' parameters
+GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
+
+
+def _kind(table: Any) -> str:
+    generator = table.get("generator") if isinstance(table, Mapping) else getattr(table, "generator", None)
+    return "existing" if generator is None else str(generator)
+
+
+def _gather(table: Any) -> Any:
+    """The table with a generator's parameters in a table of their own."""
+    if not isinstance(table, Mapping) or "generator" not in table:
+        return table
+    own = {key: table[key] for key in ("generator", "degree") if key in table}
+    parameters = {key: value for key, value in table.items() if key not in own}
+    for key, value in parameters.items():
+        if isinstance(value, str):  # the generators' records would take "3" for 3
+            raise ValueError(f"{key}: expected a number, not {value!r}")
+    return own | {"parameters": parameters}
+
+
+Mesh = Annotated[
+    Annotated[MeshFile, Tag("existing")]
+    | Annotated[VaneClusterMesh, Tag("vane_cluster")]
+    | Annotated[BlockMesh, Tag("block")],
+    Discriminator(_kind),
+    BeforeValidator(_gather),
+]
+
+
+@dataclass(frozen=True, config=STRICT)
+class MaterialTable:
+    """Isotropic material of a volume group: young (Pa), poisson, density (kg/m^3), damping_ratio of every mode,
+    fatigue_strength (Pa)."""
+
+    young: Positive
+    poisson: Annotated[Real, Field(gt=-1, lt=0.5)]
+    density: Positive
+    damping_ratio: Ratio | None = None
+    fatigue_strength: Positive | None = None
+
+    @property
+    def elastic(self) -> Material:
+        """What the finite elements need of it."""
+        from vanedamp.modal.elasticity import Material  # dolfinx is slow to load, and a bad file wants a quick answer
+
+        return Material(self.young, self.poisson, self.density)
+
+
+def _components(clamped: Any) -> Any:
+    """{facet group: components} from a list of groups and of such tables."""
+    merged: dict[Any, Any] = {}
+    for entry in [clamped] if isinstance(clamped, Mapping) else clamped if isinstance(clamped, list) else [None]:
+        if not isinstance(entry, str | Mapping):
+            raise ValueError("expected a list of facet groups, such as ['clamp'] or [{ clamp = 'y' }]")
+        merged |= {entry: "xyz"} if isinstance(entry, str) else entry
+    for group, components in merged.items():
+        if not components or not isinstance(components, str) or set(components) - set("xyz"):
+            raise ValueError(f"{group}: expected components out of 'xyz', not {components!r}")
+    return merged
+
+
+def _axes(stiffness: Any) -> Any:
+    """One number stands for all three axes."""
+    return [stiffness] * 3 if isinstance(stiffness, int | float) else stiffness
+
+
+@dataclass(frozen=True, config=STRICT)
+class ElasticTable:
+    """Springs over a facet group, N/m^3: `stiffness` (a number or [x, y, z]) or `normal` and `tangential`."""
+
+    stiffness: Annotated[tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(_axes)] = (0.0, 0.0, 0.0)
+    normal: NonNegative = 0.0
+    tangential: NonNegative = 0.0
+
+    def __post_init__(self) -> None:
+        if not any((*self.stiffness, self.normal, self.tangential)):
+            raise ValueError("stiffness: expected N/m^3, such as 1e12 or [1e12, 5e11, 1e12], or normal and tangential")
+
+    @property
+    def springs(self) -> ElasticSupport:
+        """What the finite elements need of it."""
+        from vanedamp.modal.elasticity import ElasticSupport
+
+        return ElasticSupport(self.stiffness, self.normal, self.tangential)
+
+
+@dataclass(frozen=True, config=STRICT)
+class Support:
+    """Groups of facets, edges or points that are held: all components, or those named, as in {group = "y"}.
+
+    Springs are spread over facet groups.
+    """
+
+    clamped: Annotated[dict[str, str], BeforeValidator(_components)] = field(default_factory=dict)
+    elastic: dict[str, ElasticTable] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for group in self.elastic:
+            if set(self.clamped.get(group, "")) == set("xyz"):
+                raise ValueError(f"elastic.{group}: the group is clamped, so that springs do nothing; choose one")
+
+
+@dataclass(frozen=True, config=STRICT)
+class ModesTable:
+    """Which modes are computed (the first `count`, or all from `min_frequency` to `max_frequency` Hz) and which is the
+    first bending: the one with most effective mass along `direction`, or the one most like the first shape of the file
+    `shape`. `at` names the interface coordinate of the rigid model. Modes whose frequencies agree within
+    `pair_tolerance` (relative) are one multiple mode, turned so that one has all the motion of that coordinate."""
+
+    count: Annotated[Whole, Field(ge=1)] | None = None
+    max_frequency: Positive | None = None
+    min_frequency: NonNegative = 0.0
+    direction: Direction = (0.0, 1.0, 0.0)
+    damping_ratio: Ratio | None = None
+    at: str | None = None
+    shape: str | None = None
+    pair_tolerance: Annotated[Real, Field(ge=0, le=0.1)] = 1e-3
+
+    def __post_init__(self) -> None:
+        if self.count is not None and self.max_frequency is not None:
+            raise ValueError("give one of count and max_frequency")
+        if self.min_frequency and not self.min_frequency < (self.max_frequency or 0.0):
+            raise ValueError("min_frequency: expected a max_frequency above it, the two ends of a range")
+
+
+@dataclass(frozen=True, config=STRICT)
+class InterfaceTable:
+    """One interface coordinate: the displacement of a group along a direction, or its rotation about it.
+
+    `facets` names a facet group, or else a group of edges or points (a node set), whose average is that of its nodes.
+    The direction of a cavity's walls and floor is that from its left wall to its right one; "normal" takes the facets'
+    own (rom.interface.normal_direction).
+    """
+
+    facets: str
+    direction: Annotated[Direction | Literal["normal"], Field(union_mode="left_to_right")]
+    kind: Literal["average", "rigid", "node", "full"] = "average"
+    motion: Literal["translation", "rotation"] = "translation"
+
+
+@dataclass(frozen=True, config=STRICT)
+class Case:
+    """Everything that modes and reduction of a structure need."""
+
+    mesh: Mesh
+    material: Annotated[dict[str, MaterialTable], Field(min_length=1)]
+    support: Support = field(default_factory=Support)
+    modes: ModesTable = field(default_factory=ModesTable)
+    interface: dict[str, InterfaceTable] = field(default_factory=dict)
+    calibration: CalibrationTable | None = None
+
+    def __post_init__(self) -> None:
+        given = {table.damping_ratio for table in self.material.values()} - {None}
+        if self.modes.damping_ratio is None and len(given) > 1:
+            raise ValueError("material: the damping ratios differ; set the one of the modes in [modes] damping_ratio")
+        if self.modes.at is not None and self.modes.at not in self.interface:
+            raise ValueError(f"modes.at: no interface '{self.modes.at}'; {_known(self.modes.at, self.interface)}")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Case:
+        """The case in a TOML file; a mesh file is taken relative to it. Raises InputError, for absurd units too."""
+        data = read_toml(path)
+        mesh = data.get("mesh")
+        if isinstance(mesh, dict):
+            _check_mesh(mesh, path)
+        for keys in _FILES:
+            _find_file(data, keys, path)
+        case = validate(cls, data, str(path))
+        for group, table in case.material.items():
+            absurd = absurdity(table.young, table.density)
+            if absurd is not None:
+                raise InputError(f"{path}: material.{group}.{absurd}; give young in Pa and density in kg/m^3")
+        return case
+
+    @property
+    def files(self) -> list[str]:
+        """The files that the case names: mesh and measurements."""
+        mesh = self.mesh.file if isinstance(self.mesh, MeshFile) else None
+        damping = self.calibration.damping.frf if self.calibration and self.calibration.damping else None
+        tune = self.calibration.tune.shapes if self.calibration and self.calibration.tune else None
+        return [file for file in (mesh, self.modes.shape, damping, tune) if file is not None]
+
+    @property
+    def damping_ratio(self) -> float:
+        """Modal damping ratio of every mode; zero when the file names none."""
+        if self.modes.damping_ratio is not None:
+            return self.modes.damping_ratio
+        return next((t.damping_ratio for t in self.material.values() if t.damping_ratio is not None), 0.0)
+
+    @property
+    def fatigue_strength(self) -> float | None:
+        """The least of the materials' fatigue strengths, Pa."""
+        return min((t.fatigue_strength for t in self.material.values() if t.fatigue_strength is not None), default=None)
+
+    def strengths(self, volumes: Iterable[str]) -> dict[str, float]:
+        """Fatigue strength of every volume group, Pa; the least of all where a group's material has none."""
+        least = self.fatigue_strength
+        if least is None:
+            return {}
+        tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
+        return {name: (table.fatigue_strength if table else None) or least for name, table in tables.items()}
+
+    @property
+    def materials(self) -> dict[str, Material]:
+        """Elastic materials by volume group."""
+        return {name: table.elastic for name, table in self.material.items()}
+
+    @property
+    def elastic_supports(self) -> dict[str, ElasticSupport]:
+        """Springs by facet group."""
+        return {name: table.springs for name, table in self.support.elastic.items()}
+
+    @property
+    def response_label(self) -> str | None:
+        """The interface coordinate of the rigid model: the one named, the only one, or `shroud`.
+
+        None without any interface. Raises InputError when the choice is open.
+        """
+        if self.modes.at is not None or not self.interface:
+            return self.modes.at
+        if len(self.interface) == 1 or "shroud" in self.interface:
+            return "shroud" if "shroud" in self.interface else next(iter(self.interface))
+        raise InputError(f"modes.at: name the interface of the rigid model, one of {', '.join(self.interface)}")
+
+    @property
+    def facet_groups(self) -> set[str]:
+        """Every group that supports and interfaces name."""
+        return {*self.support.clamped, *self.support.elastic, *(table.facets for table in self.interface.values())}
+
+    def check_groups(
+        self, facets: Iterable[str], volumes: Iterable[str], lower: Mapping[str, Iterable[str]] | None = None
+    ) -> None:
+        """Raise InputError for a group that the mesh does not have; lower: kind ("edge", "point") -> groups."""
+        surfaces = {"facet": list(facets)}
+        known = surfaces | {kind: list(names) for kind, names in (lower or {}).items()}
+        for group in self.support.clamped:
+            _check_group("support.clamped", group, known)
+        for group in self.support.elastic:
+            _check_group(f"support.elastic.{group}", group, surfaces)
+        for label, table in self.interface.items():
+            _check_group(f"interface.{label}.facets", table.facets, known)
+        for group in self.material:
+            if group != "default":
+                _check_group(f"material.{group}", group, {"volume": [*volumes, "default"]})
+
+
+def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) -> None:
+    """Take a file that a key names relative to the case, and see that it is there."""
+    table: Any = data
+    for key in keys[:-1]:
+        table = table.get(key) if isinstance(table, dict) else None
+    name = table.get(keys[-1]) if isinstance(table, dict) else None
+    if isinstance(name, str):
+        table[keys[-1]] = str(Path(path).parent / name)
+        if not Path(table[keys[-1]]).is_file():
+            raise InputError(f"{path}: {'.'.join(keys)}: no such file {table[keys[-1]]}")
+
+
+def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
+    """Settle what the union of mesh tables cannot say in one line, and find the file."""
+    generator, file = mesh.get("generator"), mesh.get("file")
+    if (generator is None) == (file is None):
+        raise InputError(f"{path}: mesh: give one of file and generator")
+    known = ["file", "degree", "scale"]
+    if generator is not None:
+        if str(generator) not in GENERATORS:
+            raise InputError(
+                f"{path}: mesh.generator: no generator {generator!r}; {_known(str(generator), GENERATORS)}"
+            )
+        known = ["generator", "degree", *_names(GENERATORS[str(generator)])]
+    for key in mesh:
+        owners = [f'generator = "{name}"' for name, record in GENERATORS.items() if key in _names(record)]
+        if key not in known and generator is None and owners:
+            raise InputError(f"{path}: mesh.{key}: belongs to {' or '.join(owners)}, not to a file")
+        if key not in known:
+            raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, known)}")
+    if isinstance(file, str):
+        mesh["file"] = str(Path(path).parent / file)
+        if not Path(mesh["file"]).is_file():
+            raise InputError(f"{path}: mesh.file: no such file {mesh['file']}; `vanedamp mesh` writes one")
+
+
+def _names(record: Any) -> list[str]:
+    return [item.name for item in fields(record)]
+
+
+def _check_group(key: str, group: str, known: Mapping[str, list[str]]) -> None:
+    """Raise InputError for a group that is none of those known, by kind; the first kind is the usual one."""
+    if any(group in names for names in known.values()):
+        return
+    (kind, names), *others = known.items()
+    told = "".join(f"; {other} groups: {', '.join(sorted(found))}" for other, found in others if found)
+    raise InputError(f"{key}: no {kind} group '{group}' in the mesh; it has {', '.join(sorted(names)) or 'none'}{told}")
+
+
+def _known(word: str, known: Iterable[str]) -> str:
+    return nearest(word, list(known))

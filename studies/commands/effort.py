@@ -1,0 +1,77 @@
+"""What a command would take, estimated before the work: what nobody would wait for, or has memory for, is refused.
+
+Known costs are those of one body on a rigid structure (docs/accuracy.md); richer scenes take more. The bounds are
+generous: whoever meets one has most likely slipped by some powers of ten.
+"""
+
+from __future__ import annotations
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.optimisation.study import Study
+from vanedamp.studies.workers import available_cores
+
+#: s of an excitation period; of a step of the methods that step; and of a run besides
+_PERIOD, _STEP, _RUN = 20e-6, 0.1e-6, 2.5e-3
+#: bytes of a period's record, of a sample of one channel, and of a finished point
+_RECORD, _SAMPLE, _POINT = 300, 8, 400
+#: at most: points of a sweep, bytes of a run, s of a command
+MOST_POINTS, MOST_BYTES, MOST_SECONDS = 1_000_000, 8e9, 30 * 86400.0
+
+
+def check_run(scene: Scene, samples: int = 0) -> None:
+    """Refuse a run whose records fill the memory, or that takes a month. Raises InputError."""
+    periods, channels = scene.time.simulated, 2 * (1 + len(scene.damper) + len(scene.friction_damper))
+    sampled = _SAMPLE * samples * channels * periods
+    for key, name, needed in (("time.periods", "periods", _RECORD * periods), ("--samples", "samples", sampled)):
+        if needed > MOST_BYTES:
+            raise InputError(
+                f"{key}: {periods:.3g} periods need {_amount(needed)} for their {name}; at most {_amount(MOST_BYTES)}: "
+                'some thousand periods reach a steady state, and steady = "auto" ends with it'
+            )
+    _check_time("time.periods", f"{periods:.3g} periods", _seconds(scene))
+
+
+def check_sweep(scene: Scene, workers: int | None) -> None:
+    """Refuse a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
+    points, count = scene.points, workers or available_cores()
+    seconds = points * _seconds(scene) / count
+    if points > MOST_POINTS:
+        raise InputError(
+            f"sweep: {points:.3g} points take {_duration(seconds)} on {count} workers and {_amount(_POINT * points)}; "
+            f"at most {MOST_POINTS}: take fewer values an axis, or several sweeps"
+        )
+    check_run(scene)
+    _check_time("sweep", f"{points} points of {scene.time.simulated} periods on {count} workers", seconds)
+
+
+def check_optimise(study: Study, workers: int | None) -> None:
+    """Refuse an optimisation that takes a month. Raises InputError."""
+    table, count = study.table, workers or available_cores()
+    designs = table.map.mass_ratio * table.map.gap_ratio + table.evaluations * (2 + table.samples)
+    scenes = designs * table.count
+    check_run(study.scene)
+    _check_time("optimise", f"{scenes:.3g} scenes on {count} workers", scenes * _seconds(study.scene) / count)
+
+
+def _seconds(scene: Scene) -> float:
+    """Processor time of a run."""
+    solver = scene.solver
+    step = {"exact": 0.0, "solve_ivp": 1e-3}.get(solver.method, _STEP) * (solver.substeps or 1)
+    return _RUN + scene.time.simulated * (_PERIOD + step * solver.steps)
+
+
+def _check_time(key: str, what: str, seconds: float) -> None:
+    if seconds > MOST_SECONDS:
+        raise InputError(
+            f"{key}: {what} take about {_duration(seconds)}; at most {_duration(MOST_SECONDS)}: take fewer points, "
+            "periods or steps"
+        )
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds / 86400:.3g} days" if seconds > 86400 else f"{seconds / 3600:.2g} h"
+
+
+def _amount(size: float) -> str:
+    return f"{size / 1e9:.3g} GB"

@@ -1,0 +1,102 @@
+"""The files of a command: outputs that can be written, that are no inputs, and each a file of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import stat
+from argparse import Namespace
+from collections.abc import Iterable
+from pathlib import Path
+
+from vanedamp.files.store import destination
+from vanedamp.files.toml_input import InputError
+
+#: options of the command line that name a file
+_OUTPUTS = ("output", "json", "vtk")
+
+
+def check_outputs(arguments: Namespace, **suffixes: tuple[str, ...]) -> None:
+    """Refuse files that could not be written, before the work. `--json` onto standard output becomes `-`."""
+    if _is_stdout(getattr(arguments, "json", None) or "-"):
+        arguments.json = "-"
+    for option, path in _outputs(arguments):
+        trouble = _trouble(path)
+        if trouble is not None:
+            raise InputError(f"--{option} {path}: {trouble}")
+        if path.suffix not in suffixes.get(option, (path.suffix,)):
+            raise InputError(f"--{option} {path}: expected a file name ending in {' or '.join(suffixes[option])}")
+        if _is_stdout(path):
+            raise InputError(f"--{option} {path}: is standard output, where the summary goes; name another file")
+    for (one, first), (other, second) in itertools.combinations(_outputs(arguments), 2):
+        if _same(first, second):
+            raise InputError(f"--{one} and --{other}: both are {second}; name two files")
+    named = getattr(arguments, "input", None)
+    keep(arguments, [named] if named is not None else arguments.inputs)
+
+
+def keep(arguments: Namespace, inputs: Iterable[str | Path]) -> None:
+    """Refuse outputs that would take the place of an input."""
+    for option, path in _outputs(arguments):
+        refuse_input(f"--{option}", path, inputs)
+
+
+def refuse_input(option: str, path: Path, inputs: Iterable[str | Path]) -> None:
+    """Refuse an output that would take the place of an input."""
+    for file in inputs:
+        if path.exists() and os.path.exists(file) and _same(path, Path(file)):
+            raise InputError(f"{option} {path}: is an input ({file}), which would be lost; name another file")
+
+
+def output_folder(arguments: Namespace) -> Path:
+    """The folder that a command writes, perhaps not there yet."""
+    folder = Path(arguments.output)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--output {folder}: expected a folder, not a file")
+    return folder
+
+
+def checkpoint_file(output: str | None) -> Path | None:
+    """Where a sweep keeps what is finished: beside its result, if that is a file."""
+    return None if output is None or destination(output) is None else Path(f"{output}.partial")
+
+
+def _outputs(arguments: Namespace) -> list[tuple[str, Path]]:
+    """The outputs named, with their options; a sweep's checkpoint is one."""
+    given = [(option, getattr(arguments, option, None)) for option in _OUTPUTS]
+    if arguments.command == "sweep":
+        given.append(("output", checkpoint_file(arguments.output)))
+    return [(option, Path(name)) for option, name in given if name is not None and (option, name) != ("json", "-")]
+
+
+def _trouble(path: Path) -> str | None:
+    """Why a file cannot be written; None where it can."""
+    try:
+        target = destination(path)
+    except OSError as error:
+        return f"cannot be written ({error.strerror})"
+    if path.is_dir():
+        return "is a folder"
+    if target is None:
+        kind = path.stat().st_mode
+        if stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
+            return "is a disk or a socket; expected a file, a pipe or a device such as /dev/null"
+        return None if os.access(path, os.W_OK) else "cannot be written to"
+    if not target.parent.is_dir():
+        return "its folder does not exist"
+    return None if os.access(target.parent, os.W_OK) else "its folder cannot be written to"
+
+
+def _same(one: Path, other: Path) -> bool:
+    """Whether two names are one file; /dev/null takes everything."""
+    if one.exists() and other.exists():
+        return os.path.samefile(one, other) and not os.path.samefile(one, os.devnull)
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
+def _is_stdout(path: str | Path) -> bool:
+    with contextlib.suppress(OSError):
+        found = os.stat(path)
+        return os.path.samestat(found, os.fstat(1)) and not os.path.samestat(found, os.stat(os.devnull))
+    return False

@@ -1,0 +1,135 @@
+"""The result of an optimisation: the map of reductions, the two optima, and how they were found."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.studies.optimisation.study import Design
+
+_KIND = "optimisation"
+_PLAIN = (
+    "mass", "amplitude", "reference", "resonance_frequency", "scenes", "trouble", "wall_time_s", "sentence",
+)  # fmt: skip
+_ARRAYS = {
+    "map_mass_ratio": (("map_mass_ratio",), "1"), "map_gap_ratio": (("map_gap_ratio",), "1"),
+    "map_amplitude": (("map_mass_ratio", "map_gap_ratio"), "1"),
+    "history_design": (("evaluation", "variable"), "1"), "history_amplitude": (("evaluation",), "1"),
+    "history_robust": (("evaluation",), "1"), "frequency": (("frequency",), "Hz"),
+    "undamped": (("frequency",), "1"), "nominal_response": (("frequency",), "1"),
+    "robust_response": (("frequency",), "1"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A design with its amplitude in the band over the undamped one there: as designed, and within the tolerances."""
+
+    design: Design
+    amplitude: float
+    amplitude_tolerances: float
+
+    @property
+    def reduction(self) -> float:
+        """What is taken from the undamped amplitude, as designed."""
+        return 1.0 - self.amplitude
+
+    @property
+    def reduction_tolerances(self) -> float:
+        """The same within the tolerances."""
+        return 1.0 - self.amplitude_tolerances
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return self.design._asdict() | {
+            "amplitude": self.amplitude, "amplitude_tolerances": self.amplitude_tolerances,
+            "reduction": self.reduction, "reduction_tolerances": self.reduction_tolerances,
+        }  # fmt: skip
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> Optimum:
+        """The record of `to_json`."""
+        design = Design(data["mass_ratio"], data["gap_ratio"], int(data["bodies"]))
+        return cls(design, data["amplitude"], data["amplitude_tolerances"])
+
+
+@dataclass(frozen=True, eq=False)
+class Optimisation:
+    """What an optimisation found. Amplitudes are those in the band (worst or mean, as the study says) over `reference`.
+
+    study              the [optimise] table and the scene, as plain data
+    mass, amplitude    kg of the structure and m of X: what mass ratio and gap ratio refer to
+    reference          m, undamped amplitude in the band: its maximum, at the points or between them, or its mean
+    resonance_frequency  Hz of the resonance that X and mass are of
+    nominal, robust    the best design as it is, and the best within the tolerances
+    map_*              axes (a,), (b,) and amplitudes (a, b) of designs as they are, with the bodies of `nominal`
+    history_*          designs (h, 3) in the order in which they were tried, their amplitudes (h,), and whether these
+                       are amplitudes within the tolerances (1) or as designed (0)
+    frequency          (f,) Hz of the band; undamped, nominal_response, robust_response: (f,) amplitudes, nan
+                       where a run is not ok
+    headlines          of these responses (studies.headline.Headline), by "nominal" and "robust"
+    scenes, trouble    how many runs it took, and how many of them have another status than ok
+    wall_time_s        s
+    sentence           the answer in words
+    """
+
+    study: Mapping[str, Any]
+    mass: float
+    amplitude: float
+    reference: float
+    resonance_frequency: float
+    nominal: Optimum
+    robust: Optimum
+    map_mass_ratio: np.ndarray
+    map_gap_ratio: np.ndarray
+    map_amplitude: np.ndarray
+    history_design: np.ndarray
+    history_amplitude: np.ndarray
+    history_robust: np.ndarray
+    frequency: np.ndarray
+    undamped: np.ndarray
+    nominal_response: np.ndarray
+    robust_response: np.ndarray
+    scenes: int
+    trouble: int
+    wall_time_s: float
+    sentence: str
+    headlines: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, arrays as nested lists."""
+        arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
+        return self._plain() | {"study": dict(self.study), "headlines": dict(self.headlines)} | arrays
+
+    def _plain(self) -> dict[str, Any]:
+        optima = {"nominal": self.nominal.to_json(), "robust": self.robust.to_json()}
+        return {name: getattr(self, name) for name in _PLAIN} | optima
+
+    def save(self, path: str | Path) -> None:
+        """Write HDF5 that xarray opens. Raises files.store.StoreError."""
+        variables = {name: Variable(getattr(self, name), dims, unit) for name, (dims, unit) in _ARRAYS.items()}
+        variables["variable"] = Variable(np.array(Design._fields, object), ("variable",))
+        tables = {name: dict(getattr(self, name)) for name in ("study", "headlines", "provenance")}
+        save(path, _KIND, variables, self._plain() | tables)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Optimisation:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        values, attributes = load(path, _KIND)
+        arrays: dict[str, Any] = {name: frozen(values[name]) for name in _ARRAYS}
+        return cls(
+            **{name: attributes[name] for name in _PLAIN},
+            **arrays,
+            nominal=Optimum.of(json.loads(attributes["nominal"])),
+            robust=Optimum.of(json.loads(attributes["robust"])),
+            study=json.loads(attributes["study"]),
+            headlines=json.loads(attributes["headlines"]),
+            provenance=json.loads(attributes["provenance"]),
+        )

@@ -1,0 +1,273 @@
+"""The damper that reduces most: mass, gap and number of bodies, as designed and within tolerances.
+
+Both searches are scipy's differential evolution (Storn and Price, 1997), which evaluates a whole generation at a time,
+on all workers. The second starts from the best designs of the first, and judges each by the same sample of the
+tolerances (a Latin hypercube and the design itself), so that designs differ by what they are, not by their luck.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from scipy.optimize import differential_evolution
+from scipy.stats import qmc
+
+from vanedamp.coupling.sweep.sweep import run_list, tops
+from vanedamp.coupling.sweep.worker import COLUMNS
+from vanedamp.files.store import finite, frozen
+from vanedamp.studies.headline import Headline, headline
+from vanedamp.studies.optimisation.record import Optimisation, Optimum
+from vanedamp.studies.optimisation.study import Design, Study
+
+#: generations of a search, at least
+_GENERATIONS = 5
+_NONE = {"mass": 0.0, "gap": 0.0, "excitation": 0.0, "restitution": 0.0, "friction": 0.0, "orientation_deg": 0.0}
+_Deviation = Mapping[str, float]
+
+
+def optimise(
+    study: Study,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Optimisation:
+    """Search, map and compare. The same study and seed give the same answer, whatever the executor.
+
+    progress: called with the number of runs done and of those expected.
+    """
+    started = time.perf_counter()
+    table = study.table
+    trial = _Trial(study, executor, progress, deviations(study))
+    first = trial.search(trial.nominal, None)
+    second = trial.search(trial.robust, trial.best_designs(first)) if len(trial.sample) > 1 else first
+    nominal, robust = trial.optimum(first), trial.optimum(second)
+    if robust.amplitude_tolerances > nominal.amplitude_tolerances:
+        robust = nominal  # the search as designed has found the better one
+    if robust.amplitude < nominal.amplitude:
+        nominal = robust
+    axes = [np.linspace(*bounds, count) for bounds, count in (
+        (table.variables.mass_ratio, table.map.mass_ratio), (table.variables.gap_ratio, table.map.gap_ratio)
+    )]  # fmt: skip
+    designs = [Design(float(m), float(g), nominal.design.bodies) for m in axes[0] for g in axes[1]]
+    amplitudes = trial.nominal(designs).reshape(len(axes[0]), len(axes[1]))
+    responses = {name: trial.response(item.design) for name, item in (("nominal", nominal), ("robust", robust))}
+    headlines = {
+        name: trial.headline(item.design, responses[name][0])
+        for name, item in (("nominal", nominal), ("robust", robust))
+    }
+    took = time.perf_counter() - started
+    return Optimisation(
+        study={"optimise": _plain(asdict(table)), "scene": study.scene.to_dict()},
+        mass=study.mass,
+        amplitude=study.amplitude,
+        reference=study.reference,
+        resonance_frequency=study.resonance.frequency,
+        nominal=nominal,
+        robust=robust,
+        map_mass_ratio=frozen(axes[0]),
+        map_gap_ratio=frozen(axes[1]),
+        map_amplitude=frozen(amplitudes),
+        history_design=frozen([design for design, _, _ in trial.history]),
+        history_amplitude=frozen([amplitude for _, amplitude, _ in trial.history]),
+        history_robust=frozen([robust for _, _, robust in trial.history]),
+        frequency=frozen(table.frequencies),
+        undamped=frozen(responses["nominal"][1]),
+        nominal_response=frozen(responses["nominal"][0]),
+        robust_response=frozen(responses["robust"][0]),
+        headlines={name: _of_band(found) for name, found in headlines.items()},
+        scenes=trial.scenes,
+        trouble=trial.trouble,
+        wall_time_s=took,
+        sentence=_sentence(study, nominal, robust, headlines, trial.scenes, took),
+        provenance=dict(provenance or {}),
+    )
+
+
+def deviations(study: Study) -> list[_Deviation]:
+    """The sample of the tolerances: the design itself, and a Latin hypercube over those that are not zero."""
+    widths = {name: width for name, width in asdict(study.table.tolerances).items() if width > 0}
+    if not widths:
+        return [_NONE]
+    points = qmc.LatinHypercube(len(widths), seed=study.table.seed).random(study.table.samples)
+    names, half = list(widths), np.array(list(widths.values()))
+    return [_NONE, *(_NONE | dict(zip(names, row, strict=True)) for row in ((2 * points - 1) * half).tolist())]
+
+
+class _Trial:
+    """Designs tried so far, and the runs that took."""
+
+    def __init__(
+        self,
+        study: Study,
+        executor: Executor | None,
+        progress: Callable[[int, int], None] | None,
+        sample: Sequence[_Deviation],
+    ) -> None:
+        self.study, self.sample = study, sample
+        self.history: list[tuple[Design, float, bool]] = []
+        self.scenes = self.trouble = 0
+        self._executor, self._progress = executor, progress
+        table = study.table
+        self._variables = [n for n in Design._fields if len(set(getattr(table.variables, n))) > 1]
+        designs = table.evaluations * (1 + len(sample) * (len(sample) > 1)) + table.map.mass_ratio * table.map.gap_ratio
+        self._expected = len(table.frequencies) * designs
+
+    def nominal(self, designs: Sequence[Design]) -> np.ndarray:
+        """Amplitudes (d,) of designs as they are."""
+        return self._judge(designs, self.sample[:1])
+
+    def robust(self, designs: Sequence[Design]) -> np.ndarray:
+        """Amplitudes (d,) of designs within the tolerances."""
+        return self._judge(designs, self.sample)
+
+    def optimum(self, design: Design) -> Optimum:
+        """Both amplitudes of a design."""
+        found = self.nominal([design]), self.robust([design])
+        for amplitudes, robust in zip(found, (False, True), strict=True):
+            self._remember([design], amplitudes, robust)
+        return Optimum(design, float(found[0][0]), float(found[1][0]))
+
+    def response(self, design: Design) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes (f,) over the reference of a design, nan where its run is not ok, and without bodies."""
+        damped, undamped = self._run([design], self.sample[:1])
+        return damped[0, 0], undamped[0, 0]
+
+    def headline(self, design: Design, damped: np.ndarray) -> Headline:
+        """The headline of a design's amplitudes (f,) over the reference."""
+        frequencies, known = self.study.table.frequencies, self.study.reference * damped
+        undamped, fixed = self.study.linear(design, self.sample[0])
+        band = float(frequencies[0]), float(frequencies[-1])
+        return headline(
+            frequencies, known, known, np.full(len(known), np.nan), undamped.amplitude(frequencies),
+            fixed.amplitude(frequencies), tops(undamped.peak(*band), fixed.peak(*band)), along_frequency=True,
+        )  # fmt: skip
+
+    def search(self, judge: Callable[[Sequence[Design]], np.ndarray], first: np.ndarray | None) -> Design:
+        """The best design by differential evolution, from a first generation or from a Latin hypercube."""
+        table, names = self.study.table, self._variables
+        if not names:
+            return self._design([])
+        bounds = [getattr(table.variables, name) for name in names]
+        size = max(5, table.evaluations // max(_GENERATIONS, math.isqrt(table.evaluations)))
+        if first is None:
+            first = qmc.scale(qmc.LatinHypercube(len(names), seed=table.seed).random(size), *np.transpose(bounds))
+
+        def objective(columns: np.ndarray) -> np.ndarray:
+            designs = [self._design(column) for column in np.atleast_2d(columns.T)]
+            amplitudes = judge(designs)
+            self._remember(designs, amplitudes, judge == self.robust)
+            return amplitudes
+
+        found = differential_evolution(
+            objective, bounds, init=first[:size], maxiter=max(table.evaluations // size - 1, 1), tol=0.0, polish=False,
+            seed=table.seed, updating="deferred", vectorized=True, integrality=[name == "bodies" for name in names],
+        )  # fmt: skip
+        return self._design(found.x)
+
+    def best_designs(self, best: Design) -> np.ndarray:
+        """The best designs so far (s, variables), that one first, as the first generation of another search."""
+        ordered = sorted(self.history, key=lambda entry: (entry[0] != best, entry[1]))
+        distinct = list(dict.fromkeys(design for design, _, _ in ordered))
+        return np.array([[getattr(design, name) for name in self._variables] for design in distinct], float)
+
+    def _remember(self, designs: Sequence[Design], amplitudes: np.ndarray, robust: bool) -> None:
+        self.history += [(design, float(a), robust) for design, a in zip(designs, amplitudes, strict=True)]
+
+    def _design(self, values: Sequence[float] | np.ndarray) -> Design:
+        """The design of the variables' values; the others are held."""
+        held = {name: getattr(self.study.table.variables, name)[0] for name in Design._fields}
+        chosen = held | dict(zip(self._variables, map(float, values), strict=True))
+        return Design(chosen["mass_ratio"], chosen["gap_ratio"], round(chosen["bodies"]))
+
+    def _judge(self, designs: Sequence[Design], sample: Sequence[_Deviation]) -> np.ndarray:
+        table, (damped, undamped) = self.study.table, self._run(designs, sample)
+        # a run that is not ok has damped nothing
+        damped = np.where(np.isnan(damped), np.fmax(undamped, 1.0), damped)
+        band = damped.max(axis=2) if table.over_band == "worst" else damped.mean(axis=2)
+        return np.asarray(band.max(axis=1) if table.over_tolerances == "worst" else band.mean(axis=1))
+
+    def _run(self, designs: Sequence[Design], sample: Sequence[_Deviation]) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes (d, s, f) over the reference at the same level, with the bodies and without.
+
+        nan with the bodies where a run is not ok, and without them where it is no scene.
+        """
+        table = self.study.table
+        shape = (len(designs), len(sample), len(table.frequencies))
+        damped, undamped = np.zeros(shape), np.zeros(shape)
+        levels = self.study.reference * np.array([1 + deviation["excitation"] for deviation in sample])[:, None]
+        for count in sorted({design.bodies for design in designs}):
+            places = [place for place, design in enumerate(designs) if design.bodies == count]
+            points = [
+                self.study.point(designs[place], deviation, float(frequency))
+                for place in places for deviation in sample for frequency in table.frequencies
+            ]  # fmt: skip
+            finished = run_list(self.study.with_bodies(count), points, self._executor, self._tell)
+            self.scenes += len(points)
+            ok = finished.text("status") == "ok"
+            self.trouble += int(np.count_nonzero(~ok))
+            for name, amplitudes in ((table.measure, damped), ("amplitude_undamped", undamped)):
+                values = finished.values[:, COLUMNS.index(name)]
+                if amplitudes is damped:
+                    values = np.where(ok, values, np.nan)
+                amplitudes[places] = values.reshape(len(places), *shape[1:]) / levels
+        return damped, undamped
+
+    def _tell(self, done: int) -> None:
+        """Show progress: so many runs of the list at hand."""
+        if self._progress is not None:
+            self._progress(self.scenes + done, max(self._expected, self.scenes + done))
+
+
+def _plain(data: Any) -> Any:
+    """Plain data with lists for tuples."""
+    if isinstance(data, dict):
+        return {key: _plain(value) for key, value in data.items()}
+    return [_plain(value) for value in data] if isinstance(data, list | tuple) else data
+
+
+_KEYS = (
+    "damped_peak", "damped_peak_at", "peak_ratio", "undamped_peak", "undamped_peak_at", "fixed_peak", "fixed_peak_at",
+    "peak_at_edge", "undamped_at_edge", "fixed_at_edge", "spacing", "half_power_width", "too_coarse", "points",
+    "points_left_out",
+)  # fmt: skip
+
+
+def _of_band(found: Headline) -> dict[str, Any]:
+    """What a headline says of the measure in the band."""
+    data: dict[str, Any] = finite(found.to_json())
+    return {key: data[key] for key in _KEYS}
+
+
+def _sentence(
+    study: Study, nominal: Optimum, robust: Optimum, headlines: Mapping[str, Headline], scenes: int, took: float
+) -> str:
+    table = study.table
+    if table.over_band == "mean":
+        of = "the undamped mean in the band"
+    elif headlines["nominal"].undamped_at_edge:
+        of = f"the highest undamped amplitude in the band, {study.reference:.3g} m"
+    else:
+        of = "the undamped maximum (worst in the band)"
+    text = f"{_told(nominal.design, study)} takes {nominal.reduction:.0%} of {of}"
+    if asdict(table.tolerances) != _NONE:
+        kind = "at worst" if table.over_tolerances == "worst" else "in the mean"
+        text += (
+            f", {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: {_told(robust.design, study)} "
+            f"takes {robust.reduction:.0%}, {robust.reduction_tolerances:.0%} {kind}"
+        )
+    remarks = dict.fromkeys(remark for found in headlines.values() for remark in found.remarks)
+    return f"{'; '.join([text, *remarks])}. {scenes} scenes in {took:.0f} s."
+
+
+def _told(design: Design, study: Study) -> str:
+    bodies = "1 body" if design.bodies == 1 else f"{design.bodies} bodies"
+    return (
+        f"{bodies} of together {design.mass_ratio:.2%} of the mass ({1e3 * design.mass_ratio * study.mass:.3g} g) with "
+        f"a gap of {design.gap_ratio:.2f} X ({1e6 * design.gap_ratio * study.amplitude:.3g} µm)"
+    )

@@ -1,0 +1,235 @@
+"""The study of an optimisation: a scene, and an [optimise] table of variables, band and tolerances."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import asdict, field, fields, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+from pydantic.dataclasses import dataclass
+
+from vanedamp.coupling.scene.bodies import Damper
+from vanedamp.coupling.scene.paths import Range, axis_values
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Prescribed, Rom
+from vanedamp.coupling.sweep.grid import Points
+from vanedamp.coupling.system.linear_response import LinearResponse, linear_responses
+from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
+from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml, validate
+
+_MOST_FREQUENCIES = 10_000
+
+
+def _bounds(value: Any) -> Any:
+    """One number is a variable that is held."""
+    return [value, value] if isinstance(value, int | float) else value
+
+
+Bounds = Annotated[tuple[Positive, Positive], BeforeValidator(_bounds)]
+Counts = Annotated[
+    tuple[Annotated[Whole, Field(ge=1, le=32)], Annotated[Whole, Field(ge=1, le=32)]], BeforeValidator(_bounds)
+]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Variables:
+    """What is chosen, each [lowest, highest] or one value: mass of all bodies over that of the structure, free travel
+    over the undamped maximum X, number of bodies."""
+
+    mass_ratio: Bounds = (0.005, 0.05)
+    gap_ratio: Bounds = (0.1, 1.5)
+    bodies: Counts = (1, 1)
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            low, high = getattr(self, item.name)
+            if low > high:
+                raise ValueError(f"{item.name}: expected [lowest, highest], not [{low:g}, {high:g}]")
+
+
+@dataclass(frozen=True, config=STRICT)
+class Tolerances:
+    """Half widths of what the design cannot hold: shares of mass, gap and excitation; restitution, friction and
+    orientation (degrees) as they are."""
+
+    mass: Annotated[Real, Field(ge=0, lt=1)] = 0.0
+    gap: Annotated[Real, Field(ge=0, lt=1)] = 0.0
+    excitation: Annotated[Real, Field(ge=0, lt=1)] = 0.0
+    restitution: NonNegative = 0.0
+    friction: NonNegative = 0.0
+    orientation_deg: NonNegative = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class Map:
+    """Points of the map along mass ratio and gap ratio."""
+
+    mass_ratio: Annotated[Whole, Field(ge=2, le=1000)] = 9
+    gap_ratio: Annotated[Whole, Field(ge=2, le=1000)] = 12
+
+
+@dataclass(frozen=True, config=STRICT)
+class Optimise:
+    """What is best, and how it is sought.
+
+    band: excitation frequencies, Hz; measure: of a run; over_band, over_tolerances: what counts of a band's and of the
+    tolerances' values; samples: of the tolerances, by Latin hypercube; evaluations: designs that each of the two
+    searches may try.
+    """
+
+    band: Range | Annotated[tuple[Positive, ...], Field(min_length=1)]
+    variables: Variables = field(default_factory=Variables)
+    tolerances: Tolerances = field(default_factory=Tolerances)
+    map: Map = field(default_factory=Map)
+    measure: Literal["amplitude_mean", "amplitude_max"] = "amplitude_mean"
+    over_band: Literal["worst", "mean"] = "worst"
+    over_tolerances: Literal["worst", "mean"] = "worst"
+    samples: Annotated[Whole, Field(ge=1, le=10_000)] = 12
+    evaluations: Annotated[Whole, Field(ge=5, le=100_000)] = 150
+    seed: Annotated[Whole, Field(ge=0)] = 1
+
+    def __post_init__(self) -> None:
+        if self.count > _MOST_FREQUENCIES:
+            raise ValueError(f"band: {self.count} frequencies; at most {_MOST_FREQUENCIES}")
+        if self.frequencies.min() <= 0.0:
+            raise ValueError(f"band: expected positive frequencies, not {self.frequencies.min():g} Hz")
+        for before, after in itertools.pairwise(self.frequencies.tolist()):
+            if after <= before:
+                raise ValueError(f"band: expected frequencies that rise, not {after:g} Hz after {before:g} Hz")
+
+    @property
+    def count(self) -> int:
+        """Number of frequencies."""
+        return self.band.num if isinstance(self.band, Range) else len(self.band)
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Excitation frequencies, Hz."""
+        return np.array(axis_values(self.band), float)
+
+
+class Design(NamedTuple):
+    """Mass of all bodies over that of the structure, free travel over X, number of bodies."""
+
+    mass_ratio: float
+    gap_ratio: float
+    bodies: int
+
+
+@dataclass(frozen=True, config=STRICT)
+class _File:
+    optimise: Optimise
+
+
+class Study(NamedTuple):
+    """A scene, its [optimise] table, and what designs are measured in.
+
+    resonance: whose modal mass (kg) mass ratios refer to; amplitude: its undamped amplitude X (m), to which gap ratios
+    refer; reference: the undamped amplitude in the band (m), its maximum or its mean as `over_band` says, to which
+    damped amplitudes refer.
+    """
+
+    scene: Scene
+    table: Optimise
+    resonance: Resonance
+    amplitude: float
+    reference: float
+
+    @property
+    def mass(self) -> float:
+        """Modal mass of the structure, kg."""
+        return self.resonance.mass
+
+    @classmethod
+    def load(cls, path: str | Path) -> Study:
+        """The study in a TOML file. Raises InputError."""
+        data = read_toml(path)
+        if "optimise" not in data:
+            raise InputError(f"{path}: optimise: missing; say what is best in an [optimise] table (docs/sweeps.md)")
+        table = validate(_File, {"optimise": data.pop("optimise")}, str(path)).optimise
+        band = table.frequencies.tolist()
+        scene = Scene.of(data, path)
+        if scene.excitation.resonance_near is None:
+            scene = replace(scene, excitation=replace(scene.excitation, resonance_near=(band[0], band[-1])))
+        try:
+            _check(scene)
+            force, resonance = excitation_force(scene), chosen_resonance(scene)
+            undamped = linear_responses(scene)[0]
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        if force == 0.0:
+            raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
+        worst = table.over_band == "worst"
+        reference = undamped.peak(band[0], band[-1]).amplitude if worst else undamped.amplitude(band).mean()
+        study = cls(replace(scene, sweep={}), table, resonance, force * resonance.flexibility, float(reference))
+        try:
+            study._check_corners()
+        except InputError as error:
+            raise InputError(f"{path}: optimise.{str(error).removeprefix('sweep: ')}") from None
+        return study
+
+    def _check_corners(self) -> None:
+        """Raise InputError where the tolerances lead to what is no scene."""
+        variables, widths = self.table.variables, asdict(self.table.tolerances)
+        design = Design(variables.mass_ratio[1], variables.gap_ratio[0], variables.bodies[1])
+        for side in (-1.0, 1.0):
+            deviation = {name: side * width for name, width in widths.items()}
+            scene = Points(self.with_bodies(design.bodies), {}).scene(
+                self.point(design, deviation, float(self.table.frequencies[0]))
+            )
+            linear_structure(scene)
+
+    def with_bodies(self, count: int) -> Scene:
+        """The scene with so many bodies like its first one, put into its cavities in turn."""
+        first, names = self.scene.damper[0], [cavity.name for cavity in self.scene.cavity]
+        cavities = sorted(index % len(names) for index in range(count))
+        bodies = tuple(
+            Damper(names[place], first.mass, first.friction, first.restitution, 0.0, 0.0, first.normal_load)
+            for place in cavities
+        )
+        return replace(self.scene, damper=bodies)
+
+    def linear(self, design: Design, deviation: Mapping[str, float]) -> tuple[LinearResponse, LinearResponse]:
+        """Without bodies, and with those of a design glued to their floors."""
+        point = self.point(design, deviation, float(self.table.frequencies[0]))
+        return linear_responses(Points(self.with_bodies(design.bodies), {}).scene(point))
+
+    def point(self, design: Design, deviation: Mapping[str, float], frequency: float) -> dict[str, Any]:
+        """What a design, off by a deviation of the tolerances, changes in the scene with its number of bodies."""
+        scene, first = self.scene, self.scene.damper[0]
+        gap = design.gap_ratio * self.amplitude * (1 + deviation["gap"])
+        level = scene.excitation.resonance_amplitude or scene.excitation.force
+        assert level is not None
+        key = "force" if scene.excitation.resonance_amplitude is None else "resonance_amplitude"
+        cavities = [damper.cavity for damper in self.with_bodies(design.bodies).damper]
+        places = {
+            f"damper.{index}.position": gap * ((cavities[:index].count(name) + 1) / (cavities.count(name) + 1) - 0.5)
+            for index, name in enumerate(cavities)
+        }
+        return places | {
+            "excitation.frequency": frequency,
+            f"excitation.{key}": level * (1 + deviation["excitation"]),
+            "cavity.gap": gap,
+            "damper.mass": design.mass_ratio * self.mass / design.bodies * (1 + deviation["mass"]),
+            "damper.restitution": float(np.clip(first.restitution + deviation["restitution"], 0.0, 1.0)),
+            "damper.friction": max(first.friction + deviation["friction"], 0.0),
+            "gravity.orientation_deg": scene.gravity.orientation_deg + deviation["orientation_deg"],
+        }
+
+
+def _check(scene: Scene) -> None:
+    if isinstance(scene.structure, Prescribed):
+        raise InputError('structure: a prescribed motion is not damped; take model = "rigid" or "rom"')
+    if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+        raise InputError("structure.modes: name a number, so that all designs are compared on one model")
+    if not scene.damper:
+        raise InputError("damper: missing; the first one says what the bodies are like")
+    if scene.excitation.base_acceleration:
+        raise InputError(
+            "excitation.base_acceleration: name force or resonance_amplitude, the level that is to be damped"
+        )

@@ -1,0 +1,213 @@
+"""Pictures of the paper's studies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vanedamp.coupling.response.response import Response
+from vanedamp.files.store import replacing
+from vanedamp.studies.paper.claims_rigid import MOST_THETA, attached_closed_form, regime
+from vanedamp.studies.paper.claims_systems import FORCES, LOADS, NAMES, top
+from vanedamp.studies.paper.curve import Curve
+from vanedamp.studies.report.charts import COLOURS
+
+_GREY, _DARK = "#94a3b8", "#475569"
+
+
+def responses_picture(curves: Mapping[str, Curve], title: str, path: Path, linear: str | None = None) -> None:
+    """Forced responses of curves by their labels, with the undamped and fixed curves of one (default: the first)."""
+    figure, axes = plt.subplots(figsize=(9.5, 5.2), layout="constrained")
+    _linear(axes, curves[linear or next(iter(curves))])
+    for (label, curve), colour in zip(curves.items(), COLOURS, strict=False):
+        _damped(axes, curve, label, colour)
+    _finish(axes, title)
+    _save(figure, path)
+
+
+def panels_picture(panels: Mapping[str, Mapping[str, Curve]], title: str, path: Path) -> None:
+    """The same, in panels side by side by their titles."""
+    figure, row = plt.subplots(1, len(panels), figsize=(5.6 * len(panels), 5.2), sharey=True, layout="constrained")
+    for axes, (name, curves) in zip(row, panels.items(), strict=True):
+        _linear(axes, next(iter(curves.values())))
+        for (label, curve), colour in zip(curves.items(), COLOURS, strict=False):
+            _damped(axes, curve, label, colour)
+        _finish(axes, name, ylabel=axes is row[0])
+    figure.suptitle(title)
+    _save(figure, path)
+
+
+def orientations_picture(found: Mapping[str, Sequence[Curve]], angles: Sequence[float], title: str, path: Path) -> None:
+    """Horizontal and vertical responses, and the tops over the angle."""
+    found = {label: of for label, of in found.items() if "starts" not in label}
+    figure, (first, second, third) = plt.subplots(1, 3, figsize=(16, 5.2), layout="constrained")
+    for axes, index, name in ((first, 0, "horizontal"), (second, -1, "vertical")):
+        _linear(axes, found["single"][index])
+        for (label, of), colour in zip(found.items(), COLOURS, strict=False):
+            style = "--" if "aside" in label else "-"  # they lie on the single one
+            axes.plot(of[index].frequency, 100 * of[index].smooth, style, color=colour, label=label)
+        _finish(axes, f"{name}: smoothed means")
+    for (label, of), colour in zip(found.items(), COLOURS, strict=False):
+        tops = [100 * float(curve.smooth.max()) for curve in of]
+        spread = [100 * curve.peak().confidence for curve in of]
+        style = "--" if "aside" in label else "-"
+        third.errorbar(angles, tops, spread, color=colour, linestyle=style, marker="o", capsize=3, label=label)
+    third.set_xticks(list(angles))
+    third.set_xlabel("orientation from the horizontal, degrees")
+    third.set_ylabel("top of the smoothed mean / undamped maximum, %")
+    third.set_ylim(bottom=0)
+    third.set_title("tops; bars: 95 % confidence of the highest mean")
+    third.grid(True, color="#e2e8f0")
+    third.legend(fontsize=8)
+    figure.suptitle(title)
+    _save(figure, path)
+
+
+def history_picture(response: Response, reference: float, title: str, path: Path, shown: int = 30) -> None:
+    """The last periods with a mark at every impact, the peaks of the periods, and the times between impacts."""
+    figure = plt.figure(figsize=(12, 7), layout="constrained")
+    grid = figure.add_gridspec(2, 2)
+    top, left, right = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
+    period = 1 / response.frequency
+    begin = (response.periods - shown) * period
+    late = response.time >= begin
+    time, motion = response.time[late], response.displacement[late] / reference
+    top.plot(1e3 * time, motion, color=COLOURS[0], label="structure")
+    impacts = [event for event in response.event_list if event.kind == "impact"]
+    for side, marker, colour in (("left", "<", COLOURS[1]), ("right", ">", COLOURS[2])):
+        at = np.array([event.time for event in impacts if event.side == side and event.time >= begin])
+        label = f"impact on the {side} wall"
+        top.plot(1e3 * at, np.interp(at, time, motion), marker, color=colour, markersize=6, label=label)
+    top.set_xlim(1e3 * begin, 1e3 * response.periods * period)
+    top.set_ylim(top=1.45 * motion.max())
+    top.set_xlabel("time, ms")
+    top.set_ylabel("displacement / undamped maximum")
+    top.set_title(f"the last {shown} periods")
+    top.legend(ncols=3, loc="upper right", fontsize=9)
+    left.plot(
+        np.arange(1, response.periods + 1),
+        response.peak / reference,
+        color=COLOURS[0],
+        linewidth=0.6,
+        label="peak of a period",
+    )
+    left.axvline(response.transient, color=_GREY, linestyle="--", label="end of the transient")
+    left.set_xlabel("period")
+    left.set_ylabel("peak / undamped maximum")
+    left.set_ylim(bottom=0)
+    left.legend(fontsize=9)
+    steady = np.array([event.time for event in impacts if event.time >= response.transient * period])
+    right.hist(np.diff(steady) / period, bins=60, color=COLOURS[0], label=f"{len(steady) - 1} intervals")
+    right.set_xlabel("time between impacts, periods")
+    right.set_ylabel("number")
+    right.legend(fontsize=9)
+    for axes in (top, left, right):
+        axes.grid(True, color="#e2e8f0")
+    figure.suptitle(title)
+    _save(figure, path)
+
+
+def mistuning_picture(
+    curves: Sequence[Curve], half_gaps: Sequence[float], restitution: float, title: str, path: Path
+) -> None:
+    """Attached mass fraction over the amplitude in half gaps, beside the closed form."""
+    figure, axes = plt.subplots(figsize=(9.5, 5.2), layout="constrained")
+    for curve, half, colour in zip(curves, half_gaps, COLOURS, strict=False):
+        chosen, _ = regime(curve, half, restitution)
+        hit = curve.impacts > 0
+        axes.plot(
+            curve.mean[chosen] / half,
+            curve.attached[chosen],
+            "o",
+            color=colour,
+            label=f"gap {2 * half:g} undamped amplitudes",
+        )
+        other = hit & ~chosen
+        axes.plot(curve.mean[other] / half, curve.attached[other], "x", color=colour, markersize=5, alpha=0.6)
+    amplitude = np.linspace(0.15, 1.1, 300)
+    theta, attached = attached_closed_form(amplitude, 1.0, restitution)
+    stable = theta < MOST_THETA
+    axes.plot(amplitude[stable], attached[stable], color="#0f172a", label="closed form, symmetric 1:1 regime")
+    axes.plot(amplitude[~stable], attached[~stable], ":", color="#0f172a", label="where it is not stable")
+    axes.plot([], [], "x", color=_DARK, label="other responses with impacts")
+    axes.set_xlim(0.1, 1.1)
+    axes.set_ylim(0, 4)
+    axes.set_xlabel("amplitude / half gap")
+    axes.set_ylabel("attached mass fraction")
+    axes.set_title(title)
+    axes.grid(True, color="#e2e8f0")
+    axes.legend(fontsize=9)
+    _save(figure, path)
+
+
+def systems_picture(found: Mapping[str, Sequence[Curve]], title: str, path: Path) -> None:
+    """The best of each system, and its tops."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(14.5, 5.6), width_ratios=[1.5, 1], layout="constrained")
+    _linear(left, found["single_body"][0])
+    labels, tops, means, colours = [], [], [], []
+    numbers: dict[str, Sequence[Any]] = {"friction_damper": FORCES, "rotating": LOADS}
+    for (name, of), colour in zip(found.items(), COLOURS, strict=False):
+        best = min(of, key=top)
+        left.plot(best.frequency, 100 * best.mean, ".", color=colour, markersize=3, alpha=0.6)
+        line = best.smooth if best.impacts.any() else best.mean
+        left.plot(best.frequency, 100 * line, color=colour, linewidth=1.8, label=NAMES[name])
+        for index, curve in enumerate(of):
+            what = {"friction_damper": "normal force", "rotating": "load"}.get(name)
+            labels.append(NAMES[name] if what is None else f"{NAMES[name]}, {what} {numbers[name][index]:g}")
+            tops.append(100 * top(curve))
+            means.append(100 * curve.peak().height)
+            colours.append(colour)
+    bars = right.barh(np.arange(len(tops)), tops, color=colours)
+    right.bar_label(bars, [f"{top:.0f}" for top in tops], label_type="center", color="white", fontsize=9)
+    right.plot(means, np.arange(len(means)), "|", color="#0f172a", markersize=12, label="highest mean")
+    right.legend(loc="upper right")
+    right.set_yticks(np.arange(len(tops)), labels, fontsize=9)
+    right.invert_yaxis()
+    right.set_xlim(0, 112)
+    right.set_xlabel("top / undamped maximum, %")
+    right.set_title(
+        "tops of the curves; forces in exciting forces,\nloads in shares of the one that sticks", fontsize=11
+    )
+    _finish(left, "means (points) and smoothed means; of several loads the best")
+    figure.suptitle(title)
+    _save(figure, path)
+
+
+def _linear(axes: Axes, curve: Curve) -> None:
+    axes.plot(curve.frequency, 100 * curve.undamped, ":", color=_DARK, linewidth=1.4, label="undamped")
+    axes.plot(curve.frequency, 100 * curve.fixed, "--", color=_GREY, linewidth=1.4, label="bodies fixed")
+
+
+def _damped(axes: Axes, curve: Curve, label: str, colour: str) -> None:
+    axes.plot(
+        curve.frequency, 100 * curve.largest, ".", color=colour, markersize=3.5, alpha=0.7, label=f"{label}, maximum"
+    )
+    low, high = curve.mean - curve.confidence, curve.mean + curve.confidence
+    axes.fill_between(curve.frequency, 100 * low, 100 * high, color=colour, alpha=0.25, linewidth=0)
+    axes.plot(curve.frequency, 100 * curve.smooth, color=colour, linewidth=2, label=f"{label}, smoothed mean")
+
+
+def _finish(axes: Axes, title: str, ylabel: bool = True) -> None:
+    axes.set_xlabel("excitation frequency, Hz")
+    if ylabel:
+        axes.set_ylabel("amplitude / undamped maximum, %")
+    axes.set_ylim(0, 105)
+    axes.margins(x=0)
+    axes.set_title(title)
+    axes.grid(True, color="#e2e8f0")
+    axes.legend(fontsize=8)
+
+
+def _save(figure: Figure, path: Path) -> None:
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=110)
+    plt.close(figure)

@@ -1,0 +1,242 @@
+"""Every figure of the paper as a study on the shipped cluster: sweeps, pictures, and claims with a verdict each.
+
+A figure is a file in paper_scenes/ (paper.figure_file), rules for its claims and a picture. What was computed before
+with the same scene, model and versions can be taken over, so that an interrupted run goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import textwrap
+import time
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.sweep.checkpoint import clear
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.provenance import versions
+from vanedamp.files.store import StoreError, digest, finite, load, write_json
+from vanedamp.files.toml_input import InputError, nearest, read_toml, validate
+from vanedamp.meshes.vane_cluster import SHIPPED
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.paper import claims_reduced as paper_reduced
+from vanedamp.studies.paper import claims_rigid as paper_claims
+from vanedamp.studies.paper import claims_systems as systems
+from vanedamp.studies.paper import plots as paper_plots
+from vanedamp.studies.paper.curve import Curve, curves
+from vanedamp.studies.paper.figure_file import FOLDER, Bar, Effort, PaperFigure, Structure, write_scene
+from vanedamp.studies.report.results import CLAIMS, Claim, Study
+from vanedamp.studies.terminal import progress
+from vanedamp.studies.workers import workers
+
+NAMES = ("fig9", "fig10", "fig12", "fig13", "fig14", "fig19", "mistuning", "systems")
+#: modes of the reduced model's file: what `modes = "auto"` chooses from
+MODES = 12
+
+
+@dataclass(frozen=True)
+class Session:
+    """Where studies go and what computes them.
+
+    pool: of processes, None for this one; effort: less than the figures' files say; resume: take over what the folder
+    has of the same scene, model and versions; computed: sweeps of this session by the stem of their files.
+    """
+
+    structure: Structure
+    folder: Path
+    pool: Executor | None = None
+    effort: Effort | None = None
+    resume: bool = False
+    computed: dict[str, Sweep] = field(default_factory=dict)
+
+
+def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None, resume: bool = False) -> list[Study]:
+    """Compute the named studies (default: all) into a folder, and tell their claims. Raises InputError."""
+    for name in names:
+        if name not in NAMES:
+            raise InputError(f"no study '{name}'; {nearest(name, list(NAMES))}")
+    started = time.perf_counter()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--output {folder}: cannot be made ({error.strerror})") from error
+    structure = prepare(folder, resume)
+    studies = []
+    with workers(count) as pool:
+        session = Session(structure, folder, pool, resume=resume)
+        for name in names or NAMES:
+            begun = time.perf_counter()
+            studies.append(study(name, session))
+            tell(studies[-1], time.perf_counter() - begun)
+    print(f"\n{folder}: {time.perf_counter() - started:.0f} s; for a page: vanedamp report {folder} -o report.html")
+    return studies
+
+
+def prepare(folder: Path, resume: bool = False) -> Structure:
+    """The shipped cluster's modes.h5 and rom.h5 in a folder; resume: unless they are there, of this case and mesh."""
+    case, mesh, source = folder / "case.toml", folder / "vane_cluster.msh", FOLDER / "case.toml"
+    found, reduced = folder / "modes.h5", folder / "rom.h5"
+    same = all(old.is_file() and old.read_bytes() == new.read_bytes() for old, new in ((case, source), (mesh, SHIPPED)))
+    if not (resume and same and _made_by_us(found, reduced, MODES)):
+        shutil.copyfile(SHIPPED, mesh)
+        shutil.copyfile(source, case)
+        from vanedamp.studies.case.stages import assemble, modal_analysis, reduction
+        from vanedamp.studies.case.tables import Case
+
+        structure = assemble(Case.load(case))
+        modal_analysis(structure).save(found)
+        reduction(structure, MODES).save(reduced)
+    return Structure.load(found, reduced)
+
+
+def _made_by_us(found: Path, reduced: Path, modes: int) -> bool:
+    try:
+        _, attributes = load(found, "modes")
+        return json.loads(attributes["versions"]) == versions() and ReducedModel.load(reduced).modes == modes
+    except (StoreError, KeyError):
+        return False
+
+
+def study(name: str, session: Session) -> Study:
+    """One study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
+    if name == "fig13":
+        return _history(session)
+    figure = PaperFigure.load(name, session.structure, session.effort)
+    found = {curve: _swept(figure, curve, session) for curve in figure.scenes}
+    read = {curve: curves(sweep, curve.replace("_", " ") or name) for curve, sweep in found.items()}
+    claims = _claims(figure, read)
+    _picture(figure, read, session.folder / f"{name}.png")
+    trouble = sum(int((sweep.status != "ok").sum()) for sweep in found.values())
+    if trouble:
+        told = f" ({trouble} of {sum(sweep.status.size for sweep in found.values())} points are not ok.)"
+        claims = [replace(claim, why=(claim.why + told).strip()) for claim in claims]
+    return _written(Study(name, figure.title, [f"{figure.stem(curve)}.h5" for curve in found], claims), session.folder)
+
+
+def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
+    """The sweep of a curve: of this session, of the folder where it may be taken over, or computed."""
+    scene, stem = figure.scenes[curve], figure.stem(curve)
+    path = session.folder / f"{stem}.h5"
+    checkpoint = Path(f"{path}.partial")
+    provenance: dict[str, Any] = {"versions": versions()}
+    if isinstance(scene.structure, Rom):
+        provenance["model"] = digest(scene.structure.file)
+    old = session.computed.get(stem) or (_kept(path) if session.resume else None)
+    if old is None or old.scene != scene or any(old.provenance.get(key) != provenance[key] for key in provenance):
+        if not session.resume:
+            clear(checkpoint)
+        write_scene(scene, session.folder / f"{stem}.toml")
+        with progress(stem) as report:
+            old = sweep(scene, session.pool, report, checkpoint, provenance)
+        old.save(path)
+        clear(checkpoint)
+    session.computed[stem] = old
+    return old
+
+
+def _kept(path: Path) -> Sweep | None:
+    try:
+        return Sweep.load(path)
+    except (StoreError, KeyError, InputError):  # none, or of another version
+        return None
+
+
+def _claims(figure: PaperFigure, found: dict[str, list[Curve]]) -> list[Claim]:
+    first = next(iter(figure.scenes.values()))
+    reference = next(iter(found.values()))[0].reference
+    match figure.name:
+        case "fig9":
+            return paper_claims.fig9(found)
+        case "fig10":
+            return paper_claims.fig10(found)
+        case "fig12":
+            return paper_reduced.fig12(found)
+        case "fig14":
+            return paper_claims.fig14(found)
+        case "fig19":
+            bar = validate(Bar, read_toml(FOLDER / "fig19.toml")["bar"], "bar")
+            return paper_claims.fig19(found, bar, figure.scenes["nominal"].damper[0].mass)
+        case "mistuning":
+            return paper_claims.mistuning(found, _half_gaps(first, reference), first.damper[0].restitution)
+    return systems.claims(found)
+
+
+def _picture(figure: PaperFigure, found: dict[str, list[Curve]], path: Path) -> None:
+    title = figure.title
+    match figure.name:
+        case "fig9":
+            names = ("reference", "reference/2", "reference/10")
+            paper_plots.responses_picture(dict(zip(names, found[""], strict=True)), title, path)
+        case "fig14":
+            scene = figure.scenes["single"]
+            angles = scene.sweep_points()[0]["gravity.orientation_deg"]
+            paper_plots.orientations_picture(_named(found), angles.tolist(), title, path)
+        case "fig19":
+            both = _named(found)
+            ours = {name: of[0] for name, of in both.items()}
+            panels = {
+                "mass and gap by the bar's length": {n: c for n, c in ours.items() if "gap" not in n},
+                "mass alone, gap reference/2": {n.removesuffix(" same gap"): c for n, c in ours.items() if "gap" in n},
+            }
+            paper_plots.panels_picture(panels, title, path)
+        case "mistuning":
+            first = figure.scenes[""]
+            gaps = _half_gaps(first, found[""][0].reference)
+            paper_plots.mistuning_picture(found[""], gaps, first.damper[0].restitution, title, path)
+        case "systems":
+            paper_plots.systems_picture(found, title, path)
+        case _:
+            paper_plots.responses_picture({name: of[0] for name, of in _named(found).items()}, title, path)
+
+
+def _named(found: dict[str, list[Curve]]) -> dict[str, list[Curve]]:
+    return {name.replace("_", " "): of for name, of in found.items()}
+
+
+def _half_gaps(scene: Scene, reference: float) -> list[float]:
+    gaps = scene.sweep_points()[0]["cavity.c1.gap"]
+    return (gaps / 2 / reference).tolist()
+
+
+def _history(session: Session) -> Study:
+    """Fig. 13: the run at the damped peak of Fig. 12, with samples and events."""
+    data = read_toml(FOLDER / "fig13.toml")
+    figure = PaperFigure.load("fig12", session.structure, session.effort)
+    runs = {}
+    for curve, of in figure.scenes.items():
+        found = curves(_swept(figure, curve, session), curve)[0]
+        scene = of.replace({"excitation.frequency": found.peak().frequency, "sweep": {}, "time": data["time"]})
+        aside = scene.replace({"damper.0.position": data["aside"] * scene.cavity[0].gap})
+        runs[curve] = scene, simulate(scene, events=True, samples_per_period=data["samples"]), simulate(aside)
+    scene, response, alike = runs["reduced"]
+    folder = session.folder
+    write_scene(scene, folder / "fig13.toml")
+    response.save(folder / "fig13_response.h5", {"versions": versions(), "scene": scene.to_dict()})
+    title = f"{data['title']}, {response.frequency:.1f} Hz"
+    paper_plots.history_picture(response, session.structure.amplitude, title, folder / "fig13.png")
+    claims = paper_reduced.fig13(response, runs["rigid"][1], alike)
+    return _written(Study("fig13", title, ["fig13_response.h5"], claims), folder)
+
+
+def _written(found: Study, folder: Path) -> Study:
+    write_json(folder / f"{found.study}{CLAIMS}", finite(asdict(found)))
+    return found
+
+
+def tell(found: Study, seconds: float) -> None:
+    """Print a study's claims: what the paper says, what comes out here, the verdict."""
+    print(f"\n{found.study}: {found.title} ({seconds:.1f} s)")
+    for claim in found.claims:
+        rows = [("paper", claim.claim), ("here", claim.ours), (claim.verdict, claim.why)]
+        for head, text in rows:
+            lines = textwrap.wrap(text, 105) or [""]
+            print(f"  {head:10}{lines[0]}".rstrip())
+            print("".join(f"            {line}\n" for line in lines[1:]), end="")

@@ -1,0 +1,149 @@
+"""Forced responses: what a sweep says along one axis, beside the linear curves of the structure."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
+from vanedamp.coupling.sweep.grid import FREQUENCY
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.files.store import frozen
+from vanedamp.studies.headline import Headline, headline, reference_of, shown
+
+
+@dataclass(frozen=True, eq=False)
+class ForcedResponse:
+    """Curves along an axis of a sweep, each of shape (n,); displacements in m, nan where a point is not ok.
+
+    reference          what amplitudes are divided by in charts: the undamped maximum over the range
+    undamped, fixed    linear amplitudes at the points, of all that have any
+    damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks
+    energy_share       (n, 4) of viscous, friction, impact and contact loss
+    headline           what the curve comes to
+    source             the file it comes from
+    """
+
+    name: str
+    axis: str
+    units: str
+    x: np.ndarray
+    reference: float
+    undamped: np.ndarray
+    fixed: np.ndarray
+    damped_max: np.ndarray
+    damped_mean: np.ndarray
+    attached_mass_fraction: np.ndarray
+    impacts_per_period: np.ndarray
+    energy_share: np.ndarray
+    headline: Headline
+    source: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """The headline for people."""
+        told = self.headline.sentence(self.axis, self.units, self.x[0], self.x[-1])
+        return f"{self.name}: {told}"
+
+    def to_json(self) -> dict[str, Any]:
+        """The headline as plain data: what the curve is of, its range, its figures and the sentence."""
+        ends = [value.item() if isinstance(value, np.generic) else value for value in (self.x[0], self.x[-1])]
+        told = {"name": self.name, "axis": self.axis, "range": ends}
+        return told | self.headline.to_json() | {"sentence": self.sentence}
+
+
+def model_name(scene: Scene) -> str:
+    """The rung of the model ladder, in words."""
+    structure = scene.structure
+    if isinstance(structure, Rom):
+        return "reduced model" if structure.modes is None else f"reduced model, {structure.modes} modes"
+    return {Rigid: "rigid model", Prescribed: "prescribed motion"}[type(structure)]
+
+
+def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedResponse]:
+    """One forced response for every combination of the other axes.
+
+    They run along the excitation frequency if the sweep has it, or else along its longest axis of numbers.
+    """
+    paths = list(sweep.axes)
+    lengths = [len(values) * (values.dtype.kind in "if") for values in sweep.axes.values()]
+    along = paths.index(FREQUENCY) if FREQUENCY in paths else int(np.argmax(lengths))
+    order = np.argsort(sweep.axes[paths[along]], kind="stable")
+    others = [sweep.axes[path] for index, path in enumerate(paths) if index != along]
+    labels = [path for index, path in enumerate(paths) if index != along]
+    responses = []
+    for combination in itertools.product(*(range(len(values)) for values in others)):
+        point: tuple[Any, ...] = (*combination[:along], order, *combination[along:])
+        units = sweep.units()
+        values = [
+            f"{path.split('.', 1)[-1]} = {quantity(axis[index], units[path])}"
+            for path, axis, index in zip(labels, others, combination, strict=True)
+        ]
+        responses.append(_response(sweep, point, paths[along], ", ".join([name or model_name(sweep.scene), *values])))
+    return responses
+
+
+def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> ForcedResponse:
+    ok = sweep.status[point] == "ok"
+    damped = {
+        "damped_max": sweep.amplitude_max, "damped_mean": sweep.amplitude_mean, "impacts_per_period":
+        sweep.impacts_per_period, "attached_mass_fraction": sweep.attached_mass_fraction,
+    }  # fmt: skip
+    cut: dict[str, Any] = {key: frozen(np.where(ok, values[point], np.nan)) for key, values in damped.items()}
+    x = sweep.axes[axis][point[list(sweep.axes).index(axis)]]
+    undamped, fixed = frozen(sweep.amplitude_undamped[point]), frozen(sweep.amplitude_fixed[point])
+    tops = peaks_of(sweep, point) if axis == FREQUENCY else {}
+    return ForcedResponse(
+        name=name,
+        axis=axis,
+        units=sweep.units()[axis],
+        x=x,
+        reference=reference_of(undamped, tops),
+        undamped=undamped,
+        fixed=fixed,
+        energy_share=frozen(np.where(ok[:, None], sweep.energy_share[point], np.nan)),
+        headline=headline(
+            x, cut["damped_mean"], cut["damped_max"], cut["attached_mass_fraction"], undamped, fixed, tops,
+            axis == FREQUENCY,
+        ),
+        **cut,
+    )  # fmt: skip
+
+
+def peaks_of(sweep: Sweep, point: tuple[Any, ...]) -> dict[str, Any]:
+    """Tops of the linear curves of a part of a sweep, by the names of coupling.sweep.sweep.PEAKS."""
+    if not sweep.peaks:
+        return {}
+    along = list(sweep.axes).index(FREQUENCY)
+    return {name: values[point[:along] + point[along + 1 :]] for name, values in sweep.peaks.items()}
+
+
+def for_people(units: str) -> tuple[float, str]:
+    """Factor and unit in which values of a unit are shown."""
+    return (1e6, "µm") if units == "m" else (1.0, units)
+
+
+def quantity(value: Any, units: str) -> str:
+    """A value with its unit, lengths in micrometres."""
+    factor, larger = for_people(units)
+    if factor != 1.0 and not isinstance(value, str):
+        return f"{value * factor:.4g} {larger}"
+    return f"{shown(value)} {units}".removesuffix(" 1")
+
+
+def resonance_grid(start: float, stop: float, peaks: list[float], width: float, num: int) -> np.ndarray:
+    """(num,) ascending frequencies from start to stop, half of them evenly and half around the peaks.
+
+    peaks: frequencies, each of which is a point of the grid; width: of a peak, as a share of its frequency.
+    """
+    fine = np.linspace(start, stop, 4001)
+    bells = sum(1 / (1 + ((fine - peak) / (width * peak)) ** 2) for peak in peaks)
+    share = np.cumsum(1 / len(fine) + bells / np.sum(bells))
+    grid = np.interp(np.linspace(share[0], share[-1], num), share, fine)
+    for peak in peaks:
+        grid[np.argmin(np.abs(grid - peak))] = peak
+    return grid

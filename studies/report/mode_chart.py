@@ -1,0 +1,120 @@
+"""Mode shapes that can be turned: the surface of the mesh, deformed and coloured by displacement (plotly)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import plotly.graph_objects as go
+
+from vanedamp.studies.report.charts import FONT
+
+#: surfaces with more triangles than this are shown as pictures: turning them would be no pleasure
+MOST_TRIANGLES = 60_000
+_MOST_MODES = 12
+_EXAGGERATION = 0.06  # largest displacement, as a share of the structure's size
+# cells by their number of nodes: faces by corners, as VTK counts them
+_TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
+_HEXAHEDRON = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+_FACES: dict[int, tuple[tuple[int, ...], ...]] = {
+    4: _TETRAHEDRON, 10: _TETRAHEDRON, 8: _HEXAHEDRON, 20: _HEXAHEDRON, 27: _HEXAHEDRON,
+}  # fmt: skip
+
+
+def surface(cells: np.ndarray) -> np.ndarray:
+    """(triangles, 3) corners of the cells' outer faces, seen from outside.
+
+    cells: (cells, nodes) of tetrahedra or hexahedra, corners first. Raises KeyError for other cells.
+    """
+    faces = np.vstack([cells[:, list(face)] for face in _FACES[cells.shape[1]]])
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    outer = faces[first[count == 1]]
+    return outer if outer.shape[1] == 3 else np.vstack([outer[:, :3], outer[:, [0, 2, 3]]])
+
+
+def sharp_edges(points: np.ndarray, triangles: np.ndarray, angle_deg: float = 30.0) -> np.ndarray:
+    """(edges, 2) nodes of the edges of a closed surface whose two triangles differ by more than an angle."""
+    normals = np.cross(
+        points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
+    )
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    owner = np.tile(np.arange(len(triangles)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, owner = edges[order], owner[order]
+    pairs = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+    cosine = np.einsum("ij,ij->i", normals[owner[pairs]], normals[owner[pairs + 1]])
+    return edges[pairs[cosine < np.cos(np.radians(angle_deg))]]
+
+
+class Surface(NamedTuple):
+    """The nodes (n,) on a mesh's surface, and its triangles (t, 3) as places in them."""
+
+    nodes: np.ndarray
+    triangles: np.ndarray
+
+
+def small_surface(values: Mapping[str, np.ndarray]) -> Surface | None:
+    """The surface of a record of modes, if a page can carry it."""
+    cells = values["cell"]
+    if cells.shape[1] not in _FACES:
+        return None
+    nodes, triangles = np.unique(surface(cells), return_inverse=True)
+    return Surface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * MOST_TRIANGLES else None
+
+
+def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.Figure:
+    """The modes of a record of `vanedamp modal`, one at a time, beginning with `mode`."""
+    nodes, triangles = of
+    points = values["coordinates"][nodes]
+    chosen = range(min(len(values["frequency"]), max(_MOST_MODES, mode + 1)))
+    shapes = [values["shape"][index].reshape(-1, 3)[nodes] for index in chosen]
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    figure = go.Figure([_at_rest(points, triangles)])
+    for index, shape in zip(chosen, shapes, strict=True):
+        figure.add_trace(_deformed(points, triangles, shape, size, visible=index == mode))
+    names = [f"mode {index + 1}: {values['frequency'][index]:.2f} Hz" for index in chosen]
+    menu = [
+        {"label": name, "method": "update", "args": [{"visible": [True, *(index == other for other in chosen)]}]}
+        for index, name in zip(chosen, names, strict=True)
+    ]
+    axis = {"gridcolor": "#e2e8f0", "backgroundcolor": "#fff", "nticks": 5}
+    figure.update_layout(
+        height=560, autosize=True, font={"family": FONT, "size": 13}, margin={"l": 0, "r": 0, "t": 48, "b": 0},
+        legend={"x": 0.0, "y": 0.0}, uirevision="kept",
+        updatemenus=[{"buttons": menu, "active": mode, "x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}],
+        scene={
+            "aspectmode": "data", "xaxis": axis | {"title": "x, m"}, "yaxis": axis | {"title": "y, m"},
+            "zaxis": axis | {"title": "z, m"}, "camera": {"eye": {"x": 2.0, "y": 0.95, "z": 0.75}},
+        },
+    )  # fmt: skip
+    return figure
+
+
+def mode_rows(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> Iterator[list[float]]:
+    """x, y, z (m) and the displacements of a mode at the nodes of the surface."""
+    moved = values["shape"][mode].reshape(-1, 3)
+    yield from np.column_stack([values["coordinates"][of.nodes], moved[of.nodes]]).tolist()
+
+
+def _at_rest(points: np.ndarray, triangles: np.ndarray) -> go.Scatter3d:
+    edges = points[sharp_edges(points, triangles)]
+    lines = np.full((len(edges), 3, 3), np.nan, np.float32)  # nan lifts the pen
+    lines[:, :2] = edges
+    x, y, z = lines.reshape(-1, 3).T
+    look = {"color": "#64748b", "width": 1.5}
+    return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=look, name="edges at rest", showlegend=True, hoverinfo="skip")
+
+
+def _deformed(points: np.ndarray, triangles: np.ndarray, shape: np.ndarray, size: float, visible: bool) -> go.Mesh3d:
+    magnitude = np.linalg.norm(shape, axis=1)
+    moved = (points + shape * (_EXAGGERATION * size / magnitude.max())).astype(np.float32)
+    (x, y, z), (i, j, k) = moved.T, triangles.astype(np.int32).T
+    bar: dict[str, Any] = {"title": {"text": "displacement /<br>largest displacement"}, "len": 0.7, "thickness": 16}
+    return go.Mesh3d(
+        x=x, y=y, z=z, i=i, j=j, k=k, intensity=(magnitude / magnitude.max()).astype(np.float32), cmin=0, cmax=1,
+        colorscale="Viridis", colorbar=bar, flatshading=False, visible=visible,
+        hovertemplate="%{intensity:.3f}<extra></extra>", lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05},
+        name="mode",
+    )  # fmt: skip

@@ -1,0 +1,117 @@
+"""Time histories: a run's displacement, its bodies in their cavities, and their impacts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.store import frozen, load
+from vanedamp.files.toml_input import validate
+from vanedamp.studies.report.charts import COLOURS, dressed
+
+_MOST_PERIODS = 200  # in a page: the last of a run
+_SHOWN_PERIODS = 25
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Samples of a run and the figures about it.
+
+    time          (n,) s, as sampled; displacement (n,) m at excitation.at
+    bodies        (n, dampers) m, relative to their cavities
+    impacts       (m,) s; struck: (m,) number of the body of each
+    measures      plain figures and energies of the run, as `vanedamp run --json` tells them
+    scene         what was run; None if the file does not say
+    """
+
+    time: np.ndarray
+    displacement: np.ndarray
+    bodies: np.ndarray
+    impacts: np.ndarray
+    struck: np.ndarray
+    measures: Mapping[str, Any]
+    provenance: Mapping[str, Any]
+    scene: Scene | None
+
+    @classmethod
+    def load(cls, path: str | Path) -> History:
+        """Read what `vanedamp run` wrote. Raises files.store.StoreError."""
+        values, attributes = load(path, "response")
+        provenance = json.loads(attributes.pop("provenance", "{}"))
+        kinds = values.get("event_kind", np.array([], dtype=object)) == "impact"
+        energy = json.loads(attributes.pop("energy", "{}"))
+        return cls(
+            time=frozen(values.get("time", [])),
+            displacement=frozen(values.get("displacement", [])),
+            bodies=frozen(values.get("body_displacement", np.zeros((0, 0)))),
+            impacts=frozen(np.asarray(values.get("event_time", []))[kinds]),
+            struck=frozen(np.asarray(values.get("event_damper", []))[kinds], int),
+            measures=attributes | {"energy": energy},
+            provenance=provenance,
+            scene=validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None,
+        )
+
+    @property
+    def period(self) -> float:
+        """s"""
+        return 1.0 / float(self.measures["frequency"])
+
+    def late(self) -> History:
+        """The last periods alone, as many as a page carries."""
+        begin = self.time[-1] - _MOST_PERIODS * self.period
+        kept, hit = self.time >= begin, self.impacts >= begin
+        return History(
+            self.time[kept], self.displacement[kept], self.bodies[kept], self.impacts[hit], self.struck[hit],
+            self.measures, self.provenance, self.scene,
+        )  # fmt: skip
+
+    def rows(self) -> Iterator[list[float]]:
+        """time, displacement and those of the bodies."""
+        yield from np.column_stack([self.time, self.displacement, self.bodies]).tolist()
+
+
+def history_figure(history: History) -> go.Figure:
+    """Displacement with a mark at every impact, above the bodies' places between the walls."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
+    milliseconds = 1e3 * history.time
+    figure.add_scatter(
+        x=milliseconds, y=1e6 * history.displacement, name="structure", line={"color": "#0f172a", "width": 1.4},
+        hovertemplate="%{y:.4g} µm", row=1, col=1,
+    )  # fmt: skip
+    at = np.interp(history.impacts, history.time, history.displacement)
+    for body in range(history.bodies.shape[1]):
+        colour = COLOURS[body % len(COLOURS)]
+        mine = history.struck == body
+        figure.add_scatter(
+            x=1e3 * history.impacts[mine], y=1e6 * at[mine], name=f"impacts of body {body + 1}", mode="markers",
+            marker={"color": colour, "size": 7, "symbol": "x"}, hovertemplate="%{y:.4g} µm", row=1, col=1,
+        )  # fmt: skip
+        figure.add_scatter(
+            x=milliseconds, y=1e6 * history.bodies[:, body], name=f"body {body + 1} in its cavity",
+            line={"color": colour, "width": 1.2}, hovertemplate="%{y:.4g} µm", row=2, col=1,
+        )  # fmt: skip
+    for wall in _walls(history.scene):
+        figure.add_hline(y=1e6 * wall, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=2, col=1)
+    figure.update_yaxes(title_text="displacement, µm", row=1, col=1)
+    figure.update_yaxes(title_text="relative to the cavity, µm", row=2, col=1)
+    end = milliseconds[-1]
+    figure.update_xaxes(range=[end - 1e3 * _SHOWN_PERIODS * history.period, end], hoverformat=".6g")
+    figure.update_xaxes(title_text="time, ms", row=2, col=1)
+    figure.update_layout(hovermode="x unified")
+    return dressed(figure, height=560)
+
+
+def _walls(scene: Scene | None) -> list[float]:
+    """Where bodies alone in their cavities end, m."""
+    if scene is None:
+        return []
+    alone = [cavity.gap for cavity in scene.cavity if sum(damper.cavity == cavity.name for damper in scene.damper) == 1]
+    return sorted({side * gap / 2 for gap in alone for side in (-1, 1)})

@@ -1,0 +1,66 @@
+"""Vibration damping of vane clusters by loose bodies in cavities.
+
+The parts, in the order of the pipeline: `modal` (finite elements: mesh to matrices, modes, rigid model), `rom` (reduced
+models), `coupling` (scenes of a structure and its bodies, run by the exact event engine and other methods), `studies`
+(cases, sweeps' pictures, reports, the command line); `meshes` has meshes by parameters, `files` what all stand on.
+
+The names below are loaded when they are first used, so that `import vanedamp` takes no time.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vanedamp.coupling.engine import simulate
+    from vanedamp.coupling.response.response import Response, Status
+    from vanedamp.coupling.scene.scene import Scene
+    from vanedamp.coupling.sweep.record import Sweep
+    from vanedamp.coupling.sweep.sweep import sweep
+    from vanedamp.files.toml_input import InputError
+    from vanedamp.modal.eigen import Modes, solve_modes
+    from vanedamp.modal.matrices import SystemMatrices
+    from vanedamp.modal.rigid_model import RigidModel, rigid_model
+    from vanedamp.rom.interface import Interface
+    from vanedamp.rom.reduced import ReducedModel
+    from vanedamp.rom.reduction import reduce
+    from vanedamp.studies.case.tables import Case
+
+__all__ = [
+    "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "Scene", "Status", "Sweep",
+    "SystemMatrices", "reduce", "rigid_model", "simulate", "solve_modes", "sweep",
+]  # fmt: skip
+
+_PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
+_HOMES = {
+    "Case": "studies.case.tables",
+    "InputError": "files.toml_input",
+    "Interface": "rom.interface",
+    "Modes": "modal.eigen",
+    "ReducedModel": "rom.reduced",
+    "Response": "coupling.response.response",
+    "RigidModel": "modal.rigid_model",
+    "Scene": "coupling.scene.scene",
+    "Status": "coupling.response.response",
+    "Sweep": "coupling.sweep.sweep",
+    "SystemMatrices": "modal.matrices",
+    "reduce": "rom.reduction",
+    "rigid_model": "modal.rigid_model",
+    "simulate": "coupling.engine",
+    "solve_modes": "modal.eigen",
+    "sweep": "coupling.sweep.sweep",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name, or a part, where it is first used."""
+    if name in _PARTS:
+        return import_module(f"vanedamp.{name}")
+    if name in _HOMES:
+        return getattr(import_module(f"vanedamp.{_HOMES[name]}"), name)
+    raise AttributeError(f"module 'vanedamp' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, *_PARTS])
