@@ -61,12 +61,20 @@ def sweep(folder, workers, event="none", end="", count=1):
     return subprocess.Popen(
         [sys.executable, "-c", PROGRAM, event, end, str(count), *command], cwd=folder, start_new_session=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        preexec_fn=heed_interrupts,
     )  # fmt: skip
 
 
+def heed_interrupts():
+    """What a shell runs in the background ignores interrupts, and so would all that the tests start there."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def until(condition):
-    """Wait for what will happen."""
+    """Wait for what will happen, a minute at most."""
+    end = time.monotonic() + 60.0
     while not condition():
+        assert time.monotonic() < end
         time.sleep(0.01)
 
 
@@ -81,7 +89,11 @@ def members(group):
 
 
 def check(process, folder):
-    out, error = process.communicate()
+    try:
+        out, error = process.communicate(timeout=120.0)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        raise
     assert (process.returncode, out, error) == (130, "", "vanedamp: interrupted\n")
     until(lambda: not members(process.pid))
     assert (folder / "sweep.h5").read_text() == "precious"
