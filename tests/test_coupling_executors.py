@@ -74,7 +74,7 @@ def deadly(base, choices, values, task):
 def test_a_point_that_kills_its_worker_is_one_point(changes, monkeypatch):
     """Such as one that needs more memory than there is: all others are what they are without it."""
     expected = sweep(scene(**changes))
-    monkeypatch.setattr("vanedamp.coupling.sweep.sweep.run_points", deadly)
+    monkeypatch.setattr("vanedamp.coupling.sweep.schedule.run_points", deadly)
     with WorkerPool(2) as pool:
         found = sweep(scene(**changes), pool)
     assert found.status.ravel()[5] == "error: the worker process ended abruptly (killed, or out of memory)"
@@ -87,7 +87,7 @@ def test_a_point_that_kills_its_worker_is_one_point(changes, monkeypatch):
 @pytest.mark.slow
 def test_a_pool_that_is_gone_is_told(monkeypatch, tmp_path):
     """A pool of the standard library does not start anew; what was finished is kept."""
-    monkeypatch.setattr("vanedamp.coupling.sweep.sweep.run_points", deadly)
+    monkeypatch.setattr("vanedamp.coupling.sweep.schedule.run_points", deadly)
     with (
         ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool,
         pytest.raises(SweepError, match=r"workers are gone .* go on from the checkpoint"),
