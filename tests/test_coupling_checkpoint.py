@@ -9,8 +9,8 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from sweeping import RESONANCE, ROOT, command, kill_after_a_flush, scene, write
 
+from tests.tools.sweep_processes import RESONANCE, ROOT, command, kill_after_a_flush, scene, write
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.sweep import worker as module
 from vanedamp.coupling.sweep.checkpoint import Checkpoint, clear
@@ -116,7 +116,7 @@ def test_an_unreadable_checkpoint_is_refused_and_kept(damage, tmp_path):
 
 PROGRAM = """
 import resource, sys
-from sweeping import scene
+from tests.tools.sweep_processes import scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import StoreError
 
@@ -133,7 +133,7 @@ except StoreError as error:
 
 def test_a_full_disk_is_told_and_keeps_what_was_done(tmp_path, monkeypatch):
     """The limit of a file's size fails writes as a full disk does, within the process that writes."""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])}
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )

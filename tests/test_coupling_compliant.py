@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from compliant_scenes import STILL, collision, pile, scene, stop
-from following import follow
-from random_scenes import random_compliant
-from reference_laws import contact_time, damping_ratio
 
+from tests.reference.comparison import follow
+from tests.reference.compliant_collision import contact_time, damping_ratio
+from tests.tools.closed_form_compliant_scenes import STILL, collision, pile, scene, stop
+from tests.tools.random_scenes import random_compliant
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.files.toml_input import InputError

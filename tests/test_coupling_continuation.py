@@ -6,8 +6,8 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from sweeping import DATA, scene
 
+from tests.tools.sweep_processes import DATA, scene
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import grid

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from closed_scenes import ball, one_to_one, period_one_start, rubbing, scene, table
 
+from tests.tools.closed_form_scenes import ball, one_to_one, period_one_start, rubbing, scene, table
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene

@@ -12,9 +12,9 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
-from sweeping import ROOT, scene
-from test_studies_mpi import ENVIRONMENT
 
+from tests.test_studies_mpi import ENVIRONMENT
+from tests.tools.sweep_processes import ROOT, scene
 from vanedamp.coupling.sweep import worker as points
 from vanedamp.coupling.sweep.schedule import SweepError
 from vanedamp.coupling.sweep.sweep import sweep
@@ -23,7 +23,7 @@ from vanedamp.studies.workers import WorkerPool
 LINKED = {"continuation": {"direction": "up"}}
 PROGRAM = """
 from mpi4py.futures import MPICommExecutor
-from sweeping import scene
+from tests.tools.sweep_processes import scene
 from vanedamp.coupling.sweep.sweep import sweep
 
 with MPICommExecutor() as executor:
@@ -45,7 +45,7 @@ def whole(request, tmp_path_factory):
 def test_mpi_ranks(whole, tmp_path):
     """The first rank hands out the tasks, two do them."""
     (tmp_path / "program.py").write_text(PROGRAM.format(changes=whole[0]))
-    environment = os.environ | ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])}
+    environment = os.environ | ENVIRONMENT | {"PYTHONPATH": str(ROOT)}
     command = ["mpirun", "-n", "3", sys.executable, "program.py"]
     done = subprocess.run(
         command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=300

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_scenes import random_jenkins, random_scene
-from test_coupling_properties import FAST
-from worlds import scene_of, worlds
 
+from tests.test_coupling_properties import FAST
+from tests.tools.random_scenes import random_jenkins, random_scene
+from tests.tools.scene_strategies import scene_of, scene_tables
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
 from vanedamp.coupling.response.response import Status
@@ -118,7 +118,7 @@ def random_row(seed, structure, bodies):
     return scene.replace({"time": {"periods": PERIODS, "transient": 0}})
 
 
-def check_world(data):
+def check_drawn(data):
     """Walls apart from floors, compliant contacts, friction dampers: the same impacts, or none where none is compared.
 
     A stiff contact has some hundred times the frequency that steps and tolerances are set for.
@@ -130,15 +130,15 @@ def check_world(data):
 
 @FAST
 @given(data=st.data())
-def test_worlds(data):
-    check_world(data.draw(worlds()))
+def test_drawn_scenes(data):
+    check_drawn(data.draw(scene_tables()))
 
 
 @pytest.mark.slow
 @settings(FAST, max_examples=300)
 @given(data=st.data())
-def test_many_worlds(data):
-    check_world(data.draw(worlds()))
+def test_many_scenes(data):
+    check_drawn(data.draw(scene_tables()))
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from compliant_scenes import jenkins, jenkins_turns, scene
-from following import follow
-from random_scenes import random_jenkins
 
+from tests.reference.comparison import follow
+from tests.tools.closed_form_compliant_scenes import jenkins, jenkins_turns, scene
+from tests.tools.random_scenes import random_jenkins
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_coupling_traps import cluster
 
+from tests.test_coupling_traps import cluster
 from vanedamp.coupling.exact.event_driven import EngineRun
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.response import records as recs

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from laws_by_event import check_events
 
+from tests.tools.laws_by_event import check_events
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene

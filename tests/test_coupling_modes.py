@@ -5,12 +5,12 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from compliant_scenes import STILL, scene
-from precise import propagator
-from reference_laws import damping_ratio
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from tests.reference.compliant_collision import damping_ratio
+from tests.reference.multiprecision import propagator
+from tests.tools.closed_form_compliant_scenes import STILL, scene
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes, real_modes
 from vanedamp.coupling.exact.subsystem_assembly import _about_centre, add_flow, empty_flows

@@ -1,17 +1,18 @@
 """Laws that every motion obeys, over random scenes: Newton's laws, momentum, energy, walls, symmetry and units.
 
-Scenes are compared with their images before chaos parts them (tests/images.py), and stepped through event by event
-(tests/laws_by_event.py). Units and masses are compared over the first impacts alone: each impact multiplies a
-difference by about (travel of the structure)/(gap), so these agree within 1e-8 where round-off begins at 1e-15.
+Scenes are compared with their images before chaos parts them (tests/tools/scene_symmetries.py), and stepped through
+event by event (tests/tools/laws_by_event.py). Units and masses are compared over the first impacts only: each impact
+multiplies a difference by about (travel of the structure)/(gap), so these agree within 1e-8 where round-off begins at
+1e-15.
 """
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from laws_of_runs import KINDS, SETTINGS, check_images, check_laws, images_of, impacts, laws_of
-from worlds import between, scene_of, worlds
 
+from tests.tools.laws_of_runs import KINDS, SETTINGS, check_laws, check_symmetries, impacts, laws_of, symmetries_of
+from tests.tools.scene_strategies import between, scene_of, scene_tables
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 
@@ -27,7 +28,7 @@ LAWS = pytest.mark.parametrize("law", ["newton", "compliant"])
 @given(data=st.data())
 def test_laws(kind, data):
     law, elements = KINDS[kind]
-    check_laws(data.draw(worlds(laws=(law,), elements=elements)))
+    check_laws(data.draw(scene_tables(laws=(law,), elements=elements)))
 
 
 @pytest.mark.slow
@@ -41,15 +42,15 @@ def test_laws_of_thousands(kind, seed):
 @LAWS
 @FEW
 @given(data=st.data())
-def test_images(law, data):
-    check_images(data.draw(worlds(laws=(law,))))
+def test_symmetries(law, data):
+    check_symmetries(data.draw(scene_tables(laws=(law,))))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS[:4])
 @LAWS
-def test_images_of_thousands(law, seed):
-    images_of(law, seed, EACH)
+def test_symmetries_of_thousands(law, seed):
+    symmetries_of(law, seed, EACH)
 
 
 def agree(one, other, sign=1.0, length=1.0, speed=1.0, time=1.0, order=None):
@@ -76,7 +77,7 @@ def agree(one, other, sign=1.0, length=1.0, speed=1.0, time=1.0, order=None):
 
 @FAST
 @given(
-    data=worlds(structures=("rigid",), laws=("newton",), cavities="own", elements=False),
+    data=scene_tables(structures=("rigid",), laws=("newton",), cavities="own", elements=False),
     power=st.integers(-12, 12),
     stretch=st.integers(-12, 12),
 )
@@ -106,7 +107,9 @@ def test_units_do_not_matter(data, power, stretch):
 
 
 @FAST
-@given(data=worlds(structures=("rigid",), laws=("newton",), cavities="own", elements=False), mass=between(1e-6, 1e6))
+@given(
+    data=scene_tables(structures=("rigid",), laws=("newton",), cavities="own", elements=False), mass=between(1e-6, 1e6)
+)
 def test_only_ratios_of_masses_matter(data, mass):
     scene = scene_of(data)
     values = {"structure.mass": mass, "structure.stiffness": mass}
@@ -120,7 +123,7 @@ def test_only_ratios_of_masses_matter(data, mass):
 
 
 @FAST
-@given(data=worlds(structures=("rigid",)), cut=st.integers(1, 2))
+@given(data=scene_tables(structures=("rigid",)), cut=st.integers(1, 2))
 def test_shorter_run_is_the_beginning_of_the_longer(data, cut):
     """The state at a period's start does not depend on how far the run goes, to the last bit."""
     scene = scene_of(data)

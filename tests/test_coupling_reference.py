@@ -1,4 +1,4 @@
-"""The engine against an independent way: DOP853 at rtol 1e-12 with event search (tests/reference.py), random scenes.
+"""The engine against an independent way: DOP853 at rtol 1e-12 with event search (tests/reference/), random scenes.
 
 Impacts come in the same order at times equal to 1e-8 of a period, and the motion between them is the same. Chaos
 multiplies every difference at each impact, so the comparison ends where two runs of the reference itself, at other
@@ -7,9 +7,9 @@ step lengths and tolerances, part. The last impacts of a chatter are left out: e
 
 import numpy as np
 import pytest
-from random_scenes import random_reduced, random_scene
-from reference import with_horizon
 
+from tests.reference.integrator import with_horizon
+from tests.tools.random_scenes import random_reduced, random_scene
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 

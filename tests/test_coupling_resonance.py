@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 import pytest
-from following import follow
-from laws_by_event import check_events
 
+from tests.reference.comparison import follow
+from tests.tools.laws_by_event import check_events
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact import subsystem_assembly as flow
 from vanedamp.coupling.scene.scene import Scene

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from random_scenes import random_scene
-from reference import with_horizon
 
+from tests.reference.integrator import with_horizon
+from tests.tools.random_scenes import random_scene
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from test_coupling_engine import cluster
 
+from tests.test_coupling_engine import cluster
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length

@@ -8,8 +8,8 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 import xarray
-from sweeping import RESONANCE, scene
 
+from tests.tools.sweep_processes import RESONANCE, scene
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.sweep import worker as module
 from vanedamp.coupling.sweep.record import Sweep

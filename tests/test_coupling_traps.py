@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
-from random_scenes import random_reduced, random_scene
-from stepping import Stepper
-from worlds import scene_of
 
+from tests.tools.random_scenes import random_reduced, random_scene
+from tests.tools.scene_strategies import scene_of
+from tests.tools.segment_stepper import Stepper
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact import state as st
 from vanedamp.coupling.response.response import Status

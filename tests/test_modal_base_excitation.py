@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import linalg
 from scipy.sparse.linalg import spsolve
-from structures import rod
 
+from tests.tools.small_structures import rod
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.base_excitation import BaseExcitationError, base_response
 from vanedamp.modal.eigen import Modes, solve_modes

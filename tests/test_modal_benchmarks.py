@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from validation_modes import FV32, SDLS01, square_plate, tapered_membrane
 
+from tests.validation.modes import FV32, SDLS01, square_plate, tapered_membrane
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.modal.elasticity import Material, Solid

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from cases import BLOCK
 
+from tests.tools.block_case import BLOCK
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal import abaqus, nastran
 from vanedamp.modal.eigen import solve_modes

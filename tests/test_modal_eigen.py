@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import linalg, optimize, sparse
 from scipy.sparse.linalg import eigsh, spsolve
-from structures import truss
 
+from tests.tools.small_structures import truss
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import Modes, SolverError, count_below, factorize, solve_modes
 from vanedamp.modal.elasticity import Material, assemble

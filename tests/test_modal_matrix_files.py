@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import io, sparse
-from structures import truss
 
+from tests.tools.small_structures import truss
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.matrices import MatricesError
 from vanedamp.modal.matrix_files import read_folder, read_matrices, write_folder

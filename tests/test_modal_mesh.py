@@ -7,9 +7,9 @@ import sys
 import gmsh
 import numpy as np
 import pytest
-from boxes import write_boxes
 from scipy.sparse.linalg import spsolve
 
+from tests.tools.two_cubes_mesh import write_boxes
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.modal import fenicsx

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from cases import BLOCK, changed
 
+from tests.tools.block_case import BLOCK, changed
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import Modes, solve_modes
 from vanedamp.modal.elasticity import Material, assemble

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from boxes import write_boxes
 
+from tests.tools.two_cubes_mesh import write_boxes
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
 from vanedamp.modal.stress import hot_spot
 

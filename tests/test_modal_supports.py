@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from boxes import write_boxes
 from scipy.sparse.linalg import spsolve
 
+from tests.tools.two_cubes_mesh import write_boxes
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticityError, ElasticSupport, Material, Solid, assemble

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import sparse
-from structures import truss
 
+from tests.tools.small_structures import truss
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.correlation import MeasuredShapes, observed_shapes
 from vanedamp.modal.eigen import solve_modes

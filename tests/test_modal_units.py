@@ -5,8 +5,8 @@ import json
 import gmsh
 import numpy as np
 import pytest
-from cases import BLOCK, changed
 
+from tests.tools.block_case import BLOCK, changed
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
 from vanedamp.modal.msh import session

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from random_scenes import random_reduced, random_scene
-from reference import Event, Reference, agreement, integrate
-from reference_ledger import imbalance, ledger
 from scipy.optimize import brentq
 
+from tests.reference.integrator import Event, Reference, agreement, integrate
+from tests.reference.ledger import imbalance, ledger
+from tests.tools.random_scenes import random_reduced, random_scene
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from compliant_scenes import collision, jenkins, jenkins_turns, pile, stop
-from random_scenes import random_compliant, random_jenkins
-from reference import agreement, integrate
-from reference_laws import contact_time, damping_ratio
-from reference_ledger import imbalance, ledger
+
+from tests.reference.compliant_collision import contact_time, damping_ratio
+from tests.reference.integrator import agreement, integrate
+from tests.reference.ledger import imbalance, ledger
+from tests.tools.closed_form_compliant_scenes import collision, jenkins, jenkins_turns, pile, stop
+from tests.tools.random_scenes import random_compliant, random_jenkins
 
 KINDS = [
     ("rigid", 1, ""), ("prescribed", 1, ""), ("rigid", 2, ""), ("rigid", 2, "shared"), ("rom", 2, ""),

@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from cases import DAMPED_BLOCK
-from structures import rod
 
+from tests.tools.block_case import DAMPED_BLOCK
+from tests.tools.small_structures import rod
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import settle, settle_all
 from vanedamp.coupling.scene.scene import Scene

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy import linalg
-from structures import rod, truss
 
+from tests.tools.small_structures import rod, truss
 from vanedamp.modal.matrices import Patch, SystemMatrices
 from vanedamp.rom import checks
 from vanedamp.rom.bases.craig_bampton import ReductionError, reduce

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from scipy import io, linalg, sparse
-from structures import truss
 
+from tests.tools.small_structures import truss
 from vanedamp.coupling.system.modal_basis import modal_basis
 from vanedamp.rom.external import ExternalError, external_model, read_matrices
 from vanedamp.rom.interface import Interface, InterfaceCoordinate

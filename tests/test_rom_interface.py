@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from scipy import linalg
-from structures import truss
 
+from tests.tools.small_structures import truss
 from vanedamp.modal.matrices import MatricesError
 from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, rigid_motions
 

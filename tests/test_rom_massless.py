@@ -5,9 +5,9 @@ Monjaraz-Tec, Gross and Krack (2022), Computers and Structures 259, 106698, and 
 
 import numpy as np
 import pytest
-from massless_boundary import Boundary, craig_bampton, frequencies, macneal
-from structures import rod, truss
 
+from tests.reference.massless_boundary import Boundary, craig_bampton, frequencies, macneal
+from tests.tools.small_structures import rod, truss
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate

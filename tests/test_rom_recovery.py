@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from cases import DAMPED_BLOCK
 from scipy import linalg
-from structures import truss
 
+from tests.tools.block_case import DAMPED_BLOCK
+from tests.tools.small_structures import truss
 from vanedamp.coupling.output_histories import histories
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import linalg
-from structures import rod, truss
 
+from tests.tools.small_structures import rod, truss
 from vanedamp.rom import checks
 from vanedamp.rom import error_estimate as ladder
 from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model

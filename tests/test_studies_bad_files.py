@@ -3,9 +3,9 @@
 import h5py
 import numpy as np
 import pytest
-from cases import BLOCK
 from scipy import io, sparse
 
+from tests.tools.block_case import BLOCK
 from vanedamp.modal.matrices import MatricesError, SystemMatrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main

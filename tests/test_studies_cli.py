@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 import pytest
 import xarray
-from cases import DAMPED_BLOCK
 
+from tests.tools.block_case import DAMPED_BLOCK
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.store import StoreError, load

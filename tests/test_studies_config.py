@@ -1,8 +1,8 @@
 """Case files: what they mean, and the one line that says what is wrong with them."""
 
-import cases
 import pytest
 
+from tests.tools import block_case
 from vanedamp.files.toml_input import InputError
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.studies.case.tables import Case
@@ -25,7 +25,7 @@ direction = [0, 1, 0]
 facets = "c1_floor"
 direction = [0, 1, 0]
 """
-BLOCK = cases.BLOCK.split("[support]")[0]
+BLOCK = block_case.BLOCK.split("[support]")[0]
 THREE = "expected three numbers, not all zero, such as"
 
 

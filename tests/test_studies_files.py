@@ -9,8 +9,8 @@ import threading
 from pathlib import Path
 
 import pytest
-from cases import DAMPED_BLOCK
 
+from tests.tools.block_case import DAMPED_BLOCK
 from vanedamp.files.store import StoreError, Variable, load, replacing, save
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.matrix_files import FILES

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from structures import rod
 
+from tests.tools.small_structures import rod
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate

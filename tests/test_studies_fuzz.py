@@ -8,8 +8,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 import tomli_w
-from fuzz import PRESCRIBED, ROM_SCENE, SCENE, drawn
 
+from tests.tools.fuzz import PRESCRIBED, ROM_SCENE, SCENE, drawn
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate

@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 import tomli_w
-from random_scenes import random_reduced, random_scene
 
+from tests.tools.random_scenes import random_reduced, random_scene
 from vanedamp.studies.cli import main
 
 PATH = "excitation.frequency"

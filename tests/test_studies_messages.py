@@ -1,8 +1,8 @@
 """One line for what is wrong: in files that look right, and for work that nobody would wait for."""
 
 import pytest
-from cases import BLOCK, changed
 
+from tests.tools.block_case import BLOCK, changed
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.meshes.benchmarks import Block

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from cases import BLOCK, changed
 
+from tests.tools.block_case import BLOCK, changed
 from vanedamp.modal.eigen import Modes
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.report.page import write_report

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import BLOCK
 
+from tests.tools.block_case import BLOCK
 from vanedamp.modal.eigen import Modes
 from vanedamp.studies.cli import BAD_INPUT, main
 
@@ -67,6 +67,6 @@ def test_bad_input_is_told_once(tmp_path):
 
 
 def test_a_fault_ends_all_ranks(tmp_path):
-    finished = on_two_ranks(cwd=tmp_path, program=(str(ROOT / "tests" / "mpi_fault.py"),))
+    finished = on_two_ranks(cwd=tmp_path, program=(str(ROOT / "tests" / "tools" / "mpi_fault.py"),))
     assert finished.returncode != 0
     assert finished.stderr.count("RuntimeError: a fault of the program") == 1

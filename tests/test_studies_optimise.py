@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray
-from sweeping import ROOT
 
+from tests.tools.sweep_processes import ROOT
 from vanedamp.coupling.engine import simulate
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.cli import BAD_INPUT, main

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
-import validation_contact
-import validation_modes
-from validation import Page
 
-CASES = [*validation_contact.CASES, *validation_modes.CASES]
+from tests.validation import contact, modes
+from tests.validation.page import Page
+
+CASES = [*contact.CASES, *modes.CASES]
 
 
 @pytest.fixture(scope="module")

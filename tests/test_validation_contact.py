@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from validation_bar import MODES, Bar
-from validation_contact import ImpactOscillator
-from validation_unilateral import Chain
+
+from tests.validation.bar import MODES, Bar
+from tests.validation.contact import ImpactOscillator
+from tests.validation.unilateral_spring import Chain
 
 
 def test_impact_oscillator_tends_to_its_orbit():

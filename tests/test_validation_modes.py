@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from validation_modes import STEEL, Tube, bending_pairs, square_membrane
+
+from tests.validation.modes import STEEL, Tube, bending_pairs, square_membrane
 
 
 def test_square_membrane_converges(tmp_path):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from reference import Event, Reference, quadrature
-from reference_system import System
+
+from tests.reference.integrator import Event, Reference, quadrature
+from tests.reference.system import System
 
 
 def ledger(result: Reference) -> dict[str, float]:

@@ -11,8 +11,8 @@ import gmsh
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq
-from validation import Case, Figure, case
 
+from tests.validation.page import Case, Figure, case
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble

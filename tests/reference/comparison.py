@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from reference import Reference, with_horizon
-from reference_ledger import ledger
 
+from tests.reference.integrator import Reference, with_horizon
+from tests.reference.ledger import ledger
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Event, Response, Status
 from vanedamp.coupling.scene.scene import Scene

@@ -1,9 +1,4 @@
-"""Cases that others have published, as the rows of docs/validation.md.
-
-    python tests/validation.py
-
-computes every figure of the page and writes its tables anew, in about a minute.
-"""
+"""Cases that others have published, as the rows of docs/validation.md."""
 
 from __future__ import annotations
 
@@ -13,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "validation.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "validation.md"
 HEADER = ("case", "source", "quantity", "reference", "here", "deviation", "test")
 
 
@@ -126,17 +121,3 @@ class Page:
             lines += each.lines()
         self.text = self.text[:start] + "\n".join(lines) + "\n" + self.text[stop:]
         self.path.write_text(self.text, encoding="utf-8")
-
-
-def main() -> None:
-    """Write every table of the page."""
-    import validation_contact
-    import validation_modes
-
-    page = Page()
-    page.write("contact", validation_contact.CASES)
-    page.write("modes", validation_modes.CASES)
-
-
-if __name__ == "__main__":
-    main()

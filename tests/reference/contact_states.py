@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from reference_system import System
+
+from tests.reference.system import System
 
 STUCK = 0
 #: States of a compliant contact: apart, pressing, or apart with the wall not yet sprung back.

@@ -12,7 +12,7 @@ import tomli_w
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 RESONANCE = 15.915494309189533
 DATA = {
     "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from reference_impacts import accumulates, collide, snap
-from reference_modes import OPEN, PRESSING, STUCK, VANISHES, ZERO, Flow, Mode, Modes
-from reference_system import System
 from scipy.integrate import DOP853, DenseOutput, OdeSolution
 from scipy.optimize import brentq
 
+from tests.reference.contact_states import OPEN, PRESSING, STUCK, VANISHES, ZERO, Flow, Mode, Modes
+from tests.reference.impacts import accumulates, collide, snap
+from tests.reference.system import System
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.rom.reduced import ReducedModel
 

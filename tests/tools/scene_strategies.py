@@ -32,7 +32,7 @@ def speeds(largest):
 
 
 @st.composite
-def worlds(draw, structures=STRUCTURES, laws=LAWS, cavities=None, elements=True, longest=6):
+def scene_tables(draw, structures=STRUCTURES, laws=LAWS, cavities=None, elements=True, longest=6):
     """Tables of a scene (`scene_of` makes it one).
 
     cavities: "own" for one body a cavity, otherwise up to four bodies share them at random; elements: whether friction
@@ -83,7 +83,7 @@ def model_file(seed: int, modes: int) -> str:
 
 @cache
 def _folder() -> tempfile.TemporaryDirectory:
-    return tempfile.TemporaryDirectory(prefix="worlds-")
+    return tempfile.TemporaryDirectory(prefix="scene-strategies-")
 
 
 def _bodies(draw, law, cavities):

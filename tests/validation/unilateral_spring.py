@@ -6,10 +6,10 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from closed_scenes import scene
 from scipy.optimize import minimize_scalar, root
-from validation import Figure, case
 
+from tests.tools.closed_form_scenes import scene
+from tests.validation.page import Figure, case
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import Handover

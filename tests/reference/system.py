@@ -19,9 +19,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from reference_laws import damping_ratio
 from scipy.linalg import eigh
 
+from tests.reference.compliant_collision import damping_ratio
 from vanedamp.coupling.scene.bodies import FrictionDamper
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid

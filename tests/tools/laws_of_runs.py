@@ -2,8 +2,8 @@
 
 Run as a script, it looks at thousands of scenes, event by event, and prints the largest violations with their seeds:
 
-    .venv/bin/python tests/laws_of_runs.py [PARTS [EXAMPLES [FIRST_SEED]]]
-    .venv/bin/python tests/laws_of_runs.py KIND SEED          one part again, with the scene that fails
+    .venv/bin/python -m tests.tools.laws_of_runs [PARTS [EXAMPLES [FIRST_SEED]]]
+    .venv/bin/python -m tests.tools.laws_of_runs KIND SEED        one part again, with the scene that fails
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, assume, given, seed, settings
 from hypothesis import strategies as st
-from images import compare, hairs, later, mirrored, record, renumbered, reordered, unmirrored
-from laws_by_event import Worst, check_events
-from worlds import scene_of, worlds
 
+from tests.tools.laws_by_event import Worst, check_events
+from tests.tools.scene_strategies import scene_of, scene_tables
+from tests.tools.scene_symmetries import compare, later, mirrored, perturbed, record, renumbered, reordered, unmirrored
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact import automaton as auto
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
@@ -117,10 +117,10 @@ def check_walls(scene, response):
         assert openings.min() >= -1e-12 * cavity.gap
 
 
-def check_images(data):
+def check_symmetries(data):
     """Mirror image, cavities in another order, and a start at another phase: the same motion."""
     one = record(data)
-    apart = [record(near) for near in hairs(data)]
+    apart = [record(near) for near in perturbed(data)]
     codes = {run.code for run in (one, *apart)}
     assume(not (hops(scene_of(data)) and auto.EVENT_BUDGET in codes))
     assert codes == {auto.DONE}
@@ -143,20 +143,20 @@ def laws_of(kind: str, first: int, examples: int) -> Worst:
     @settings(SETTINGS, max_examples=examples)
     @given(data=st.data())
     def check(data):
-        largest.merge(check_laws(data.draw(worlds(laws=(law,), elements=elements)), LONGEST))
+        largest.merge(check_laws(data.draw(scene_tables(laws=(law,), elements=elements)), LONGEST))
 
     check()
     return largest
 
 
-def images_of(law: str, first: int, examples: int) -> None:
+def symmetries_of(law: str, first: int, examples: int) -> None:
     """Compare so many scenes, drawn from a seed, with their images."""
 
     @seed(first)
     @settings(SETTINGS, max_examples=examples)
     @given(data=st.data())
     def check(data):
-        check_images(data.draw(worlds(laws=(law,))))
+        check_symmetries(data.draw(scene_tables(laws=(law,))))
 
     check()
 

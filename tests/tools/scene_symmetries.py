@@ -1,6 +1,6 @@
-"""Images of a scene, and whether two runs are images of each other until chaos has amplified round-off.
+"""Symmetries of a scene, and whether two runs are images of each other until chaos has amplified round-off.
 
-How fast it does so is measured: the scene is run again from states a hair apart, and where those part, the comparison
+How fast it does so is measured: the scene is run again slightly perturbed, and where these runs part, the comparison
 ends. Up to there the image may differ by what they differ by, although its own round-off is ten thousand times smaller.
 """
 
@@ -11,15 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from stepping import Segment, Stepper
-from worlds import scene_of
 
+from tests.tools.scene_strategies import scene_of
+from tests.tools.segment_stepper import Segment, Stepper
 from vanedamp.coupling.exact import state as st
 from vanedamp.coupling.response.evaluation import events_of
 from vanedamp.coupling.system.constraints import Rows
 
-#: how far apart the runs that measure chaos begin, as a share of the free travel
-HAIR = 1e-11
+#: perturbation of the runs that measure chaos, as a share of lengths and masses
+PERTURBATION = 1e-11
 #: where they have parted, in periods, of the fastest speed and of each state
 PARTED = 1e-6
 #: what round-off may do without chaos
@@ -39,7 +39,7 @@ class Record:
     hits: Hits
     sections: np.ndarray
     code: int
-    together: float  # when two contacts of one cavity are first hit at once: a hair between them decides
+    together: float  # when two contacts of one cavity are first hit at once: round-off decides between them
 
     @property
     def fastest(self) -> float:
@@ -70,7 +70,7 @@ def record(data: dict, change=None) -> Record:
 def compare(one: Record, other: Record, apart: list[Record], shift: float = 0.0, sections: bool = True) -> float:
     """Assert that `other` is `one`, `shift` periods later. Returns the time up to which they could be compared.
 
-    apart: runs that began a hair from `one`.
+    apart: perturbed runs of `one`.
     """
     assert not other.code, f"the image ended with code {other.code}"
     end, spread = one.together, ROUND_OFF
@@ -79,7 +79,7 @@ def compare(one: Record, other: Record, apart: list[Record], shift: float = 0.0,
         end, spread = min(end, part), max(spread, difference)
     part, difference = _difference(one, other, shift, end - 10 * PARTED)
     assert part >= end - 10 * PARTED, f"impacts part at {part:.9g} of {end:.9g} periods"
-    assert difference <= spread, f"impacts differ by {difference:.3g}, runs a hair apart by {spread:.3g}"
+    assert difference <= spread, f"impacts differ by {difference:.3g}, perturbed runs by {spread:.3g}"
     if sections:
         _compare_sections(one, other, apart, int(min(end, len(one.sections) - 1)) + 1)
     return end
@@ -95,7 +95,7 @@ def _compare_sections(one: Record, other: Record, apart: list[Record], count: in
     # bodies that touch no wall any more part without an impact that would tell
     count = np.argmax(spread > PARTED) if np.any(spread > PARTED) else count
     widest, largest = spread[:count].max(initial=ROUND_OFF), difference[:count].max(initial=0.0)
-    assert largest <= widest, f"sections differ by {largest:.3g}, a hair apart by {widest:.3g}"
+    assert largest <= widest, f"sections differ by {largest:.3g}, perturbed runs by {widest:.3g}"
 
 
 def _difference(one: Record, other: Record, shift: float, end: float) -> tuple[float, float]:
@@ -123,10 +123,10 @@ def _fast(hits: np.ndarray, fastest: float) -> np.ndarray:
     return hits[np.abs(hits[:, 1]) > FADING * fastest] / [1.0, fastest]
 
 
-def hairs(data: dict) -> list[dict]:
-    """The tables with lengths and masses a hair larger and smaller."""
+def perturbed(data: dict) -> list[dict]:
+    """The tables with lengths and masses larger and smaller by a perturbation."""
     near = []
-    for factor in (1 + HAIR, 1 - HAIR):
+    for factor in (1 + PERTURBATION, 1 - PERTURBATION):
         cavities = [cavity | {"gap": cavity["gap"] * factor} for cavity in data["cavity"]]
         dampers = [
             damper | {"position": damper["position"] * factor, "mass": damper["mass"] * factor ** (1 + index)}

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from closed_scenes import scene
-from structures import rod
-from validation import Figure, case
 
+from tests.tools.closed_form_scenes import scene
+from tests.tools.small_structures import rod
+from tests.validation.page import Figure, case
 from vanedamp.coupling.engine import simulate
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduction import reduce

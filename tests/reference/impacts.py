@@ -6,8 +6,9 @@ import itertools
 import math
 
 import numpy as np
-from reference_modes import STUCK, ZERO, Mode, Modes
-from reference_system import System
+
+from tests.reference.contact_states import STUCK, ZERO, Mode, Modes
+from tests.reference.system import System
 
 #: A sequence of impacts that would be over within this time (radians of the excitation) is completed at once.
 CHATTER = 1e-9

@@ -6,8 +6,8 @@ import itertools
 from dataclasses import dataclass, fields
 
 import numpy as np
-from stepping import SLIDES, Moment, Segment, Step, Stepper
 
+from tests.tools.segment_stepper import SLIDES, Moment, Segment, Step, Stepper
 from vanedamp.coupling.exact import automaton as auto
 from vanedamp.coupling.exact import state as st
 from vanedamp.coupling.exact.event_functions import ADHESION, CHATTER, RESOLUTION

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from closed_scenes import ball, one_to_one, period_one_start, rubbing, scene, table
-from compliant_scenes import stop
 from scipy.linalg import expm
 from scipy.optimize import brentq
-from validation import Case, Figure, case
-from validation_bar import bar_on_a_spring, bar_on_a_wall, falling_bar
-from validation_unilateral import unilateral_spring
 
+from tests.tools.closed_form_compliant_scenes import stop
+from tests.tools.closed_form_scenes import ball, one_to_one, period_one_start, rubbing, scene, table
+from tests.validation.bar import bar_on_a_spring, bar_on_a_wall, falling_bar
+from tests.validation.page import Case, Figure, case
+from tests.validation.unilateral_spring import unilateral_spring
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import Handover

@@ -1,0 +1,1 @@
+"""Tests: closed forms, rates, published cases and independent solutions."""

@@ -1,0 +1,1 @@
+"""What several tests share: scenes, meshes and cases, the engine step by step, commands as processes."""

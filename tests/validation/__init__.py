@@ -1,0 +1,1 @@
+"""Cases that others have published, and the page that shows them."""
