@@ -1,6 +1,17 @@
-"""Expensive records that several test files share."""
+"""Expensive records and working directories that several test files share."""
 
 import pytest
+
+from tests.tools.input_files import DAMPED_BLOCK, SCENE
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A working directory with a case and a scene."""
+    (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
+    (tmp_path / "scene.toml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.tools.sweep_processes import RESONANCE, ROOT, command, kill_after_a_flush, scene, write
+from tests.tools.processes import environment
+from tests.tools.sweep_processes import RESONANCE, command, kill_after_a_flush, scene, write
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.sweep import worker as module
 from vanedamp.coupling.sweep.checkpoint import Checkpoint, clear
@@ -116,6 +117,7 @@ def test_an_unreadable_checkpoint_is_refused_and_kept(damage, tmp_path):
 
 PROGRAM = """
 import resource, sys
+from tests.tools.processes import environment
 from tests.tools.sweep_processes import scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import StoreError
@@ -133,9 +135,8 @@ except StoreError as error:
 
 def test_a_full_disk_is_told_and_keeps_what_was_done(tmp_path, monkeypatch):
     """The limit of a file's size fails writes as a full disk does, within the process that writes."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-c", PROGRAM], cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False
     )
     assert done.returncode == 1, done.stderr
     assert done.stderr.startswith("told: sweep.partial: cannot be written (File too large)")

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from tests.tools.input_files import CLUSTER, changed
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.excitation import Gravity
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.modal.matrices import Patch, SystemMatrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.stages import assemble, interface, reduction
@@ -230,18 +230,7 @@ def test_walls_that_fit_or_are_not_known_run(directions, normals, labels, tmp_pa
     assert simulate(cavity(tmp_path / "rom.h5", directions, normals, **labels)).status == "ok"
 
 
-CASE = f"""
-[mesh]
-file = "{SHIPPED}"
-degree = 1
-[material.default]
-young = 2e11
-poisson = 0.3
-density = 8190.0
-damping_ratio = 0.002
-[support]
-clamped = ["clamp"]
-"""
+CASE = changed(CLUSTER, ("degree = 2", "degree = 1")).split("[modes]")[0]
 
 
 def reduced(folder, **directions):

@@ -13,8 +13,8 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from tests.test_studies_mpi import ENVIRONMENT
-from tests.tools.sweep_processes import ROOT, scene
+from tests.tools.processes import RANKS, environment
+from tests.tools.sweep_processes import scene
 from vanedamp.coupling.sweep import worker as points
 from vanedamp.coupling.sweep.schedule import SweepError
 from vanedamp.coupling.sweep.sweep import sweep
@@ -45,10 +45,9 @@ def whole(request, tmp_path_factory):
 def test_mpi_ranks(whole, tmp_path):
     """The first rank hands out the tasks, two do them."""
     (tmp_path / "program.py").write_text(PROGRAM.format(changes=whole[0]))
-    environment = os.environ | ENVIRONMENT | {"PYTHONPATH": str(ROOT)}
     command = ["mpirun", "-n", "3", sys.executable, "program.py"]
     done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=300
+        command, cwd=tmp_path, env=environment(**RANKS), capture_output=True, text=True, check=False, timeout=300
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "mpi.h5").read_bytes() == whole[1]
@@ -112,8 +111,7 @@ if __name__ == "__main__":
 
 def test_workers_end_with_a_parent_that_is_killed(tmp_path):
     (tmp_path / "program.py").write_text(ORPHANS)
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    parent = subprocess.Popen([sys.executable, "program.py"], cwd=tmp_path, env=environment, stdout=subprocess.PIPE)
+    parent = subprocess.Popen([sys.executable, "program.py"], cwd=tmp_path, env=environment(), stdout=subprocess.PIPE)
     workers = [int(word) for word in parent.stdout.readline().split()]
     assert workers and all(running(worker) for worker in workers)
     parent.kill()

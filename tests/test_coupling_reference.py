@@ -5,27 +5,15 @@ multiplies every difference at each impact, so the comparison ends where two run
 step lengths and tolerances, part. The last impacts of a chatter are left out: each way completes it by its own rule.
 """
 
-import numpy as np
 import pytest
 
+from tests.reference.comparison import SAMPLES, compare_motion, impacts
 from tests.reference.integrator import with_horizon
 from tests.tools.random_scenes import random_reduced, random_scene
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 
-PERIODS, SAMPLES = 10, 32
-# impacts slower than this share of the fastest are the end of a chatter
-FADING = 1e-3
-
-
-def impacts(events, end):
-    """(time, body) of the impacts up to `end` that are no end of a chatter."""
-    fastest = max((abs(event.relative_velocity_before) for event in events), default=0.0)
-    return [
-        (event.time, event.damper)
-        for event in events
-        if event.time < end and event.kind == "impact" and abs(event.relative_velocity_before) > FADING * fastest
-    ]
+PERIODS = 10
 
 
 @pytest.mark.parametrize(
@@ -50,15 +38,7 @@ def test_motion_equals_dop853(structure, bodies, seed, tmp_path):
 
     expected, found = impacts(reference.events, end), impacts(response.event_list, end)
     assert abs(len(expected) - len(found)) <= 1  # one may lie just beyond the end
-    for (time, body), (other, other_body) in zip(expected, found, strict=False):
-        assert body == other_body
-        assert abs(time - other) < 1e-8 * period
-
-    time = response.time[response.time < end]
-    assert len(time) > 2 * SAMPLES
-    followed = response.displacement[: len(time)] - reference.x(time)
-    assert np.abs(followed).max() <= 2e-8 * np.abs(response.displacement).max()
-    for body, damper in enumerate(scene.damper):
-        gap = next(cavity.gap for cavity in scene.cavity if cavity.name == damper.cavity)
-        followed = response.body_displacement[: len(time), body] - reference.r(body, time)
-        assert np.abs(followed).max() <= 2e-7 * gap
+    for one, other in zip(expected, found, strict=False):
+        assert one.damper == other.damper
+        assert abs(one.time - other.time) < 1e-8 * period
+    compare_motion(scene, response, reference, end, structure=2e-8, bodies=2e-7)

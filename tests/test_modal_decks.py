@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.tools.block_case import BLOCK
+from tests.tools.input_files import BLOCK
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal import abaqus, nastran
 from vanedamp.modal.eigen import solve_modes

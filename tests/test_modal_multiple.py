@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.tools.block_case import BLOCK, changed
+from tests.tools.input_files import BLOCK, changed
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import Modes, solve_modes
 from vanedamp.modal.elasticity import Material, assemble

@@ -6,7 +6,7 @@ import gmsh
 import numpy as np
 import pytest
 
-from tests.tools.block_case import BLOCK, changed
+from tests.tools.input_files import BLOCK, changed
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
 from vanedamp.modal.msh import session

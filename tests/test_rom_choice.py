@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.tools.block_case import DAMPED_BLOCK
+from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.small_structures import rod
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import settle, settle_all

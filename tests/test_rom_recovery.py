@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from tests.tools.block_case import DAMPED_BLOCK
+from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.small_structures import truss
 from vanedamp.coupling.output_histories import histories
 from vanedamp.coupling.scene.scene import Scene

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import io, sparse
 
-from tests.tools.block_case import BLOCK
+from tests.tools.input_files import BLOCK
 from vanedamp.modal.matrices import MatricesError, SystemMatrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main

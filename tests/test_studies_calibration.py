@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.tools.block_case import BLOCK, changed
+from tests.tools.input_files import BLOCK, changed
 from vanedamp.modal.correlation import MeasuredShapes, observed_shapes
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.frf import Frf

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 import xarray
 
-from tests.tools.block_case import DAMPED_BLOCK
+from tests.tools.input_files import DAMPED_BLOCK, SCENE, changed, rom_scene
+from tests.tools.processes import ROOT, environment, vanedamp
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.store import StoreError, load
@@ -22,54 +23,9 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, _parser, main
 from vanedamp.studies.commands import all as commands
 
-ROOT = Path(__file__).resolve().parent.parent
-SCENE = """
-[structure]
-model = "rigid"
-mass = 1.0
-stiffness = 1e4
-damping_ratio = 0.01
-[excitation]
-frequency = 15.9
-resonance_amplitude = 1e-3
-[[cavity]]
-name = "c1"
-gap = 2e-4
-[[damper]]
-cavity = "c1"
-mass = 0.05
-friction = 0.3
-restitution = 0.6
-[time]
-periods = 30
-transient = 10
-[sweep]
-"excitation.frequency" = {start = 15.4, stop = 16.2, num = 4}
-"""
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """A working directory with a case and a scene."""
-    (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
-    (tmp_path / "scene.toml").write_text(SCENE)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
 
 def change(path, old, new):
-    text = path.read_text()
-    assert text.count(old) == 1
-    path.write_text(text.replace(old, new))
-
-
-def vanedamp(*arguments, cwd, **environment):
-    """The command as a process of its own."""
-    variables = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    return subprocess.run(
-        [sys.executable, "-m", "vanedamp", *arguments], cwd=cwd, capture_output=True, text=True, check=False,
-        env=variables | {"PYTHONPATH": str(ROOT)} | environment,
-    )  # fmt: skip
+    path.write_text(changed(path.read_text(), (old, new)))
 
 
 # results
@@ -225,12 +181,12 @@ def test_foreign_checkpoints_are_told_and_kept(folder, capfd):
 
 def test_sweep_of_a_reduced_model_by_two_workers(folder, capsys):
     assert main(["reduce", "case.toml", "--modes", "1", "-o", "rom.h5"]) == 0
-    scene = SCENE.replace(
-        'model = "rigid"\nmass = 1.0\nstiffness = 1e4\ndamping_ratio = 0.01', 'model = "rom"\nfile = "rom.h5"'
-    )
     first = ReducedModel.load("rom.h5").natural_frequencies_hz[0]
-    scene = scene.replace("frequency = 15.9", f'frequency = {first}\nat = "tip"').replace("gap", 'floor = "tip"\ngap')
-    scene = scene.split("[sweep]")[0] + f'[sweep]\n"excitation.frequency" = [{0.98 * first}, {first}]\n'
+    scene = changed(
+        rom_scene("rom.h5"),
+        ("frequency = 15.9", f"frequency = {first}"),
+        ("{start = 15.4, stop = 16.2, num = 4}", f"[{0.98 * first}, {first}]"),
+    )
     (folder / "rom.toml").write_text(scene)
     for workers in "12":
         assert main(["sweep", "rom.toml", "-o", f"sweep{workers}.h5", "--workers", workers]) == 0
@@ -304,11 +260,6 @@ def test_bad_input(command, file, old, new, extra, told, folder, capfd):
     assert sorted(path.name for path in folder.iterdir()) == before
 
 
-ROM_SCENE = SCENE.replace("mass = 1.0\nstiffness = 1e4\ndamping_ratio = 0.01", 'file = "{file}"').replace(
-    '"rigid"', '"rom"'
-).replace("frequency = 15.9", 'frequency = 15.9\nat = "{at}"').replace("gap", 'floor = "tip"\ngap')  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def rom(tmp_path_factory):
     path = tmp_path_factory.mktemp("rom") / "rom.h5"
@@ -325,7 +276,7 @@ def test_bad_reduced_models(command, folder, rom, capfd):
         (rom, "tap", ["excitation.at", "'tap'", "tip, top"]),
         ("case.toml", "tip", ["case.toml", "HDF5"]),
     ]:
-        scene.write_text(ROM_SCENE.replace("{file}", str(file)).replace("{at}", at))
+        scene.write_text(rom_scene(file, at))
         assert main([command, "rom.toml"]) == BAD_INPUT
         error = capfd.readouterr().err
         assert error.count("\n") == 1
@@ -344,7 +295,7 @@ def test_bad_reduced_models(command, folder, rom, capfd):
 )
 def test_newtons_law_on_several_modes_is_told(command, tables, modes, told, folder, rom, capfd):
     """It does not converge with their number (docs/reduction.md), and it is what a scene without [contact] has."""
-    text = ROM_SCENE.replace('"{file}"', f'"{rom}"{modes}').replace("{at}", "tip")
+    text = changed(rom_scene(rom), (f'"{rom}"', f'"{rom}"{modes}'))
     (folder / "rom.toml").write_text(tables + text)
     assert main([command, "rom.toml", "-o", "out.h5", "--json", "out.json"]) == 0
     warnings = json.loads((folder / "out.json").read_text())["warnings"]
@@ -447,8 +398,7 @@ def test_killed_sweep_keeps_the_old_file_and_goes_on(folder):
         "from vanedamp.studies.cli import main\nmain(sys.argv[1:])\n"
     )
     arguments = ["sweep", "scene.toml", "-o", "sweep.h5", "--workers", "1"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    finished = subprocess.run([sys.executable, "-c", killer, *arguments], cwd=folder, env=environment, check=False)
+    finished = subprocess.run([sys.executable, "-c", killer, *arguments], cwd=folder, env=environment(), check=False)
     assert finished.returncode == -signal.SIGKILL
     assert (folder / "sweep.h5").read_text() == "precious"
     assert 1 <= len(load("sweep.h5.partial", "sweep-checkpoint")[0]["point"]) <= 2

@@ -2,30 +2,12 @@
 
 import pytest
 
-from tests.tools import block_case
+from tests.tools.input_files import BLOCK, CLUSTER, changed
 from vanedamp.files.toml_input import InputError
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.studies.case.tables import Case
 
-CASE = f"""
-[mesh]
-file = "{SHIPPED}"
-degree = 2
-[material.default]
-young = 2e11
-poisson = 0.3
-density = 8190.0
-damping_ratio = 0.002
-[support]
-clamped = ["clamp"]
-[modes]
-count = 10
-direction = [0, 1, 0]
-[interface.c1]
-facets = "c1_floor"
-direction = [0, 1, 0]
-"""
-BLOCK = block_case.BLOCK.split("[support]")[0]
+FREE_BLOCK = BLOCK.split("[support]")[0]
 THREE = "expected three numbers, not all zero, such as"
 
 
@@ -35,13 +17,8 @@ def load(text, tmp_path):
     return Case.load(path)
 
 
-def changed(old, new, text=CASE):
-    assert text.count(old) == 1
-    return text.replace(old, new)
-
-
 def test_reads_a_case(tmp_path):
-    case = load(CASE, tmp_path)
+    case = load(CLUSTER, tmp_path)
     assert case.mesh.file == str(SHIPPED)
     assert case.damping_ratio == 0.002
     assert case.fatigue_strength is None
@@ -52,15 +29,15 @@ def test_reads_a_case(tmp_path):
 
 def test_mesh_is_found_beside_the_case(tmp_path):
     (tmp_path / "part.msh").write_text("")
-    case = load(changed(str(SHIPPED), "part.msh"), tmp_path)
+    case = load(changed(CLUSTER, (str(SHIPPED), "part.msh")), tmp_path)
     assert case.mesh.file == str(tmp_path / "part.msh")
 
 
 def test_generators_take_their_parameters(tmp_path):
-    case = load(BLOCK, tmp_path)
+    case = load(FREE_BLOCK, tmp_path)
     assert case.mesh.parameters.divisions == (6, 2, 1)
     assert case.mesh.degree == 2
-    cluster = load(changed(f'file = "{SHIPPED}"', 'generator = "vane_cluster"\nairfoils = 3'), tmp_path)
+    cluster = load(changed(CLUSTER, (f'file = "{SHIPPED}"', 'generator = "vane_cluster"\nairfoils = 3')), tmp_path)
     assert cluster.mesh.parameters.airfoils == 3
 
 
@@ -74,18 +51,18 @@ def test_generators_take_their_parameters(tmp_path):
     ],
 )
 def test_supports(clamped, expected, tmp_path):
-    case = load(changed('["clamp"]', clamped), tmp_path)
+    case = load(changed(CLUSTER, ('["clamp"]', clamped)), tmp_path)
     assert case.support.clamped == expected
 
 
 def test_damping_of_the_modes_overrides_the_material(tmp_path):
-    assert load(changed("count = 10", "damping_ratio = 0.01"), tmp_path).damping_ratio == 0.01
-    assert load(changed("damping_ratio = 0.002\n", ""), tmp_path).damping_ratio == 0.0
+    assert load(changed(CLUSTER, ("count = 10", "damping_ratio = 0.01")), tmp_path).damping_ratio == 0.01
+    assert load(changed(CLUSTER, ("damping_ratio = 0.002\n", "")), tmp_path).damping_ratio == 0.0
 
 
 def test_least_fatigue_strength_counts(tmp_path):
     second = "[material.airfoils]\nyoung = 1e11\npoisson = 0.3\ndensity = 1000\nfatigue_strength = 3e8\n[support]"
-    text = changed("[support]", second, changed("density = 8190.0", "density = 8190.0\nfatigue_strength = 4e8"))
+    text = changed(CLUSTER, ("[support]", second), ("density = 8190.0", "density = 8190.0\nfatigue_strength = 4e8"))
     assert load(text, tmp_path).fatigue_strength == 3e8
 
 
@@ -99,14 +76,14 @@ def test_least_fatigue_strength_counts(tmp_path):
     ],
 )
 def test_response_of_the_rigid_model(interfaces, at, expected, tmp_path):
-    head = CASE.split("[interface")[0]
+    head = CLUSTER.split("[interface")[0]
     tables = "".join(f'[interface.{name}]\nfacets = "f"\ndirection = [0, 1, 0]\n' for name in interfaces)
     text = head.replace("count = 10", f'at = "{at}"' if at else "") + tables
     assert load(text, tmp_path).response_label == expected
 
 
 def test_open_choice_of_the_response_is_refused(tmp_path):
-    case = load(CASE + '[interface.c2]\nfacets = "f"\ndirection = [0, 1, 0]\n', tmp_path)
+    case = load(CLUSTER + '[interface.c2]\nfacets = "f"\ndirection = [0, 1, 0]\n', tmp_path)
     with pytest.raises(InputError, match=r"^modes.at: name the interface of the rigid model, one of c1, c2"):
         _ = case.response_label
 
@@ -150,7 +127,7 @@ def test_open_choice_of_the_response_is_refused(tmp_path):
 )
 def test_bad_input_is_one_line_with_the_key(old, new, message, tmp_path):
     with pytest.raises(InputError) as refused:
-        load(changed(old, new), tmp_path)
+        load(changed(CLUSTER, (old, new)), tmp_path)
     text = str(refused.value)
     assert text.startswith(f"{tmp_path / 'case.toml'}: {message}")
     assert "\n" not in text
@@ -170,14 +147,14 @@ def test_bad_input_is_one_line_with_the_key(old, new, message, tmp_path):
 )
 def test_bad_generator_parameters(old, new, message, tmp_path):
     with pytest.raises(InputError) as refused:
-        load(changed(old, new, BLOCK), tmp_path)
+        load(changed(FREE_BLOCK, (old, new)), tmp_path)
     assert str(refused.value).startswith(f"{tmp_path / 'case.toml'}: {message}")
 
 
 def test_differing_damping_ratios_need_a_decision(tmp_path):
     second = "[material.airfoils]\nyoung = 1e11\npoisson = 0.3\ndensity = 1\ndamping_ratio = 0.1\n[support]"
     with pytest.raises(InputError, match=r"material: the damping ratios differ; .*\[modes\] damping_ratio"):
-        load(changed("[support]", second), tmp_path)
+        load(changed(CLUSTER, ("[support]", second)), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -193,7 +170,7 @@ def test_differing_damping_ratios_need_a_decision(tmp_path):
     ],
 )
 def test_unknown_groups_list_those_that_exist(old, new, message, tmp_path):
-    case = load(changed(old, new), tmp_path)
+    case = load(changed(CLUSTER, (old, new)), tmp_path)
     with pytest.raises(InputError) as refused:
         case.check_groups(["clamp", "c1_floor"], ["airfoils"])
     assert str(refused.value).startswith(message)
@@ -208,7 +185,7 @@ def test_unknown_groups_list_those_that_exist(old, new, message, tmp_path):
     ],
 )
 def test_elastic_supports(table, axes, across, along, tmp_path):
-    case = load(changed('clamped = ["clamp"]', f"[support.elastic.clamp]\n{table}"), tmp_path)
+    case = load(changed(CLUSTER, ('clamped = ["clamp"]', f"[support.elastic.clamp]\n{table}")), tmp_path)
     springs = case.elastic_supports["clamp"]
     assert (springs.stiffness, springs.normal, springs.tangential) == (axes, across, along)
 
@@ -225,4 +202,4 @@ def test_elastic_supports(table, axes, across, along, tmp_path):
 )
 def test_refuses_elastic_supports(support, message, tmp_path):
     with pytest.raises(InputError, match=message):
-        load(changed('clamped = ["clamp"]', support).replace("[support]\n[", "["), tmp_path)
+        load(changed(CLUSTER, ('clamped = ["clamp"]', support)).replace("[support]\n[", "["), tmp_path)

@@ -10,47 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.tools.block_case import DAMPED_BLOCK
+from tests.tools.input_files import DAMPED_BLOCK, SCENE, rom_scene
+from tests.tools.processes import ROOT, environment, vanedamp
 from vanedamp.files.store import StoreError, Variable, load, replacing, save
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.matrix_files import FILES
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main
-
-ROOT = Path(__file__).resolve().parent.parent
-SCENE = """
-[structure]
-model = "rigid"
-mass = 1.0
-stiffness = 1e4
-damping_ratio = 0.01
-[excitation]
-frequency = 15.9
-force = 1.0
-[time]
-periods = 30
-[sweep]
-"excitation.frequency" = [15.7, 15.8, 15.9]
-"""
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """A working directory with a case, a scene, and the files that a rom scene and a case with a mesh name."""
-    (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
-    (tmp_path / "scene.toml").write_text(SCENE)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def vanedamp(*arguments, cwd, **environment):
-    """The command as a process of its own."""
-    variables = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    return subprocess.run(
-        [sys.executable, "-m", "vanedamp", *arguments], cwd=cwd, capture_output=True, text=True, check=False,
-        env=variables | {"PYTHONPATH": str(ROOT)} | environment,
-    )  # fmt: skip
-
 
 # links, devices, pipes
 
@@ -116,8 +82,7 @@ def test_standard_output_by_its_name(folder):
 
 def _rom_scene(folder):
     ReducedModel.from_matrices([[1.0]], [[1e4]], {"tip": [1.0]}, damping_ratio=0.01).save(folder / "rom.h5")
-    text = SCENE.replace('"rigid"', '"rom"\nfile = "rom.h5"').replace("force", 'at = "tip"\nforce')
-    (folder / "rom.toml").write_text(text.replace("mass = 1.0\nstiffness = 1e4\ndamping_ratio = 0.01", ""))
+    (folder / "rom.toml").write_text(rom_scene("rom.h5"))
 
 
 def _mesh_case(folder):
@@ -235,7 +200,7 @@ def test_full_standard_output(folder):
     with open("/dev/full", "w") as full:
         finished = subprocess.run(
             [sys.executable, "-m", "vanedamp", "run", "scene.toml", "--json", "-"], cwd=folder, stdout=full,
-            stderr=subprocess.PIPE, text=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)},
+            stderr=subprocess.PIPE, text=True, check=False, env=environment(),
         )  # fmt: skip
     assert finished.returncode == BAD_INPUT
     assert finished.stderr == "vanedamp: standard output, or another file: No space left on device\n"
@@ -243,9 +208,7 @@ def test_full_standard_output(folder):
 
 def test_nobody_reads_on(folder):
     command = f"{sys.executable} -m vanedamp run scene.toml --events --json - | head -c 1"
-    finished = subprocess.run(
-        command, shell=True, cwd=folder, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}
-    )
+    finished = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, env=environment())
     assert (finished.stdout, finished.stderr) == ("{", "")
 
 

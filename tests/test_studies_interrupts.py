@@ -11,32 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.tools.input_files import SCENE, changed
+from tests.tools.processes import environment
 from vanedamp.studies.interrupts import swallowed_interrupts_again
 
-ROOT = Path(__file__).resolve().parent.parent
 # hours of work
-SCENE = """
-[structure]
-model = "rigid"
-mass = 1.0
-stiffness = 1e4
-damping_ratio = 0.01
-[excitation]
-frequency = 15.9
-resonance_amplitude = 1e-3
-[[cavity]]
-name = "c1"
-gap = 2e-4
-[[damper]]
-cavity = "c1"
-mass = 0.05
-friction = 0.3
-restitution = 0.6
-[time]
-periods = 2000
-[sweep]
-"excitation.frequency" = {start = 15.4, stop = 16.2, num = 100_000}
-"""
+LONG = changed(SCENE, ("periods = 30", "periods = 2000"), ("num = 4", "num = 100_000"))
 #: the command; it sends the signal to its process group at the n-th event of a kind
 PROGRAM = """
 import os, signal, sys
@@ -55,12 +35,12 @@ sys.exit(main(sys.argv[4:]))
 
 def sweep(folder, workers, event="none", end="", count=1):
     """The sweep in a process group of its own; its standard output and error are pipes."""
-    (folder / "scene.toml").write_text(SCENE)
+    (folder / "scene.toml").write_text(LONG)
     (folder / "sweep.h5").write_text("precious")
     command = ["sweep", "scene.toml", "-o", "sweep.h5", "--workers", str(workers)]
     return subprocess.Popen(
         [sys.executable, "-c", PROGRAM, event, end, str(count), *command], cwd=folder, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(),
         preexec_fn=heed_interrupts,
     )  # fmt: skip
 

@@ -2,41 +2,14 @@
 
 import pytest
 
-from tests.tools.block_case import BLOCK, changed
+from tests.tools.input_files import BLOCK, SCENE, changed
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import ParameterError, VaneCluster
 from vanedamp.studies.cli import BAD_INPUT, main
 
-SCENE = """
-[structure]
-model = "rigid"
-mass = 1.0
-stiffness = 1e4
-damping_ratio = 0.01
-[excitation]
-frequency = 15.9
-force = 1.0
-[[cavity]]
-name = "c1"
-gap = 2e-4
-[[damper]]
-cavity = "c1"
-mass = 0.05
-[time]
-periods = 30
-[sweep]
-"excitation.frequency" = [15.8, 15.9]
-"""
-RANGE = '"excitation.frequency" = [15.8, 15.9]'
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """A working directory."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+RANGE = '"excitation.frequency" = {start = 15.4, stop = 16.2, num = 4}'
 
 
 @pytest.mark.parametrize("command", ["run", "modal"])
@@ -71,7 +44,7 @@ def test_files_with_a_mark_of_their_encoding(command, folder):
         ('name = "c1"', 'name = "gap"', "cavity[0].name: expected a word that is no number and no key"),
         ("mass = 0.05", "mass = 1e300", "damper[0].mass: expected a number up to 1e+40 in SI units"),
         ("mass = 0.05", "mass = 1e-300", "damper[0].mass: expected at least 1e-40 in SI units"),
-        ("force = 1.0", "", "excitation: nothing moves the structure; give force"),
+        ("resonance_amplitude = 1e-3", "", "excitation: nothing moves the structure; give force"),
         ("[structure]", "a = " + "[" * 5000, "not valid TOML"),
     ],
 )
@@ -90,7 +63,7 @@ def test_keys_of_a_generator_beside_a_file(folder, capfd):
 
 
 def test_free_decay_has_no_undamped_maximum(folder, capfd):
-    text = changed(SCENE, ("force = 1.0", "[initial]\ndisplacement = 1e-3"))
+    text = changed(SCENE, ("resonance_amplitude = 1e-3", "[initial]\ndisplacement = 1e-3"))
     (folder / "scene.toml").write_text(text)
     assert main(["sweep", "scene.toml", "--workers", "1"]) == 0
     out = capfd.readouterr().out
@@ -120,7 +93,7 @@ def test_free_decay_has_no_undamped_maximum(folder, capfd):
         ),
         (
             "sweep",
-            "periods = 30",
+            "periods = 30\ntransient = 10",
             "periods = 20_000_000\n[solver]\nmethod = 'solve_ivp'\nsteps_per_period = 1000",
             "time.periods: 2e+07 periods take about 23",
         ),

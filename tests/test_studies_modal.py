@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.tools.block_case import BLOCK, changed
+from tests.tools.input_files import BLOCK, changed
 from vanedamp.modal.eigen import Modes
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.report.page import write_report

@@ -1,37 +1,25 @@
 """`mpirun -n 2 vanedamp modal`: the figures of one rank, and every file and line written once."""
 
 import json
-import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.tools.block_case import BLOCK
+from tests.tools.input_files import BLOCK
+from tests.tools.processes import RANKS, ROOT, environment
 from vanedamp.modal.eigen import Modes
 from vanedamp.studies.cli import BAD_INPUT, main
 
-ROOT = Path(__file__).resolve().parent.parent
-# Open MPI 4 and 5: more ranks than cores, as root in a container
-ENVIRONMENT = {
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_rmaps_base_oversubscribe": "1",
-    "OMPI_MCA_mpi_yield_when_idle": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-    "OMP_NUM_THREADS": "1",
-    "PYTHONPATH": str(ROOT),
-}
 pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mpirun")
 
 
 def on_two_ranks(*arguments, cwd, program=("-m", "vanedamp")):
     command = ["mpirun", "-n", "2", sys.executable, *program, *arguments]
     return subprocess.run(
-        command, cwd=cwd, env=os.environ | ENVIRONMENT, capture_output=True, text=True, check=False, timeout=300
+        command, cwd=cwd, env=environment(**RANKS), capture_output=True, text=True, check=False, timeout=300
     )
 
 

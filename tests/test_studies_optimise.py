@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 import xarray
 
-from tests.tools.sweep_processes import ROOT
+from tests.tools.processes import ROOT
 from vanedamp.coupling.engine import simulate
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.cli import BAD_INPUT, main

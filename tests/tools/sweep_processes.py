@@ -1,18 +1,16 @@
 """A small sweep, and sweeps as processes that can be killed."""
 
-import os
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import tomli_w
 
+from tests.tools.processes import environment
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate
 
-ROOT = Path(__file__).resolve().parents[2]
 RESONANCE = 15.915494309189533
 DATA = {
     "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
@@ -38,8 +36,8 @@ def write(folder, **changes):
 def command(folder, *arguments, output="sweep.h5"):
     """A sweep of the folder's scene.toml as a process."""
     words = [sys.executable, "-m", "vanedamp", "sweep", "scene.toml", "-o", output, *arguments]
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    return subprocess.Popen(words, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    variables = environment(OMP_NUM_THREADS="1")
+    return subprocess.Popen(words, cwd=folder, env=variables, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
 def stamp(path):
