@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from vanedamp.meshes.benchmarks import Block, build
+from tests.tools import small_structures
+from tests.tools.small_structures import STEEL
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.vane_cluster import build as build_cluster
 from vanedamp.modal.correlation import (
@@ -21,16 +22,10 @@ from vanedamp.modal.correlation import (
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble
 
-STEEL = Material(young=2.0e11, poisson=0.3, density=8190.0)
-
 
 @pytest.fixture(scope="module")
 def blade(tmp_path_factory):
-    """A plate clamped at the root, thin along z."""
-    path = build(
-        Block(0.2, 0.08, 0.01, divisions=(6, 3, 1), hexahedra=True), tmp_path_factory.mktemp("blade") / "b.msh"
-    )
-    return assemble(path, {"default": STEEL}, {"root": "xyz"}, degree=2)
+    return small_structures.blade(tmp_path_factory.mktemp("blade"), (6, 3, 1))
 
 
 @pytest.fixture(scope="module")

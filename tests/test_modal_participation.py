@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from vanedamp.meshes.benchmarks import Block, build
+from tests.tools import small_structures
 from vanedamp.modal.eigen import Modes, solve_modes
-from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.participation import (
     ParticipationError,
     effective_mass_shares,
@@ -14,16 +13,10 @@ from vanedamp.modal.participation import (
     participation_factors,
 )
 
-STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
-
 
 @pytest.fixture(scope="module")
 def blade(tmp_path_factory):
-    """A small plate clamped at the root, thin along z."""
-    path = build(
-        Block(0.2, 0.08, 0.01, divisions=(4, 2, 1), hexahedra=True), tmp_path_factory.mktemp("blade") / "b.msh"
-    )
-    return assemble(path, {"default": STEEL}, {"root": "xyz"}, degree=2)
+    return small_structures.blade(tmp_path_factory.mktemp("blade"), (4, 2, 1))
 
 
 @pytest.fixture(scope="module")
