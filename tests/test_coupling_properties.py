@@ -6,29 +6,29 @@ multiplies a difference by about (travel of the structure)/(gap), so these agree
 1e-15.
 """
 
+import math
+from itertools import zip_longest
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tests.tools.laws_of_runs import KINDS, SETTINGS, check_laws, check_symmetries, impacts, laws_of, symmetries_of
+from tests.tools.laws_of_runs import KINDS, SETTINGS, impacts, laws_of, symmetries_of, whole
 from tests.tools.scene_strategies import between, scene_of, scene_tables
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.response.response import Status
 
 FAST = settings(SETTINGS, max_examples=15, derandomize=True)
-FEW = settings(FAST, max_examples=6)
 #: seeds of the slow tier, and scenes of each
 SEEDS, EACH = range(14), 250
 LAWS = pytest.mark.parametrize("law", ["newton", "compliant"])
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@FAST
-@given(data=st.data())
-def test_laws(kind, data):
-    law, elements = KINDS[kind]
-    check_laws(data.draw(scene_tables(laws=(law,), elements=elements)))
+def test_laws(kind):
+    worst = laws_of(kind, 0, 15, longest=None)
+    assert worst.scenes >= 13
+    assert worst.impacts >= 200
 
 
 @pytest.mark.slow
@@ -40,51 +40,50 @@ def test_laws_of_thousands(kind, seed):
 
 
 @LAWS
-@FEW
-@given(data=st.data())
-def test_symmetries(law, data):
-    check_symmetries(data.draw(scene_tables(laws=(law,))))
+def test_symmetries(law):
+    assert symmetries_of(law, 0, 6) >= 100
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS[:4])
 @LAWS
 def test_symmetries_of_thousands(law, seed):
-    symmetries_of(law, seed, EACH)
+    assert symmetries_of(law, seed, EACH) >= 20 * EACH
 
 
-def agree(one, other, sign=1.0, length=1.0, speed=1.0, time=1.0, order=None):
-    """The first impacts of `other` are those of `one` times the factors. Sides are not compared: they may swap."""
+def agree(one, other, length=1.0, time=1.0):
+    """The first impacts of `other` are those of `one` times the factors, and so is the motion up to the next.
+
+    Returns the number of impacts compared. Whether a slow one happens is decided by round-off: there it ends.
+    """
     first, second = impacts(one), impacts(other)
-    assert abs(len(first[:4]) - len(second[:4])) <= 1
+    speed = length / time
     fastest = max((abs(event.relative_velocity_before) for event in first), default=1.0)
-    for a, b in zip(first[:4], second[:4], strict=False):
-        if abs(a.relative_velocity_before) < 1e-3 * fastest:
-            return  # grazing and the end of chatter are decided by round-off
+    compared, until = 0, one.periods
+    for a, b in zip_longest(first, second):
+        speeds = [abs(e.relative_velocity_before) / s for e, s in ((a, 1.0), (b, speed)) if e is not None]
+        if compared == 4 or min(speeds) < 1e-3 * fastest:
+            until = min(e.time / t * one.frequency for e, t in ((a, 1.0), (b, time)) if e is not None)
+            break
+        assert a is not None and b is not None
+        assert (a.damper, a.side) == (b.damper, b.side)
         assert b.time == pytest.approx(a.time * time, rel=1e-8)
         # a slow impact is told from a miss by the square root of round-off
         assert b.relative_velocity_before == pytest.approx(
-            sign * speed * a.relative_velocity_before, abs=1e-7 * speed * fastest
+            speed * a.relative_velocity_before, abs=1e-7 * speed * fastest
         )
-        if order is not None:
-            assert b.damper == order[a.damper]
-    until = 2
-    if len(first) > 4:
-        until = min(until, int(first[4].time * one.frequency))
-    if until and first[:1] and first[0].time * one.frequency > 1:
-        assert other.section[:until, 0] == pytest.approx(sign * length * one.section[:until, 0], abs=1e-8 * length)
+        compared += 1
+    motion = one.section[: math.ceil(until), 0]
+    assert len(motion)
+    assert other.section[: len(motion), 0] == pytest.approx(length * motion, abs=1e-7 * length)
+    return compared
 
 
-@FAST
-@given(
-    data=scene_tables(structures=("rigid",), laws=("newton",), cavities="own", elements=False),
-    power=st.integers(-12, 12),
-    stretch=st.integers(-12, 12),
-)
-def test_units_do_not_matter(data, power, stretch):
-    """Lengths times 2^power and times 2^stretch: the same events, exactly scaled."""
-    length, time = 2.0**power, 2.0**stretch
-    scene = scene_of(data)
+ONE_EACH = scene_tables(structures=("rigid",), laws=("newton",), cavities="own", elements=False)
+
+
+def in_units(data, length, time):
+    """Values of the scene with these as the units of length and time."""
     values = {
         "structure.stiffness": 1.0 / time**2,
         "initial.displacement": data["initial"]["displacement"] * length,
@@ -102,16 +101,11 @@ def test_units_do_not_matter(data, power, stretch):
         values[f"damper.{index}.velocity"] = damper["velocity"] * length / time
         if "normal_load" in damper:
             values[f"damper.{index}.normal_load"] = damper["normal_load"] * length / time**2
-    one, other = simulate(scene, events=True), simulate(scene.replace(values), events=True)
-    agree(one, other, length=length, speed=length / time, time=time)
+    return values
 
 
-@FAST
-@given(
-    data=scene_tables(structures=("rigid",), laws=("newton",), cavities="own", elements=False), mass=between(1e-6, 1e6)
-)
-def test_only_ratios_of_masses_matter(data, mass):
-    scene = scene_of(data)
+def in_unit_of_mass(data, mass):
+    """Values of the scene with this as the unit of mass."""
     values = {"structure.mass": mass, "structure.stiffness": mass}
     if "force" in data["excitation"]:
         values["excitation.force"] = data["excitation"]["force"] * mass
@@ -119,7 +113,37 @@ def test_only_ratios_of_masses_matter(data, mass):
         values[f"damper.{index}.mass"] = damper["mass"] * mass
         if "normal_load" in damper:
             values[f"damper.{index}.normal_load"] = damper["normal_load"] * mass
-    agree(simulate(scene, events=True), simulate(scene.replace(values), events=True))
+    return values
+
+
+def test_units_do_not_matter():
+    """Lengths times 2^power and times 2^stretch: the same events, scaled."""
+    compared = []
+
+    @FAST
+    @given(data=ONE_EACH, power=st.integers(-12, 12), stretch=st.integers(-12, 12))
+    def check(data, power, stretch):
+        length, time = 2.0**power, 2.0**stretch
+        scene = scene_of(data)
+        one, other = (simulate(s, events=True) for s in (scene, scene.replace(in_units(data, length, time))))
+        compared.append(agree(one, other, length, time))
+
+    check()
+    assert sum(compared) >= 25
+
+
+def test_only_ratios_of_masses_matter():
+    compared = []
+
+    @FAST
+    @given(data=ONE_EACH, mass=between(1e-6, 1e6))
+    def check(data, mass):
+        scene = scene_of(data)
+        one, other = (simulate(s, events=True) for s in (scene, scene.replace(in_unit_of_mass(data, mass))))
+        compared.append(agree(one, other))
+
+    check()
+    assert sum(compared) >= 25
 
 
 @FAST
@@ -127,7 +151,7 @@ def test_only_ratios_of_masses_matter(data, mass):
 def test_shorter_run_is_the_beginning_of_the_longer(data, cut):
     """The state at a period's start does not depend on how far the run goes, to the last bit."""
     scene = scene_of(data)
-    whole, part = simulate(scene), simulate(scene.replace({"time.periods": cut}))
-    assume(whole.status == part.status == Status.OK)
-    assert np.array_equal(part.section, whole.section[: cut + 1])
-    assert np.array_equal(part.slip, whole.slip[: cut + 1])
+    longer, shorter = simulate(scene), simulate(scene.replace({"time.periods": cut}))
+    assume(whole(scene, longer) and whole(scene, shorter))
+    assert np.array_equal(shorter.section, longer.section[: cut + 1])
+    assert np.array_equal(shorter.slip, longer.slip[: cut + 1])

@@ -67,22 +67,22 @@ def record(data: dict, change=None) -> Record:
     return Record({key: np.array(hit) for key, hit in hits.items()}, run.records.section[: done + 1], code, together)
 
 
-def compare(one: Record, other: Record, apart: list[Record], shift: float = 0.0, sections: bool = True) -> float:
-    """Assert that `other` is `one`, `shift` periods later. Returns the time up to which they could be compared.
+def compare(one: Record, other: Record, apart: list[Record], shift: float = 0.0, sections: bool = True) -> int:
+    """Assert that `other` is `one`, `shift` periods later. Returns the number of impacts that could be compared.
 
     apart: perturbed runs of `one`.
     """
     assert not other.code, f"the image ended with code {other.code}"
     end, spread = one.together, ROUND_OFF
     for near in apart:
-        part, difference = _difference(one, near, 0.0, np.inf)
+        part, difference, _ = _difference(one, near, 0.0, np.inf)
         end, spread = min(end, part), max(spread, difference)
-    part, difference = _difference(one, other, shift, end - 10 * PARTED)
+    part, difference, compared = _difference(one, other, shift, end - 10 * PARTED)
     assert part >= end - 10 * PARTED, f"impacts part at {part:.9g} of {end:.9g} periods"
     assert difference <= spread, f"impacts differ by {difference:.3g}, perturbed runs by {spread:.3g}"
     if sections:
         _compare_sections(one, other, apart, int(min(end, len(one.sections) - 1)) + 1)
-    return end
+    return compared
 
 
 def _compare_sections(one: Record, other: Record, apart: list[Record], count: int) -> None:
@@ -98,9 +98,9 @@ def _compare_sections(one: Record, other: Record, apart: list[Record], count: in
     assert largest <= widest, f"sections differ by {largest:.3g}, perturbed runs by {widest:.3g}"
 
 
-def _difference(one: Record, other: Record, shift: float, end: float) -> tuple[float, float]:
-    """(when the impacts of two runs part, largest difference before), over the times from `shift` to `end`."""
-    parts, largest, pairs = np.inf, [0.0], []
+def _difference(one: Record, other: Record, shift: float, end: float) -> tuple[float, float, int]:
+    """(when the impacts of two runs part, largest difference before, how many those are), from `shift` to `end`."""
+    parts, pairs = np.inf, []
     last = len(one.sections) - 1 - PARTED
     for key in one.hits.keys() | other.hits.keys():
         a, b = (_fast(run.hits.get(key, np.zeros((0, 2))), one.fastest) for run in (one, other))
@@ -113,9 +113,8 @@ def _difference(one: Record, other: Record, shift: float, end: float) -> tuple[f
         if np.any(apart > PARTED):
             parts = min(parts, a[np.argmax(apart > PARTED), 0])
         pairs.append((a[:count, 0], apart))
-    for times, apart in pairs:
-        largest.append(apart[times < min(parts, end)].max(initial=0.0))
-    return parts, max(largest)
+    before = np.concatenate([apart[times < min(parts, end)] for times, apart in pairs] or [np.zeros(0)])
+    return parts, before.max(initial=0.0), len(before)
 
 
 def _fast(hits: np.ndarray, fastest: float) -> np.ndarray:
