@@ -298,7 +298,9 @@ def test_a_critically_damped_contact_ends_the_run_with_a_status(units):
         # amplitudes that cancel by 1/excess leave that many digits fewer in the energies: the ledger says so
         judged = {Status.OK} if abs(excess) > 1e-8 else {Status.OK, Status.ENERGY}
         allowed = {Status.ILL_CONDITIONED} if ended else judged
-        assert response.status in allowed or 1e-15 < abs(excess) < 3e-13
+        # here round-off decides whether doubles resolve the subsystem
+        near = 1e-15 < abs(excess) < 3e-13
+        assert response.status in (allowed | judged | {Status.ILL_CONDITIONED} if near else allowed)
         if response.status != Status.ILL_CONDITIONED:
             limit = 1e-9 + 64 * EPS / math.sqrt(abs(excess))
             assert response.event_list[0].relative_velocity_after * time / length == pytest.approx(

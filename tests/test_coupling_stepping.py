@@ -227,11 +227,15 @@ def test_samples_are_those_of_the_exact_engine(stick_slip):
         simulate(by(stick_slip, method="moreau", steps_per_period=50), samples_per_period=20)
 
 
-def test_beyond_its_limit_the_explicit_method_says_so(periodic):
-    # omega_max h = 2 at pi steps a period: beyond it the motion of 3.08 steps would grow by e every 2 steps
-    stiff = periodic.replace({"structure.stiffness": (2 * math.pi * 10) ** 2, "time.periods": 200})
+def test_beyond_its_limit_the_explicit_method_says_so():
+    """omega_max h = 2 at pi steps a period of the structure, 31.4 of the excitation."""
+    stiff = made(
+        {"structure": STRUCTURE | {"stiffness": (2 * math.pi * 10) ** 2},
+         "excitation": {"frequency": 1.0, "force": 1.0}, "time": {"periods": 200}}
+    )  # fmt: skip
+    assert simulate(by(stiff, method="penalty", steps_per_period=34)).status is Status.OK
     response = simulate(by(stiff, method="penalty", steps_per_period=30))
-    assert response.status in (Status.DIVERGED, Status.PENETRATION, Status.ENERGY)
+    assert response.status is Status.DIVERGED
     assert all(np.isfinite(value) for value in (response.amplitude_max, *response.energy.values()))
 
 
@@ -249,8 +253,13 @@ def test_a_missed_impact_is_flagged():
 
 
 def test_without_completion_chatter_spends_the_budget(chatter):
-    response = simulate(by(chatter, method="solve_ivp", complete_chatter=False, max_events=60, rtol=1e-7))
-    assert response.status in (Status.EVENT_BUDGET, Status.PENETRATION, Status.UNDECIDED)
+    """Some 20 impacts a period with completion, twice as many without: the budget lies between."""
+    completed, followed = (
+        simulate(by(chatter, method="solve_ivp", complete_chatter=complete, max_events=240, rtol=1e-7))
+        for complete in (True, False)
+    )
+    assert completed.status is Status.OK
+    assert followed.status is Status.EVENT_BUDGET
 
 
 @pytest.mark.parametrize(
