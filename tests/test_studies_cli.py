@@ -20,7 +20,7 @@ from vanedamp.files.store import StoreError, load
 from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrix_files import read_folder
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.cli import BAD_INPUT, _parser, main
+from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.commands import all as commands
 
 
@@ -405,22 +405,6 @@ def test_killed_sweep_keeps_the_old_file_and_goes_on(folder):
     assert main([*arguments, "--resume"]) == 0
     assert Sweep.load("sweep.h5").shape == (4,)
     assert not (folder / "sweep.h5.partial").exists()
-
-
-# words
-
-
-def test_commands_of_the_readme_are_understood(capsys):
-    text = (ROOT / "README.md").read_text()
-    lines = [line.split("#")[0].split() for line in text.splitlines() if line.startswith("    vanedamp ")]
-    assert len(lines) >= 5
-    for _, *arguments in lines:
-        assert _parser().parse_args(arguments).command == arguments[0]
-    described = {line.split("`")[1].split()[1] for line in text.splitlines() if line.startswith("| `vanedamp ")}
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    usage = capsys.readouterr().out
-    assert described == {line.split()[0] for line in usage.splitlines() if line.startswith("    ") and line[4] != " "}
 
 
 # processes
