@@ -2,12 +2,12 @@
 
 import pytest
 
-from tests.tools.input_files import DAMPED_BLOCK, SCENE
-
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A working directory with a case and a scene."""
+    from tests.tools.input_files import DAMPED_BLOCK, SCENE
+
     (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
     (tmp_path / "scene.toml").write_text(SCENE)
     monkeypatch.chdir(tmp_path)

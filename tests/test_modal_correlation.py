@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from tests.tools import small_structures
-from tests.tools.small_structures import STEEL
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.vane_cluster import build as build_cluster
 from vanedamp.modal.correlation import (
@@ -21,6 +20,8 @@ from vanedamp.modal.correlation import (
 )
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble
+
+STEEL = Material(young=2.0e11, poisson=0.3, density=8190.0)
 
 
 @pytest.fixture(scope="module")

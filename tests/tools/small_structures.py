@@ -3,17 +3,16 @@
 import numpy as np
 from scipy import sparse
 
-from vanedamp.meshes.benchmarks import Block, build
-from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.matrices import Patch, SystemMatrices
-
-STEEL = Material(young=2.0e11, poisson=0.3, density=8190.0)
 
 
 def blade(folder, divisions):
     """A plate of solid elements, clamped at the root, thin along z. folder: where its mesh is written."""
+    from vanedamp.meshes.benchmarks import Block, build
+    from vanedamp.modal.elasticity import Material, assemble
+
     path = build(Block(0.2, 0.08, 0.01, divisions=divisions, hexahedra=True), folder / "blade.msh")
-    return assemble(path, {"default": STEEL}, {"root": "xyz"}, degree=2)
+    return assemble(path, {"default": Material(young=2.0e11, poisson=0.3, density=8190.0)}, {"root": "xyz"}, degree=2)
 
 
 def rod(elements=400, damping_ratio=0.0, root=None):
