@@ -52,7 +52,7 @@ def rounding(stiffness: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * np.finfo(float).eps * own)
 
 
-def rigid_motions(stiffness: np.ndarray, squares: np.ndarray, shapes: np.ndarray) -> int:
+def count_rigid_motions(stiffness: np.ndarray, squares: np.ndarray, shapes: np.ndarray) -> int:
     """How many modes of `spectrum` are motions that no support holds: their stiffness is not to be told from round-off.
 
     Each of the n terms of its sums and each of the n steps of a factorisation rounds once.

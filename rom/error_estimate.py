@@ -185,7 +185,7 @@ def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
     return Choice(chosen, tolerance, rigid, tuple(ladder), sentence, bool(within.size))
 
 
-def grid(model: ReducedModel, low_hz: float, high_hz: float, points: int = 17) -> np.ndarray:
+def frequency_grid(model: ReducedModel, low_hz: float, high_hz: float, points: int = 17) -> np.ndarray:
     """Frequencies over a range, the resonances in it that have a height, and the edges of all half-power bands."""
     natural, shapes = model.natural_frequencies_hz, model.natural[1]
     losses = np.einsum("ij,ik,kj->j", shapes, model.damping, shapes)

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import linalg
 
 from vanedamp.files import store
-from vanedamp.rom.dense_modes import halved, modal_damping, rigid_motions, spectrum
+from vanedamp.rom.dense_modes import count_rigid_motions, halved, modal_damping, spectrum
 from vanedamp.rom.fields import ReducedModelError, check_definite, shaped, symmetric, unit
 
 __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
@@ -137,8 +137,8 @@ class ReducedModel:
 
     @property
     def rigid_modes(self) -> int:
-        """How many motions no support holds: `rom.dense_modes.rigid_motions`."""
-        return rigid_motions(self.stiffness, *self.natural)
+        """How many motions no support holds: `rom.dense_modes.count_rigid_motions`."""
+        return count_rigid_motions(self.stiffness, *self.natural)
 
     @property
     def static_stiffness(self) -> np.ndarray:

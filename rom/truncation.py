@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from vanedamp.rom.dense_modes import check_elastic, halved, krylov, rigid_motions, spectrum
+from vanedamp.rom.dense_modes import check_elastic, count_rigid_motions, halved, krylov, spectrum
 from vanedamp.rom.fields import ReducedModelError
 from vanedamp.rom.reduced import ReducedModel
 
@@ -45,7 +45,7 @@ def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedMode
     inertia, rigidity = (matrix[np.ix_(dropped, dropped)] for matrix in (model.mass, model.stiffness))
     own: list[np.ndarray] = []
     if (blocks or model.residual_flexibility is not None) and dropped.size:
-        check_elastic(rigid_motions(rigidity, *spectrum(inertia, rigidity)), 0)
+        check_elastic(count_rigid_motions(rigidity, *spectrum(inertia, rigidity)), 0)
         static = np.linalg.solve(rigidity, model.selection[:, dropped].T)
         if model.residual_flexibility is not None:
             lost = np.zeros((model.size, len(model.interface)))

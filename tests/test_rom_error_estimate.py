@@ -86,7 +86,7 @@ def test_choice_keeps_its_promise():
     interface = Interface.on_patches(matrices, ENDS)
     every = reduce(matrices, interface, modes=28)
     rich = rich_model(matrices, interface, "craig-bampton", 20)
-    frequencies = ladder.grid(rich, 0.0, 2.0 * rich.natural_frequencies_hz[0])
+    frequencies = ladder.frequency_grid(rich, 0.0, 2.0 * rich.natural_frequencies_hz[0])
     rungs = basis_ladder(rich, "craig-bampton", frequencies)
     for tolerance in (0.1, 1e-2, 1e-4):
         choice = ladder.choose(rungs, tolerance, 1.0)
@@ -99,7 +99,7 @@ def test_choice_keeps_its_promise():
 def test_natural_ladder_ends_at_the_whole_model():
     matrices = replace(truss(), damping_ratio=0.01)
     whole = reduce(matrices, Interface.on_patches(matrices, ENDS), modes=6)
-    frequencies = ladder.grid(whole, 0.0, 0.1)
+    frequencies = ladder.frequency_grid(whole, 0.0, 0.1)
     rungs = ladder.natural_ladder(whole, frequencies, ["a"])
     assert rungs[-1].receptance < 1e-12
     assert [rung.modes for rung in rungs] == list(range(1, whole.size + 1))
@@ -115,5 +115,5 @@ def test_natural_ladder_ends_at_the_whole_model():
 def test_frequencies_of_comparison_hold_resonances_that_have_a_height(ratio):
     """Without damping the receptance has no value at a natural frequency, or one that round-off makes."""
     model = ReducedModel.from_matrices(np.eye(2), np.diag([1.0, 9.0]), {"tip": [1.0, 1.0]}, damping_ratio=ratio)
-    found = np.isin(model.natural_frequencies_hz, ladder.grid(model, 0.01, 1.0))
+    found = np.isin(model.natural_frequencies_hz, ladder.frequency_grid(model, 0.01, 1.0))
     assert np.all(found == (ratio > 0.0))
