@@ -24,13 +24,15 @@ from typing import Any, NamedTuple, TextIO
 import h5py
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
+
 SCHEMA_VERSION = 1
 
 #: where links stand for the files that processes have open
 _OPEN_FILES = Path("/proc")
 
 
-class StoreError(ValueError):
+class StoreError(VanedampError):
     """A file that cannot be read (missing, damaged, of another kind, of a newer schema) or cannot be written."""
 
 

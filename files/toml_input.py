@@ -12,6 +12,8 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
+from vanedamp.files.errors import VanedampError
+
 T = TypeVar("T")
 
 #: Every record read from a file knows all its keys and holds finite numbers.
@@ -56,7 +58,7 @@ def _three(direction: Any) -> Any:
 Direction = Annotated[tuple[Real, Real, Real], BeforeValidator(_three)]
 
 
-class InputError(ValueError):
+class InputError(VanedampError):
     """Bad input. The message is one line: file, key, what is wrong and what would be right."""
 
 

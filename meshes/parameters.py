@@ -6,8 +6,10 @@ from numbers import Integral, Real
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 
-class ParameterError(ValueError):
+
+class ParameterError(VanedampError):
     """A parameter of a mesh that is out of its range or does not fit the others; the message starts with its name."""
 
 

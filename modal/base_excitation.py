@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.eigen import Modes, factorize
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
 
 
-class BaseExcitationError(ValueError):
+class BaseExcitationError(VanedampError):
     """Modes, functionals or frequencies that do not fit; the message names which and the remedy."""
 
 

@@ -13,6 +13,7 @@ from scipy import sparse
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrices import SystemMatrices
@@ -25,7 +26,7 @@ _NEIGHBOURS = 8
 _UNSEEN = 1e-6
 
 
-class CorrelationError(ValueError):
+class CorrelationError(VanedampError):
     """Shapes or points that do not fit the structure; the message names what and the remedy."""
 
 

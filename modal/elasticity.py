@@ -12,6 +12,7 @@ import numpy as np
 import ufl
 from scipy import sparse
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
 from vanedamp.modal.matrices import Patch, SystemMatrices
 
@@ -19,7 +20,7 @@ DEFAULT = "default"
 _COMPONENTS = "xyz"
 
 
-class ElasticityError(ValueError):
+class ElasticityError(VanedampError):
     """A material, support or displacement field that does not fit; the message names it and the remedy."""
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.rational_fit import Fit, Rational
 
@@ -22,7 +23,7 @@ _MISFIT = 0.5
 _CHANCE = 1e-4
 
 
-class FrfError(ValueError):
+class FrfError(VanedampError):
     """A frequency response, or a band of it, that gives no poles; the message names what and the remedy."""
 
 

@@ -15,13 +15,14 @@ import numpy as np
 from scipy import sparse
 
 from vanedamp.files import store
+from vanedamp.files.errors import VanedampError
 
 _KIND = "system-matrices"
 # assembly adds the same numbers in another order above and below the diagonal
 _ASYMMETRY = 1e-10
 
 
-class MatricesError(ValueError):
+class MatricesError(VanedampError):
     """System matrices or a patch of them that do not fit together; the message names the field and the remedy."""
 
 

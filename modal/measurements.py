@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import Frf, FrfError
@@ -28,7 +29,7 @@ _QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _NORMAL_MODE, _COMPLEX_MODE, _FRF = 2, 3, 4
 
 
-class MeasurementError(ValueError):
+class MeasurementError(VanedampError):
     """A file of shapes or responses that cannot be read or written; the message names the file and the remedy."""
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import least_squares
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.correlation import LEAST_MAC, MeasuredShapes, Pairing, measured_mac, modal_assurance, pair_modes
 from vanedamp.modal.eigen import Modes, solve_modes
@@ -29,7 +30,7 @@ _SPARE = 4
 _ALIKE = 1e-6
 
 
-class TuningError(ValueError):
+class TuningError(VanedampError):
     """Parts, targets or modes that determine no factors; the message names what and the remedy."""
 
 

@@ -13,10 +13,11 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import replacing
 
 
-class MeshError(ValueError):
+class MeshError(VanedampError):
     """A mesh that cannot be read or does not hold what is asked of it; the message names file, group and remedy."""
 
 

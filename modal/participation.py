@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
 
 NOTABLE_SHARE = 0.1
 
 
-class ParticipationError(ValueError):
+class ParticipationError(VanedampError):
     """No mode moves in the direction asked for; the message tells what the modes do."""
 
 

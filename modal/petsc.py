@@ -17,6 +17,7 @@ from petsc4py import PETSc
 from scipy import sparse
 from slepc4py import SLEPc
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal import parallel
 
 # a round trip through a well-posed finite element matrix loses 5 to 8 digits, through a singular one all of them
@@ -26,7 +27,7 @@ _FOR_INERTIA = {24: 1, 13: 1}
 _PREFIX = "vanedamp_"
 
 
-class SolverError(ValueError):
+class SolverError(VanedampError):
     """A matrix that cannot be factorised, or an eigenvalue problem that does not converge."""
 
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal.eigen import Modes
 
 FATIGUE_SHARE = 0.7
 
 
-class CalibrationError(ValueError):
+class CalibrationError(VanedampError):
     """A mode or a strength that gives no rigid model; the message names the quantity and the remedy."""
 
 

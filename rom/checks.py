@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 from scipy import linalg, sparse
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases.craig_bampton import Factorize, superlu
 from vanedamp.rom.interface import Interface, rigid_basis
 from vanedamp.rom.reduced import ReducedModel
 
 
-class CheckError(ValueError):
+class CheckError(VanedampError):
     """A check that does not apply to this structure or lacks what it needs; the message tells which."""
 
 

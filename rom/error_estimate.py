@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.rom.contact_pulse import Collision, pulse, share_above
 from vanedamp.rom.dense_modes import spectrum
 from vanedamp.rom.reduced import ReducedModel
@@ -32,7 +33,7 @@ _WITHOUT_RESIDUAL: dict[str, Any] = {
 }  # fmt: skip
 
 
-class LadderError(ValueError):
+class LadderError(VanedampError):
     """No model meets the tolerance, or the question is not one; the message tells what would help."""
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import io, linalg, sparse
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.rom import checks
 from vanedamp.rom.reduced import ReducedModel
 
@@ -25,7 +26,7 @@ _ASYMMETRY = 1e-6
 _INDEFINITE = 1e-6
 
 
-class ExternalError(ValueError):
+class ExternalError(VanedampError):
     """Matrices of another code that cannot be read or are no structure's; the message names the file or the matrix."""
 
 

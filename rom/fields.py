@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files import store
+from vanedamp.files.errors import VanedampError
 
 _ASYMMETRY = 1e-9
 # negative eigenvalues of a semidefinite K, relative to the largest: round-off of the rigid motions of a free structure
 _INDEFINITE = 1e-9
 
 
-class ReducedModelError(ValueError):
+class ReducedModelError(VanedampError):
     """A reduced model that does not fit together, or a question it cannot answer; the message names the field."""
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from vanedamp.files import store
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal.matrices import Patch, SystemMatrices, patch_average, unit_direction
 
 KINDS = ("average", "rigid", "node", "full")
@@ -19,7 +20,7 @@ _DEPENDENT = 1e-10
 _FLAT = 0.5
 
 
-class InterfaceError(ValueError):
+class InterfaceError(VanedampError):
     """Interface coordinates that the structure does not have, or that depend on each other; the message names them."""
 
 

@@ -26,6 +26,7 @@ import scipy
 from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
@@ -38,7 +39,7 @@ _OWN_SHARE = 1e-10
 _SMALLEST = 1e-14
 
 
-class ReductionError(ValueError):
+class ReductionError(VanedampError):
     """A structure that cannot be reduced as asked; the message tells what to change."""
 
 
