@@ -100,7 +100,7 @@ class Factorization:
 
 def negative_eigenvalues(matrix: sparse.csr_array) -> int:
     """Number of negative eigenvalues of a symmetric matrix, from its factors (Sylvester's law of inertia)."""
-    found: int = _together("inertia", (matrix,))
+    found: int = _on_all_ranks("inertia", (matrix,))
     return found
 
 
@@ -113,7 +113,7 @@ def nearest_eigenpairs(
     that factorises; left out, CHOLMOD where the shift is below the spectrum and the matrix on one rank, otherwise
     MUMPS. Raises SolverError when fewer converge than were asked for.
     """
-    values, vectors = _together("nearest", (stiffness, mass), count, shift, direct)
+    values, vectors = _on_all_ranks("nearest", (stiffness, mass), count, shift, direct)
     nearest = np.argsort(np.abs(values - shift), kind="stable")[:count]
     order = nearest[np.argsort(values[nearest], kind="stable")]
     return values[order], vectors[order]
@@ -127,7 +127,7 @@ def interval_eigenpairs(
     Shifts walk through the interval, and inertia counts tell how many eigenvalues lie between two of them (Campos and
     Roman 2012, Numer. Algorithms 60). Raises SolverError.
     """
-    values, vectors = _together("interval", (stiffness, mass), lower, upper)
+    values, vectors = _on_all_ranks("interval", (stiffness, mass), lower, upper)
     order = np.argsort(values, kind="stable")
     return values[order], vectors[order]
 
@@ -135,23 +135,23 @@ def interval_eigenpairs(
 @contextlib.contextmanager
 def ranks() -> Iterator[bool]:
     """True on MPI's rank 0, which runs the program; the other ranks help with its factorisations, then see False."""
-    with parallel.ranks(_help) as first:
+    with parallel.ranks(_assist) as first:
         yield first
 
 
-def _together(task: str, matrices: tuple[sparse.csr_array, ...], *arguments: Any) -> Any:
+def _on_all_ranks(task: str, matrices: tuple[sparse.csr_array, ...], *arguments: Any) -> Any:
     """A task on all ranks with the matrices of rank 0."""
     parallel.invite(task, len(matrices), arguments)
-    return _take_part(task, matrices, arguments)
+    return _run_task(task, matrices, arguments)
 
 
-def _help(task: str, matrices: int, arguments: tuple[Any, ...]) -> None:
+def _assist(task: str, matrices: int, arguments: tuple[Any, ...]) -> None:
     # what fails, fails on rank 0 too, and is told there
     with contextlib.suppress(SolverError, PETSc.Error):
-        _take_part(task, (None,) * matrices, arguments)
+        _run_task(task, (None,) * matrices, arguments)
 
 
-def _take_part(task: str, matrices: tuple[sparse.csr_array | None, ...], arguments: tuple[Any, ...]) -> Any:
+def _run_task(task: str, matrices: tuple[sparse.csr_array | None, ...], arguments: tuple[Any, ...]) -> Any:
     with contextlib.ExitStack() as stack:
         operators = [stack.enter_context(_petsc(_distributed(matrix))) for matrix in matrices]
         return _TASKS[task](stack, operators, *arguments)
@@ -212,6 +212,11 @@ _TASKS: dict[str, Callable[..., Any]] = {"inertia": _inertia, "nearest": _neares
 def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any]) -> Any:
     eps = stack.enter_context(_petsc(SLEPc.EPS().create(parallel.COMM)))
     eps.setOptionsPrefix(_PREFIX)
+    # the solver makes its factors itself, so that MUMPS takes its controls from the options of that prefix only
+    options = PETSc.Options(f"{_PREFIX}st_mat_mumps_icntl_")
+    for number, value in _FOR_INERTIA.items():
+        options[str(number)] = value
+        stack.callback(options.delValue, str(number))
     eps.setOperators(*operators)
     eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     eps.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
@@ -283,6 +288,3 @@ def _complaint(factor: Any) -> str:
     status, detail = factor.getMumpsInfog(1), factor.getMumpsInfog(2)
     return f"status {status} ({detail})" + (", not enough memory" if status in (-9, -13) else "")
 
-
-for _number, _value in _FOR_INERTIA.items():
-    PETSc.Options()[f"{_PREFIX}st_mat_mumps_icntl_{_number}"] = _value
