@@ -13,6 +13,7 @@ from scipy import linalg, sparse
 
 from vanedamp.files import store
 from vanedamp.modal import petsc
+from vanedamp.modal.algebra import affine_fields, leading_sign, ritz_values
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.petsc import Factorization, SolverError
 
@@ -219,14 +220,7 @@ def _eigenvalue(frequency_hz: float) -> float:
 
 def _straining_eigenvalue(matrices: SystemMatrices) -> float:
     """The lowest Ritz value of uniform strains of the structure without supports, (rad/s)^2: its spectrum's scale."""
-    offsets = matrices.coordinates - matrices.coordinates.mean(axis=0)
-    offsets /= np.abs(offsets).max() or 1.0
-    affine = np.column_stack([np.ones(len(offsets)), offsets])
-    fields = np.einsum("na,ij->niaj", affine, np.eye(3)).reshape(matrices.size, -1)
-    # a flat or straight set of nodes has fewer independent fields than twelve
-    left, singular, _ = np.linalg.svd(fields, full_matrices=False)
-    basis = left[:, singular > 1e-8 * singular[0]]
-    values = linalg.eigh(basis.T @ (matrices.stiffness @ basis), basis.T @ (matrices.mass @ basis), eigvals_only=True)
+    values = ritz_values(matrices.stiffness, matrices.mass, affine_fields(matrices.coordinates))
     return float(values[values > 1e-6 * values[-1]][0])
 
 
@@ -235,11 +229,7 @@ def shape_signs(vectors: np.ndarray, factors: np.ndarray) -> np.ndarray:
 
     factors: (m, 3) participation factors of the shapes along x, y and z.
     """
-    signs = np.empty(len(vectors))
-    for index, (vector, factor) in enumerate(zip(vectors, factors, strict=True)):
-        # a mode that barely couples to a translation has a factor of noise
-        guide = factor if np.abs(factor).max() > 1e-6 * np.abs(factors).max() else vector
-        # near ties go to the first, so that round-off does not choose
-        first = np.flatnonzero(np.abs(guide) > (1.0 - 1e-6) * np.abs(guide).max())[0]
-        signs[index] = np.sign(guide[first])
-    return signs
+    # a mode that barely couples to a translation has a factor of noise
+    noise = 1e-6 * np.abs(factors).max()
+    guides = (f if np.abs(f).max() > noise else vector for vector, f in zip(vectors, factors, strict=True))
+    return np.array([leading_sign(guide) for guide in guides])

@@ -16,6 +16,7 @@ import numpy as np
 from scipy import io, sparse
 
 from vanedamp.files.store import replacing, write_csv
+from vanedamp.modal.algebra import symmetric_part
 from vanedamp.modal.matrices import MatricesError, Patch, SystemMatrices
 
 #: what `write_folder` writes
@@ -95,7 +96,7 @@ def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> No
     home.mkdir(parents=True, exist_ok=True)
     for name, matrix in (("stiffness", matrices.stiffness), ("mass", matrices.mass)):
         # round-off of the assembly differs above and below the diagonal; a symmetric file holds one of them
-        whole = sparse.coo_matrix(0.5 * (matrix + matrix.T))
+        whole = sparse.coo_matrix(symmetric_part(matrix))
         with replacing(home / f"{name}.mtx") as temporary, temporary.open("wb") as stream:
             io.mmwrite(stream, whole, symmetry="symmetric", precision=17)
     nodes = [[index, *xyz] for index, xyz in enumerate(matrices.coordinates.tolist(), 1)]

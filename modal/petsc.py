@@ -287,4 +287,3 @@ def _complaint(factor: Any) -> str:
     """What MUMPS says about a failure."""
     status, detail = factor.getMumpsInfog(1), factor.getMumpsInfog(2)
     return f"status {status} ({detail})" + (", not enough memory" if status in (-9, -13) else "")
-

@@ -1,14 +1,13 @@
-"""Natural modes of small dense matrices, and what is made of them: modal damping, quasi-static blocks."""
+"""Natural modes of small dense matrices, the number of rigid motions among them, and modal damping."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy import linalg
 
-from vanedamp.rom.fields import ReducedModelError
+from vanedamp.modal.algebra import symmetric_part
+from vanedamp.rom.checks import ReducedModelError
 
-# share of its own that a quasi-static coordinate needs for the mass to stay well conditioned
-_OWN_SHARE = 1e-10
 # ratio of the lowest to the highest squared frequency below which round-off of the highest is felt in the lowest
 _WIDE = 1e-6
 # round-offs of the stiffness, for each coordinate, below which a squared frequency is none
@@ -70,33 +69,10 @@ def modal_damping(mass: np.ndarray, stiffness: np.ndarray, ratio: float) -> np.n
     eigenvalues, shapes = spectrum(mass, stiffness)
     inertia = mass @ shapes
     damping = inertia * (2.0 * ratio * np.sqrt(np.maximum(eigenvalues, 0.0))) @ inertia.T
-    return halved(damping)
-
-
-def krylov(start: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, count: int) -> list[np.ndarray]:
-    """`count` blocks of the Krylov space of K^-1 M, M-orthonormal, without what the blocks before have."""
-    blocks: list[np.ndarray] = []
-    block = start
-    for _ in range(count):
-        norms = np.sqrt(np.einsum("ij,ij->j", block, mass @ block))
-        rest = block[:, norms > 0.0] / norms[norms > 0.0]
-        for known in [*blocks, *blocks]:  # twice is enough
-            rest = rest - known @ (known.T @ (mass @ rest))
-        values, vectors = np.linalg.eigh(rest.T @ (mass @ rest))
-        own = values > _OWN_SHARE
-        if not np.any(own):
-            break
-        blocks.append(rest @ (vectors[:, own] / np.sqrt(values[own])))
-        block = np.linalg.solve(stiffness, mass @ blocks[-1])
-    return blocks
+    return symmetric_part(damping)
 
 
 def check_elastic(rigid: int, modes: int) -> None:
     """Raise ReducedModelError if the lowest `modes` modes do not hold all the rigid motions, so that one is dropped."""
     if rigid > modes:
         raise ReducedModelError("modes: a rigid motion would be dropped, which has no static response; keep more modes")
-
-
-def halved(matrix: np.ndarray) -> np.ndarray:
-    """The symmetric part."""
-    return 0.5 * (matrix + matrix.T)

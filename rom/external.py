@@ -16,6 +16,7 @@ import numpy as np
 from scipy import io, linalg, sparse
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom import checks
 from vanedamp.rom.reduced import ReducedModel
 
@@ -102,7 +103,7 @@ def external_model(
     asymmetry, worst = max((checks.asymmetry(matrix), name) for name, matrix in matrices.items())
     if asymmetry > _ASYMMETRY:
         raise ExternalError(f"{worst}: not symmetric ({asymmetry:.1e}); if only one triangle is stored, mirror it")
-    matrices = {name: 0.5 * (matrix + matrix.T) for name, matrix in matrices.items()}
+    matrices = {name: symmetric_part(matrix) for name, matrix in matrices.items()}
     size = len(mass)
     rows = {label: _row(label, given, size) for label, given in interface.items()}
     massless = ~np.any(matrices["mass"], axis=0)
@@ -144,7 +145,7 @@ def _condensed(
         {name: basis.T @ matrix @ basis for name, matrix in matrices.items()},
         {label: row @ basis for label, row in rows.items()},
         None if base_load is None else basis.T @ base_load,
-        0.5 * (residual + residual.T),
+        symmetric_part(residual),
     )
 
 

@@ -16,8 +16,9 @@ import numpy as np
 from scipy import linalg
 
 from vanedamp.files import store
-from vanedamp.rom.dense_modes import count_rigid_motions, halved, modal_damping, spectrum
-from vanedamp.rom.fields import ReducedModelError, check_definite, shaped, symmetric, unit
+from vanedamp.modal.algebra import symmetric_part
+from vanedamp.rom.checks import ReducedModelError, check_definite, shaped, symmetric, unit
+from vanedamp.rom.dense_modes import count_rigid_motions, modal_damping, spectrum
 
 __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
 
@@ -189,9 +190,9 @@ class ReducedModel:
 
     def projected(self, basis: np.ndarray, **changes: Any) -> ReducedModel:
         """Ritz model in the coordinates y of q = basis @ y, basis (n, m). `changes` are fields of the new model."""
-        mass, stiffness = (halved(basis.T @ matrix @ basis) for matrix in (self.mass, self.stiffness))
+        mass, stiffness = (symmetric_part(basis.T @ matrix @ basis) for matrix in (self.mass, self.stiffness))
         if self.damping_ratio is None:
-            damping = halved(basis.T @ self.damping @ basis)
+            damping = symmetric_part(basis.T @ self.damping @ basis)
         else:
             damping = modal_damping(mass, stiffness, self.damping_ratio)
         values: dict[str, Any] = {

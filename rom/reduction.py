@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases import craig_bampton, free_interface
-from vanedamp.rom.bases.craig_bampton import Factorize, ReductionError, superlu
+from vanedamp.rom.bases.projection import Factorize, ReductionError, superlu
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy import linalg
 
-from vanedamp.rom.dense_modes import check_elastic, count_rigid_motions, halved, krylov, spectrum
-from vanedamp.rom.fields import ReducedModelError
+from vanedamp.modal.algebra import orthonormal, symmetric_part
+from vanedamp.rom.checks import ReducedModelError
+from vanedamp.rom.dense_modes import check_elastic, count_rigid_motions, spectrum
+from vanedamp.rom.krylov import krylov
 from vanedamp.rom.reduced import ReducedModel
 
 
@@ -51,7 +54,7 @@ def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedMode
             lost = np.zeros((model.size, len(model.interface)))
             lost[dropped] = static
             changes |= residual_fields(model, lost)
-        own = krylov(static, rigidity, inertia, blocks)
+        own = krylov(static, partial(np.linalg.solve, rigidity), inertia, blocks)
     basis = np.zeros((model.size, sum(block.shape[1] for block in own) + modes))
     if own:
         basis[dropped, : basis.shape[1] - modes] = np.hstack(own)
@@ -93,7 +96,7 @@ def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
     check_elastic(model.rigid_modes, modes)
     dropped = shapes[:, modes:]
     static = (model.selection @ dropped).T / squares[modes:, None]
-    block = np.hstack(krylov(static, np.diag(squares[modes:]), np.eye(len(static)), 1))
+    block = orthonormal(static, np.eye(len(static)))
     kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (block.shape[1],)}
     return model.projected(np.hstack([dropped @ block, shapes[:, :modes]]), **kept)
 
@@ -113,7 +116,7 @@ def boundary_form(model: ReducedModel) -> tuple[np.ndarray, np.ndarray, np.ndarr
     mass, damping, stiffness = (
         linalg.block_diag(np.zeros((size, size)), matrix) for matrix in (model.mass, model.damping, model.stiffness)
     )
-    return mass, damping, halved(stiffness + rows.T @ np.linalg.solve(residual, rows))
+    return mass, damping, symmetric_part(stiffness + rows.T @ np.linalg.solve(residual, rows))
 
 
 def residual_fields(model: ReducedModel, static: np.ndarray) -> dict[str, Any]:
@@ -127,7 +130,7 @@ def residual_fields(model: ReducedModel, static: np.ndarray) -> dict[str, Any]:
     flexibility = grown(model.selection, model.residual_flexibility)
     assert flexibility is not None
     return {
-        "residual_flexibility": halved(flexibility),
+        "residual_flexibility": symmetric_part(flexibility),
         "residual_recovery": grown(model.recovery, model.residual_recovery),
         "output_residual": grown(model.output_rows, model.output_residual),
     }

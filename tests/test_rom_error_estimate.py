@@ -7,7 +7,7 @@ import pytest
 from scipy import linalg
 from structures import rod, truss
 
-from vanedamp.rom import checks
+from tests.tools.reduction_errors import full_receptance, receptance_errors
 from vanedamp.rom import error_estimate as ladder
 from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
@@ -31,14 +31,14 @@ def coarse():
     interface = Interface.on_patches(matrices, [InterfaceCoordinate(label, label, (0, 1, 0)) for label in labels])
     first, second, third = solve_modes(matrices, 3).frequencies_hz
     frequencies = np.array([0.3 * first, 0.97 * first, 1.002 * first, 1.5 * first, 1.01 * second, 1.2 * third])
-    return matrices, interface, frequencies, checks.full_receptance(matrices, interface, frequencies, factorize)
+    return matrices, interface, frequencies, full_receptance(matrices, interface, frequencies, factorize)
 
 
 def within_five(rich, basis, frequencies, reference, counts):
     """Assert that the estimate is within a factor of five of the true error, frequency by frequency."""
     for modes in counts:
         model = basis_model(rich, basis, modes)
-        truth = checks.receptance_errors(model, frequencies, reference)
+        truth = receptance_errors(model, frequencies, reference)
         estimate = ladder.frf_errors(model, rich if basis == "massless" else truncated(rich, modes), frequencies)
         seen = truth > 1e-9  # what round-off leaves of the reference
         assert np.all(estimate[seen] < 5 * truth[seen]), (basis, modes)
@@ -92,7 +92,7 @@ def test_choice_keeps_its_promise():
         choice = ladder.choose(rungs, tolerance, 1.0)
         chosen = choice.chosen.modes
         assert choice.met
-        true = checks.receptance_errors(truncated(rich, chosen, 1), frequencies, every.receptance(frequencies))
+        true = receptance_errors(truncated(rich, chosen, 1), frequencies, every.receptance(frequencies))
         assert true.max() < 1.01 * tolerance
 
 
