@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -205,6 +205,16 @@ class ReducedModel:
             "recovery": None if self.recovery is None else self.recovery @ basis,
         }
         return replace(self, **(values | changes))
+
+    def with_masses(self, masses: Iterable[tuple[str, float]]) -> ReducedModel:
+        """Return the model with masses (kg) fixed to interface coordinates, such as bodies glued to their cavities.
+
+        The damping matrix stays; it is then no longer that of one ratio.
+        """
+        mass = np.array(self.mass)
+        for label, value in masses:
+            mass += value * np.outer(self.row(label), self.row(label))
+        return replace(self, mass=mass, damping_ratio=None)
 
     def reconstruct(self, q: np.ndarray, forces: np.ndarray | None = None) -> np.ndarray:
         """Full displacements T q, (N,) or (N, t), of coordinates (n,) or (n, t). Raises ReducedModelError without T.
