@@ -59,12 +59,12 @@ class Modes:
         return len(self.frequencies_hz)
 
     def first(self, count: int) -> Modes:
-        """The first so many of the modes."""
+        """Return the first `count` modes."""
         return Modes(self.frequencies_hz[:count], self.shapes[:count], self.residuals[:count], self.provenance)
 
     @property
     def angular_frequencies(self) -> np.ndarray:
-        """(m,) rad/s."""
+        """Angular frequencies (m,), rad/s."""
         return 2.0 * np.pi * self.frequencies_hz
 
     def save(
@@ -93,7 +93,7 @@ class Modes:
 def solve_modes(
     matrices: SystemMatrices, count: int = 10, max_frequency: float | None = None, min_frequency: float = 0.0
 ) -> Modes:
-    """The lowest `count` modes, or all modes from `min_frequency` to `max_frequency` (Hz, then `count` is not used).
+    """Return the lowest `count` modes, or all from `min_frequency` to `max_frequency` (Hz; `count` is then not used).
 
     Sylvester's law of inertia proves that no mode is missed. Free and partly held structures show their rigid modes at
     zero frequency: those whose strain energy is within round-off. Raises SolverError for a count that the structure
@@ -121,7 +121,7 @@ def solve_modes(
 
 
 def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
-    """Number of modes below a frequency, from the inertia of K - (2 pi f)^2 M: exact, without computing a mode."""
+    """Return the number of modes below a frequency, exactly, from the inertia of K - (2 pi f)^2 M."""
     if not frequency_hz > 0.0:
         raise SolverError(f"frequency: expected a positive number of Hz, not {frequency_hz}")
     free = matrices.free
@@ -144,12 +144,12 @@ class _Pencil(NamedTuple):
     mass: sparse.csr_array
 
     def below(self, eigenvalue: float) -> int:
-        """Number of eigenvalues below one."""
+        """Return the number of eigenvalues below one."""
         return petsc.negative_eigenvalues(sparse.csr_array(self.stiffness - eigenvalue * self.mass))
 
 
 def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest eigenpairs, proved complete by the inertia in a gap of the spectrum above them."""
+    """Return the lowest eigenpairs, proved complete by the inertia in a gap of the spectrum above them."""
     size, spare = pencil.mass.shape[0], _SPARE
     while True:
         asked = min(count + spare, size)
@@ -170,7 +170,7 @@ def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.n
 
 
 def _within(pencil: _Pencil, low_hz: float, high_hz: float, floor: float) -> tuple[np.ndarray, np.ndarray]:
-    """All eigenpairs of a range of frequencies, as many as the inertia at its ends says."""
+    """Return all eigenpairs of a range of frequencies, whose number follows from the inertia at its ends."""
     if not 0.0 <= low_hz < high_hz:
         raise SolverError(f"min_frequency: expected 0 <= min_frequency < max_frequency, not {low_hz} and {high_hz} Hz")
     lower, upper = _eigenvalue(low_hz) if low_hz else floor, _eigenvalue(high_hz)
@@ -197,10 +197,10 @@ def _sliced(pencil: _Pencil, lower: float, upper: float, count: int) -> tuple[np
 
 
 def _orthonormal(vectors: np.ndarray, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mass-orthonormal vectors from ascending eigenvectors, and their products with the mass.
+    """Return mass-orthonormal vectors from ascending eigenvectors, and their products with the mass.
 
     Vectors with residuals r (in the norm of M^-1) are orthogonal to |phi_i^T M phi_j| <= (r_i + r_j) / |lambda_i -
-    lambda_j| alone where no Krylov space holds both, such as those of two slices. The lower one keeps its direction
+    lambda_j| only, where no Krylov space holds both, such as those of two slices. The lower one keeps its direction
     (Cholesky): that adds at most their product to the relative residual of the higher one, while the other way round
     the lower one's would grow by the ratio of their eigenvalues.
     """
@@ -219,13 +219,13 @@ def _eigenvalue(frequency_hz: float) -> float:
 
 
 def _straining_eigenvalue(matrices: SystemMatrices) -> float:
-    """The lowest Ritz value of uniform strains of the structure without supports, (rad/s)^2: its spectrum's scale."""
+    """Return the lowest Ritz value of uniform strains without supports, (rad/s)^2: the scale of the spectrum."""
     values = ritz_values(matrices.stiffness, matrices.mass, affine_fields(matrices.coordinates))
     return float(values[values > 1e-6 * values[-1]][0])
 
 
 def shape_signs(vectors: np.ndarray, factors: np.ndarray) -> np.ndarray:
-    """(m,) +-1 that fix the direction of shapes (m, N), whatever the solver's start vector was.
+    """Return signs (m,) that fix the direction of shapes (m, N), whatever the solver's start vector was.
 
     factors: (m, 3) participation factors of the shapes along x, y and z.
     """

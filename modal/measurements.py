@@ -21,7 +21,7 @@ from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import Frf, FrfError
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".bunv")
-#: what the two columns of a response in a CSV may be
+#: meanings of the two columns of a response in a CSV
 COLUMNS = ("real-imaginary", "magnitude-degrees", "magnitude-radians")
 _PLACE = ("x", "y", "z", "dx", "dy", "dz")
 # specific data types of UFF 58, record 9
@@ -34,7 +34,7 @@ class MeasurementError(VanedampError):
 
 
 def read_shapes(path: str | os.PathLike[str]) -> MeasuredShapes:
-    """Measured mode shapes from a CSV or universal file.
+    """Read measured mode shapes from a CSV or universal file.
 
     CSV: a header `x, y, z, dx, dy, dz, <mode>, ...`, then a row for every measured displacement: its point (m), its
     direction, and its value in every mode, as 0.5 or 0.5+0.1j; a mode's name is its frequency in Hz, if it is a number.
@@ -63,12 +63,12 @@ def write_shapes(shapes: MeasuredShapes, path: str | os.PathLike[str]) -> None:
 
 
 def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns: str | None = None) -> Frf:
-    """A frequency response from a CSV or universal file (dataset 58, function type 4).
+    """Read a frequency response from a CSV or universal file (dataset 58, function type 4).
 
-    CSV: the frequency (Hz), then two columns for every response; `quantity` says what they are. A universal file says
-    itself.
+    CSV: the frequency (Hz), then two columns for every response; `quantity` says of which kind. A universal file
+    says so itself.
 
-    columns  one of COLUMNS; left out: as the words of the header line tell (real, imag; magnitude, phase in deg or
+    columns  one of COLUMNS; left out: as the header line says (real, imag; magnitude, phase in deg or
              rad), or else real and imaginary parts. Columns that look like magnitude and phase, without a word that
              says so, are refused
 
@@ -96,11 +96,11 @@ def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns
 
 
 def _columns(given: str | None, header: Sequence[str], first: np.ndarray, second: np.ndarray) -> str:
-    """Which of COLUMNS the pairs (k, n) of a CSV are."""
+    """Return which of COLUMNS the pairs (k, n) of a CSV are."""
     if given is not None and given not in COLUMNS:
         raise MeasurementError(f"columns: expected one of {', '.join(COLUMNS)}, not {given!r}")
-    told = given or _told(header, second)
-    if told is None:
+    kind = given or _header_kind(header, second)
+    if kind is None:
         one_sign = np.all(first > 0.0, axis=1) | np.all(first < 0.0, axis=1)
         turns = (np.abs(second).max(axis=1) <= 361.0) & (np.ptp(second, axis=1) > 0.1)
         if np.any(one_sign & turns):
@@ -108,14 +108,14 @@ def _columns(given: str | None, header: Sequence[str], first: np.ndarray, second
                 "columns: a response's first column keeps its sign, its second one looks like a phase; say what they "
                 f"are by a header line or by columns = one of {', '.join(COLUMNS)}"
             )
-        told = "real-imaginary"
-    if told != "real-imaginary" and np.any(first < 0.0):
+        kind = "real-imaginary"
+    if kind != "real-imaginary" and np.any(first < 0.0):
         raise MeasurementError("columns: a magnitude is negative; expected linear magnitudes, not decibels")
-    return told
+    return kind
 
 
-def _told(header: Sequence[str], second: np.ndarray) -> str | None:
-    """What the words of a header line say of the first pair of columns; None where they say nothing."""
+def _header_kind(header: Sequence[str], second: np.ndarray) -> str | None:
+    """Return which of COLUMNS the header line says that the first pair is; None where it does not say."""
     if len(header) < 3:
         return None
     one, other = header[1].lower(), header[2].lower()
@@ -177,7 +177,7 @@ def _shapes_of_csv(file: Path) -> MeasuredShapes:
 
 
 def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
-    """The words of a header line, if there is one, and the rows of numbers of a CSV file."""
+    """Return the words of a header line, if there is one, and the rows of numbers of a CSV file."""
     rows, header = _table(file), []
     if rows and np.isnan(_number(rows[0][0])):
         header, rows = [word.strip() for word in rows[0]], rows[1:]

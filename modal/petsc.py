@@ -56,7 +56,7 @@ class Factorization:
             raise
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution, of the shape (n,) or (n, k) of the right-hand side."""
+        """Return the solution, of the shape (n,) or (n, k) of the right-hand side."""
         values = np.asarray(rhs, dtype=float)
         if values.ndim not in (1, 2) or values.shape[0] != self.size:
             raise SolverError(f"rhs: expected shape ({self.size},) or ({self.size}, k), not {values.shape}")
@@ -99,7 +99,7 @@ class Factorization:
 
 
 def negative_eigenvalues(matrix: sparse.csr_array) -> int:
-    """Number of negative eigenvalues of a symmetric matrix, from its factors (Sylvester's law of inertia)."""
+    """Return the number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia."""
     found: int = _on_all_ranks("inertia", (matrix,))
     return found
 
@@ -107,7 +107,7 @@ def negative_eigenvalues(matrix: sparse.csr_array) -> int:
 def nearest_eigenpairs(
     stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float, direct: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues (count,) ascending and vectors (count, n) of K x = lambda M x nearest to a shift.
+    """Return eigenvalues (count,) ascending and vectors (count, n) of K x = lambda M x nearest to a shift.
 
     Krylov-Schur with shift and invert (Stewart 2001, SIAM J. Matrix Anal. Appl. 23). direct: PETSc's name of the solver
     that factorises; left out, CHOLMOD where the shift is below the spectrum and the matrix on one rank, otherwise
@@ -122,9 +122,9 @@ def nearest_eigenpairs(
 def interval_eigenpairs(
     stiffness: sparse.csr_array, mass: sparse.csr_array, lower: float, upper: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """All eigenvalues (m,) ascending in an interval and their vectors (m, n), by spectrum slicing.
+    """Return all eigenvalues (m,) ascending in an interval and their vectors (m, n), by spectrum slicing.
 
-    Shifts walk through the interval, and inertia counts tell how many eigenvalues lie between two of them (Campos and
+    Shifts walk through the interval, and inertia counts give the number of eigenvalues between two of them (Campos and
     Roman 2012, Numer. Algorithms 60). Raises SolverError.
     """
     values, vectors = _on_all_ranks("interval", (stiffness, mass), lower, upper)
@@ -134,19 +134,19 @@ def interval_eigenpairs(
 
 @contextlib.contextmanager
 def ranks() -> Iterator[bool]:
-    """True on MPI's rank 0, which runs the program; the other ranks help with its factorisations, then see False."""
+    """Yield True on MPI's rank 0, which runs the program, and False on the others once they have helped it."""
     with parallel.ranks(_assist) as first:
         yield first
 
 
 def _on_all_ranks(task: str, matrices: tuple[sparse.csr_array, ...], *arguments: Any) -> Any:
-    """A task on all ranks with the matrices of rank 0."""
+    """Run a task on all ranks with the matrices of rank 0."""
     parallel.invite(task, len(matrices), arguments)
     return _run_task(task, matrices, arguments)
 
 
 def _assist(task: str, matrices: int, arguments: tuple[Any, ...]) -> None:
-    # what fails, fails on rank 0 too, and is told there
+    # a failure occurs on rank 0 too, which reports it
     with contextlib.suppress(SolverError, PETSc.Error):
         _run_task(task, (None,) * matrices, arguments)
 
@@ -233,7 +233,7 @@ def _solve(eps: Any) -> None:
 
 
 def _eigenpairs(stack: contextlib.ExitStack, eps: Any, operator: Any) -> tuple[np.ndarray, np.ndarray]:
-    """All converged values and, on rank 0, vectors."""
+    """Return all converged values and, on rank 0, vectors."""
     vector = stack.enter_context(_petsc(operator.createVecRight()))
     values, vectors = np.empty(eps.getConverged()), np.empty((eps.getConverged(), vector.getLocalSize()))
     for index in range(len(values)):
@@ -251,7 +251,7 @@ def _petsc(created: Any) -> Iterator[Any]:
 
 
 def _petsc_matrix(matrix: sparse.csr_array) -> Any:
-    """A PETSc matrix of this rank alone from a symmetric CSR one; the caller destroys it."""
+    """Return a PETSc matrix on this rank only from a symmetric CSR one; the caller destroys it."""
     csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), np.array(matrix.data))
     created = PETSc.Mat().createAIJ(size=matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
     created.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -259,7 +259,7 @@ def _petsc_matrix(matrix: sparse.csr_array) -> Any:
 
 
 def _distributed(matrix: sparse.csr_array | None) -> Any:
-    """A PETSc matrix over all ranks from rank 0's symmetric CSR one; the caller destroys it."""
+    """Return a PETSc matrix over all ranks from rank 0's symmetric CSR one; the caller destroys it."""
     size, csr = parallel.rows(matrix)
     local = (len(csr[0]) - 1, size)
     created = PETSc.Mat().createAIJ(size=(local, local), csr=csr, comm=parallel.COMM)
@@ -276,7 +276,7 @@ def _set_direct(ksp: Any, direct: str = "mumps") -> None:
 
 
 def _configure_direct(ksp: Any) -> None:
-    """As `_set_direct`, with what inertia counts need."""
+    """Make a Krylov solver a direct one that can count negative eigenvalues."""
     _set_direct(ksp)
     ksp.getPC().setFactorSetUpSolverType()
     for number, value in _FOR_INERTIA.items():
@@ -284,6 +284,6 @@ def _configure_direct(ksp: Any) -> None:
 
 
 def _complaint(factor: Any) -> str:
-    """What MUMPS says about a failure."""
+    """Return MUMPS' status after a failure, in words."""
     status, detail = factor.getMumpsInfog(1), factor.getMumpsInfog(2)
     return f"status {status} ({detail})" + (", not enough memory" if status in (-9, -13) else "")

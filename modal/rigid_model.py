@@ -40,7 +40,7 @@ class RigidModel:
 
 
 def rigid_model(modes: Modes, mode: int, functional: np.ndarray, at: str, damping_ratio: float) -> RigidModel:
-    """Rigid model of a mode at the interface coordinate u = functional^T q, with functional (N,).
+    """Return the rigid model of a mode at the interface coordinate u = functional^T q, with functional (N,).
 
     m = phi^T M phi / (w^T phi)^2, c = w_1^2 m, d = 2 zeta w_1 m. Raises CalibrationError when the mode does not move
     the interface coordinate, or has no frequency.
@@ -72,7 +72,7 @@ def fatigue_amplitude(
     fatigue_strength: float,
     share: float = FATIGUE_SHARE,
 ) -> float:
-    """Displacement amplitude, m, of an interface coordinate at which a mode's stress reaches a share of the strength.
+    """Return the displacement amplitude, m, of an interface coordinate at a share of a mode's fatigue strength.
 
     peak_stress       Pa, largest von Mises stress of the mode's shape as it is stored (Solid.von_mises(shape).max()).
                       Sharp corners are singular points of elasticity: their stress grows with mesh refinement

@@ -31,7 +31,7 @@ class HotSpot:
 def hot_spot(
     solid: Solid, displacement: np.ndarray, strengths: Mapping[str, float], within: Collection[str] | None = None
 ) -> HotSpot:
-    """The corner of a cell with the largest ratio of von Mises stress to fatigue strength.
+    """Return the corner of a cell with the largest ratio of von Mises stress to fatigue strength.
 
     displacement  (N,)
     strengths     Pa, by volume group; groups that are not named do not count

@@ -30,13 +30,13 @@ def check_definite(squares: np.ndarray) -> None:
 
 
 def unit(directions: np.ndarray) -> np.ndarray:
-    """Directions (k, 3) scaled to length one, to round-off; zeros stay."""
+    """Return directions (k, 3) scaled to length one, to round-off; zeros stay."""
     lengths = np.linalg.norm(directions, axis=1, keepdims=True)
     return store.frozen(directions / np.where((lengths == 0.0) | np.isclose(lengths, 1.0, rtol=1e-12), 1.0, lengths))
 
 
 def shaped(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """A frozen array of that shape, all finite. Raises ReducedModelError."""
+    """Return a frozen array of that shape, all finite. Raises ReducedModelError."""
     array = store.frozen(values)
     if array.shape != shape:
         raise ReducedModelError(f"{name}: expected shape {shape}, not {array.shape}")
@@ -46,7 +46,7 @@ def shaped(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def symmetric(name: str, values: Any, size: int) -> np.ndarray:
-    """A frozen symmetric matrix (size, size). Raises ReducedModelError."""
+    """Return a frozen symmetric matrix (size, size). Raises ReducedModelError."""
     array = shaped(name, values, (size, size))
     if array.any() and asymmetry(array) > _ASYMMETRY:
         raise ReducedModelError(f"{name}: not symmetric; if only one triangle is stored, mirror it")

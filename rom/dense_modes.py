@@ -15,7 +15,7 @@ _MARGIN = 20.0
 
 
 def spectrum(mass: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Squared angular frequencies, ascending, and mass-normalised shapes as columns. Raises ReducedModelError.
+    """Return squared angular frequencies, ascending, and mass-normalised shapes as columns. Raises ReducedModelError.
 
     The eigenvalues of (K, M) err by round-off of the highest one. Where that is felt in the lowest, the lower half of
     the scale is taken from (M, K) instead, as 1/omega^2, which errs by round-off of the lowest one.
@@ -26,7 +26,7 @@ def spectrum(mass: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.nd
         raise ReducedModelError("mass: not positive definite; drop coordinates without mass of their own") from error
     if squares[0] >= _WIDE * squares[-1]:
         return squares, shapes
-    # a stiffness that is singular within round-off is shifted by what (K, M) cannot tell from zero
+    # a stiffness that is singular within round-off is shifted by an amount that (K, M) cannot distinguish from zero
     for shift in (0.0, _MARGIN * len(squares) * np.finfo(float).eps * squares[-1]):
         try:
             inverse, flexible = linalg.eigh(mass, stiffness + shift * mass)
@@ -42,7 +42,7 @@ def spectrum(mass: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def rounding(stiffness: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-    """(m,) what the squared frequencies of mass-normalised shapes may change by when every entry of K is rounded.
+    """Return bounds (m,) of the change of squared frequencies when every entry of K is rounded.
 
     |phi|^T |K| |phi| eps / 2: first order perturbation by a componentwise backward error (Higham 2002, Accuracy and
     Stability of Numerical Algorithms, section 7.2). No units play a part, and neither do higher modes.
@@ -52,7 +52,7 @@ def rounding(stiffness: np.ndarray, shapes: np.ndarray) -> np.ndarray:
 
 
 def count_rigid_motions(stiffness: np.ndarray, squares: np.ndarray, shapes: np.ndarray) -> int:
-    """How many modes of `spectrum` are motions that no support holds: their stiffness is not to be told from round-off.
+    """Count the modes of `spectrum` that no support holds: their stiffness lies within round-off of zero.
 
     Each of the n terms of its sums and each of the n steps of a factorisation rounds once.
     """
@@ -60,7 +60,7 @@ def count_rigid_motions(stiffness: np.ndarray, squares: np.ndarray, shapes: np.n
 
 
 def modal_damping(mass: np.ndarray, stiffness: np.ndarray, ratio: float) -> np.ndarray:
-    """(n, n) C = M Phi diag(2 ratio omega) Phi^T M: the same damping ratio for every mode Phi of (K, M).
+    """Return C = M Phi diag(2 ratio omega) Phi^T M (n, n): the same damping ratio for every mode Phi of (K, M).
 
     Raises ReducedModelError for a ratio outside 0 <= ratio < 1 or a mass that is not positive definite.
     """

@@ -30,9 +30,9 @@ def krylov(
 ) -> list[np.ndarray]:
     """Return up to `count` blocks (n, j <= m) of the Krylov space of K^-1 M, M-orthonormal.
 
-    start   (n, m) what the first block is made of
+    start   (n, m) fields that span the first block
     solve   K^-1 applied to loads (n, m)
-    select  what is kept of a block, from it and the blocks before; left out: all
+    select  the part of a block to keep, from the block and those before; left out: all of it
 
     A block has no combinations that the blocks before have; there are fewer blocks where nothing is left.
     """

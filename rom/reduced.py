@@ -1,6 +1,6 @@
-"""ReducedModel: small dense M, C, K with labelled interface coordinates. All that the coupling knows of a structure.
+"""ReducedModel: small dense M, C, K with labelled interface coordinates. The coupling knows no more of a structure.
 
-Needs numpy, scipy and the record store alone: a user of another code enters here with `ReducedModel.from_matrices`.
+Needs numpy, scipy and the record store only: a user of another code enters here with `ReducedModel.from_matrices`.
 """
 
 from __future__ import annotations
@@ -39,18 +39,18 @@ class ReducedModel:
     base_load                 (n, 3) kg, T^T M r, r the unit translation along x, y, z: a base acceleration a (3,) loads
                               the model with -base_load @ a, and q is then relative to the base; zeros when unknown
     damping_ratio             of every mode, if C was made from one; None for any other C
-    fixed_interface_modes     how many of the last coordinates are fixed-interface modes, by frequency: `truncated` can
+    fixed_interface_modes     the last coordinates are this many fixed-interface modes, by frequency: `truncated` can
                               drop these
-    free_modes                how many of the last coordinates are free-interface modes instead, apart from the rest
+    free_modes                the last coordinates are this many free-interface modes instead, uncoupled from the rest
     blocks                    sizes of the blocks of quasi-static coordinates just before these modes
-    residual_flexibility      (k, k) m/N, what the interface yields under its own forces f besides, u = selection q +
-                              G f: a boundary without mass; None without
+    residual_flexibility      (k, k) m/N, additional interface displacement per unit interface force, u = selection q +
+                              G f: a massless boundary; None without
     outputs, output_rows      p names, and the functionals (p, n) of these: stresses or displacements, own units
-    output_residual           (p, k) what the outputs have under the interface's forces besides, per N
+    output_residual           (p, k) additional outputs per unit interface force, per N
     provenance                where the numbers come from (JSON-able)
     recovery, coordinates     (N, n) basis T with full displacements T q, dof = 3 * node + component, and the (N / 3, 3)
                               positions of its nodes; None when not kept
-    residual_recovery         (N, k) m/N, displacements under the interface's forces besides; with residual_flexibility
+    residual_recovery         (N, k) m/N, additional displacements per unit interface force; with residual_flexibility
 
     Raises ReducedModelError.
     """
@@ -95,7 +95,7 @@ class ReducedModel:
         base_load: np.ndarray | None = None,
         **others: Any,
     ) -> ReducedModel:
-        """A model from dense matrices (n, n) and the row (n,) of every interface label.
+        """Return a model from dense matrices (n, n) and the row (n,) of every interface label.
 
         Damping is either a matrix (n, n) or the ratio of every mode. Raises ReducedModelError.
         """
@@ -138,7 +138,7 @@ class ReducedModel:
 
     @property
     def rigid_modes(self) -> int:
-        """How many motions no support holds: `rom.dense_modes.count_rigid_motions`."""
+        """Number of motions that no support holds: `rom.dense_modes.count_rigid_motions`."""
         return count_rigid_motions(self.stiffness, *self.natural)
 
     @property
@@ -157,11 +157,11 @@ class ReducedModel:
         return -0.5 * scale**2 * (multipliers + multipliers.T)
 
     def row(self, label: str) -> np.ndarray:
-        """(n,) functional of an interface coordinate. Raises ReducedModelError with the labels that exist."""
+        """Return the functional (n,) of an interface coordinate. Raises ReducedModelError for an unknown label."""
         return self.selection[self._index(label)]
 
     def contact_mass(self, label: str) -> float:
-        """1 / (w^T M^-1 w), kg: what an impact on that interface coordinate has to move at once.
+        """Return 1 / (w^T M^-1 w), kg: the mass that an impact on that interface coordinate has to move at once.
 
         It falls with the number of modes kept, so Newton's impact law means another collision in every truncation. A
         coordinate with residual flexibility has none.
@@ -172,24 +172,24 @@ class ReducedModel:
         return float(1.0 / (row @ linalg.solve(self.mass, row, assume_a="pos")))
 
     def receptance(self, frequencies_hz: Sequence[float] | np.ndarray) -> np.ndarray:
-        """(f, k, k) complex receptance, m/N, from forces at all interface coordinates to displacements at all."""
+        """Return the complex receptance (f, k, k), m/N, from forces to displacements at all interface coordinates."""
         omegas = 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies_hz, dtype=float))
         dynamic = (self.stiffness + 1j * omega * self.damping - omega**2 * self.mass for omega in omegas)
         residual = 0.0 if self.residual_flexibility is None else self.residual_flexibility
         return np.array([self.selection @ np.linalg.solve(matrix, self.selection.T) + residual for matrix in dynamic])
 
     def frf(self, frequencies_hz: Sequence[float] | np.ndarray, response_label: str, force_label: str) -> np.ndarray:
-        """(f,) complex receptance, m/N: displacement at one interface coordinate for a unit force at another."""
+        """Return the complex receptance (f,), m/N: a displacement for a unit force, both at interface coordinates."""
         response, force = self._index(response_label), self._index(force_label)
         return self.receptance(frequencies_hz)[:, response, force]
 
     @property
     def modes(self) -> int:
-        """How many of the coordinates are modes that `truncated` can drop."""
+        """Number of the coordinates that are modes, which `truncated` can drop."""
         return self.fixed_interface_modes or self.free_modes
 
     def projected(self, basis: np.ndarray, **changes: Any) -> ReducedModel:
-        """Ritz model in the coordinates y of q = basis @ y, basis (n, m). `changes` are fields of the new model."""
+        """Return the Ritz model in the coordinates y of q = basis @ y, basis (n, m), with `changes` of its fields."""
         mass, stiffness = (symmetric_part(basis.T @ matrix @ basis) for matrix in (self.mass, self.stiffness))
         if self.damping_ratio is None:
             damping = symmetric_part(basis.T @ self.damping @ basis)
@@ -217,9 +217,9 @@ class ReducedModel:
         return replace(self, mass=mass, damping_ratio=None)
 
     def reconstruct(self, q: np.ndarray, forces: np.ndarray | None = None) -> np.ndarray:
-        """Full displacements T q, (N,) or (N, t), of coordinates (n,) or (n, t). Raises ReducedModelError without T.
+        """Return full displacements T q, (N,) or (N, t), of coordinates (n,) or (n, t). Raises ReducedModelError.
 
-        forces (k,) or (k, t) at the interface add what a massless boundary yields under them.
+        forces (k,) or (k, t) at the interface add the displacements of a massless boundary under them.
         """
         if self.recovery is None:
             raise ReducedModelError(
@@ -228,7 +228,7 @@ class ReducedModel:
         return _with_residual(self.recovery @ q, self.residual_recovery, forces)
 
     def evaluate(self, q: np.ndarray, forces: np.ndarray | None = None) -> np.ndarray:
-        """The outputs (p,) or (p, t) of coordinates (n,) or (n, t); forces as in `reconstruct`.
+        """Return the outputs (p,) or (p, t) of coordinates (n,) or (n, t); forces as in `reconstruct`.
 
         Raises ReducedModelError for a model without outputs.
         """
@@ -266,7 +266,7 @@ def _with_residual(values: np.ndarray, residual: np.ndarray | None, forces: np.n
 
 
 def _checked(model: ReducedModel) -> dict[str, Any]:
-    """The fields of a model as they should be: arrays frozen and symmetric, names as text. Raises ReducedModelError."""
+    """Return a model's fields in final form: frozen and symmetric arrays, names as text. Raises ReducedModelError."""
     if not model.interface:
         raise ReducedModelError("interface: empty; a reduced model needs a coordinate that loads can act on")
     size, count = len(np.atleast_1d(model.mass)), len(model.interface)
@@ -357,7 +357,7 @@ def _save(model: ReducedModel, path: str | os.PathLike[str]) -> None:
 
 
 def _fields(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The fields of the model whose record `save` wrote. Raises files.store.StoreError."""
+    """Return the fields of the model whose record `save` wrote. Raises files.store.StoreError."""
     values, attributes = store.load(path, _KIND)
     fields = {name: values[name] for name in ("mass", "damping", "stiffness", "selection", "directions", "base_load")}
     for name, values_of in fields.items():

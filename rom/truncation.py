@@ -16,10 +16,10 @@ from vanedamp.rom.reduced import ReducedModel
 
 
 def truncated(model: ReducedModel, modes: int, blocks: int | None = None) -> ReducedModel:
-    """A model with its first `modes` modes, and its first `blocks` blocks of quasi-static coordinates, alone.
+    """Return the model with only its first `modes` modes and its first `blocks` blocks of quasi-static coordinates.
 
     The static interface stays exact: with fixed-interface modes anyway; of free-interface modes, the blocks and the
-    residual flexibility take up what those dropped give statically. A damping ratio holds for the modes of the
+    residual flexibility take over the static part of the dropped ones. A damping ratio holds for the modes of the
     smaller model; any other C is cut. Raises ReducedModelError when more are asked for than there are.
     """
     if not 0 <= modes <= model.modes:
@@ -40,7 +40,7 @@ def truncated(model: ReducedModel, modes: int, blocks: int | None = None) -> Red
 
 
 def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedModel:
-    """Free-interface modes beyond `modes` go; the blocks are built anew in the space of what is dropped."""
+    """Drop free-interface modes beyond `modes`, and rebuild the blocks in the space of the dropped ones."""
     first = model.size - model.free_modes
     kept = np.arange(first, first + modes)
     dropped = np.setdiff1d(np.arange(model.size), kept)
@@ -65,7 +65,7 @@ def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedMode
 
 
 def massless(model: ReducedModel, modes: int) -> ReducedModel:
-    """A model's own lowest `modes` natural modes; the rest of its flexibility, statically: a massless boundary.
+    """Return a model's own lowest `modes` natural modes, with the rest of its flexibility as a massless boundary.
 
     MacNeal (1971), Computers and Structures 1(4), in modal coordinates eta with the interface's forces f,
 
@@ -85,7 +85,7 @@ def massless(model: ReducedModel, modes: int) -> ReducedModel:
 
 
 def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
-    """A model's own lowest `modes` natural modes after residual attachment modes, with their mass (Rubin 1975).
+    """Return a model's own lowest `modes` natural modes after residual attachment modes, with their mass (Rubin 1975).
 
     As many more coordinates as the interface has independent ones; its flexibility stays exact. Raises
     ReducedModelError for all of the modes, or fewer than the structure has rigid motions.
@@ -102,7 +102,7 @@ def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
 
 
 def boundary_form(model: ReducedModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass (singular), damping and stiffness (k + n, k + n) in (u, eta) of a model with a massless boundary.
+    """Return mass (singular), damping and stiffness (k + n, k + n) in (u, eta) of a model with a massless boundary.
 
     Eliminates the forces, f = G^-1 (u - selection eta). Raises ReducedModelError unless G is positive definite.
     """
@@ -120,7 +120,7 @@ def boundary_form(model: ReducedModel) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def residual_fields(model: ReducedModel, static: np.ndarray) -> dict[str, Any]:
-    """The residual fields of a model after the response q = static @ f (n, k) has become part of them."""
+    """Return the residual fields of a model after the response q = static @ f (n, k) has become part of them."""
 
     def grown(rows: np.ndarray | None, before: np.ndarray | None) -> np.ndarray | None:
         if rows is None:

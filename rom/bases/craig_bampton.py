@@ -45,13 +45,13 @@ def reduce(
     quasi_static: bool | int = False,
     characteristic: int = 6,
 ) -> ReducedModel:
-    """The structure in its interface displacements and the lowest fixed-interface modes (0 modes: Guyan's reduction).
+    """Reduce a structure to its interface displacements and lowest fixed-interface modes (none: Guyan's reduction).
 
     factorize      solves with a symmetric indefinite matrix, such as modal.eigen.factorize
     keep_recovery  keep the basis, to reconstruct full displacements
     quasi_static   insert the quasi-static modes between interface and fixed-interface modes: for the price of as many
                    coordinates as the interface has, frequencies and receptances are right by orders of magnitude more;
-                   a number: so many blocks of them, each the quasi-static response to the inertia of the one before
+                   a number: that many blocks of them, each the quasi-static response to the inertia of the one before
     characteristic how many characteristic constraint modes an interface with patches of kind "full" keeps; its own
                    coordinates stay statically exact
 
@@ -80,7 +80,7 @@ def reduce(
 
 
 def _boundary(interface: Interface, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What is held: functionals (n, b) of the nodes of full patches, and of what else the interface has.
+    """Return the held functionals (n, b): of the nodes of full patches, and of the rest of the interface.
 
     Second, the interface coordinates (k, b) in these.
     """
@@ -96,10 +96,10 @@ def _boundary(interface: Interface, vectors: np.ndarray) -> tuple[np.ndarray, np
 def _characteristic(
     constraint: np.ndarray, stiffness: sparse.csr_array, mass: sparse.csr_array, labels: np.ndarray, count: int
 ) -> np.ndarray:
-    """(b, k + count) boundary displacements: of least energy for unit interface coordinates, then characteristic modes.
+    """Return boundary displacements (b, k + count): static ones of unit interface coordinates, characteristic modes.
 
     Castanier, Tan and Pierre (2001), AIAA J. 39(6): the lowest modes of the constraint modes' own stiffness and mass.
-    What they share with the former is taken out, so that each moves the interface as its place says.
+    They are made free of the former, so that only these move the interface coordinates.
     """
     size, own = len(labels[0]), len(labels)
     if not 0 <= count <= size - own:
@@ -134,17 +134,17 @@ class _Held:
             )
 
     def constraint_modes(self) -> np.ndarray:
-        """(n, k) displacements of least strain energy for a unit displacement of every interface coordinate."""
+        """Return displacements (n, k) of least strain energy for a unit displacement of every interface coordinate."""
         given = np.vstack([np.zeros((self.size, self.count)), np.diag(self._scale)])
         return self._factor.solve(given)[: self.size]
 
     def solve(self, load: np.ndarray) -> np.ndarray:
-        """Displacements (n,) or (n, m) under loads of that shape, interface held."""
+        """Return displacements (n,) or (n, m) under loads of that shape, interface held."""
         return self._factor.solve(np.concatenate([load, np.zeros((self.count, *load.shape[1:]))]))[: self.size]
 
 
 def _fixed_interface_modes(held: _Held, stiffness: sparse.csr_array, mass: sparse.csr_array, modes: int) -> np.ndarray:
-    """(n, modes) mass-normalised, by frequency.
+    """Return mass-normalised modes (n, modes), by frequency.
 
     The inverse of the held stiffness maps into W^T q = 0 and is self-adjoint in the inner product of the mass, so that
     Lanczos on it finds the held modes and never sees the interface; small structures are solved densely.
@@ -172,7 +172,7 @@ def _fixed_interface_modes(held: _Held, stiffness: sparse.csr_array, mass: spars
 def _quasi_static_blocks(
     held: _Held, mass: sparse.csr_array, constraint: np.ndarray, fixed: np.ndarray, count: int
 ) -> list[np.ndarray]:
-    """Blocks (n, m <= k), each M-orthonormal, without combinations that blocks before and fixed-interface modes have.
+    """Return blocks (n, m <= k), M-orthonormal, without combinations that blocks before and fixed-interface modes have.
 
     They are not made orthogonal to the latter: a truncated model keeps them whole.
     """
@@ -194,7 +194,7 @@ def _quasi_static_blocks(
 
 
 def _independent(fields: np.ndarray, shares: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> int:
-    """How many of the last fields (n, m), whose own shares ascend, leave the mass of all together well conditioned.
+    """Count the last fields (n, m), their own shares ascending, that leave the mass of all together well conditioned.
 
     A share that is small beside known fields which are nearly dependent already multiplies with theirs.
     """

@@ -1,4 +1,4 @@
-"""Free-interface reduction: natural modes, and what the interface's forces strain besides.
+"""Free-interface reduction: natural modes, and residual attachment modes of the interface's forces.
 
 Rubin (1975), AIAA J. 13(8): natural modes phi_j and residual attachment modes, the part of the static response to unit
 forces w at the interface that the modes lack,
@@ -42,9 +42,9 @@ def reduce_free(
     keep_recovery: bool = False,
     blocks: int = 1,
 ) -> ReducedModel:
-    """The structure in its lowest `modes` natural modes after `blocks` blocks of residual attachment modes.
+    """Reduce a structure to its lowest `modes` natural modes, after `blocks` blocks of residual attachment modes.
 
-    blocks = 0: the modes alone; 1: Rubin's basis; more: higher orders of the residual's inertia. The other arguments
+    blocks = 0: the modes only; 1: Rubin's basis; more: higher orders of the residual's inertia. The other arguments
     are those of bases.craig_bampton.reduce. Raises ReductionError for fewer modes than the structure has rigid motions,
     or more than it has at all, and for a structure with a mechanism.
     """
@@ -91,7 +91,7 @@ def _rigid_motions(
 def _natural_modes(
     shifted: Solver, stiffness: sparse.csr_array, mass: sparse.csr_array, modes: int, shift: float, rigid: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Squared frequencies (modes,), those of rigid motions exactly zero, and mass-normalised shapes (n, modes)."""
+    """Return squared frequencies (modes,), zero for rigid motions, and mass-normalised shapes (n, modes)."""
     size = mass.shape[0]
     if modes == 0:
         return np.empty(0), np.empty((size, 0))
@@ -117,7 +117,7 @@ def _attachments(
     shift: float,
     count: int,
 ) -> list[np.ndarray]:
-    """Blocks (n, m <= k) of residual attachment modes, M-orthonormal."""
+    """Return blocks (n, m <= k) of residual attachment modes, M-orthonormal."""
     if count == 0:
         return []
     inertia = mass @ shapes
@@ -148,5 +148,5 @@ def _static(
 
 
 def _uncoupled(matrix: np.ndarray, lead: int, diagonal: np.ndarray) -> np.ndarray:
-    """The attachments' block and the modes' diagonal, which round-off alone couples."""
+    """Return the attachments' block and the modes' diagonal: all else is round-off."""
     return linalg.block_diag(symmetric_part(matrix[:lead, :lead]), np.diag(diagonal))

@@ -1,4 +1,4 @@
-"""What the bases share: the factorisation they solve with, and the reduced model of a basis."""
+"""Parts that the bases share: the factorisation they solve with, and the reduced model of a basis."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Solver(Protocol):
     """A factorised matrix."""
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution for a right-hand side (n,) or (n, k), of the same shape."""
+        """Return the solution for a right-hand side (n,) or (n, k), of the same shape."""
 
 
 Factorize = Callable[[sparse.csr_array], Solver]
