@@ -49,8 +49,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` on success, remove it on any failure.
 
     A killed or failing writer thus leaves the old file or none, never half a file. The temporary file keeps the suffix.
-    A link stays one, and the file that it leads to is replaced. A device or a pipe gets the
-    content once it is complete. Raises StoreError when it cannot be written: a full disk, no permission, no folder.
+    A link stays one, and the file that it leads to is replaced. A device or a pipe gets the content once it is
+    complete. Raises StoreError when it cannot be written: a full disk, no permission, no folder.
     """
     try:
         target = destination(path)

@@ -104,7 +104,7 @@ def identify(frf: Frf, count: int = 1) -> Poles:
 
     A rational function with common conjugate poles and real terms for the modes below and above the band is fitted to
     all responses: vector fitting (Gustavsen and Semlyen 1999) finds the poles from anywhere, then least squares over
-    the poles alone, their residues eliminated (Golub and Pereyra 1973), which is unbiased under noise. Unlike a circle
+    the poles only, their residues eliminated (Golub and Pereyra 1973), which is unbiased under noise. Unlike a circle
     fit it separates modes that overlap. Poles stay conjugate, which scipy's AAA (1.15 or newer) does not provide.
 
     A pole is a mode when the band holds its half-power points, its half-power bandwidth 2 zeta f is at least half the

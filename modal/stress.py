@@ -36,7 +36,7 @@ def hot_spot(
     displacement  (N,)
     strengths     Pa, by volume group; groups that are not named do not count
     within        volume groups to look in; left out: all of `strengths`. Sharp corners at supports and where the mesh
-                  has no fillets are singular points of elasticity: their stress grows with refinement, so look beside
+                  has no fillets are singular points of elasticity: their stress grows with refinement, leave these out
 
     Raises ElasticityError for a group that the mesh does not have, a strength that is no positive number, no strain.
     """

@@ -24,6 +24,24 @@ __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
 
 
 _KIND = "reduced-model"
+# dimensions and units of the arrays, here and in the record
+_ARRAYS = {
+    "mass": (("row", "column"), "kg"),
+    "damping": (("row", "column"), "N s/m"),
+    "stiffness": (("row", "column"), "N/m"),
+    "selection": (("interface", "column"), "1"),
+    "directions": (("interface", "axis"), "1"),
+    "base_load": (("row", "axis"), "kg"),
+    "normals": (("interface", "axis"), "1"),
+    "recovery": (("dof", "column"), "1"),
+    "coordinates": (("node", "axis"), "m"),
+    "residual_flexibility": (("interface", "force"), "m/N"),
+    "output_rows": (("output", "column"), "1"),
+    "output_residual": (("output", "force"), "1"),
+    "residual_recovery": (("dof", "force"), "m/N"),
+}
+_SYMMETRIC = ("mass", "damping", "stiffness", "residual_flexibility")
+_REQUIRED = ("mass", "damping", "stiffness", "selection", "directions", "base_load")
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,30 +288,23 @@ def _checked(model: ReducedModel) -> dict[str, Any]:
     if not model.interface:
         raise ReducedModelError("interface: empty; a reduced model needs a coordinate that loads can act on")
     size, count = len(np.atleast_1d(model.mass)), len(model.interface)
+    nodes = 0 if model.recovery is None else len(model.recovery) // 3
+    lengths = {
+        "row": size, "column": size, "interface": count, "force": count, "axis": 3,
+        "output": len(model.outputs), "dof": 3 * nodes, "node": nodes,
+    }  # fmt: skip
     values: dict[str, Any] = {
-        name: symmetric(name, getattr(model, name), size) for name in ("mass", "damping", "stiffness")
+        "interface": tuple(str(label) for label in model.interface),
+        "outputs": tuple(str(name) for name in model.outputs),
+        "blocks": tuple(int(block) for block in model.blocks),
+        "provenance": dict(model.provenance),
     }
-    for name, shape in {"selection": (count, size), "directions": (count, 3), "base_load": (size, 3)}.items():
-        values[name] = shaped(name, getattr(model, name), shape)
+    required = {*_REQUIRED, *(["coordinates"] if nodes else []), *(["output_rows"] if model.outputs else [])}
+    for name, (dims, _) in _ARRAYS.items():
+        given, shape = getattr(model, name), tuple(lengths[dimension] for dimension in dims)
+        if given is not None or name in required:
+            values[name] = symmetric(name, given, shape[0]) if name in _SYMMETRIC else shaped(name, given, shape)
     values["directions"] = unit(values["directions"])
-    if model.normals is not None:
-        values["normals"] = shaped("normals", model.normals, (count, 3))
-    if model.residual_flexibility is not None:
-        values["residual_flexibility"] = symmetric("residual_flexibility", model.residual_flexibility, count)
-    if model.outputs:
-        values["outputs"] = tuple(str(name) for name in model.outputs)
-        values["output_rows"] = shaped("output_rows", model.output_rows, (len(model.outputs), size))
-        if model.output_residual is not None:
-            values["output_residual"] = shaped("output_residual", model.output_residual, (len(model.outputs), count))
-    values["blocks"] = tuple(int(block) for block in model.blocks)
-    if model.recovery is not None:
-        nodes = len(model.recovery) // 3
-        values["recovery"] = shaped("recovery", model.recovery, (3 * nodes, size))
-        values["coordinates"] = shaped("coordinates", model.coordinates, (nodes, 3))
-        if model.residual_recovery is not None:
-            values["residual_recovery"] = shaped("residual_recovery", model.residual_recovery, (3 * nodes, count))
-    values["interface"] = tuple(str(label) for label in model.interface)
-    values["provenance"] = dict(model.provenance)
     return values
 
 
@@ -318,32 +329,13 @@ def _check_interface(model: ReducedModel) -> None:
 
 def _save(model: ReducedModel, path: str | os.PathLike[str]) -> None:
     """Write the record."""
-    square = ("row", "column")
-    variables = {
-        "mass": store.Variable(model.mass, square, "kg"),
-        "damping": store.Variable(model.damping, square, "N s/m"),
-        "stiffness": store.Variable(model.stiffness, square, "N/m"),
-        "interface": store.Variable(np.array(model.interface, dtype=object), ("interface",)),
-        "axis": store.Variable(np.array(["x", "y", "z"], dtype=object), ("axis",)),
-        "selection": store.Variable(model.selection, ("interface", "column")),
-        "directions": store.Variable(model.directions, ("interface", "axis")),
-        "base_load": store.Variable(model.base_load, ("row", "axis"), "kg"),
-        "natural_frequency": store.Variable(model.natural_frequencies_hz, ("mode",), "Hz"),
-    }
-    if model.normals is not None:
-        variables["normals"] = store.Variable(model.normals, ("interface", "axis"))
-    if model.recovery is not None and model.coordinates is not None:
-        variables["recovery"] = store.Variable(model.recovery, ("dof", "column"))
-        variables["coordinates"] = store.Variable(model.coordinates, ("node", "axis"), "m")
-    if model.residual_flexibility is not None:
-        variables["residual_flexibility"] = store.Variable(model.residual_flexibility, ("interface", "force"), "m/N")
+    arrays = {name: (getattr(model, name), *layout) for name, layout in _ARRAYS.items()}
+    variables = {name: store.Variable(*entry) for name, entry in arrays.items() if entry[0] is not None}
+    variables["interface"] = store.Variable(np.array(model.interface, dtype=object), ("interface",))
+    variables["axis"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("axis",))
+    variables["natural_frequency"] = store.Variable(model.natural_frequencies_hz, ("mode",), "Hz")
     if model.outputs:
         variables["output"] = store.Variable(np.array(model.outputs, dtype=object), ("output",))
-        variables["output_rows"] = store.Variable(model.output_rows, ("output", "column"))
-        if model.output_residual is not None:
-            variables["output_residual"] = store.Variable(model.output_residual, ("output", "force"))
-    if model.residual_recovery is not None:
-        variables["residual_recovery"] = store.Variable(model.residual_recovery, ("dof", "force"), "m/N")
     if model.blocks:
         variables["blocks"] = store.Variable(np.array(model.blocks, np.int64), ("block",))
     attributes = {
@@ -359,26 +351,20 @@ def _save(model: ReducedModel, path: str | os.PathLike[str]) -> None:
 def _fields(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the fields of the model whose record `save` wrote. Raises files.store.StoreError."""
     values, attributes = store.load(path, _KIND)
-    fields = {name: values[name] for name in ("mass", "damping", "stiffness", "selection", "directions", "base_load")}
-    for name, values_of in fields.items():
-        if np.iscomplexobj(values_of):
+    required = {name: values[name] for name in _REQUIRED}
+    for name, array in required.items():
+        if np.iscomplexobj(array):
             raise store.StoreError(f"{path}: {name}: expected real numbers, not complex ones")
-        if not np.all(np.isfinite(values_of)):
+        if not np.all(np.isfinite(array)):
             raise store.StoreError(f"{path}: {name}: holds entries that are not finite")
     return dict(
-        **fields,
+        **required,
+        **{name: values.get(name) for name in _ARRAYS if name not in _REQUIRED},
         interface=tuple(values["interface"]),
+        outputs=tuple(values.get("output", ())),
+        blocks=tuple(values.get("blocks", ())),
         damping_ratio=attributes.get("damping_ratio"),
         fixed_interface_modes=attributes["fixed_interface_modes"],
         free_modes=attributes.get("free_modes", 0),
-        blocks=tuple(values.get("blocks", ())),
-        residual_flexibility=values.get("residual_flexibility"),
-        outputs=tuple(values.get("output", ())),
-        output_rows=values.get("output_rows"),
-        output_residual=values.get("output_residual"),
-        residual_recovery=values.get("residual_recovery"),
-        normals=values.get("normals"),
         provenance=json.loads(attributes["provenance"]),
-        recovery=values.get("recovery"),
-        coordinates=values.get("coordinates"),
     )

@@ -52,7 +52,7 @@ def reduce(
     quasi_static   insert the quasi-static modes between interface and fixed-interface modes: for the price of as many
                    coordinates as the interface has, frequencies and receptances are right by orders of magnitude more;
                    a number: that many blocks of them, each the quasi-static response to the inertia of the one before
-    characteristic how many characteristic constraint modes an interface with patches of kind "full" keeps; its own
+    characteristic number of characteristic constraint modes kept of patches of kind "full"; the interface's own
                    coordinates stay statically exact
 
     Raises ReductionError for more modes than the structure has, and when it can move with its interface held.
@@ -196,7 +196,7 @@ def _quasi_static_blocks(
 def _independent(fields: np.ndarray, shares: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> int:
     """Count the last fields (n, m), their own shares ascending, that leave the mass of all together well conditioned.
 
-    A share that is small beside known fields which are nearly dependent already multiplies with theirs.
+    A small share multiplies with those of known fields that are nearly dependent, so it does not decide by itself.
     """
     for count in range(int(np.count_nonzero(shares > _OWN_SHARE)), 0, -1):
         together = np.hstack([known, fields[:, -count:]])
