@@ -1,1 +1,1 @@
-"""Ground: files of records, validated TOML, provenance."""
+"""Ground of all parts: `errors` (the base of all), `store` (HDF5 records, whole files), `toml_input`, `provenance`."""

@@ -8,7 +8,7 @@ import platform
 
 
 def versions() -> dict[str, str]:
-    """Versions of this project and of the libraries its numbers depend on."""
+    """Return the versions of this project and of the libraries its numbers depend on."""
     try:
         own = importlib.metadata.version("vanedamp")
     except importlib.metadata.PackageNotFoundError:  # run from a source tree

@@ -24,13 +24,15 @@ from typing import Any, NamedTuple, TextIO
 import h5py
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
+
 SCHEMA_VERSION = 1
 
 #: where links stand for the files that processes have open
 _OPEN_FILES = Path("/proc")
 
 
-class StoreError(ValueError):
+class StoreError(VanedampError):
     """A file that cannot be read (missing, damaged, of another kind, of a newer schema) or cannot be written."""
 
 
@@ -47,8 +49,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` on success, remove it on any failure.
 
     A killed or failing writer thus leaves the old file or none, never half a file. The temporary file keeps the suffix.
-    A link stays one, and the file that it leads to is replaced. What is no regular file (a device, a pipe) gets the
-    content once it is complete. Raises StoreError when it cannot be written: a full disk, no permission, no folder.
+    A link stays one, and the file that it leads to is replaced. A device or a pipe gets the content once it is
+    complete. Raises StoreError when it cannot be written: a full disk, no permission, no folder.
     """
     try:
         target = destination(path)
@@ -78,7 +80,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def destination(path: str | os.PathLike[str]) -> Path | None:
-    """The regular file that a path names, there or not yet, past all links; None for a device, a pipe, an open file.
+    """Return the regular file, there or not yet, that a path leads to; None for a device, a pipe or an open file.
 
     Raises OSError for links that lead round in a circle.
     """
@@ -109,7 +111,7 @@ def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterabl
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
-    """The same table as text."""
+    """Return the text of the table that `write_csv` writes."""
     stream = io.StringIO(newline="")
     _write_rows(stream, header, rows)
     return stream.getvalue()
@@ -128,17 +130,17 @@ def write_json(path: str | os.PathLike[str], data: Any) -> None:
 
 
 def json_text(data: Any) -> str:
-    """Finite plain data as JSON. Raises ValueError for nan and infinity, which it does not know."""
+    """Return finite plain data as JSON. Raises ValueError for nan and infinity, which JSON does not know."""
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
 def digest(path: str | os.PathLike[str]) -> str:
-    """SHA-256 of a file's bytes: which file a result comes from."""
+    """Return the SHA-256 of a file's bytes, which says what file a result comes from."""
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def finite(data: Any) -> Any:
-    """Plain data with None for what is not finite."""
+    """Return plain data with None in place of nan and infinity."""
     if isinstance(data, Mapping):
         return {key: finite(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
@@ -220,18 +222,18 @@ def _record(path: str | os.PathLike[str], kind: str, file: h5py.File) -> tuple[d
 
 
 class _Fields(dict[str, Any]):
-    """What a record holds by name; what it lacks is told with its file."""
+    """The fields of a record by name; a missing one raises StoreError with the file."""
 
     def __init__(self, path: str | os.PathLike[str], values: Mapping[str, Any]) -> None:
         super().__init__(values)
         self._path = path
 
     def __missing__(self, name: str) -> Any:
-        raise StoreError(f"{self._path}: holds no {name!r}; the record is not whole, write it anew")
+        raise StoreError(f"{self._path}: holds no {name!r}; the record is not whole, write it again")
 
 
 def frozen(array: Any, dtype: Any = float) -> np.ndarray:
-    """A contiguous read-only copy of an array: what frozen records hold."""
+    """Return a contiguous read-only copy of an array, as frozen records hold it."""
     copy = np.array(array, dtype=dtype, order="C")
     copy.setflags(write=False)
     return copy

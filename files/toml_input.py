@@ -1,4 +1,4 @@
-"""Input files at the border: TOML in, validated frozen records out, errors of one line that say what would be right."""
+"""Input files at the border: TOML in, validated frozen records out, errors of one line that name the remedy."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
+
+from vanedamp.files.errors import VanedampError
 
 T = TypeVar("T")
 
@@ -56,12 +58,12 @@ def _three(direction: Any) -> Any:
 Direction = Annotated[tuple[Real, Real, Real], BeforeValidator(_three)]
 
 
-class InputError(ValueError):
+class InputError(VanedampError):
     """Bad input. The message is one line: file, key, what is wrong and what would be right."""
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The tables of a TOML file, UTF-8 with or without its mark. Raises InputError if it is missing or not TOML."""
+    """Return the tables of a TOML file, UTF-8 with or without a byte order mark. Raises InputError."""
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
@@ -75,7 +77,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
-    """`data` as a `record`, or an InputError naming the source, the key and the remedy."""
+    """Return `data` as a `record`. Raises InputError naming the source, the key and the remedy."""
     adapter: TypeAdapter[T] = _adapter(record)  # type: ignore[arg-type]
     try:
         return adapter.validate_python(dict(data))
@@ -91,7 +93,7 @@ def _adapter(record: Any) -> TypeAdapter[Any]:
 
 
 def nearest(word: str, known: list[str]) -> str:
-    """'; did you mean ...?' for a misspelt word, otherwise the list of what exists."""
+    """Return "did you mean ...?" for a misspelt word, otherwise the list of known ones."""
     close = difflib.get_close_matches(word, known, n=1)
     return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(sorted(known))}"
 
@@ -120,9 +122,9 @@ def _explain(adapter: TypeAdapter[Any], error: Any, data: Any) -> str:
 
 
 def _unknown(schema: dict[str, Any], location: tuple[Any, ...], name: str) -> str:
-    """What to say about a key that a table does not have: whose it is, or which it may be."""
+    """Explain a key that a table does not have: the variants that have it, or the keys that this one may have."""
     variants = _nodes(schema, location[:-1])
-    # of several variants of a table the one at hand is a step of the location, by the value that tells them apart
+    # of several variants of a table the one at hand is a step of the location, by the value that distinguishes them
     own = [node for node in variants if location[-2:-1] and location[-2] in _constants(node).values()] or variants
     owners = [pair for node in variants if name in node.get("properties", {}) for pair in _constants(node).items()]
     if owners:
@@ -133,12 +135,12 @@ def _unknown(schema: dict[str, Any], location: tuple[Any, ...], name: str) -> st
 
 
 def _constants(node: dict[str, Any]) -> dict[str, str]:
-    """The keys of a table that hold one value only: those tell variants apart."""
+    """Return the keys of a table that hold one value only, which distinguish variants of it."""
     return {name: item["const"] for name, item in node.get("properties", {}).items() if "const" in item}
 
 
 def _path_in_data(location: tuple[Any, ...], data: Any, names_absent_key: bool) -> list[Any]:
-    """The part of pydantic's location that names the file's own keys: tags of unions are left out."""
+    """Return the part of pydantic's location that names the file's own keys: tags of unions are left out."""
     path: list[Any] = []
     for position, step in enumerate(location):
         inside = isinstance(data, Mapping) and step in data
@@ -162,7 +164,7 @@ def _tags(schema: dict[str, Any], location: tuple[Any, ...], tag: str) -> list[s
 
 
 def _nodes(schema: dict[str, Any], location: tuple[Any, ...]) -> list[dict[str, Any]]:
-    """The JSON-schema objects that can stand at a location, unions spread out."""
+    """Return the JSON-schema objects that can stand at a location, unions spread out."""
 
     def spread(node: dict[str, Any]) -> list[dict[str, Any]]:
         if "$ref" in node:

@@ -12,7 +12,7 @@ import gmsh
 from vanedamp.meshes.parameters import ParameterError, check_elements, check_size
 from vanedamp.modal import msh
 
-#: ratio of lengths; gmsh takes for one what is nearer than 1e-8 of a model's size
+#: ratio of lengths; gmsh merges points nearer than 1e-8 of a model's size
 _SLENDEREST = 1e5
 _FACES = ("root", "tip", "left", "right", "bottom", "top")
 
@@ -47,9 +47,7 @@ class Block:
                 raise ParameterError(f"{name}: expected a positive number of metres, not {value}")
         lengths = [self.length, self.width, self.thickness, self.tip_width or self.width]
         if max(lengths) > _SLENDEREST * min(lengths):
-            raise ParameterError(
-                f"length: {max(lengths):g} m beside {min(lengths):g} m is more than gmsh can tell apart"
-            )
+            raise ParameterError(f"length: {max(lengths):g} m beside {min(lengths):g} m is more than gmsh can resolve")
         if len(self.divisions) != 3 or any(count < 1 for count in self.divisions):
             raise ParameterError(f"divisions: expected three counts of at least 1, not {self.divisions}")
         if self.hexahedra and self.element_size is not None:
@@ -97,7 +95,7 @@ def _solid(block: Block) -> int:
 
 
 def _faces(block: Block, volume: int) -> list[int]:
-    """Surfaces in the order of `_FACES`, told apart by the middles of their bounding boxes."""
+    """Return the surfaces in the order of `_FACES`, found by the middles of their bounding boxes."""
     surfaces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
     boxes = {tag: gmsh.model.getBoundingBox(2, tag) for tag in surfaces}
     middles = {tag: [0.5 * (box[axis] + box[axis + 3]) for axis in range(3)] for tag, box in boxes.items()}

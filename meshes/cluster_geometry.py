@@ -17,7 +17,7 @@ _TOLERANCE = 1e-7  # m
 
 
 def solids(parameters: VaneCluster) -> dict[str, list[int]]:
-    """Volume groups: shrouds with pockets, the airfoils between them and the bodies in them, with shared faces."""
+    """Make the volumes: shrouds with pockets, the airfoils between them and the bodies in them, with shared faces."""
     occ = gmsh.model.occ
     inner = _annular_sector(parameters, parameters.inner_radius, parameters.platform_radius)
     outer = _annular_sector(parameters, parameters.casing_radius, parameters.outer_radius)
@@ -72,7 +72,7 @@ def _annular_sector(parameters: VaneCluster, inner: float, outer: float) -> int:
 
 
 def _airfoil(parameters: VaneCluster, angle: float) -> int:
-    """A prism whose ends lie inside both shrouds."""
+    """Make a prism whose ends lie inside both shrouds."""
     occ = gmsh.model.occ
     foot = parameters.platform_radius - 0.5 * parameters.inner_thickness
     tip = parameters.casing_radius + 0.5 * parameters.outer_thickness
@@ -99,7 +99,7 @@ def _damper(parameters: VaneCluster, angle: float) -> int:
 
 
 def _box(parameters: VaneCluster, angle: float, back: float, size: tuple[float, float, float]) -> int:
-    """A box on the floor of a cavity, from the axial position `back` on; axial, tangential and radial size."""
+    """Make a box on the floor of a cavity, from the axial position `back` on; axial, tangential and radial size."""
     occ = gmsh.model.occ
     floor = parameters.cavity_radius - 0.5 * parameters.cavity_height
     box = occ.addBox(back, -0.5 * size[1], floor, *size)
@@ -108,7 +108,7 @@ def _box(parameters: VaneCluster, angle: float, back: float, size: tuple[float, 
 
 
 def facets(parameters: VaneCluster) -> dict[str, list[int]]:
-    """Facet groups, found by where their surfaces lie."""
+    """Return the facet groups, found by the position of their surfaces."""
     surfaces = [tag for _, tag in gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)]
     found = {
         "clamp": [tag for tag in surfaces if _on_cylinder(tag, parameters.outer_radius)],
@@ -127,7 +127,7 @@ def facets(parameters: VaneCluster) -> dict[str, list[int]]:
 
 
 def _walls(parameters: VaneCluster, angle: float, centres: dict[int, np.ndarray]) -> dict[str, list[int]]:
-    """The surfaces of the walls of the cavity at an angle, from the centres (axial, y, z) of all surfaces."""
+    """Return the surfaces of the walls of the cavity at an angle, from the centres (axial, y, z) of all surfaces."""
     sine, cosine = math.sin(angle), math.cos(angle)
     half = 0.5 * np.array([parameters.cavity_depth, parameters.cavity_width, parameters.cavity_height])
     middle = np.array([0.5 * parameters.axial_length - half[0], 0.0, parameters.cavity_radius])
@@ -143,7 +143,7 @@ def _walls(parameters: VaneCluster, angle: float, centres: dict[int, np.ndarray]
 
 
 def _on_cylinder(surface: int, radius: float) -> bool:
-    """Whether a surface lies on the cylinder of that radius about the machine's axis."""
+    """Return whether a surface lies on the cylinder of that radius about the machine's axis."""
     lower, upper = (np.array(bound) for bound in gmsh.model.getParametrizationBounds(2, surface))
     shares = np.array([[0.5, 0.5], [0.2, 0.3], [0.9, 0.6]])
     points = np.array(gmsh.model.getValue(2, surface, (lower + shares * (upper - lower)).ravel())).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""What is wrong with a parameter of a mesh."""
+"""Parameters of the vane cluster, and the checks of a mesh's parameters."""
 
 import math
 from dataclasses import dataclass, fields
@@ -6,8 +6,10 @@ from numbers import Integral, Real
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 
-class ParameterError(ValueError):
+
+class ParameterError(VanedampError):
     """A parameter of a mesh that is out of its range or does not fit the others; the message starts with its name."""
 
 
@@ -49,8 +51,8 @@ class VaneCluster:
     wall, as an electrode erodes it; the lid that keeps the bodies in is not modelled. Cavities are spread evenly.
 
     With a damper's width, height and depth (tangential, radial, axial; all three or none) a body of that size is
-    meshed into every cavity, tied to the middle of its floor, and to every other wall that it reaches. What it covers
-    of a wall is no part of the wall's facet group.
+    meshed into every cavity, tied to the middle of its floor, and to every other wall that it reaches. The part
+    of a wall that it covers is no part of the wall's facet group.
     """
 
     airfoils: int = 4
@@ -131,16 +133,16 @@ class VaneCluster:
 
     @property
     def damper_volume(self) -> float:
-        """Of the tied bodies in all cavities, m^3."""
+        """Volume of the tied bodies in all cavities, m^3."""
         return self.cavities * math.prod(self.damper_size)
 
     def cavity_angles(self) -> np.ndarray:
-        """(cavities,) angular position of the cavities, rad."""
+        """Return the angular positions (cavities,) of the cavities, rad."""
         slot = math.radians(self.sector_deg) / max(self.cavities, 1)
         return (np.arange(self.cavities) - 0.5 * (self.cavities - 1)) * slot
 
     def profile(self, points: int = 24) -> tuple[np.ndarray, np.ndarray]:
-        """Suction and pressure side of the airfoil, (points, 2) each, axial and tangential, from the leading edge, m.
+        """Return suction and pressure side of the airfoil, (points, 2) each: axial, tangential, m, from its nose.
 
         Circular-arc camber line with the thickness of the NACA four-digit series (Abbott and von Doenhoff, Theory of
         Wing Sections, 1959, section 6.4; closed trailing edge), widened linearly to the given edge thickness.

@@ -1,1 +1,7 @@
-"""Finite elements: mesh to matrices, modes and the calibrated rigid model."""
+"""Finite elements, from a mesh to modes and the rigid model. Begin with `elasticity.Solid` and `eigen.solve_modes`.
+
+In the order of the pipeline: `mesh_import` (on `abaqus`, `nastran`, `frames`) and `msh` read meshes; `elasticity` (on
+`fenicsx`) assembles `matrices`, which `matrix_files` exchanges; `eigen` (on `petsc`, `parallel`, `algebra`) solves;
+`multiple`, `participation` and `stress` describe them, `units` checks them; `measurements`, `frf` (on `rational_fit`)
+and `correlation` are for tests, `model_updating` fits the model to them; `rigid_model` and `base_excitation` come last.
+"""

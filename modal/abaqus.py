@@ -1,7 +1,7 @@
 """Decks of Abaqus and CalculiX (.inp): nodes in global coordinates, elements and sets.
 
-Every keyword that gives or moves nodes and elements is followed or refused. Others say nothing about the mesh: what
-they mean for the structure (materials and their *ORIENTATION, supports and the *TRANSFORM of their axes, loads, steps)
+Every keyword that gives or moves nodes and elements is followed or refused. Others say nothing about the mesh: their
+meaning for the structure (materials and their *ORIENTATION, supports and the *TRANSFORM of their axes, loads, steps)
 is said in the case, in global axes.
 """
 
@@ -59,7 +59,7 @@ class _Card(NamedTuple):
         return MeshError(f"{self.file}: line {line or self.line}: *{self.keyword} {message}")
 
     def numbers(self) -> list[tuple[int, list[float]]]:
-        """The data as numbers; an empty field is zero."""
+        """Return the data as numbers; an empty field is zero."""
         rows = []
         for line, words in self.data:
             try:
@@ -71,7 +71,7 @@ class _Card(NamedTuple):
 
 @dataclass
 class _Deck:
-    """What has been read: nodes and elements by label, in the order of the file."""
+    """The part of a deck read so far: nodes and elements by label, in the order of the file."""
 
     nodes: dict[int, np.ndarray] = field(default_factory=dict)
     elements: dict[int, tuple[int, int]] = field(default_factory=dict)  # label -> block, place in it
@@ -102,7 +102,7 @@ class _Deck:
             follow(card)
 
     def mesh(self) -> Any:
-        """The mesh as meshio holds it."""
+        """Return the mesh as a meshio.Mesh."""
         meshio = importlib.import_module("meshio")
         place = {label: index for index, label in enumerate(self.nodes)}
         sizes = [len(rows) for _, rows in self.blocks]
@@ -124,7 +124,7 @@ class _Deck:
         )
 
     def _check_scope(self, card: _Card) -> None:
-        """Labels are unique within one part alone."""
+        """Refuse a second part: labels are unique within one part only."""
         if self.meshed is not None and self.scope != self.meshed:
             raise card.error("of a second part, or of the assembly; write one part with all of the mesh")
         self.meshed = self.scope
@@ -266,7 +266,7 @@ class _Deck:
 
 
 def read(path: Path) -> Any:
-    """The mesh of a deck, as a meshio.Mesh with its sets. Raises MeshError with file and line."""
+    """Return the mesh of a deck as a meshio.Mesh with its sets. Raises MeshError with file and line."""
     deck = _Deck()
     for card in _cards(path):
         deck.read(card)
@@ -274,7 +274,7 @@ def read(path: Path) -> Any:
 
 
 def _spelling(sets: dict[str, list[int]], name: str) -> str:
-    """The name as it was first written: Abaqus knows no case."""
+    """Return the name as it was first written: Abaqus ignores case."""
     return next((known for known in sets if known.upper() == name.upper()), name)
 
 
@@ -301,7 +301,7 @@ def _cards(path: Path) -> Iterator[_Card]:
 
 
 def _finished(card: _Card) -> Iterator[_Card]:
-    """The card, with the data of the file that it names; of *INCLUDE, the cards of that file."""
+    """Yield the card with the data of the file that it names; of *INCLUDE, the cards of that file."""
     name = card.parameters.get("INPUT")
     if name is None or card.keyword not in ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET"):
         yield card

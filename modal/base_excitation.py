@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.eigen import Modes, factorize
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
 
 
-class BaseExcitationError(ValueError):
+class BaseExcitationError(VanedampError):
     """Modes, functionals or frequencies that do not fit; the message names which and the remedy."""
 
 
@@ -39,7 +40,7 @@ def base_response(
     damping_ratios: float | Sequence[float] | np.ndarray | None = None,
     static_correction: bool = True,
 ) -> BaseResponse:
-    """Response of u = functionals^T q when all supports move along a direction.
+    """Return the response of u = functionals^T q when all supports move along a direction.
 
     functionals        (N, k) or (N,), such as patch_average gives
     damping_ratios     of every mode or (m,); left out: the matrices' own
@@ -48,7 +49,7 @@ def base_response(
                        modes enough below their last frequency
 
     In coordinates relative to the base, M q'' + C q' + K q = -M r a with r the translation of every node. Springs of
-    elastic supports stand on the base. Raises BaseExcitationError for what does not fit or has rigid motions.
+    elastic supports stand on the base. Raises BaseExcitationError for arguments that do not fit, and for rigid motions.
     """
     observed = np.asarray(functionals, dtype=float).reshape(matrices.size, -1)
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies_hz, dtype=float))
@@ -72,7 +73,7 @@ def base_response(
 
 
 def static_shape(matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
-    """(N,) m, displacements under a static load (N,) N. Raises SolverError if the supports do not hold."""
+    """Return the displacements (N,), m, under a static load (N,), N. Raises SolverError if the supports do not hold."""
     free, shape = matrices.free, np.zeros(matrices.size)
     with factorize(matrices.stiffness[free][:, free]) as factors:
         shape[free] = factors.solve(load[free])

@@ -13,6 +13,7 @@ from scipy import sparse
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrices import SystemMatrices
@@ -25,8 +26,8 @@ _NEIGHBOURS = 8
 _UNSEEN = 1e-6
 
 
-class CorrelationError(ValueError):
-    """Shapes or points that do not fit the structure; the message names what and the remedy."""
+class CorrelationError(VanedampError):
+    """Shapes or points that do not fit the structure; the message names the argument and the remedy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +80,10 @@ class MeasuredShapes:
 
 @dataclass(frozen=True, eq=False)
 class Pairing:
-    """Modes of a first set with their partners in a second one.
+    """Modes of a first set with their partners in a second one; the others have none.
 
-    mac                      (m1, m2) of every first with every second shape
-    first, second            (k,) indices of the pairs, the first ascending
-    unpaired_first, _second  indices without a partner
+    mac            (m1, m2) of every first with every second shape
+    first, second  (k,) indices of the pairs, the first ascending
     """
 
     mac: np.ndarray
@@ -95,24 +95,9 @@ class Pairing:
         """(k,) MAC of the pairs."""
         return np.array(self.mac[self.first, self.second])
 
-    @property
-    def unpaired_first(self) -> np.ndarray:
-        """Indices of the first set without a partner."""
-        return np.setdiff1d(np.arange(self.mac.shape[0]), self.first)
-
-    @property
-    def unpaired_second(self) -> np.ndarray:
-        """Indices of the second set without a partner."""
-        return np.setdiff1d(np.arange(self.mac.shape[1]), self.second)
-
-    def partner(self, first: int) -> int | None:
-        """The second set's partner of a mode of the first."""
-        found = np.flatnonzero(self.first == first)
-        return int(self.second[found[0]]) if found.size else None
-
 
 def modal_assurance(first: np.ndarray, second: np.ndarray, mass: sparse.csr_array | None = None) -> np.ndarray:
-    """(m1, m2) modal assurance criterion of shapes (m1, N) and (m2, N), weighted by a mass matrix if one is given.
+    """Return the modal assurance criterion (m1, m2) of shapes (m1, N) and (m2, N), weighted by a mass matrix if given.
 
     |a^H W b|^2 / ((a^H W a)(b^H W b)), 1 for shapes that agree up to a (complex) factor (Allemang and Brown 1982); 0
     for a shape without motion.
@@ -124,7 +109,7 @@ def modal_assurance(first: np.ndarray, second: np.ndarray, mass: sparse.csr_arra
 
 
 def pair_modes(mac: np.ndarray, least: float = LEAST_MAC) -> Pairing:
-    """The pairs with the largest sum of MAC values, each mode once; pairs below `least` are dropped.
+    """Return the pairs with the largest sum of MAC values, each mode once; pairs below `least` are dropped.
 
     An optimal assignment (Crouse 2016, IEEE Trans. Aerosp. Electron. Syst. 52) does not depend on the order of the
     modes, and two shapes cannot claim one partner, as they do when each takes its best.
@@ -138,14 +123,8 @@ def pair_modes(mac: np.ndarray, least: float = LEAST_MAC) -> Pairing:
     return Pairing(frozen(values), frozen(first[kept], np.int64), frozen(second[kept], np.int64))
 
 
-def nearest_node(coordinates: np.ndarray, points: np.ndarray, directions: np.ndarray) -> sparse.csr_array:
-    """(p, N) displacements of the nodes nearest to the points along the directions (unit length)."""
-    _, nodes = cKDTree(coordinates).query(points)
-    return _functionals(nodes[:, None], np.ones((len(points), 1)), directions, len(coordinates))
-
-
 def interpolation(coordinates: np.ndarray, points: np.ndarray, directions: np.ndarray) -> sparse.csr_array:
-    """(p, N) displacements at the points along the directions, from the nodes around each point.
+    """Return the matrix (p, N) of displacements at points along directions, interpolated from the nodes around each.
 
     Weights of the least-squares affine field through the eight nearest nodes, the near ones weighing more (Lancaster
     and Salkauskas 1981, moving least squares): exact for rigid motion and constant strain where the nodes span space;
@@ -155,20 +134,19 @@ def interpolation(coordinates: np.ndarray, points: np.ndarray, directions: np.nd
     return _functionals(nodes, weights, directions, len(coordinates))
 
 
-def observed_shapes(modes: Modes, matrices: SystemMatrices, measured: MeasuredShapes, exact: bool = True) -> np.ndarray:
-    """(m, p) what the measurement would see of computed modes; `exact` interpolates, or else the nearest nodes count.
+def observed_shapes(modes: Modes, matrices: SystemMatrices, measured: MeasuredShapes) -> np.ndarray:
+    """Return computed modes (m, p) at the measured degrees of freedom.
 
     Raises CorrelationError for points that lie away from the structure: their coordinates are then in another frame or
     another unit.
     """
     check_points(matrices.coordinates, measured.points)
-    observe = interpolation if exact else nearest_node
-    seen = observe(matrices.coordinates, measured.points, measured.directions)
+    seen = interpolation(matrices.coordinates, measured.points, measured.directions)
     return np.asarray((seen @ modes.shapes.T).T)
 
 
 def measured_mac(modes: Modes, matrices: SystemMatrices, measured: MeasuredShapes) -> np.ndarray:
-    """(computed, measured) MAC at the measured degrees of freedom."""
+    """Return the MAC (computed, measured) at the measured degrees of freedom."""
     seen = observed_shapes(modes, matrices, measured)
     # a mode that does not move what was measured is round-off there, and round-off has the shape of anything
     unseen = np.abs(seen).max(axis=1) < _UNSEEN * np.abs(modes.shapes).max(axis=1)
@@ -177,7 +155,7 @@ def measured_mac(modes: Modes, matrices: SystemMatrices, measured: MeasuredShape
 
 
 def compare(first: Modes, first_matrices: SystemMatrices, second: Modes, second_matrices: SystemMatrices) -> np.ndarray:
-    """(m1, m2) MAC of two analyses, weighted by the first one's mass; of another mesh, interpolated to its nodes."""
+    """Return the MAC (m1, m2) of two analyses, weighted by the first one's mass, at the nodes of its mesh."""
     shapes, coordinates = second.shapes, first_matrices.coordinates
     same = coordinates.shape == second_matrices.coordinates.shape
     if not (same and np.allclose(coordinates, second_matrices.coordinates, rtol=0.0, atol=1e-9)):
@@ -191,7 +169,7 @@ def compare(first: Modes, first_matrices: SystemMatrices, second: Modes, second_
 def mode_like(
     modes: Modes, matrices: SystemMatrices, measured: MeasuredShapes, shape: int = 0, least: float = LEAST_MAC
 ) -> int:
-    """Index of the computed mode that is most like one measured shape.
+    """Return the index of the computed mode that is most like one measured shape.
 
     Raises CorrelationError when none has a MAC of `least`.
     """
@@ -219,7 +197,7 @@ def check_points(coordinates: np.ndarray, points: Sequence[Sequence[float]] | np
 
 
 def _affine_weights(coordinates: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (p, k) around the points, and weights (p, k) that evaluate there the affine field fitted through them."""
+    """Return nodes (p, k) around points, and weights (p, k) that evaluate there the affine field fitted to them."""
     count = min(_NEIGHBOURS, len(coordinates))
     distances, nodes = cKDTree(coordinates).query(points, k=count)
     distances, nodes = distances.reshape(-1, count), nodes.reshape(-1, count)
@@ -234,7 +212,7 @@ def _affine_weights(coordinates: np.ndarray, points: np.ndarray) -> tuple[np.nda
 
 
 def _functionals(nodes: np.ndarray, weights: np.ndarray, directions: np.ndarray, n_nodes: int) -> sparse.csr_array:
-    """(p, 3 n_nodes) rows that weigh nodes (p, k) along directions (p, 3)."""
+    """Return rows (p, 3 n_nodes) that weigh nodes (p, k) along directions (p, 3)."""
     rows = np.repeat(np.arange(len(nodes)), 3 * nodes.shape[1])
     columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
     values = (weights[:, :, None] * directions[:, None, :]).ravel()

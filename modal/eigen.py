@@ -13,6 +13,7 @@ from scipy import linalg, sparse
 
 from vanedamp.files import store
 from vanedamp.modal import petsc
+from vanedamp.modal.algebra import affine_fields, leading_sign, ritz_values
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.petsc import Factorization, SolverError
 
@@ -58,12 +59,12 @@ class Modes:
         return len(self.frequencies_hz)
 
     def first(self, count: int) -> Modes:
-        """The first so many of the modes."""
+        """Return the first `count` modes."""
         return Modes(self.frequencies_hz[:count], self.shapes[:count], self.residuals[:count], self.provenance)
 
     @property
     def angular_frequencies(self) -> np.ndarray:
-        """(m,) rad/s."""
+        """Angular frequencies (m,), rad/s."""
         return 2.0 * np.pi * self.frequencies_hz
 
     def save(
@@ -92,7 +93,7 @@ class Modes:
 def solve_modes(
     matrices: SystemMatrices, count: int = 10, max_frequency: float | None = None, min_frequency: float = 0.0
 ) -> Modes:
-    """The lowest `count` modes, or all modes from `min_frequency` to `max_frequency` (Hz, then `count` is not used).
+    """Return the lowest `count` modes, or all from `min_frequency` to `max_frequency` (Hz; `count` is then not used).
 
     Sylvester's law of inertia proves that no mode is missed. Free and partly held structures show their rigid modes at
     zero frequency: those whose strain energy is within round-off. Raises SolverError for a count that the structure
@@ -120,7 +121,7 @@ def solve_modes(
 
 
 def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
-    """Number of modes below a frequency, from the inertia of K - (2 pi f)^2 M: exact, without computing a mode."""
+    """Return the number of modes below a frequency, exactly, from the inertia of K - (2 pi f)^2 M."""
     if not frequency_hz > 0.0:
         raise SolverError(f"frequency: expected a positive number of Hz, not {frequency_hz}")
     free = matrices.free
@@ -143,12 +144,12 @@ class _Pencil(NamedTuple):
     mass: sparse.csr_array
 
     def below(self, eigenvalue: float) -> int:
-        """Number of eigenvalues below one."""
+        """Return the number of eigenvalues below one."""
         return petsc.negative_eigenvalues(sparse.csr_array(self.stiffness - eigenvalue * self.mass))
 
 
 def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest eigenpairs, proved complete by the inertia in a gap of the spectrum above them."""
+    """Return the lowest eigenpairs, proved complete by the inertia in a gap of the spectrum above them."""
     size, spare = pencil.mass.shape[0], _SPARE
     while True:
         asked = min(count + spare, size)
@@ -169,7 +170,7 @@ def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.n
 
 
 def _within(pencil: _Pencil, low_hz: float, high_hz: float, floor: float) -> tuple[np.ndarray, np.ndarray]:
-    """All eigenpairs of a range of frequencies, as many as the inertia at its ends says."""
+    """Return all eigenpairs of a range of frequencies, whose number follows from the inertia at its ends."""
     if not 0.0 <= low_hz < high_hz:
         raise SolverError(f"min_frequency: expected 0 <= min_frequency < max_frequency, not {low_hz} and {high_hz} Hz")
     lower, upper = _eigenvalue(low_hz) if low_hz else floor, _eigenvalue(high_hz)
@@ -196,10 +197,10 @@ def _sliced(pencil: _Pencil, lower: float, upper: float, count: int) -> tuple[np
 
 
 def _orthonormal(vectors: np.ndarray, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mass-orthonormal vectors from ascending eigenvectors, and their products with the mass.
+    """Return mass-orthonormal vectors from ascending eigenvectors, and their products with the mass.
 
     Vectors with residuals r (in the norm of M^-1) are orthogonal to |phi_i^T M phi_j| <= (r_i + r_j) / |lambda_i -
-    lambda_j| alone where no Krylov space holds both, such as those of two slices. The lower one keeps its direction
+    lambda_j| only, where no Krylov space holds both, such as those of two slices. The lower one keeps its direction
     (Cholesky): that adds at most their product to the relative residual of the higher one, while the other way round
     the lower one's would grow by the ratio of their eigenvalues.
     """
@@ -218,28 +219,17 @@ def _eigenvalue(frequency_hz: float) -> float:
 
 
 def _straining_eigenvalue(matrices: SystemMatrices) -> float:
-    """The lowest Ritz value of uniform strains of the structure without supports, (rad/s)^2: its spectrum's scale."""
-    offsets = matrices.coordinates - matrices.coordinates.mean(axis=0)
-    offsets /= np.abs(offsets).max() or 1.0
-    affine = np.column_stack([np.ones(len(offsets)), offsets])
-    fields = np.einsum("na,ij->niaj", affine, np.eye(3)).reshape(matrices.size, -1)
-    # a flat or straight set of nodes has fewer independent fields than twelve
-    left, singular, _ = np.linalg.svd(fields, full_matrices=False)
-    basis = left[:, singular > 1e-8 * singular[0]]
-    values = linalg.eigh(basis.T @ (matrices.stiffness @ basis), basis.T @ (matrices.mass @ basis), eigvals_only=True)
+    """Return the lowest Ritz value of uniform strains without supports, (rad/s)^2: the scale of the spectrum."""
+    values = ritz_values(matrices.stiffness, matrices.mass, affine_fields(matrices.coordinates))
     return float(values[values > 1e-6 * values[-1]][0])
 
 
 def shape_signs(vectors: np.ndarray, factors: np.ndarray) -> np.ndarray:
-    """(m,) +-1 that fix the direction of shapes (m, N), whatever the solver's start vector was.
+    """Return signs (m,) that fix the direction of shapes (m, N), whatever the solver's start vector was.
 
     factors: (m, 3) participation factors of the shapes along x, y and z.
     """
-    signs = np.empty(len(vectors))
-    for index, (vector, factor) in enumerate(zip(vectors, factors, strict=True)):
-        # a mode that barely couples to a translation has a factor of noise
-        guide = factor if np.abs(factor).max() > 1e-6 * np.abs(factors).max() else vector
-        # near ties go to the first, so that round-off does not choose
-        first = np.flatnonzero(np.abs(guide) > (1.0 - 1e-6) * np.abs(guide).max())[0]
-        signs[index] = np.sign(guide[first])
-    return signs
+    # a mode that barely couples to a translation has a factor of noise
+    noise = 1e-6 * np.abs(factors).max()
+    guides = (f if np.abs(f).max() > noise else vector for vector, f in zip(vectors, factors, strict=True))
+    return np.array([leading_sign(guide) for guide in guides])

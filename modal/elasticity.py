@@ -12,6 +12,7 @@ import numpy as np
 import ufl
 from scipy import sparse
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
 from vanedamp.modal.matrices import Patch, SystemMatrices
 
@@ -19,7 +20,7 @@ DEFAULT = "default"
 _COMPONENTS = "xyz"
 
 
-class ElasticityError(ValueError):
+class ElasticityError(VanedampError):
     """A material, support or displacement field that does not fit; the message names it and the remedy."""
 
 
@@ -72,7 +73,7 @@ class ElasticSupport:
 
 
 class Solid:
-    """An elastic body on a mesh: its forms, and what needs the mesh after the matrices are made.
+    """An elastic body on a mesh: its forms, and stresses and pictures that need the mesh after assembly.
 
     materials  volume group -> Material; the key "default" serves every group that is not named
     degree     of the displacements, 1 to 3; 2 is right for bending
@@ -106,12 +107,12 @@ class Solid:
         self._density = fenicsx.cell_constants(self.domain, {name: m.density for name, m in self.materials.items()})
 
     def stress(self, displacement: Any) -> Any:
-        """UFL stress tensor of a UFL displacement, Pa."""
+        """Return the UFL stress tensor of a UFL displacement, Pa."""
         strain = ufl.sym(ufl.grad(displacement))
         return self._lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * self._shear * strain
 
     def assemble(self, clamped: Mapping[str, str], damping_ratio: float) -> SystemMatrices:
-        """Unconstrained matrices, every group as a patch, and the supports {group: "xyz" or components}.
+        """Return unconstrained matrices, with every group as a patch, and the supports {group: "xyz" or components}.
 
         Groups are of facets, edges or points; the nodes of edges and points have the weight one. Elastic supports are
         part of the stiffness.
@@ -141,9 +142,9 @@ class Solid:
         )
 
     def stiffness_parts(self) -> dict[str, sparse.csr_array]:
-        """What the stiffness is the sum of, (N, N) N/m each: "material.<volume group>" and "support.<facet group>".
+        """Return the parts of the stiffness, (N, N) N/m each: "material.<volume group>" and "support.<facet group>".
 
-        Each is proportional to its Young's modulus or to its support's stiffnesses: the derivatives that tuning needs.
+        Each is proportional to its Young's modulus or to its support's stiffnesses: the derivatives of model updating.
         """
         parts = {
             f"material.{name}": self._material_stiffness(fenicsx.over_cells(self.domain, cells))
@@ -152,7 +153,7 @@ class Solid:
         return parts | {f"support.{name}": self._support_stiffness(name) for name in self.elastic}
 
     def von_mises(self, displacement: np.ndarray) -> np.ndarray:
-        """Von Mises stress, Pa, of displacements (N,) at the corners of all cells, each cell from its own side."""
+        """Return von Mises stresses, Pa, of displacements (N,) at the corners of all cells, each from its own cell."""
         if np.shape(displacement) != (3 * len(fenicsx.node_coordinates(self.space)),):
             raise ElasticityError(f"displacement: shape {np.shape(displacement)} is not that of this mesh and degree")
         deviator = ufl.dev(self.stress(fenicsx.field(self.space, displacement)))
@@ -160,7 +161,7 @@ class Solid:
         return np.array(fenicsx.evaluate(equivalent, fenicsx.discontinuous_space(self.domain, 1)).x.array)
 
     def stress_components(self, displacement: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
-        """(6, k) stresses xx, yy, zz, xy, yz, zx, Pa, of displacements (N,), where `von_mises` has its values.
+        """Return stresses xx, yy, zz, xy, yz, zx (6, k), Pa, of displacements (N,), where `von_mises` has its values.
 
         points: indices of the places wanted; default: all. They are linear in the displacements.
         """
@@ -173,11 +174,11 @@ class Solid:
         return np.array(values) if points is None else np.array(values)[:, points]
 
     def stress_points(self) -> np.ndarray:
-        """(k, 3) m, the places of the values of `von_mises`."""
+        """Return the places (k, 3), m, of the values of `von_mises`."""
         return fenicsx.node_coordinates(fenicsx.discontinuous_space(self.domain, 1))
 
     def vtk_mesh(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Cells, VTK cell types and points, the points in the order of the nodes; for pyvista.UnstructuredGrid."""
+        """Return cells, VTK cell types and points in the order of the nodes, for pyvista.UnstructuredGrid."""
         return fenicsx.vtk_mesh(self.space)
 
     def write(self, fields: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> None:
@@ -231,7 +232,7 @@ def assemble(
     damping_ratio: float = 0.0,
     elastic: Mapping[str, ElasticSupport] | None = None,
 ) -> SystemMatrices:
-    """Matrices of the elastic body on a gmsh mesh; see Solid for the arguments and the errors raised."""
+    """Return the matrices of the elastic body on a gmsh mesh; arguments and errors as in Solid."""
     return Solid(mesh, materials, degree, elastic).assemble(clamped, damping_ratio)
 
 

@@ -1,6 +1,6 @@
 """The one file that knows dolfinx's API, from 0.5.2 to 0.11, in serial.
 
-What differs between the versions is settled here; the rest of the package sees meshes with named groups, and UFL forms
+Differences between the versions are settled here; the rest of the package sees meshes with named groups, and UFL forms
 that become scipy matrices.
 """
 
@@ -61,7 +61,7 @@ class Domain:
 
     @property
     def groups(self) -> dict[str, list[tuple[int, np.ndarray]]]:
-        """Name -> (dimension, indices) of what supports and interfaces can act on.
+        """Name -> (dimension, indices) of the entities that supports and interfaces can act on.
 
         A name means a facet group where there is one, else the edges and points of that name together.
         """
@@ -72,16 +72,16 @@ class Domain:
         return found | {name: [(2, entities)] for name, entities in self.facets.items()}
 
     def group(self, name: str) -> list[tuple[int, np.ndarray]]:
-        """One of `groups`. Raises MeshError with those that exist, by kind."""
+        """Return one of `groups`. Raises MeshError with those that exist, by kind."""
         if name not in self.groups:
             kinds = {"edge": self.edges, "point": self.points}
-            told = "".join(f"; {kind} groups: {', '.join(sorted(names))}" for kind, names in kinds.items() if names)
+            lower = "".join(f"; {kind} groups: {', '.join(sorted(names))}" for kind, names in kinds.items() if names)
             known = ", ".join(sorted(self.facets)) or "none"
-            raise MeshError(f"{self.path}: no facet group {name!r}; there are: {known}{told}")
+            raise MeshError(f"{self.path}: no facet group {name!r}; there are: {known}{lower}")
         return self.groups[name]
 
     def facet_group(self, name: str) -> np.ndarray:
-        """Facet indices of a group. Raises MeshError with the groups that exist."""
+        """Return the facet indices of a group. Raises MeshError with the groups that exist."""
         if name not in self.facets:
             known = ", ".join(sorted(self.facets)) or "none"
             raise MeshError(f"{self.path}: no facet group {name!r}; there are: {known}")
@@ -89,7 +89,7 @@ class Domain:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the libraries behind this file, for provenance."""
+    """Return the versions of the libraries behind this file, for provenance."""
     return {"dolfinx": dolfinx.__version__, "petsc4py": petsc4py.__version__, "gmsh": gmsh.__version__}
 
 
@@ -130,12 +130,12 @@ def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
 
 
 def vector_space(domain: Domain, degree: int) -> Any:
-    """Continuous Lagrange displacements of a degree, three components a node."""
+    """Return the continuous Lagrange displacements of a degree, three components a node."""
     return _vectors(domain.mesh, degree)
 
 
 def discontinuous_space(domain: Domain, degree: int) -> Any:
-    """Scalar polynomials of a degree in every cell, without continuity."""
+    """Return the scalar polynomials of a degree in every cell, without continuity."""
     family = "DQ" if domain.mesh.topology.cell_name() == "hexahedron" else "DG"
     with _quiet():
         create = getattr(fem, "functionspace", None) or fem.FunctionSpace
@@ -143,7 +143,7 @@ def discontinuous_space(domain: Domain, degree: int) -> Any:
 
 
 def cell_constants(domain: Domain, values: Mapping[str, float]) -> Any:
-    """A function that is constant in every cell, its value given by volume group."""
+    """Return a function that is constant in every cell, its value given by volume group."""
     function = fem.Function(discontinuous_space(domain, 0))
     dofs = _array(function.function_space.dofmap.list)
     for name, value in values.items():
@@ -152,19 +152,19 @@ def cell_constants(domain: Domain, values: Mapping[str, float]) -> Any:
 
 
 def field(space: Any, values: np.ndarray) -> Any:
-    """A function from the values of its DOFs."""
+    """Return a function from the values of its DOFs."""
     function = fem.Function(space)
     function.x.array[:] = values
     return function
 
 
 def node_coordinates(space: Any) -> np.ndarray:
-    """(n_nodes, 3) m, in the order of the DOF blocks."""
+    """Return the coordinates (n_nodes, 3), m, in the order of the DOF blocks."""
     return np.array(space.tabulate_dof_coordinates())
 
 
 def group_nodes(space: Any, entities: np.ndarray, dimension: int = 2) -> np.ndarray:
-    """Sorted indices of the nodes on facets (dimension 2), edges (1) or vertices (0)."""
+    """Return the sorted indices of the nodes on facets (dimension 2), edges (1) or vertices (0)."""
     space.mesh.topology.create_connectivity(dimension, 3)
     return np.sort(fem.locate_dofs_topological(space, dimension, entities))
 
@@ -185,22 +185,22 @@ def matrix(form: Any) -> sparse.csr_array:
 
 
 def over_facets(domain: Domain, facets: np.ndarray) -> Any:
-    """UFL measure of the integral over boundary facets."""
+    """Return the UFL measure of the integral over boundary facets."""
     return _measure("ds", domain, 2, facets)
 
 
 def over_cells(domain: Domain, cells: np.ndarray) -> Any:
-    """UFL measure of the integral over cells."""
+    """Return the UFL measure of the integral over cells."""
     return _measure("dx", domain, 3, cells)
 
 
 def constant(domain: Domain, values: float | Sequence[float]) -> Any:
-    """A number or vector in UFL whose value is no part of the compiled form."""
+    """Return a number or vector in UFL whose value is no part of the compiled form."""
     return fem.Constant(domain.mesh, np.array(values, dtype=float))
 
 
 def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
-    """(n_nodes,) m^2, integral of every nodal shape function over the facets."""
+    """Return the integral (n_nodes,), m^2, of every nodal shape function over the facets."""
     along_x = constant(domain, [1.0, 0.0, 0.0])
     with _quiet():
         compiled = fem.form(ufl.inner(along_x, ufl.TestFunction(space)) * over_facets(domain, facets))
@@ -208,7 +208,7 @@ def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
 
 
 def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
-    """(3,) m^2, integral of the outward unit normal over boundary facets."""
+    """Return the integral (3,), m^2, of the outward unit normal over boundary facets."""
     axis = constant(domain, [1.0, 0.0, 0.0])
     with _quiet():
         compiled = fem.form(ufl.inner(axis, ufl.FacetNormal(domain.mesh)) * over_facets(domain, facets))
@@ -220,7 +220,7 @@ def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
 
 
 def evaluate(expression: Any, space: Any) -> Any:
-    """The function of a space that takes the values of a UFL expression at the space's own points."""
+    """Return the function of a space that takes the values of a UFL expression at the space's own points."""
     points = space.element.interpolation_points
     function = fem.Function(space)
     with _quiet():
@@ -244,14 +244,14 @@ def write_fields(space: Any, fields: Mapping[str, np.ndarray], path: str | os.Pa
 
 
 def vtk_mesh(space: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells, VTK cell types and points of the nodes of a space, as pyvista.UnstructuredGrid takes them."""
+    """Return cells, VTK cell types and points of the nodes of a space, as pyvista.UnstructuredGrid takes them."""
     create = getattr(dolfinx.plot, "vtk_mesh", None) or dolfinx.plot.create_vtk_mesh
     cells, types, points = create(space)
     return np.asarray(cells), np.asarray(types), np.asarray(points)
 
 
 def _prepare_groups() -> None:
-    """Refuse what dolfinx's reader keeps silent about, and bring the model to what every version of it takes."""
+    """Refuse faults that dolfinx's reader does not report, and bring the model to a form that every version reads."""
     _check_kinds()
     grouped = {
         entity for tag in msh.groups(3).values() for entity in gmsh.model.getEntitiesForPhysicalGroup(3, tag).tolist()
@@ -305,7 +305,7 @@ def _members(tags: Any, names: Mapping[str, int]) -> dict[str, np.ndarray]:
 def _lower_groups(
     mesh: Any, lines: Mapping[str, np.ndarray], nodes: Mapping[str, np.ndarray]
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Edges and vertices of groups from their gmsh nodes, by the numbers that the mesh keeps of its input."""
+    """Return edges and vertices of groups from their gmsh nodes, by the numbers that the mesh keeps of its input."""
     topology, geometry = mesh.topology, mesh.geometry
     if not (lines or nodes):
         return {}, {}
@@ -330,7 +330,7 @@ def _lower_groups(
 
 
 def _found(known: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> np.ndarray:
-    """Indices (int32) of rows of gmsh nodes among those known. Raises MeshError for one that is not there."""
+    """Return the indices (int32) of rows of gmsh nodes among known ones. Raises MeshError for one that is not there."""
     width = int(max(known.max(), wanted.max())) + 1
     keys, asked = (np.sort(rows, axis=1) @ width ** np.arange(rows.shape[1])[::-1] for rows in (known, wanted))
     order = np.argsort(keys)

@@ -21,7 +21,7 @@ class Frame:
     kind: str = "rectangular"
 
     def to_global(self, points: np.ndarray) -> np.ndarray:
-        """(n, 3) rectangular global coordinates of points (n, 3) given in this system."""
+        """Return the rectangular global coordinates (n, 3) of points (n, 3) given in this system."""
         first, second, third = np.asarray(points, dtype=float).T
         angle = np.radians(second)
         if self.kind == "cylindrical":
@@ -35,7 +35,7 @@ class Frame:
 
 
 def through(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(3, 3) rows a, b, c, right-handed: a along `first`, b in the plane of both on the side of `second`.
+    """Return rows a, b, c (3, 3), right-handed: a along `first`, b in the plane of both on the side of `second`.
 
     Raises ValueError for directions that span no plane.
     """
@@ -48,7 +48,7 @@ def through(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def rotation(axis: np.ndarray, degrees: float) -> np.ndarray:
-    """(3, 3) matrix that turns vectors about an axis (Rodrigues). Raises ValueError for an axis without length."""
+    """Return the matrix (3, 3) that rotates vectors about an axis (Rodrigues). Raises ValueError for a zero axis."""
     length = np.linalg.norm(axis)
     if not length > 0.0:
         raise ValueError("its axis has no length")

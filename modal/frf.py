@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.rational_fit import Fit, Rational
 
@@ -22,8 +23,8 @@ _MISFIT = 0.5
 _CHANCE = 1e-4
 
 
-class FrfError(ValueError):
-    """A frequency response, or a band of it, that gives no poles; the message names what and the remedy."""
+class FrfError(VanedampError):
+    """A frequency response, or a band of it, that gives no poles; the message names the argument and the remedy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +60,14 @@ class Frf:
             object.__setattr__(self, name, value)
 
     def peak_hz(self, low: float = 0.0, high: float = np.inf) -> float:
-        """Frequency of the largest value of any response between two frequencies, Hz; nan where there is no line."""
+        """Return the frequency, Hz, of the largest value between two frequencies; nan where there is no line."""
         inside = (self.frequencies_hz >= low) & (self.frequencies_hz <= high)
         if not inside.any():
             return float("nan")
         return float(self.frequencies_hz[inside][np.argmax(np.abs(self.values[:, inside]).max(axis=0))])
 
     def band(self, low: float, high: float) -> Frf:
-        """The part between two frequencies, Hz. Raises FrfError when it holds fewer than two lines."""
+        """Return the part between two frequencies, Hz. Raises FrfError when it holds fewer than two lines."""
         inside = (self.frequencies_hz >= low) & (self.frequencies_hz <= high)
         if inside.sum() < 2:
             span = f"{self.frequencies_hz[0]:.6g} to {self.frequencies_hz[-1]:.6g} Hz"
@@ -76,7 +77,7 @@ class Frf:
 
 @dataclass(frozen=True, eq=False)
 class Poles:
-    """What a rational fit found, by ascending frequency.
+    """Poles that a rational fit found, by ascending frequency.
 
     frequencies_hz  (m,) undamped natural frequencies |s| / 2 pi
     damping_ratios  (m,) -Re s / |s|
@@ -94,16 +95,16 @@ class Poles:
     fitted: np.ndarray
 
     def nearest(self, frequency_hz: float) -> int:
-        """Index of the pole nearest to a frequency."""
+        """Return the index of the pole nearest to a frequency."""
         return int(np.argmin(np.abs(self.frequencies_hz - frequency_hz)))
 
 
 def identify(frf: Frf, count: int = 1) -> Poles:
-    """Natural frequencies and damping ratios of `count` modes in a response's band.
+    """Return natural frequencies and damping ratios of `count` modes in a response's band.
 
     A rational function with common conjugate poles and real terms for the modes below and above the band is fitted to
     all responses: vector fitting (Gustavsen and Semlyen 1999) finds the poles from anywhere, then least squares over
-    the poles alone, their residues eliminated (Golub and Pereyra 1973), which is unbiased under noise. Unlike a circle
+    the poles only, their residues eliminated (Golub and Pereyra 1973), which is unbiased under noise. Unlike a circle
     fit it separates modes that overlap. Poles stay conjugate, which scipy's AAA (1.15 or newer) does not provide.
 
     A pole is a mode when the band holds its half-power points, its half-power bandwidth 2 zeta f is at least half the
@@ -147,7 +148,7 @@ def identify(frf: Frf, count: int = 1) -> Poles:
 
 
 def _deviations(found: Fit, scale: float) -> np.ndarray:
-    """(m, 2) standard deviations of Hz and damping ratio, from the Jacobian; infinite where that is singular."""
+    """Return standard deviations (m, 2) of Hz and damping ratio, from the Jacobian; infinite where that is singular."""
     jacobian, poles = found.jacobian, found.poles
     size = np.linalg.norm(jacobian, axis=0)
     if not np.all(size > 0.0):
@@ -167,7 +168,7 @@ def _span(frf: Frf) -> str:
 
 
 def _check(poles: Poles, frf: Frf) -> None:
-    """Refuse what is no damped mode of the band or what its lines do not resolve."""
+    """Refuse poles that are no damped modes of the band, or that its lines do not resolve."""
     axis = frf.frequencies_hz
     span = _span(frf)
     for frequency, ratio, (_, deviation) in zip(

@@ -15,13 +15,14 @@ import numpy as np
 from scipy import sparse
 
 from vanedamp.files import store
+from vanedamp.files.errors import VanedampError
 
 _KIND = "system-matrices"
 # assembly adds the same numbers in another order above and below the diagonal
 _ASYMMETRY = 1e-10
 
 
-class MatricesError(ValueError):
+class MatricesError(VanedampError):
     """System matrices or a patch of them that do not fit together; the message names the field and the remedy."""
 
 
@@ -119,7 +120,7 @@ class SystemMatrices:
         return np.flatnonzero(mask)
 
     def rigid_translations(self) -> np.ndarray:
-        """(N, 3) unit translations of every DOF along x, y and z."""
+        """Return unit translations (N, 3) of every DOF along x, y and z."""
         return np.tile(np.eye(3), (len(self.coordinates), 1))
 
     @property
@@ -129,14 +130,14 @@ class SystemMatrices:
         return float(np.einsum("ij,ij->", translations, self.mass @ translations) / 3.0)
 
     def movable_translations(self) -> np.ndarray:
-        """(N, 3) unit translations of the free DOFs, zero at the fixed ones."""
+        """Return unit translations (N, 3) of the free DOFs, zero at the fixed ones."""
         translations = self.rigid_translations()
         translations[self.fixed] = 0.0
         return translations
 
     @property
     def movable_mass(self) -> np.ndarray:
-        """(3,) kg along x, y and z, r^T M r of the free DOFs: what the effective masses of all modes sum to.
+        """Mass (3,) along x, y and z, kg: r^T M r of the free DOFs, the sum of the effective masses of all modes.
 
         Less than the total mass by the share of the elements at the supports that their fixed nodes carry.
         """
@@ -144,7 +145,7 @@ class SystemMatrices:
         return np.einsum("ij,ij->j", translations, self.mass @ translations)
 
     def patch(self, label: str) -> Patch:
-        """The patch of that label. Raises MatricesError with the labels that exist."""
+        """Return the patch of that label. Raises MatricesError with the labels that exist."""
         if label not in self.patches:
             raise MatricesError(f"no patch {label!r}; there are: {', '.join(sorted(self.patches)) or 'none'}")
         return self.patches[label]
@@ -197,7 +198,7 @@ class SystemMatrices:
 
 
 def unit_direction(direction: Sequence[float] | np.ndarray) -> np.ndarray:
-    """(3,) the direction scaled to length one. Raises MatricesError for a wrong shape or no length."""
+    """Return the direction (3,) scaled to length one. Raises MatricesError for a wrong shape or no length."""
     vector = np.asarray(direction, dtype=float)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)) or not np.any(vector):
         raise MatricesError(f"direction: expected three numbers, not all zero, such as [0, 1, 0]; not {direction}")
@@ -205,7 +206,7 @@ def unit_direction(direction: Sequence[float] | np.ndarray) -> np.ndarray:
 
 
 def patch_average(matrices: SystemMatrices, patch_label: str, direction: Sequence[float] | np.ndarray) -> np.ndarray:
-    """(N,) functional w of the area-averaged displacement of a patch along a direction (scaled to length one).
+    """Return the functional w (N,) of the area-averaged displacement of a patch along a direction (of any length).
 
     w^T q = sum(weights * (q . direction)) / sum(weights). Raises MatricesError for an unknown patch or no direction.
     """
@@ -216,7 +217,7 @@ def patch_average(matrices: SystemMatrices, patch_label: str, direction: Sequenc
 
 
 def _symmetric(name: str, matrix: Any, size: int) -> sparse.csr_array:
-    """A canonical read-only CSR copy of a symmetric matrix."""
+    """Return a canonical read-only CSR copy of a symmetric matrix."""
     if np.iscomplexobj(matrix):
         raise MatricesError(
             f"{name}: complex; expected a real matrix, the damping as damping_ratio (half a loss factor)"

@@ -16,9 +16,10 @@ import numpy as np
 from scipy import io, sparse
 
 from vanedamp.files.store import replacing, write_csv
+from vanedamp.modal.algebra import symmetric_part
 from vanedamp.modal.matrices import MatricesError, Patch, SystemMatrices
 
-#: what `write_folder` writes
+#: files that `write_folder` writes
 FILES = ("stiffness.mtx", "mass.mtx", "nodes.csv", "sets.csv", "fixed.csv")
 _COMPONENTS = "xyz"
 
@@ -33,7 +34,7 @@ def read_matrices(
     scale: float = 1.0,
     mass_scale: float = 1.0,
 ) -> SystemMatrices:
-    """Matrices of another code.
+    """Read the matrices of another code.
 
     stiffness, mass  .mtx (Matrix Market, symmetric or general) or .npz (scipy.sparse.save_npz), N/m and kg
     nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels
@@ -42,7 +43,7 @@ def read_matrices(
     scale            metres a unit of length of the nodes: 1e-3 for mm
     mass_scale       kg a unit of mass, with seconds: 1e3 for matrices in t, N and mm. It multiplies the stiffness, too
 
-    Raises MatricesError, with the file, for shapes that do not fit, one triangle alone, unknown nodes or sets.
+    Raises MatricesError, with the file, for shapes that do not fit, one triangle only, unknown nodes or sets.
     """
     labels, coordinates = _nodes(Path(nodes))
     patches = {} if sets is None else _patches(Path(sets), labels)
@@ -58,7 +59,7 @@ def read_matrices(
 def read_folder(
     folder: str | os.PathLike[str], damping_ratio: float = 0.0, scale: float = 1.0, mass_scale: float = 1.0
 ) -> SystemMatrices:
-    """What `write_folder` wrote, or another code in its place; scales as of `read_matrices`. Raises MatricesError."""
+    """Read a folder as `write_folder` writes it; scales as in `read_matrices`. Raises MatricesError."""
     home = Path(folder)
     labels, coordinates = _nodes(home / "nodes.csv")
     patches = _patches(home / "sets.csv", labels) if (home / "sets.csv").is_file() else {}
@@ -95,7 +96,7 @@ def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> No
     home.mkdir(parents=True, exist_ok=True)
     for name, matrix in (("stiffness", matrices.stiffness), ("mass", matrices.mass)):
         # round-off of the assembly differs above and below the diagonal; a symmetric file holds one of them
-        whole = sparse.coo_matrix(0.5 * (matrix + matrix.T))
+        whole = sparse.coo_matrix(symmetric_part(matrix))
         with replacing(home / f"{name}.mtx") as temporary, temporary.open("wb") as stream:
             io.mmwrite(stream, whole, symmetry="symmetric", precision=17)
     nodes = [[index, *xyz] for index, xyz in enumerate(matrices.coordinates.tolist(), 1)]
@@ -194,7 +195,7 @@ def _component(path: str | os.PathLike[str] | None, component: str) -> int:
 
 
 def _rows(path: Path, columns: tuple[str, ...]) -> list[list[str]]:
-    """Lines of a CSV, without its header."""
+    """Return the lines of a CSV, without its header."""
     if not path.is_file():
         raise MatricesError(f"{path}: no such file; expected the columns {', '.join(columns)}")
     with path.open(newline="", encoding="utf-8-sig") as stream:

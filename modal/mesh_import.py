@@ -1,4 +1,4 @@
-"""Meshes of other programs (Abaqus and CalculiX .inp, Nastran .bdf, and what else meshio reads) as gmsh files.
+"""Meshes of other programs (Abaqus and CalculiX .inp, Nastran .bdf, and others that meshio reads) as gmsh files.
 
 Sets of volume elements become volume groups. Facet groups are the boundary facets whose nodes are all in a node set, or
 those that shell elements of a set cover. A node set without such a facet becomes a group of its nodes, and of the
@@ -32,7 +32,7 @@ _CORNERS = {"tetra": 4, "hexahedron": 8}
 # a dolfinx geometry knows no 20-node brick; its edges are taken straight
 _VOLUMES = {"tetra": "tetra", "tetra10": "tetra10", "hexahedron": "hexahedron", "hexahedron20": "hexahedron"}
 _SHELLS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
-# what meshio passes over in these files changes the mesh
+# meshio ignores keywords of these files that change the mesh
 _READERS = {".inp": abaqus.read, ".bdf": nastran.read, ".nas": nastran.read, ".fem": nastran.read}
 _FACET_KINDS = {"tetra": "triangle", "tetra10": "triangle6", "hexahedron": "quad"}
 
@@ -99,8 +99,7 @@ def _read(path: Path) -> _Source:
         raise
     except (Exception, SystemExit) as error:  # its readers raise what they stumble over
         why = said.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__} {error}"
-        told = " ".join(why.split())
-        raise MeshError(f"{path}: this mesh cannot be read ({told})") from error
+        raise MeshError(f"{path}: this mesh cannot be read ({' '.join(why.split())})") from error
     points = np.asarray(mesh.points, dtype=float)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
@@ -139,7 +138,7 @@ def _read(path: Path) -> _Source:
 
 
 def _shell_sets(mesh: Any, sets: dict[str, list[np.ndarray]]) -> dict[str, set[tuple[int, ...]]]:
-    """Sets of shells, each shell as its sorted corners."""
+    """Return sets of shells, each shell as its sorted corners."""
     found: dict[str, set[tuple[int, ...]]] = {}
     for index, block in enumerate(mesh.cells):
         for name, parts in sets.items():
@@ -149,7 +148,7 @@ def _shell_sets(mesh: Any, sets: dict[str, list[np.ndarray]]) -> dict[str, set[t
 
 
 def _property_sets(mesh: Any) -> dict[str, list[np.ndarray]]:
-    """Nastran's property numbers as sets."""
+    """Return Nastran's property numbers as sets."""
     references = mesh.cell_data.get("nastran:ref", [])
     blocks = [np.asarray(block, dtype=int) for block in references]
     numbers = sorted({number for block in blocks for number in block.tolist()})
@@ -165,7 +164,7 @@ def _keys(facets: np.ndarray, corners: int) -> list[tuple[int, ...]]:
 
 
 def _boundary(source: _Source) -> np.ndarray:
-    """(n, k) nodes of the facets that belong to one cell, corners first."""
+    """Return the nodes (n, k) of the facets that belong to one cell, corners first."""
     shape = source.kind.removesuffix("10")
     places = [list(face) for face in _FACES[shape]]
     corners = len(places[0])
@@ -178,7 +177,7 @@ def _boundary(source: _Source) -> np.ndarray:
 
 
 def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] | None) -> dict[str, np.ndarray]:
-    """Facet group -> indices into the surface."""
+    """Return facet groups: name -> indices into the surface."""
     keys = _keys(surface, len(_FACES[source.kind.removesuffix("10")][0]))
     groups: dict[str, np.ndarray] = {}
     for name, nodes in source.node_sets.items():
@@ -196,7 +195,7 @@ def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] 
 
 
 def _edges(source: _Source) -> np.ndarray:
-    """(n, 2) nodes of the element edges, (n, 3) with the node between them of quadratic cells."""
+    """Return the nodes of the element edges: (n, 2), of quadratic cells (n, 3) with the node between them last."""
     if source.kind == "tetra10":
         places = [[*sorted(pair), middle] for pair, middle in _BETWEEN.items()]
     else:
@@ -209,7 +208,7 @@ def _edges(source: _Source) -> np.ndarray:
 def _node_groups(
     source: _Source, edges: np.ndarray, facets: dict[str, np.ndarray], wanted: Collection[str] | None
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Node sets that are no facet groups: name -> indices into the edges, name -> corners of elements."""
+    """Return node sets that are no facet groups: name -> indices into the edges, name -> corners of elements."""
     corners = np.unique(source.cells[:, : _CORNERS[source.kind.removesuffix("10")]])
     lines, points = {}, {}
     for name, nodes in source.node_sets.items():
@@ -257,7 +256,7 @@ def _write(
     scale: float,
     output: str | os.PathLike[str],
 ) -> None:
-    """entities: nodes of the cells, facets, edges and points by dimension, which the groups' members number."""
+    """Write the gmsh file; entities: nodes of cells, facets, edges and points by dimension, which groups number."""
     meshio = importlib.import_module("meshio")
     kinds = {
         3: source.kind,

@@ -1,4 +1,4 @@
-"""Moduli and support stiffnesses that bring natural frequencies to measured ones.
+"""Model updating: moduli and support stiffnesses that bring natural frequencies to measured ones.
 
 The stiffness is a sum of parts, K = sum p_j K_j, whose factors p_j start at one; `modal.elasticity.Solid` gives the
 parts of a mesh, but any symmetric matrices do.
@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import least_squares
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.modal.correlation import LEAST_MAC, MeasuredShapes, Pairing, measured_mac, modal_assurance, pair_modes
 from vanedamp.modal.eigen import Modes, solve_modes
@@ -29,18 +30,18 @@ _SPARE = 4
 _ALIKE = 1e-6
 
 
-class TuningError(ValueError):
-    """Parts, targets or modes that determine no factors; the message names what and the remedy."""
+class TuningError(VanedampError):
+    """Parts, targets or modes that determine no factors; the message names the argument and the remedy."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tuning:
-    """Factors on parts of the stiffness, and what they do to the frequencies.
+    """Factors on parts of the stiffness, and their effect on the frequencies.
 
     names          (p,) of the parts
     factors        (p,) on each part
     deviations     (p,) relative standard deviations of the factors if the measured frequencies err by 0.1 % each;
-                   large values mean that these frequencies do not tell the factors apart
+                   large values mean that these frequencies do not determine each factor
     target_hz      (n,) measured frequencies
     before_hz, after_hz   (n,) those of their partners among the computed modes
     modes_before, modes_after  (n,) indices of these partners
@@ -68,7 +69,7 @@ class Tuning:
 def sensitivities(
     modes: Modes, parts: Mapping[str, sparse.csr_array], indices: Sequence[int] | np.ndarray | None = None
 ) -> np.ndarray:
-    """(n, p) d log f_i / d log p_j = phi_i^T (p_j K_j) phi_i / (2 lambda_i) of mass-normalised modes.
+    """Return d log f_i / d log p_j = phi_i^T (p_j K_j) phi_i / (2 lambda_i), (n, p), of mass-normalised modes.
 
     parts are the p_j K_j. Fox and Kapoor (1968, AIAA J. 6): d lambda = phi^T dK phi, for modes of distinct frequencies.
     """
@@ -87,7 +88,7 @@ def tune(
     least_mac: float = LEAST_MAC,
     starts: int = 1,
 ) -> Tuning:
-    """Factors on parts of the stiffness that bring modes to target frequencies, in the least-squares sense of log f.
+    """Find factors on parts of the stiffness that bring modes to target frequencies, by least squares in log f.
 
     parts      the parts that may change, name -> (N, N); the rest of the stiffness stays
     target_hz  (n,) measured frequencies
@@ -108,10 +109,10 @@ def tune(
     bound = -np.log(LIMIT)
     found = _fit(problem, start, bound)
     for point in np.random.default_rng(0).uniform(-np.log(2.0), np.log(2.0), (starts - 1, start.size)):
-        problem.follow_anew()
+        problem.follow_from_start()
         other = _fit(problem, point, bound)
         found = other if other.cost < found.cost else found
-    problem.follow_anew()
+    problem.follow_from_start()
     after = problem.at(found.x)
     problem.check_pairs(after)
     stuck = np.flatnonzero(np.abs(found.x) > 0.999 * bound)
@@ -181,14 +182,14 @@ class _Problem:
         self.count = min(int(self.meant.max()) + 1 + _SPARE, matrices.free.size)
 
     def system(self, point: np.ndarray) -> SystemMatrices:
-        """The matrices with these factors."""
+        """Return the matrices with these factors."""
         stiffness = self.matrices.stiffness
         for factor, part in zip(np.exp(point), self.parts.values(), strict=True):
             stiffness = stiffness + (factor - 1.0) * part
         return replace(self.matrices, stiffness=sparse.csr_array(stiffness))
 
     def at(self, point: np.ndarray) -> _State:
-        """The state at logarithms of the factors; computed once for residual and Jacobian."""
+        """Return the state at logarithms of the factors; computed once for residual and Jacobian."""
         if self._state is None or self._point is None or not np.array_equal(point, self._point):
             self._state, self._point = self._evaluate(point), np.array(point)
         return self._state
@@ -202,8 +203,8 @@ class _Problem:
                 f"{state.mac[worst]:.2g}; give shapes at more points, or leave this frequency out"
             )
 
-    def follow_anew(self) -> None:
-        """Forget where the modes were followed to; the next ones are told by the untuned ones."""
+    def follow_from_start(self) -> None:
+        """Forget the modes followed so far; the next ones are paired with the untuned modes."""
         self._state, self._followed = None, self._origin
 
     def _evaluate(self, point: np.ndarray) -> _State:
@@ -229,7 +230,7 @@ class _Problem:
         )
 
     def _pair(self, modes: Modes) -> Pairing:
-        """Targets (first) with computed modes (second), all of them: a search may pass where they are hard to tell."""
+        """Pair all targets (first) with computed modes (second), even where a search passes modes hard to pair."""
         if self.measured is not None:
             return pair_modes(measured_mac(modes, self.matrices, self.measured).T, least=0.0)
         if self._followed is None:

@@ -13,16 +13,17 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import replacing
 
 
-class MeshError(ValueError):
-    """A mesh that cannot be read or does not hold what is asked of it; the message names file, group and remedy."""
+class MeshError(VanedampError):
+    """A mesh that cannot be read or lacks a group; the message names file, group and remedy."""
 
 
 @contextlib.contextmanager
 def session(name: str) -> Iterator[None]:
-    """A silent gmsh session with one new model of that name; finalised even on errors. Raises MeshError for gmsh's own.
+    """Open a silent gmsh session with a new model of that name; closed even on errors. Raises MeshError for gmsh's own.
 
     Inside a session of the caller's own, only the model is added and removed again.
     """
@@ -70,12 +71,12 @@ def merge(path: Path) -> None:
     complaints = [line for line in log if line.startswith("Error")]
     if complaints:
         raise MeshError(f"{path}: gmsh cannot read this mesh ({complaints[0]})")
-    told = [found for found in (re.fullmatch(r"Info: (\d+) elements?", line) for line in log) if found]
+    counts = [found for found in (re.fullmatch(r"Info: (\d+) elements?", line) for line in log) if found]
     labels = gmsh.model.mesh.getElements()[1]
     kept = np.unique(np.concatenate(labels)).size if labels else 0
-    if told and kept < int(told[-1][1]):
-        lost = int(told[-1][1]) - kept
-        raise MeshError(f"{path}: {lost} element numbers are given twice, of which gmsh keeps one; number them anew")
+    if counts and kept < int(counts[-1][1]):
+        lost = int(counts[-1][1]) - kept
+        raise MeshError(f"{path}: {lost} element numbers are given twice, of which gmsh keeps one; renumber them")
 
 
 def write(path: str | os.PathLike[str]) -> Path:
@@ -91,7 +92,7 @@ def write(path: str | os.PathLike[str]) -> Path:
 
 
 def groups(dimension: int) -> dict[str, int]:
-    """Name -> tag of the physical groups of a dimension in the current model; without a name, the tag is the name."""
+    """Return name -> tag of the physical groups of a dimension in the current model; nameless ones by their tag."""
     return {
         gmsh.model.getPhysicalName(dimension, tag) or str(tag): tag
         for _, tag in gmsh.model.getPhysicalGroups(dimension)
@@ -99,7 +100,7 @@ def groups(dimension: int) -> dict[str, int]:
 
 
 def taken(dimension: int) -> dict[str, np.ndarray]:
-    """Corner nodes (k, 2) of the lines, or (k, 1) of the points, of every group of a dimension below 2.
+    """Take the groups of a dimension below 2 out of the model: name -> corner nodes of lines (k, 2) or points (k, 1).
 
     The groups are taken out of the current model: not every version of dolfinx reads a model that has them.
     """
@@ -119,7 +120,7 @@ def taken(dimension: int) -> dict[str, np.ndarray]:
 
 
 def drop_strays() -> None:
-    """Take out of the current model what lies beside the volume elements, such as the centres of arcs.
+    """Take entities beside the volume elements out of the current model, such as the centres of arcs.
 
     dolfinx 0.5.2 writes past its memory when a node belongs to no volume element. Raises MeshError for groups of points
     or lines there, and for nodes that cannot be taken out.
@@ -175,7 +176,7 @@ def check_twice() -> None:
 
 
 def same_rows(rows: np.ndarray) -> tuple[int, int] | None:
-    """Two equal rows of (n, k); None where all differ."""
+    """Return the indices of two equal rows of (n, k); None where all differ."""
     _, place, counts = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
     if counts.size == 0 or counts.max() == 1:
         return None
@@ -186,7 +187,7 @@ def same_rows(rows: np.ndarray) -> tuple[int, int] | None:
 def check_volumes() -> None:
     """Raise MeshError for elements of the current model whose Jacobian is not positive everywhere.
 
-    An element turned inside out adds its stiffness as if it were whole, and nothing downstream would tell.
+    An element turned inside out adds its stiffness as if it were whole, and nothing downstream would notice.
     """
     bad = inverted()
     if bad:
@@ -198,7 +199,7 @@ def check_volumes() -> None:
 
 
 def inverted() -> dict[int, str]:
-    """Volume elements of the current model whose Jacobian is not positive everywhere, with their volume group."""
+    """Return volume elements of the current model whose Jacobian is not positive everywhere, with their group."""
     bad: dict[int, str] = {}
     for _, entity in gmsh.model.getEntities(3):
         for tags in gmsh.model.mesh.getElements(3, entity)[1]:
@@ -237,7 +238,7 @@ def _group_of(entity: int) -> str:
 
 @contextlib.contextmanager
 def _native_stderr_muted() -> Iterator[None]:
-    """Send what C code writes to standard error to nowhere.
+    """Discard the output of C code to standard error.
 
     gmsh's wheels carry a PETSc of their own, which mistakes Open MPI 5 for two MPI libraries at once and says so, past
     gmsh's own settings. Meshing does not use it.
@@ -254,7 +255,7 @@ def _native_stderr_muted() -> Iterator[None]:
 
 
 def _elements(dimension: int, tag: int) -> np.ndarray:
-    """The elements of a physical group as sorted corner nodes, each once: copies of an element are the same."""
+    """Return the elements of a physical group as sorted corner nodes, each once: copies of an element are the same."""
     found = []
     for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
         for kind, _, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):

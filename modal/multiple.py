@@ -9,12 +9,12 @@ import numpy as np
 from vanedamp.modal.eigen import Modes, shape_signs
 from vanedamp.modal.matrices import SystemMatrices
 
-# below this share of what its size allows, a component along a guide is round-off
+# below this share of its largest possible value, a component along a guide is round-off
 _NOISE = 1e-6
 
 
 def turned(modes: Modes, matrices: SystemMatrices, guides: Sequence[np.ndarray], tolerance: float) -> Modes:
-    """The modes, those of (nearly) one frequency turned into the directions of functionals.
+    """Return the modes, those of (nearly) one frequency turned into the directions of functionals.
 
     guides     functionals (N,) in order of precedence. Of the modes of a group, the first takes all that the group has
                of the first guide, and the others none of it; the second takes the rest of the second guide, and so on
@@ -22,7 +22,7 @@ def turned(modes: Modes, matrices: SystemMatrices, guides: Sequence[np.ndarray],
                are exact in the structure by its own error
 
     Turned shapes stay mass-orthonormal; their frequencies are Rayleigh quotients, within the group's, so that the order
-    by frequency holds within the tolerance alone. Their residuals show what distance the group's frequencies had. Rigid
+    by frequency holds within the tolerance only. Their residuals show the distance of the group's frequencies. Rigid
     motions, at zero frequency, are left as they are.
     """
     shapes, eigenvalues = modes.shapes.copy(), modes.angular_frequencies**2
@@ -45,7 +45,7 @@ def turned(modes: Modes, matrices: SystemMatrices, guides: Sequence[np.ndarray],
 
 
 def rivals(modes: Modes, mode: int, functional: np.ndarray, within: float, share: float) -> np.ndarray:
-    """Indices of the other modes that move a functional (N,) beside a mode.
+    """Return the indices of the other modes near a mode in frequency that move a functional (N,), too.
 
     Those whose frequency lies within a relative distance of the mode's, and whose modal compliance at the functional,
     (w^T phi)^2, is at least a share of the mode's.
@@ -57,7 +57,7 @@ def rivals(modes: Modes, mode: int, functional: np.ndarray, within: float, share
 
 
 def _groups(frequencies: np.ndarray, tolerance: float) -> list[slice]:
-    """Runs of at least two frequencies, each run within the tolerance of its first one."""
+    """Return runs of at least two frequencies, each run within the tolerance of its first one."""
     found, start = [], 0
     while start < len(frequencies):
         stop = start + 1
@@ -70,18 +70,18 @@ def _groups(frequencies: np.ndarray, tolerance: float) -> list[slice]:
 
 
 def _basis(shapes: np.ndarray, guides: Sequence[np.ndarray]) -> np.ndarray:
-    """(k, k) orthogonal, rows along the guides' components in the span of shapes (k, N), then along the shapes."""
+    """Return an orthogonal matrix (k, k): rows along the guides' components in the span of shapes (k, N), then more."""
     size = np.abs(shapes).max()
     components = [shapes @ guide for guide in guides]
-    told = [
+    directions = [
         seen / np.linalg.norm(seen)
         for seen, guide in zip(components, guides, strict=True)
         if np.linalg.norm(seen) > _NOISE * size * np.abs(guide).sum()
     ]
     rows: list[np.ndarray] = []
-    for vector in (*told, *np.eye(len(shapes))):
+    for vector in (*directions, *np.eye(len(shapes))):
         rest = vector - sum((row @ vector) * row for row in rows)
-        # twice: what is left of a vector close to the others' span is orthogonal to them to round-off
+        # twice: the rest of a vector close to the others' span is then orthogonal to them to round-off
         rest = rest - sum((row @ rest) * row for row in rows)
         if len(rows) < len(shapes) and np.linalg.norm(rest) > _NOISE:
             rows.append(rest / np.linalg.norm(rest))

@@ -1,4 +1,4 @@
-"""Bulk data of Nastran (.bdf and the like): what meshio passes over, the coordinate systems of the grid points.
+"""Bulk data of Nastran (.bdf and the like), with the coordinate systems of the grid points, which meshio ignores.
 
 The systems of displacements (CD) and of material axes say nothing about the mesh: supports and materials are the
 case's, in global axes.
@@ -35,18 +35,18 @@ class _Card(NamedTuple):
     fields: list[str]
 
     def number(self, place: int) -> float:
-        """A real field, as 1.5, 1.5+3 or 1.5D3; empty: zero."""
+        """Return a real field, such as 1.5, 1.5+3 or 1.5D3; empty: zero."""
         word = self.fields[place - 1] if place <= len(self.fields) else ""
         return float(re.sub(r"(?<=[\d.])[eEdD]?([+-]\d+)$", r"e\1", re.sub("[dD]", "e", word)) or 0.0)
 
     def whole(self, place: int) -> int:
-        """A whole field; empty: zero."""
+        """Return a whole field; empty: zero."""
         word = self.fields[place - 1] if place <= len(self.fields) else ""
         return int(word or 0)
 
 
 def read(path: Path) -> Any:
-    """The mesh as a meshio.Mesh, its points in global coordinates. Raises MeshError with file and line."""
+    """Return the mesh as a meshio.Mesh, its points in global coordinates. Raises MeshError with file and line."""
     cards = list(_cards(path))
     for card in cards:
         for why, names in _REFUSED.items():
@@ -110,11 +110,11 @@ class _Systems:
 
     @property
     def named(self) -> bool:
-        """Whether any grid point is given in a system of its own."""
+        """True if any grid point is given in a coordinate system that the file defines."""
         return bool(self.default) or any(len(card.fields) > 1 and card.fields[1] for card in self.grids.values())
 
     def place(self, label: int) -> np.ndarray:
-        """(3,) global coordinates of a grid point."""
+        """Return the global coordinates (3,) of a grid point."""
         if label not in self.places:
             card = self.grids[label]
             try:
@@ -126,7 +126,7 @@ class _Systems:
         return self.places[label]
 
     def frame(self, label: int, asked: _Card) -> Frame:
-        """A coordinate system in global terms."""
+        """Return a coordinate system in global terms."""
         if label in self.frames:
             return self.frames[label]
         if label not in self.given:
@@ -158,7 +158,7 @@ class _Systems:
 
 
 def _cards(path: Path) -> Iterator[_Card]:
-    """The entries of the bulk data with their continuations: free, small and large fields."""
+    """Yield the entries of the bulk data with their continuations: free, small and large fields."""
     card: _Card | None = None
     bulk = False
     for number, line in enumerate(path.read_text(errors="replace").splitlines(), start=1):
@@ -181,7 +181,7 @@ def _cards(path: Path) -> Iterator[_Card]:
 
 
 def _fields(text: str) -> tuple[str, list[str]]:
-    """The name and the data of one line, without its continuation marks."""
+    """Return the name and the data of one line, without its continuation marks."""
     width, count = (16, 4) if "*" in text[:8] else (8, 8)
     if "," in text:
         name, *words = (word.strip() for word in text.split(","))

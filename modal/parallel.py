@@ -1,7 +1,7 @@
 """MPI ranks that help the first one: rank 0 runs the program, the others wait for tasks and take part in them.
 
 Under `mpirun -n K` all ranks share the factorisations, which take most of the time and memory; everything else, files
-included, is rank 0's alone.
+included, is up to rank 0 only.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _PATIENCE = 2e-3  # s; a blocking receive would keep the core busy that rank 0 c
 
 @contextlib.contextmanager
 def ranks(task: Callable[..., Any]) -> Iterator[bool]:
-    """True on rank 0; on the others False, after they have served: they call `task` as rank 0 bids by `invite`.
+    """Yield True on rank 0, and False on the others once they have served: `invite` on rank 0 calls their `task`.
 
     The helpers are released when rank 0 leaves the block. An exception there ends all ranks, as one of them may be
     waiting in the middle of a task.
@@ -52,7 +52,7 @@ def invite(*arguments: Any) -> None:
 
 
 def rows(matrix: sparse.csr_array | None) -> tuple[int, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """The size of rank 0's square matrix (None elsewhere), and this rank's share of its rows: CSR arrays."""
+    """Return the size of rank 0's square matrix (None elsewhere), and this rank's share of its rows: CSR arrays."""
     size = COMM.bcast(None if matrix is None else matrix.shape[0], root=0)
     edges = np.linspace(0, size, COMM.size + 1).astype(int)
     if matrix is not None:
@@ -72,7 +72,7 @@ def rows(matrix: sparse.csr_array | None) -> tuple[int, tuple[np.ndarray, np.nda
 
 
 def gathered(vectors: np.ndarray) -> np.ndarray:
-    """(count, n) on rank 0 from every rank's (count, share of n); on the others their own share."""
+    """Return (count, n) on rank 0 from every rank's (count, share of n); on the others their own share."""
     shares = COMM.gather(vectors, root=0)
     return vectors if shares is None else np.hstack(shares)
 

@@ -6,30 +6,31 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
 
 NOTABLE_SHARE = 0.1
 
 
-class ParticipationError(ValueError):
-    """No mode moves in the direction asked for; the message tells what the modes do."""
+class ParticipationError(VanedampError):
+    """No mode moves in the direction asked for; the message says how the modes move."""
 
 
 def participation_factors(modes: Modes, matrices: SystemMatrices) -> np.ndarray:
-    """(m, 3) kg^(1/2), phi^T M r of mass-normalised modes along x, y and z, r the translation of the free DOFs."""
+    """Return phi^T M r (m, 3), kg^(1/2), of mass-normalised modes; r: translations of the free DOFs along x, y, z."""
     return modes.shapes @ (matrices.mass @ matrices.movable_translations())
 
 
 def effective_masses(modes: Modes, matrices: SystemMatrices) -> np.ndarray:
-    """(m, 3) kg, (phi^T M r)^2 / (phi^T M phi); over all modes they sum to `matrices.movable_mass`."""
+    """Return (phi^T M r)^2 / (phi^T M phi) (m, 3), kg; over all modes they sum to `matrices.movable_mass`."""
     return participation_factors(modes, matrices) ** 2
 
 
 def effective_mass_shares(
     modes: Modes, matrices: SystemMatrices, direction: Sequence[float] | np.ndarray
 ) -> np.ndarray:
-    """(m,) effective mass of every mode along one direction, as a share of the mass that can move along it."""
+    """Return the effective mass (m,) of every mode along a direction, as a share of the mass that can move along it."""
     translation = matrices.movable_translations() @ unit_direction(direction)
     inertia = matrices.mass @ translation
     return (modes.shapes @ inertia) ** 2 / (translation @ inertia)
@@ -38,7 +39,7 @@ def effective_mass_shares(
 def first_bending(
     modes: Modes, matrices: SystemMatrices, direction: Sequence[float] | np.ndarray, least_share: float = NOTABLE_SHARE
 ) -> int:
-    """Index of the mode with the largest effective mass along a direction, the lowest one of equals.
+    """Return the index of the mode with the largest effective mass along a direction, the lowest one of equals.
 
     In the first bending of a held cluster or beam all parts move the same way, so no other mode carries as much mass
     along. Torsion, or bending about the other axis, may lie lower; it carries little mass in this direction and is
@@ -53,5 +54,5 @@ def first_bending(
             f"direction {np.asarray(direction).tolist()}: no mode carries {least_share:.0%} of the movable mass "
             f"along it ({listed}); compute more modes or check the direction"
         )
-    # symmetric structures have pairs whose shares differ by round-off alone
+    # symmetric structures have pairs whose shares differ by round-off only
     return int(np.flatnonzero(shares > (1.0 - 1e-6) * largest)[0])

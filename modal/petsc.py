@@ -17,6 +17,7 @@ from petsc4py import PETSc
 from scipy import sparse
 from slepc4py import SLEPc
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal import parallel
 
 # a round trip through a well-posed finite element matrix loses 5 to 8 digits, through a singular one all of them
@@ -26,7 +27,7 @@ _FOR_INERTIA = {24: 1, 13: 1}
 _PREFIX = "vanedamp_"
 
 
-class SolverError(ValueError):
+class SolverError(VanedampError):
     """A matrix that cannot be factorised, or an eigenvalue problem that does not converge."""
 
 
@@ -55,7 +56,7 @@ class Factorization:
             raise
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution, of the shape (n,) or (n, k) of the right-hand side."""
+        """Return the solution, of the shape (n,) or (n, k) of the right-hand side."""
         values = np.asarray(rhs, dtype=float)
         if values.ndim not in (1, 2) or values.shape[0] != self.size:
             raise SolverError(f"rhs: expected shape ({self.size},) or ({self.size}, k), not {values.shape}")
@@ -98,21 +99,21 @@ class Factorization:
 
 
 def negative_eigenvalues(matrix: sparse.csr_array) -> int:
-    """Number of negative eigenvalues of a symmetric matrix, from its factors (Sylvester's law of inertia)."""
-    found: int = _together("inertia", (matrix,))
+    """Return the number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia."""
+    found: int = _on_all_ranks("inertia", (matrix,))
     return found
 
 
 def nearest_eigenpairs(
     stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float, direct: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues (count,) ascending and vectors (count, n) of K x = lambda M x nearest to a shift.
+    """Return eigenvalues (count,) ascending and vectors (count, n) of K x = lambda M x nearest to a shift.
 
     Krylov-Schur with shift and invert (Stewart 2001, SIAM J. Matrix Anal. Appl. 23). direct: PETSc's name of the solver
     that factorises; left out, CHOLMOD where the shift is below the spectrum and the matrix on one rank, otherwise
     MUMPS. Raises SolverError when fewer converge than were asked for.
     """
-    values, vectors = _together("nearest", (stiffness, mass), count, shift, direct)
+    values, vectors = _on_all_ranks("nearest", (stiffness, mass), count, shift, direct)
     nearest = np.argsort(np.abs(values - shift), kind="stable")[:count]
     order = nearest[np.argsort(values[nearest], kind="stable")]
     return values[order], vectors[order]
@@ -121,36 +122,36 @@ def nearest_eigenpairs(
 def interval_eigenpairs(
     stiffness: sparse.csr_array, mass: sparse.csr_array, lower: float, upper: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """All eigenvalues (m,) ascending in an interval and their vectors (m, n), by spectrum slicing.
+    """Return all eigenvalues (m,) ascending in an interval and their vectors (m, n), by spectrum slicing.
 
-    Shifts walk through the interval, and inertia counts tell how many eigenvalues lie between two of them (Campos and
+    Shifts walk through the interval, and inertia counts give the number of eigenvalues between two of them (Campos and
     Roman 2012, Numer. Algorithms 60). Raises SolverError.
     """
-    values, vectors = _together("interval", (stiffness, mass), lower, upper)
+    values, vectors = _on_all_ranks("interval", (stiffness, mass), lower, upper)
     order = np.argsort(values, kind="stable")
     return values[order], vectors[order]
 
 
 @contextlib.contextmanager
 def ranks() -> Iterator[bool]:
-    """True on MPI's rank 0, which runs the program; the other ranks help with its factorisations, then see False."""
-    with parallel.ranks(_help) as first:
+    """Yield True on MPI's rank 0, which runs the program, and False on the others once they have helped it."""
+    with parallel.ranks(_assist) as first:
         yield first
 
 
-def _together(task: str, matrices: tuple[sparse.csr_array, ...], *arguments: Any) -> Any:
-    """A task on all ranks with the matrices of rank 0."""
+def _on_all_ranks(task: str, matrices: tuple[sparse.csr_array, ...], *arguments: Any) -> Any:
+    """Run a task on all ranks with the matrices of rank 0."""
     parallel.invite(task, len(matrices), arguments)
-    return _take_part(task, matrices, arguments)
+    return _run_task(task, matrices, arguments)
 
 
-def _help(task: str, matrices: int, arguments: tuple[Any, ...]) -> None:
-    # what fails, fails on rank 0 too, and is told there
+def _assist(task: str, matrices: int, arguments: tuple[Any, ...]) -> None:
+    # a failure occurs on rank 0 too, which reports it
     with contextlib.suppress(SolverError, PETSc.Error):
-        _take_part(task, (None,) * matrices, arguments)
+        _run_task(task, (None,) * matrices, arguments)
 
 
-def _take_part(task: str, matrices: tuple[sparse.csr_array | None, ...], arguments: tuple[Any, ...]) -> Any:
+def _run_task(task: str, matrices: tuple[sparse.csr_array | None, ...], arguments: tuple[Any, ...]) -> Any:
     with contextlib.ExitStack() as stack:
         operators = [stack.enter_context(_petsc(_distributed(matrix))) for matrix in matrices]
         return _TASKS[task](stack, operators, *arguments)
@@ -211,6 +212,11 @@ _TASKS: dict[str, Callable[..., Any]] = {"inertia": _inertia, "nearest": _neares
 def _eigenproblem(stack: contextlib.ExitStack, operators: list[Any]) -> Any:
     eps = stack.enter_context(_petsc(SLEPc.EPS().create(parallel.COMM)))
     eps.setOptionsPrefix(_PREFIX)
+    # the solver makes its factors itself, so that MUMPS takes its controls from the options of that prefix only
+    options = PETSc.Options(f"{_PREFIX}st_mat_mumps_icntl_")
+    for number, value in _FOR_INERTIA.items():
+        options[str(number)] = value
+        stack.callback(options.delValue, str(number))
     eps.setOperators(*operators)
     eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     eps.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
@@ -227,7 +233,7 @@ def _solve(eps: Any) -> None:
 
 
 def _eigenpairs(stack: contextlib.ExitStack, eps: Any, operator: Any) -> tuple[np.ndarray, np.ndarray]:
-    """All converged values and, on rank 0, vectors."""
+    """Return all converged values and, on rank 0, vectors."""
     vector = stack.enter_context(_petsc(operator.createVecRight()))
     values, vectors = np.empty(eps.getConverged()), np.empty((eps.getConverged(), vector.getLocalSize()))
     for index in range(len(values)):
@@ -245,7 +251,7 @@ def _petsc(created: Any) -> Iterator[Any]:
 
 
 def _petsc_matrix(matrix: sparse.csr_array) -> Any:
-    """A PETSc matrix of this rank alone from a symmetric CSR one; the caller destroys it."""
+    """Return a PETSc matrix on this rank only from a symmetric CSR one; the caller destroys it."""
     csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), np.array(matrix.data))
     created = PETSc.Mat().createAIJ(size=matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
     created.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -253,7 +259,7 @@ def _petsc_matrix(matrix: sparse.csr_array) -> Any:
 
 
 def _distributed(matrix: sparse.csr_array | None) -> Any:
-    """A PETSc matrix over all ranks from rank 0's symmetric CSR one; the caller destroys it."""
+    """Return a PETSc matrix over all ranks from rank 0's symmetric CSR one; the caller destroys it."""
     size, csr = parallel.rows(matrix)
     local = (len(csr[0]) - 1, size)
     created = PETSc.Mat().createAIJ(size=(local, local), csr=csr, comm=parallel.COMM)
@@ -270,7 +276,7 @@ def _set_direct(ksp: Any, direct: str = "mumps") -> None:
 
 
 def _configure_direct(ksp: Any) -> None:
-    """As `_set_direct`, with what inertia counts need."""
+    """Make a Krylov solver a direct one that can count negative eigenvalues."""
     _set_direct(ksp)
     ksp.getPC().setFactorSetUpSolverType()
     for number, value in _FOR_INERTIA.items():
@@ -278,10 +284,6 @@ def _configure_direct(ksp: Any) -> None:
 
 
 def _complaint(factor: Any) -> str:
-    """What MUMPS says about a failure."""
+    """Return MUMPS' status after a failure, in words."""
     status, detail = factor.getMumpsInfog(1), factor.getMumpsInfog(2)
     return f"status {status} ({detail})" + (", not enough memory" if status in (-9, -13) else "")
-
-
-for _number, _value in _FOR_INERTIA.items():
-    PETSc.Options()[f"{_PREFIX}st_mat_mumps_icntl_{_number}"] = _value

@@ -10,9 +10,9 @@ from scipy import linalg, special
 from scipy.optimize import least_squares
 
 _RELOCATIONS = 30
-# a fit may try bandwidths down to this share of the least line spacing; what ends there is refused for its bandwidth
+# a fit may try bandwidths down to this share of the least line spacing; a pole that ends there is refused
 _NARROWEST = 1e-3
-# share of the responses' norm that round-off of the fit stays below; what is smaller counts as noise
+# share of the responses' norm that round-off of the fit stays below; smaller misfits count as noise
 _ROUND_OFF = 1e-12
 # poles that noise can try independently for each frequency line: see `Rational.chance`
 _TRIALS = 10
@@ -41,13 +41,13 @@ class Rational:
     power: int
 
     def best(self, count: int) -> Fit:
-        """The fit with `count` poles, from wherever vector fitting finds them."""
+        """Return the fit with `count` poles, from wherever vector fitting finds them."""
         return self.fit(self.relocated(count))
 
     def fit(self, start: np.ndarray) -> Fit:
-        """The fit next to the poles (m,) of a start.
+        """Return the fit next to the poles (m,) of a start.
 
-        Bounds keep the poles to what the lines can tell: without them noise pulls a pole onto one line, where its
+        Bounds keep the poles where the lines can resolve them: without them noise pulls a pole onto one line, where its
         decay underflows or overflows and the answer hangs on the last bit.
         """
         if start.size == 0:
@@ -64,17 +64,17 @@ class Rational:
         return Fit(_unpacked(found.x), float(found.fun @ found.fun), found.jac)
 
     def without_one(self, fit: Fit) -> Fit:
-        """The best fit with one pole less: each pole left out in turn, and poles found anew."""
+        """Return the best fit with one pole less: each pole left out in turn, and a new set by vector fitting."""
         count = fit.poles.size
         starts = [np.delete(fit.poles, index) for index in range(count)]
         return min((self.fit(start) for start in [*starts, self.relocated(count - 1)]), key=lambda other: other.misfit)
 
     def chance(self, fit: Fit) -> float:
-        """Bound of the probability that noise alone lets the last pole lower the misfit as much as it does.
+        """Bound the probability that noise by itself lets the last pole lower the misfit as much as it does.
 
         White noise gives a pole at a fixed place the share Beta(k, (N - p)/2) of the misfit that was left without it:
         2 k coefficients, N values, p parameters in all. Complex values count as one number each, not two, so that the
-        bound also holds for noise in one of their parts alone. A fit chooses the place (Davies 1987; Adler and Taylor
+        bound also holds for noise in one of their parts only. A fit chooses the place (Davies 1987; Adler and Taylor
         2007): the expected number of places that reach a level u is that of one place times the area of the half
         plane of poles in the metric of their correlation. Poles f + i b/2 correlate like Cauchy kernels, metric
         |df|^2/b^2, so bands of n lines and bandwidths from half a line spacing have the area n and the edge 2 n: 6 to
@@ -87,14 +87,14 @@ class Rational:
         return float(_TRIALS * lines * special.betainc(max(freedom, 1) / 4, responses, min(left, 1.0)))
 
     def solve(self, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Best fit (k, n) and residues (k, m) for given poles."""
+        """Return the best fit (k, n) and residues (k, m) for given poles."""
         functions = self._basis(poles)
         coefficients = np.linalg.lstsq(_real(functions), self._target, rcond=None)[0]
         count = len(poles)
         return (functions @ coefficients).T, (coefficients[:count] + 1j * coefficients[count : 2 * count]).T
 
     def relocated(self, count: int) -> np.ndarray:
-        """(count,) poles by vector fitting, from lightly damped ones spread over the band."""
+        """Return poles (count,) by vector fitting, from lightly damped ones spread over the band."""
         low, high = np.abs(self.s[0]), np.abs(self.s[-1])
         poles: np.ndarray = (-0.01 + 1j) * (low + (high - low) * (np.arange(count) + 0.5) / max(count, 1))
         for _ in range(_RELOCATIONS if count else 0):
@@ -106,7 +106,7 @@ class Rational:
         return _real(self.values.T)
 
     def _basis(self, poles: np.ndarray, terms: bool = True) -> np.ndarray:
-        """(n, 2 m + 2) real coefficients' functions: two for every pair of poles, and the modes outside the band."""
+        """Return functions (n, 2 m + 2) of the real coefficients: two a pole pair, two for modes outside the band."""
         first, second = 1.0 / (self.s[:, None] - poles), 1.0 / (self.s[:, None] - poles.conj())
         columns = [first + second, 1j * (first - second)]
         if not terms:
@@ -117,7 +117,7 @@ class Rational:
         return functions
 
     def _projected(self, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(2 n, r) orthonormal span of the functions, and the coefficients (2 m + 2, k) of the best fit."""
+        """Return the orthonormal span (2 n, r) of the functions, and the coefficients (2 m + 2, k) of the best fit."""
         functions = _real(self._basis(poles))
         size = np.linalg.norm(functions, axis=0)
         span, values, right = np.linalg.svd(functions / size, full_matrices=False)
@@ -130,7 +130,7 @@ class Rational:
         return float(np.linalg.norm(span @ (span.T @ self._target) - self._target) ** 2)
 
     def _derived(self, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(2 n k,) the best fit's error and its Jacobian (Kaufman 1975: the residues follow the poles)."""
+        """Return the best fit's error (2 n k,) and its Jacobian (Kaufman 1975: the residues follow the poles)."""
         poles = _unpacked(parameters)
         span, coefficients = self._projected(poles)
         error = span @ (span.T @ self._target) - self._target
@@ -148,11 +148,11 @@ class Rational:
         return error.ravel(), (flat - span @ (span.T @ flat)).reshape(error.size, 2 * count)
 
     def _relocate(self, poles: np.ndarray) -> np.ndarray:
-        """Zeros of the denominator that makes the fit linear; flipped into the left half plane."""
+        """Return the zeros of the denominator that makes the fit linear, flipped into the left half plane."""
         own, common, count = self._basis(poles), self._basis(poles, terms=False), len(poles)
         blocks, targets = [], []
         for values in self.values:
-            # what the response's own coefficients cannot fit is left to the common denominator
+            # the common denominator fits the rest that the response's own coefficients leave
             rows = _real(np.concatenate([own, -values[:, None] * common], axis=1))
             triangle = linalg.qr(np.column_stack([rows, _real(values[:, None])]), mode="r")[0][: rows.shape[1] + 1]
             width = own.shape[1]
@@ -171,7 +171,7 @@ class Rational:
 
 
 def _real(values: np.ndarray) -> np.ndarray:
-    """Real over imaginary parts."""
+    """Return real over imaginary parts."""
     return np.concatenate([values.real, values.imag])
 
 

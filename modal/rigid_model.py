@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal.eigen import Modes
 
 FATIGUE_SHARE = 0.7
 
 
-class CalibrationError(ValueError):
+class CalibrationError(VanedampError):
     """A mode or a strength that gives no rigid model; the message names the quantity and the remedy."""
 
 
@@ -39,7 +40,7 @@ class RigidModel:
 
 
 def rigid_model(modes: Modes, mode: int, functional: np.ndarray, at: str, damping_ratio: float) -> RigidModel:
-    """Rigid model of a mode at the interface coordinate u = functional^T q, with functional (N,).
+    """Return the rigid model of a mode at the interface coordinate u = functional^T q, with functional (N,).
 
     m = phi^T M phi / (w^T phi)^2, c = w_1^2 m, d = 2 zeta w_1 m. Raises CalibrationError when the mode does not move
     the interface coordinate, or has no frequency.
@@ -71,7 +72,7 @@ def fatigue_amplitude(
     fatigue_strength: float,
     share: float = FATIGUE_SHARE,
 ) -> float:
-    """Displacement amplitude, m, of an interface coordinate at which a mode's stress reaches a share of the strength.
+    """Return the displacement amplitude, m, of an interface coordinate at a share of a mode's fatigue strength.
 
     peak_stress       Pa, largest von Mises stress of the mode's shape as it is stored (Solid.von_mises(shape).max()).
                       Sharp corners are singular points of elasticity: their stress grows with mesh refinement

@@ -31,12 +31,12 @@ class HotSpot:
 def hot_spot(
     solid: Solid, displacement: np.ndarray, strengths: Mapping[str, float], within: Collection[str] | None = None
 ) -> HotSpot:
-    """The corner of a cell with the largest ratio of von Mises stress to fatigue strength.
+    """Return the corner of a cell with the largest ratio of von Mises stress to fatigue strength.
 
     displacement  (N,)
     strengths     Pa, by volume group; groups that are not named do not count
     within        volume groups to look in; left out: all of `strengths`. Sharp corners at supports and where the mesh
-                  has no fillets are singular points of elasticity: their stress grows with refinement, so look beside
+                  has no fillets are singular points of elasticity: their stress grows with refinement, leave these out
 
     Raises ElasticityError for a group that the mesh does not have, a strength that is no positive number, no strain.
     """

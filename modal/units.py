@@ -1,7 +1,7 @@
-"""Units by what they make of a structure: sizes, masses, sound speeds and frequencies that no part has.
+"""Slips of units, found by their effect on a structure: sizes, masses, sound speeds and frequencies that no part has.
 
-The bounds are wide: from a small blade to a machine part of some metres, from rubber to ceramics. What lies outside is
-a slip of units, as a rule: millimetres, tonnes and MPa belong together; here it is metres, kilograms and Pa.
+The bounds are wide: from a small blade to a machine part of some metres, from rubber to ceramics. Values outside are
+slips of units, as a rule: millimetres, tonnes and MPa belong together; here it is metres, kilograms and Pa.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-#: m, kg, m/s and Hz: largest extent, mass, sqrt(E/rho) and first natural frequency of what is plausible
+#: m, kg, m/s and Hz: largest extent, mass, sqrt(E/rho) and first natural frequency of a plausible structure
 SIZES, MASSES, SPEEDS, FREQUENCIES = (3e-3, 3.0), (1e-4, 1e4), (50.0, 2e4), (1.0, 1e6)
 #: no solid has a modulus (Pa), density (kg/m^3) or sound speed (m/s) outside these
 _MODULI, _DENSITIES, _FASTEST, _SLOWEST = (1.0, 2e12), (0.1, 3e4), 1e5, 1.0
@@ -18,7 +18,7 @@ _MODEL_MASSES = (1e-3, 1e5)
 
 
 def absurdity(young: float, density: float) -> str | None:
-    """What is impossible about a solid of a Young's modulus (Pa) and a density (kg/m^3); None where nothing is."""
+    """Explain why no solid has this Young's modulus (Pa) and density (kg/m^3); None where one may."""
     speed = math.sqrt(young / density)
     if not _DENSITIES[0] <= density <= _DENSITIES[1]:
         slip = f"; {1e12 * density:.4g} kg/m^3, if this is in t/mm^3" if 1e-11 < density < 1e-7 else ""
@@ -37,7 +37,7 @@ def absurdity(young: float, density: float) -> str | None:
 def doubts(
     materials: Mapping[str, tuple[float, float]], size: float, mass: float, first_hz: float | None
 ) -> tuple[str, ...]:
-    """What is implausible about a structure, with the slip of units that it looks like; one line, or none.
+    """Explain why a structure is implausible, with the slip of units that it looks like; one line, or none.
 
     materials  group -> Young's modulus (Pa) and density (kg/m^3)
     size       m, largest extent along an axis
@@ -63,7 +63,7 @@ def doubts(
 
 
 def model_doubts(effective_mass: float, first_hz: float) -> tuple[str, ...]:
-    """The same of a reduced model: the smallest effective mass (kg) of its first straining mode at the interface."""
+    """Explain the same of a reduced model, from the smallest effective mass (kg) of its first straining mode."""
     found = []
     if math.isfinite(effective_mass) and _outside(effective_mass, _MODEL_MASSES):
         slip = "; of a model in t and mm, set matrices.mass_scale = 1e3" if effective_mass < _MODEL_MASSES[0] else ""

@@ -1,4 +1,4 @@
-"""How many modes a reduction needs: the models of a basis with the estimate of each, out of one reduction.
+"""The number of modes that a reduction needs: all models of a basis with their error estimates, from one reduction.
 
 The estimate is that of rom.error_estimate: the residual's response in the basis with two more blocks of quasi-static
 modes.
@@ -18,7 +18,7 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.reduction import BASES, Factorize, reduce, superlu
 from vanedamp.rom.truncation import massless, truncated
 
-#: blocks of quasi-static coordinates beyond those of a model that its estimate needs
+#: blocks of quasi-static coordinates that the estimate of a model needs in addition to its own
 BLOCKS = 2
 
 
@@ -30,7 +30,7 @@ def rich_model(
     factorize: Factorize = superlu,
     **others: Any,
 ) -> ReducedModel:
-    """The reduction that has every model of a basis up to so many modes in it, and what their estimates need.
+    """Reduce a structure so far that every model of a basis up to `modes`, and its estimate, can be cut from it.
 
     Craig-Bampton models are those with one block of quasi-static modes. Other arguments: those of rom.reduction.reduce.
     """
@@ -41,7 +41,7 @@ def rich_model(
 
 
 def basis_model(rich: ReducedModel, basis: str, modes: int) -> ReducedModel:
-    """The model of a basis with so many modes, out of `rich_model`."""
+    """Return the model of a basis with `modes` modes, cut from `rich_model`."""
     if basis in ("macneal", "massless"):
         return massless(rich, modes)
     return truncated(rich, modes, 0 if basis == "truncated" else 1)
@@ -50,7 +50,7 @@ def basis_model(rich: ReducedModel, basis: str, modes: int) -> ReducedModel:
 def basis_ladder(
     rich: ReducedModel, basis: str, frequencies_hz: np.ndarray, labels: Sequence[str] | None = None
 ) -> list[Rung]:
-    """All models of a basis out of `rich_model`, each against that."""
+    """Return the error of every model of a basis that `rich_model` holds, against the latter."""
     least = 0 if basis == "craig-bampton" else max(rich.rigid_modes, int(basis != "rubin"))
     rungs = []
     for modes in range(least, rich.modes + 1):

@@ -1,10 +1,10 @@
-"""A body meets a wall of the structure once: what the modes that a model lacks change in the pulse.
+"""Pulse of one collision of a body with a wall of the structure, and its error due to omitted modes.
 
 The modes are at rest and the body comes with unit speed. While they touch, body, contact and modes are one linear
-system, and the pulse is a sum of exponentials until the contact's force vanishes. What the excited motion feels of it
-is its Fourier transform at the excitation frequency: the impulse, and with its phase the moment at which it acts.
+system, and the pulse is a sum of exponentials until the contact's force vanishes. The excited motion responds to
+its Fourier transform at the excitation frequency: the impulse, and with its phase the moment at which it acts.
 
-Needs numpy and scipy alone.
+Needs numpy and scipy only.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-# half periods of the pair alone after which a contact counts as ended, and looks at its force in each of them
+# half periods of body and wall on the contact after which it counts as ended, and samples of its force in each
 _LONGEST, _LOOKS = 6, 300
 
 
@@ -44,7 +44,7 @@ class Pulse(NamedTuple):
 
 
 def pulse(squares: np.ndarray, row: np.ndarray, collision: Collision, frequency_hz: float) -> Pulse:
-    """The pulse at a wall with modes of squared angular frequencies (n,) and the functional (n,), mass-normalised.
+    """Return the pulse at a wall with modes of squared angular frequencies (n,) and mass-normalised functional (n,).
 
     The transform is taken at `frequency_hz`, from the moment of touching; damping of the modes is left out.
     """
@@ -73,13 +73,8 @@ def pulse(squares: np.ndarray, row: np.ndarray, collision: Collision, frequency_
     return Pulse(complex(force @ spans), end)
 
 
-def contact_frequency(first: float, collision: Collision) -> float:
-    """Hz, of the body on its contact with a wall of first modal mass 1 / first^2, first its entry of the functional."""
-    return math.sqrt(collision.stiffness * (first**2 + 1.0 / collision.mass)) / (2.0 * math.pi)
-
-
 def pulse_spectrum(ratio: np.ndarray | float) -> np.ndarray:
-    """|Fourier transform| of a half sine of unit impulse at ratio = omega / omega_c: cos(pi r / 2) / (1 - r^2)."""
+    """Return |Fourier transform| of a half sine of unit impulse at r = omega / omega_c: cos(pi r / 2) / (1 - r^2)."""
     r = np.asarray(ratio, dtype=float)
     near = np.abs(r - 1.0) < 1e-6
     safe = np.where(near, 0.0, r)
@@ -87,7 +82,7 @@ def pulse_spectrum(ratio: np.ndarray | float) -> np.ndarray:
 
 
 def share_above(squares: np.ndarray, row: np.ndarray, modes: int, collision: Collision) -> float:
-    """Share of an elastic collision's energy that modes beyond the first `modes` of a wall would take.
+    """Return the share of an elastic collision's energy that modes beyond the first `modes` of a wall would take.
 
     A half sine of force at the contact frequency leaves mode j the energy (row_j p S(omega_j))^2 / 2, p the impulse at
     the mass of the first mode and S the pulse's spectrum; relative to that of the approach and of all modes but the

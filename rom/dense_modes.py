@@ -1,14 +1,13 @@
-"""Natural modes of small dense matrices, and what is made of them: modal damping, quasi-static blocks."""
+"""Natural modes of small dense matrices, the number of rigid motions among them, and modal damping."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy import linalg
 
-from vanedamp.rom.fields import ReducedModelError
+from vanedamp.modal.algebra import symmetric_part
+from vanedamp.rom.checks import ReducedModelError
 
-# share of its own that a quasi-static coordinate needs for the mass to stay well conditioned
-_OWN_SHARE = 1e-10
 # ratio of the lowest to the highest squared frequency below which round-off of the highest is felt in the lowest
 _WIDE = 1e-6
 # round-offs of the stiffness, for each coordinate, below which a squared frequency is none
@@ -16,7 +15,7 @@ _MARGIN = 20.0
 
 
 def spectrum(mass: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Squared angular frequencies, ascending, and mass-normalised shapes as columns. Raises ReducedModelError.
+    """Return squared angular frequencies, ascending, and mass-normalised shapes as columns. Raises ReducedModelError.
 
     The eigenvalues of (K, M) err by round-off of the highest one. Where that is felt in the lowest, the lower half of
     the scale is taken from (M, K) instead, as 1/omega^2, which errs by round-off of the lowest one.
@@ -27,7 +26,7 @@ def spectrum(mass: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.nd
         raise ReducedModelError("mass: not positive definite; drop coordinates without mass of their own") from error
     if squares[0] >= _WIDE * squares[-1]:
         return squares, shapes
-    # a stiffness that is singular within round-off is shifted by what (K, M) cannot tell from zero
+    # a stiffness that is singular within round-off is shifted by an amount that (K, M) cannot distinguish from zero
     for shift in (0.0, _MARGIN * len(squares) * np.finfo(float).eps * squares[-1]):
         try:
             inverse, flexible = linalg.eigh(mass, stiffness + shift * mass)
@@ -43,7 +42,7 @@ def spectrum(mass: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def rounding(stiffness: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-    """(m,) what the squared frequencies of mass-normalised shapes may change by when every entry of K is rounded.
+    """Return bounds (m,) of the change of squared frequencies when every entry of K is rounded.
 
     |phi|^T |K| |phi| eps / 2: first order perturbation by a componentwise backward error (Higham 2002, Accuracy and
     Stability of Numerical Algorithms, section 7.2). No units play a part, and neither do higher modes.
@@ -52,8 +51,8 @@ def rounding(stiffness: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * np.finfo(float).eps * own)
 
 
-def rigid_motions(stiffness: np.ndarray, squares: np.ndarray, shapes: np.ndarray) -> int:
-    """How many modes of `spectrum` are motions that no support holds: their stiffness is not to be told from round-off.
+def count_rigid_motions(stiffness: np.ndarray, squares: np.ndarray, shapes: np.ndarray) -> int:
+    """Count the modes of `spectrum` that no support holds: their stiffness lies within round-off of zero.
 
     Each of the n terms of its sums and each of the n steps of a factorisation rounds once.
     """
@@ -61,7 +60,7 @@ def rigid_motions(stiffness: np.ndarray, squares: np.ndarray, shapes: np.ndarray
 
 
 def modal_damping(mass: np.ndarray, stiffness: np.ndarray, ratio: float) -> np.ndarray:
-    """(n, n) C = M Phi diag(2 ratio omega) Phi^T M: the same damping ratio for every mode Phi of (K, M).
+    """Return C = M Phi diag(2 ratio omega) Phi^T M (n, n): the same damping ratio for every mode Phi of (K, M).
 
     Raises ReducedModelError for a ratio outside 0 <= ratio < 1 or a mass that is not positive definite.
     """
@@ -70,33 +69,10 @@ def modal_damping(mass: np.ndarray, stiffness: np.ndarray, ratio: float) -> np.n
     eigenvalues, shapes = spectrum(mass, stiffness)
     inertia = mass @ shapes
     damping = inertia * (2.0 * ratio * np.sqrt(np.maximum(eigenvalues, 0.0))) @ inertia.T
-    return halved(damping)
-
-
-def krylov(start: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, count: int) -> list[np.ndarray]:
-    """`count` blocks of the Krylov space of K^-1 M, M-orthonormal, without what the blocks before have."""
-    blocks: list[np.ndarray] = []
-    block = start
-    for _ in range(count):
-        norms = np.sqrt(np.einsum("ij,ij->j", block, mass @ block))
-        rest = block[:, norms > 0.0] / norms[norms > 0.0]
-        for known in [*blocks, *blocks]:  # twice is enough
-            rest = rest - known @ (known.T @ (mass @ rest))
-        values, vectors = np.linalg.eigh(rest.T @ (mass @ rest))
-        own = values > _OWN_SHARE
-        if not np.any(own):
-            break
-        blocks.append(rest @ (vectors[:, own] / np.sqrt(values[own])))
-        block = np.linalg.solve(stiffness, mass @ blocks[-1])
-    return blocks
+    return symmetric_part(damping)
 
 
 def check_elastic(rigid: int, modes: int) -> None:
     """Raise ReducedModelError if the lowest `modes` modes do not hold all the rigid motions, so that one is dropped."""
     if rigid > modes:
         raise ReducedModelError("modes: a rigid motion would be dropped, which has no static response; keep more modes")
-
-
-def halved(matrix: np.ndarray) -> np.ndarray:
-    """The symmetric part."""
-    return 0.5 * (matrix + matrix.T)

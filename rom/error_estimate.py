@@ -10,7 +10,7 @@ factors at hand, for as many solutions as the interface has coordinates each.
 Contact. Bodies act on the structure by pulses, so an error of the pulse at the excitation frequency
 (rom.contact_pulse) is one of the force that changes the response.
 
-Needs numpy and reduced models alone.
+Needs numpy and reduced models only.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.rom.contact_pulse import Collision, pulse, share_above
 from vanedamp.rom.dense_modes import spectrum
 from vanedamp.rom.reduced import ReducedModel
@@ -32,8 +33,8 @@ _WITHOUT_RESIDUAL: dict[str, Any] = {
 }  # fmt: skip
 
 
-class LadderError(ValueError):
-    """No model meets the tolerance, or the question is not one; the message tells what would help."""
+class LadderError(VanedampError):
+    """No model meets the tolerance, or the tolerance is out of range; the message names the remedy."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Rung:
 
     @property
     def error(self) -> float:
-        """The two together."""
+        """Sum of the errors of receptance and collision."""
         return self.receptance + self.collision
 
 
@@ -62,7 +63,7 @@ class Choice:
     """The smallest model within a tolerance, and why.
 
     rigid    error of the rigid model (the first mode with every interface coordinate moving as the response)
-    ladder   what was compared
+    ladder   the models compared
     sentence for people
     """
 
@@ -74,7 +75,7 @@ class Choice:
     met: bool = True
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data: `estimate` of the results."""
+        """Return plain data: `estimate` of the results."""
         return {
             **asdict(self.chosen), "error": self.chosen.error, "tolerance": self.tolerance, "met": self.met,
             "rigid": self.rigid, "sentence": self.sentence, "ladder": [asdict(rung) for rung in self.ladder],
@@ -88,7 +89,7 @@ def frf_errors(
     labels: Sequence[str] | None = None,
     forces: Sequence[str] | None = None,
 ) -> np.ndarray:
-    """(f,) estimated error of a model's receptance matrix (Frobenius norm), relative.
+    """Return the estimated relative error (f,) of a model's receptance matrix (Frobenius norm).
 
     richer: the same model with at least two blocks of quasi-static coordinates more. labels: the interface coordinates
     that count (default: all); forces: those at which forces act (default: the same).
@@ -107,7 +108,7 @@ def rigid_errors(
     labels: Sequence[str] | None = None,
     forces: Sequence[str] | None = None,
 ) -> np.ndarray:
-    """(f,) the same of the rigid model: the first natural mode, in which every coordinate moves as `at`."""
+    """Return the same (f,) of the rigid model: the first natural mode, in which every coordinate moves as `at`."""
     first = richer.projected(
         linalg.eigh(richer.stiffness, richer.mass, subset_by_index=[0, 0])[1],
         fixed_interface_modes=0, free_modes=1, blocks=(),
@@ -124,9 +125,9 @@ def natural_ladder(
     collisions: Callable[[ReducedModel], Sequence[Collision]] = lambda model: (),
     attached: bool = False,
 ) -> list[Rung]:
-    """Models of 1, 2, 3, ... natural modes of a model, with the errors of each against the whole, which is the last.
+    """Return the errors of models of 1, 2, 3, ... natural modes of a model against the whole, which is the last.
 
-    collisions: the contacts, which may depend on the model with so many modes, always in the same order; where a model
+    collisions: the contacts, which may depend on the model, always in the same order; where a model
     has none but others do, contact has no meaning on it, and it is left out. attached: with attachment modes.
     """
     squares, shapes = spectrum(richer.mass, richer.stiffness)
@@ -163,12 +164,12 @@ def _pulses(model: ReducedModel, collisions: Sequence[Collision], frequency_hz: 
 
 
 def _least(model: ReducedModel) -> int:
-    """The fewest natural modes of a model: one, or its rigid motions."""
+    """Return the fewest natural modes of a model: one, or its rigid motions."""
     return max(1, model.rigid_modes)
 
 
 def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
-    """The smallest rung from which on the error stays within the tolerance, or the best one if none does."""
+    """Return the smallest rung from which on the error stays within the tolerance, or the best one if none does."""
     if not 0.0 < tolerance < 1.0:
         raise LadderError(f"tolerance: expected a relative error between 0 and 1, not {tolerance}")
     errors = np.array([rung.error for rung in ladder])
@@ -185,8 +186,8 @@ def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
     return Choice(chosen, tolerance, rigid, tuple(ladder), sentence, bool(within.size))
 
 
-def grid(model: ReducedModel, low_hz: float, high_hz: float, points: int = 17) -> np.ndarray:
-    """Frequencies over a range, the resonances in it that have a height, and the edges of all half-power bands."""
+def frequency_grid(model: ReducedModel, low_hz: float, high_hz: float, points: int = 17) -> np.ndarray:
+    """Return frequencies over a range, the damped resonances in it, and the edges of all half-power bands."""
     natural, shapes = model.natural_frequencies_hz, model.natural[1]
     losses = np.einsum("ij,ik,kj->j", shapes, model.damping, shapes)
     within = (natural >= low_hz) & (natural <= high_hz)

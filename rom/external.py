@@ -1,7 +1,7 @@
 """Reduced models of other codes: small dense M, K (and C) from npz, Matrix Market or Nastran OP4 files.
 
-Coordinates without mass, such as boundary points that another code's reduction left without any, are condensed: the
-static flexibility that they have besides becomes the model's residual flexibility, a boundary without mass.
+Coordinates without mass, such as boundary points that another code's reduction left without any, are condensed: their
+additional static flexibility becomes the model's residual flexibility, a massless boundary.
 """
 
 from __future__ import annotations
@@ -15,23 +15,25 @@ from typing import Any
 import numpy as np
 from scipy import io, linalg, sparse
 
+from vanedamp.files.errors import VanedampError
+from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom import checks
 from vanedamp.rom.reduced import ReducedModel
 
 #: endings of files that hold several matrices by name, and of those that hold one
 NAMED, SINGLE = (".npz", ".op4"), (".mtx", ".npy")
-# of the largest entry or eigenvalue: what other codes write with 5 to 9 digits is not symmetric to the last one
+# of the largest entry or eigenvalue: other codes write 5 to 9 digits, of which the last are not symmetric
 _ASYMMETRY = 1e-6
 _INDEFINITE = 1e-6
 
 
-class ExternalError(ValueError):
+class ExternalError(VanedampError):
     """Matrices of another code that cannot be read or are no structure's; the message names the file or the matrix."""
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What the checks say of given matrices.
+    """Results of the checks of given matrices.
 
     asymmetry      largest of the matrices', relative
     definiteness   of mass and of stiffness: lowest eigenvalue relative to the highest, diagonal scaled to one
@@ -46,10 +48,10 @@ class Findings:
 
 
 def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Dense matrices by name (lower case) of an .npz or .op4 file; the one of .mtx, .npy or scipy's save_npz is "".
+    """Read the dense matrices of an .npz or .op4 file by lower-case name; that of .mtx, .npy or scipy's save_npz is "".
 
-    What a file holds beside numbers is left out. Raises ExternalError for a missing, damaged or unknown file, and for
-    OP4 without the package pyyeti.
+    Entries of a file that are no numbers are left out. Raises ExternalError for a missing, damaged or unknown file,
+    and for OP4 without the package pyyeti.
     """
     file = Path(path)
     if file.suffix not in NAMED + SINGLE:
@@ -77,7 +79,7 @@ def external_model(
     base_load: np.ndarray | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> tuple[ReducedModel, Findings]:
-    """A checked model of given matrices (n, n), with what the checks found.
+    """Return a checked model of given matrices (n, n), with the findings of the checks.
 
     interface: label -> the coordinate's index, from 0, or a row (n,) over the coordinates. The other arguments are
     those of ReducedModel.from_matrices. Raises ExternalError for matrices that are not symmetric or not (semi)definite
@@ -101,7 +103,7 @@ def external_model(
     asymmetry, worst = max((checks.asymmetry(matrix), name) for name, matrix in matrices.items())
     if asymmetry > _ASYMMETRY:
         raise ExternalError(f"{worst}: not symmetric ({asymmetry:.1e}); if only one triangle is stored, mirror it")
-    matrices = {name: 0.5 * (matrix + matrix.T) for name, matrix in matrices.items()}
+    matrices = {name: symmetric_part(matrix) for name, matrix in matrices.items()}
     size = len(mass)
     rows = {label: _row(label, given, size) for label, given in interface.items()}
     massless = ~np.any(matrices["mass"], axis=0)
@@ -125,7 +127,7 @@ def external_model(
 def _condensed(
     matrices: dict[str, np.ndarray], rows: dict[str, np.ndarray], base_load: np.ndarray | None, massless: np.ndarray
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np.ndarray | None, np.ndarray]:
-    """Coordinates without mass follow the others and the interface's forces statically."""
+    """Condense coordinates without mass: they follow the others and the interface's forces statically."""
     stiffness = matrices["stiffness"]
     if "damping" in matrices and np.any(matrices["damping"][massless]):
         raise ExternalError("damping: acts on coordinates without mass; give damping_ratio, or condense these before")
@@ -143,7 +145,7 @@ def _condensed(
         {name: basis.T @ matrix @ basis for name, matrix in matrices.items()},
         {label: row @ basis for label, row in rows.items()},
         None if base_load is None else basis.T @ base_load,
-        0.5 * (residual + residual.T),
+        symmetric_part(residual),
     )
 
 

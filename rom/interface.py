@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from vanedamp.files import store
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal.matrices import Patch, SystemMatrices, patch_average, unit_direction
 
 KINDS = ("average", "rigid", "node", "full")
@@ -19,7 +20,7 @@ _DEPENDENT = 1e-10
 _FLAT = 0.5
 
 
-class InterfaceError(ValueError):
+class InterfaceError(VanedampError):
     """Interface coordinates that the structure does not have, or that depend on each other; the message names them."""
 
 
@@ -60,7 +61,7 @@ class InterfaceCoordinate:
 def patch_motions(
     label: str, facets: str, motions: Sequence[str] = ("x", "y", "z", "rx", "ry", "rz"), kind: str = "rigid"
 ) -> list[InterfaceCoordinate]:
-    """Translations and rotations of a patch along and about the axes, all six or those named: labels "<label>.rx" ...
+    """Return translations and rotations of a patch along and about the axes, all six or those named: "<label>.rx" ...
 
     Raises InterfaceError for a name other than x, y, z, rx, ry, rz.
     """
@@ -77,7 +78,7 @@ def patch_motions(
 
 
 def normal_direction(matrices: SystemMatrices, facets: str) -> tuple[float, float, float]:
-    """Normal of a patch of facets, so turned that walls which face each other have one direction.
+    """Return the normal of a patch of facets, with the same sign for walls that face each other.
 
     Its largest component is positive, the first of those within a tenth of the largest. Raises InterfaceError for a
     patch without a normal, such as a node set or a closed surface.
@@ -91,7 +92,7 @@ def normal_direction(matrices: SystemMatrices, facets: str) -> tuple[float, floa
 
 
 def _normal(matrices: SystemMatrices, facets: str) -> np.ndarray:
-    """(3,) unit normal of a patch; zeros where it has none."""
+    """Return the unit normal (3,) of a patch; zeros where it has none."""
     normal = matrices.patch(facets).normal
     length = np.linalg.norm(normal)
     return normal / length if length > _FLAT else np.zeros(3)
@@ -121,7 +122,7 @@ class Interface:
 
     @classmethod
     def on_patches(cls, matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> Interface:
-        """The interface of these coordinates.
+        """Return the interface of these coordinates.
 
         Raises InterfaceError for labels that occur twice, rigid patches that touch the supports or each other, and
         coordinates that cannot move or depend on others; modal.matrices.MatricesError for an unknown patch.
@@ -149,7 +150,7 @@ class Interface:
         return np.array([item.direction if item.motion == "translation" else (0.0,) * 3 for item in self.coordinates])
 
     def restrict(self, matrices: SystemMatrices) -> tuple[sparse.csr_array, sparse.csr_array, np.ndarray]:
-        """Stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure."""
+        """Return stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure."""
         stiffness, mass = (
             sparse.csr_array(self.motions.T @ matrix @ self.motions) for matrix in (matrices.stiffness, matrices.mass)
         )
@@ -170,7 +171,7 @@ def _functional(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np
 
 
 def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.ndarray:
-    """(N,) functional of the rotation in the best rigid motion of a patch. Raises InterfaceError where it has none."""
+    """Return the functional (N,) of the rotation in a patch's best rigid motion. Raises InterfaceError without one."""
     patch = matrices.patch(coordinate.facets)
     offsets = matrices.coordinates[patch.nodes] - _centroid(matrices, patch)
     length = np.abs(offsets).max() or 1.0
@@ -186,7 +187,7 @@ def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.n
 
 
 def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> np.ndarray:
-    """Sorted DOFs of all nodes of patches of kind "full", without those at the supports."""
+    """Return the sorted DOFs of all nodes of patches of kind "full", without those at the supports."""
     full = {item.facets: item.label for item in coordinates if item.kind == "full"}
     nodes = np.unique(np.concatenate([np.empty(0, np.int64), *(matrices.patch(facets).nodes for facets in full)]))
     dofs = np.setdiff1d((3 * nodes[:, None] + np.arange(3)).ravel(), matrices.fixed)
@@ -197,7 +198,7 @@ def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordina
 
 
 def _motions(matrices: SystemMatrices, rigid: dict[str, str]) -> sparse.csr_array:
-    """Columns for the free DOFs outside rigid patches, then up to six for every rigid patch."""
+    """Return columns for the free DOFs outside rigid patches, then up to six for every rigid patch."""
     free = np.zeros(matrices.size, dtype=bool)
     free[matrices.free] = True
     blocks = []
@@ -220,14 +221,14 @@ def _motions(matrices: SystemMatrices, rigid: dict[str, str]) -> sparse.csr_arra
 
 
 def rigid_motions(offsets: np.ndarray) -> np.ndarray:
-    """(3 n, 6) unit translations along and rotations (1 rad, small) about x, y, z of points at (n, 3) offsets."""
+    """Return unit translations along and small unit rotations about x, y, z (3 n, 6) of points at (n, 3) offsets."""
     rotations = np.cross(np.eye(3), offsets[:, None, :])
     translations = np.broadcast_to(np.eye(3), rotations.shape)
     return np.concatenate([translations, rotations], axis=1).swapaxes(1, 2).reshape(-1, 6)
 
 
 def rigid_basis(offsets: np.ndarray) -> np.ndarray:
-    """(3 n, 6) orthonormal rigid motions of points; fewer columns for points on one line or a single one."""
+    """Return orthonormal rigid motions (3 n, 6) of points; fewer columns for points on one line or a single one."""
     length = np.abs(offsets).max() or 1.0
     left, singular, _ = np.linalg.svd(rigid_motions(offsets / length), full_matrices=False)
     return left[:, singular > _DEPENDENT * singular[0]]

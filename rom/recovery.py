@@ -21,7 +21,7 @@ COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")
 def with_outputs(
     model: ReducedModel, rows: Mapping[str, np.ndarray], residual: Mapping[str, np.ndarray] | None = None
 ) -> ReducedModel:
-    """The model with more outputs: name -> row (n,) over its coordinates.
+    """Return the model with more outputs: name -> row (n,) over its coordinates.
 
     residual: name -> row (k,) over the interface's forces, of a massless boundary. Raises ReducedModelError for a name
     that exists already or a row of the wrong length.
@@ -41,7 +41,7 @@ def with_outputs(
 
 
 def with_displacements(model: ReducedModel, points: Mapping[str, Sequence[float] | np.ndarray]) -> ReducedModel:
-    """Outputs "<name>.x", "<name>.y", "<name>.z", m: displacements of the nodes nearest to named points (3,).
+    """Add outputs "<name>.x", "<name>.y", "<name>.z", m: displacements of the nodes nearest to named points (3,).
 
     Raises ReducedModelError for a model without recovery.
     """
@@ -60,7 +60,7 @@ def with_displacements(model: ReducedModel, points: Mapping[str, Sequence[float]
 def with_stresses(
     model: ReducedModel, stresses: Mapping[str, np.ndarray], residual: Mapping[str, np.ndarray] | None = None
 ) -> ReducedModel:
-    """Outputs "<name>.xx" ... "<name>.zx", Pa, from the stresses (6, n) of the basis at named points.
+    """Add outputs "<name>.xx" ... "<name>.zx", Pa, from the stresses (6, n) of the basis at named points.
 
     residual: the same (6, k) of the residual fields of a massless boundary.
     """
@@ -70,7 +70,7 @@ def with_stresses(
 
 
 def von_mises(components: np.ndarray) -> np.ndarray:
-    """(...) von Mises stress of components (6, ...) in the order of COMPONENTS."""
+    """Return the von Mises stress (...) of components (6, ...) in the order of COMPONENTS."""
     xx, yy, zz, xy, yz, zx = components
     normal = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
     return np.sqrt(normal + 3.0 * (xy**2 + yz**2 + zx**2))

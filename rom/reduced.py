@@ -1,13 +1,13 @@
-"""ReducedModel: small dense M, C, K with labelled interface coordinates. All that the coupling knows of a structure.
+"""ReducedModel: small dense M, C, K with labelled interface coordinates. The coupling knows no more of a structure.
 
-Needs numpy, scipy and the record store alone: a user of another code enters here with `ReducedModel.from_matrices`.
+Needs numpy, scipy and the record store only: a user of another code enters here with `ReducedModel.from_matrices`.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -16,13 +16,32 @@ import numpy as np
 from scipy import linalg
 
 from vanedamp.files import store
-from vanedamp.rom.dense_modes import halved, modal_damping, rigid_motions, spectrum
-from vanedamp.rom.fields import ReducedModelError, check_definite, shaped, symmetric, unit
+from vanedamp.modal.algebra import symmetric_part
+from vanedamp.rom.checks import ReducedModelError, check_definite, shaped, symmetric, unit
+from vanedamp.rom.dense_modes import count_rigid_motions, modal_damping, spectrum
 
 __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
 
 
 _KIND = "reduced-model"
+# dimensions and units of the arrays, here and in the record
+_ARRAYS = {
+    "mass": (("row", "column"), "kg"),
+    "damping": (("row", "column"), "N s/m"),
+    "stiffness": (("row", "column"), "N/m"),
+    "selection": (("interface", "column"), "1"),
+    "directions": (("interface", "axis"), "1"),
+    "base_load": (("row", "axis"), "kg"),
+    "normals": (("interface", "axis"), "1"),
+    "recovery": (("dof", "column"), "1"),
+    "coordinates": (("node", "axis"), "m"),
+    "residual_flexibility": (("interface", "force"), "m/N"),
+    "output_rows": (("output", "column"), "1"),
+    "output_residual": (("output", "force"), "1"),
+    "residual_recovery": (("dof", "force"), "m/N"),
+}
+_SYMMETRIC = ("mass", "damping", "stiffness", "residual_flexibility")
+_REQUIRED = ("mass", "damping", "stiffness", "selection", "directions", "base_load")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,18 +57,18 @@ class ReducedModel:
     base_load                 (n, 3) kg, T^T M r, r the unit translation along x, y, z: a base acceleration a (3,) loads
                               the model with -base_load @ a, and q is then relative to the base; zeros when unknown
     damping_ratio             of every mode, if C was made from one; None for any other C
-    fixed_interface_modes     how many of the last coordinates are fixed-interface modes, by frequency: `truncated` can
+    fixed_interface_modes     the last coordinates are this many fixed-interface modes, by frequency: `truncated` can
                               drop these
-    free_modes                how many of the last coordinates are free-interface modes instead, apart from the rest
+    free_modes                the last coordinates are this many free-interface modes instead, uncoupled from the rest
     blocks                    sizes of the blocks of quasi-static coordinates just before these modes
-    residual_flexibility      (k, k) m/N, what the interface yields under its own forces f besides, u = selection q +
-                              G f: a boundary without mass; None without
+    residual_flexibility      (k, k) m/N, additional interface displacement per unit interface force, u = selection q +
+                              G f: a massless boundary; None without
     outputs, output_rows      p names, and the functionals (p, n) of these: stresses or displacements, own units
-    output_residual           (p, k) what the outputs have under the interface's forces besides, per N
+    output_residual           (p, k) additional outputs per unit interface force, per N
     provenance                where the numbers come from (JSON-able)
     recovery, coordinates     (N, n) basis T with full displacements T q, dof = 3 * node + component, and the (N / 3, 3)
                               positions of its nodes; None when not kept
-    residual_recovery         (N, k) m/N, displacements under the interface's forces besides; with residual_flexibility
+    residual_recovery         (N, k) m/N, additional displacements per unit interface force; with residual_flexibility
 
     Raises ReducedModelError.
     """
@@ -94,7 +113,7 @@ class ReducedModel:
         base_load: np.ndarray | None = None,
         **others: Any,
     ) -> ReducedModel:
-        """A model from dense matrices (n, n) and the row (n,) of every interface label.
+        """Return a model from dense matrices (n, n) and the row (n,) of every interface label.
 
         Damping is either a matrix (n, n) or the ratio of every mode. Raises ReducedModelError.
         """
@@ -137,8 +156,8 @@ class ReducedModel:
 
     @property
     def rigid_modes(self) -> int:
-        """How many motions no support holds: `rom.dense_modes.rigid_motions`."""
-        return rigid_motions(self.stiffness, *self.natural)
+        """Number of motions that no support holds: `rom.dense_modes.count_rigid_motions`."""
+        return count_rigid_motions(self.stiffness, *self.natural)
 
     @property
     def static_stiffness(self) -> np.ndarray:
@@ -156,11 +175,11 @@ class ReducedModel:
         return -0.5 * scale**2 * (multipliers + multipliers.T)
 
     def row(self, label: str) -> np.ndarray:
-        """(n,) functional of an interface coordinate. Raises ReducedModelError with the labels that exist."""
+        """Return the functional (n,) of an interface coordinate. Raises ReducedModelError for an unknown label."""
         return self.selection[self._index(label)]
 
     def contact_mass(self, label: str) -> float:
-        """1 / (w^T M^-1 w), kg: what an impact on that interface coordinate has to move at once.
+        """Return 1 / (w^T M^-1 w), kg: the mass that an impact on that interface coordinate has to move at once.
 
         It falls with the number of modes kept, so Newton's impact law means another collision in every truncation. A
         coordinate with residual flexibility has none.
@@ -171,27 +190,27 @@ class ReducedModel:
         return float(1.0 / (row @ linalg.solve(self.mass, row, assume_a="pos")))
 
     def receptance(self, frequencies_hz: Sequence[float] | np.ndarray) -> np.ndarray:
-        """(f, k, k) complex receptance, m/N, from forces at all interface coordinates to displacements at all."""
+        """Return the complex receptance (f, k, k), m/N, from forces to displacements at all interface coordinates."""
         omegas = 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies_hz, dtype=float))
         dynamic = (self.stiffness + 1j * omega * self.damping - omega**2 * self.mass for omega in omegas)
         residual = 0.0 if self.residual_flexibility is None else self.residual_flexibility
         return np.array([self.selection @ np.linalg.solve(matrix, self.selection.T) + residual for matrix in dynamic])
 
     def frf(self, frequencies_hz: Sequence[float] | np.ndarray, response_label: str, force_label: str) -> np.ndarray:
-        """(f,) complex receptance, m/N: displacement at one interface coordinate for a unit force at another."""
+        """Return the complex receptance (f,), m/N: a displacement for a unit force, both at interface coordinates."""
         response, force = self._index(response_label), self._index(force_label)
         return self.receptance(frequencies_hz)[:, response, force]
 
     @property
     def modes(self) -> int:
-        """How many of the coordinates are modes that `truncated` can drop."""
+        """Number of the coordinates that are modes, which `truncated` can drop."""
         return self.fixed_interface_modes or self.free_modes
 
     def projected(self, basis: np.ndarray, **changes: Any) -> ReducedModel:
-        """Ritz model in the coordinates y of q = basis @ y, basis (n, m). `changes` are fields of the new model."""
-        mass, stiffness = (halved(basis.T @ matrix @ basis) for matrix in (self.mass, self.stiffness))
+        """Return the Ritz model in the coordinates y of q = basis @ y, basis (n, m), with `changes` of its fields."""
+        mass, stiffness = (symmetric_part(basis.T @ matrix @ basis) for matrix in (self.mass, self.stiffness))
         if self.damping_ratio is None:
-            damping = halved(basis.T @ self.damping @ basis)
+            damping = symmetric_part(basis.T @ self.damping @ basis)
         else:
             damping = modal_damping(mass, stiffness, self.damping_ratio)
         values: dict[str, Any] = {
@@ -205,10 +224,20 @@ class ReducedModel:
         }
         return replace(self, **(values | changes))
 
-    def reconstruct(self, q: np.ndarray, forces: np.ndarray | None = None) -> np.ndarray:
-        """Full displacements T q, (N,) or (N, t), of coordinates (n,) or (n, t). Raises ReducedModelError without T.
+    def with_masses(self, masses: Iterable[tuple[str, float]]) -> ReducedModel:
+        """Return the model with masses (kg) fixed to interface coordinates, such as bodies glued to their cavities.
 
-        forces (k,) or (k, t) at the interface add what a massless boundary yields under them.
+        The damping matrix stays; it is then no longer that of one ratio.
+        """
+        mass = np.array(self.mass)
+        for label, value in masses:
+            mass += value * np.outer(self.row(label), self.row(label))
+        return replace(self, mass=mass, damping_ratio=None)
+
+    def reconstruct(self, q: np.ndarray, forces: np.ndarray | None = None) -> np.ndarray:
+        """Return full displacements T q, (N,) or (N, t), of coordinates (n,) or (n, t). Raises ReducedModelError.
+
+        forces (k,) or (k, t) at the interface add the displacements of a massless boundary under them.
         """
         if self.recovery is None:
             raise ReducedModelError(
@@ -217,7 +246,7 @@ class ReducedModel:
         return _with_residual(self.recovery @ q, self.residual_recovery, forces)
 
     def evaluate(self, q: np.ndarray, forces: np.ndarray | None = None) -> np.ndarray:
-        """The outputs (p,) or (p, t) of coordinates (n,) or (n, t); forces as in `reconstruct`.
+        """Return the outputs (p,) or (p, t) of coordinates (n,) or (n, t); forces as in `reconstruct`.
 
         Raises ReducedModelError for a model without outputs.
         """
@@ -255,34 +284,27 @@ def _with_residual(values: np.ndarray, residual: np.ndarray | None, forces: np.n
 
 
 def _checked(model: ReducedModel) -> dict[str, Any]:
-    """The fields of a model as they should be: arrays frozen and symmetric, names as text. Raises ReducedModelError."""
+    """Return a model's fields in final form: frozen and symmetric arrays, names as text. Raises ReducedModelError."""
     if not model.interface:
         raise ReducedModelError("interface: empty; a reduced model needs a coordinate that loads can act on")
     size, count = len(np.atleast_1d(model.mass)), len(model.interface)
+    nodes = 0 if model.recovery is None else len(model.recovery) // 3
+    lengths = {
+        "row": size, "column": size, "interface": count, "force": count, "axis": 3,
+        "output": len(model.outputs), "dof": 3 * nodes, "node": nodes,
+    }  # fmt: skip
     values: dict[str, Any] = {
-        name: symmetric(name, getattr(model, name), size) for name in ("mass", "damping", "stiffness")
+        "interface": tuple(str(label) for label in model.interface),
+        "outputs": tuple(str(name) for name in model.outputs),
+        "blocks": tuple(int(block) for block in model.blocks),
+        "provenance": dict(model.provenance),
     }
-    for name, shape in {"selection": (count, size), "directions": (count, 3), "base_load": (size, 3)}.items():
-        values[name] = shaped(name, getattr(model, name), shape)
+    required = {*_REQUIRED, *(["coordinates"] if nodes else []), *(["output_rows"] if model.outputs else [])}
+    for name, (dims, _) in _ARRAYS.items():
+        given, shape = getattr(model, name), tuple(lengths[dimension] for dimension in dims)
+        if given is not None or name in required:
+            values[name] = symmetric(name, given, shape[0]) if name in _SYMMETRIC else shaped(name, given, shape)
     values["directions"] = unit(values["directions"])
-    if model.normals is not None:
-        values["normals"] = shaped("normals", model.normals, (count, 3))
-    if model.residual_flexibility is not None:
-        values["residual_flexibility"] = symmetric("residual_flexibility", model.residual_flexibility, count)
-    if model.outputs:
-        values["outputs"] = tuple(str(name) for name in model.outputs)
-        values["output_rows"] = shaped("output_rows", model.output_rows, (len(model.outputs), size))
-        if model.output_residual is not None:
-            values["output_residual"] = shaped("output_residual", model.output_residual, (len(model.outputs), count))
-    values["blocks"] = tuple(int(block) for block in model.blocks)
-    if model.recovery is not None:
-        nodes = len(model.recovery) // 3
-        values["recovery"] = shaped("recovery", model.recovery, (3 * nodes, size))
-        values["coordinates"] = shaped("coordinates", model.coordinates, (nodes, 3))
-        if model.residual_recovery is not None:
-            values["residual_recovery"] = shaped("residual_recovery", model.residual_recovery, (3 * nodes, count))
-    values["interface"] = tuple(str(label) for label in model.interface)
-    values["provenance"] = dict(model.provenance)
     return values
 
 
@@ -307,32 +329,13 @@ def _check_interface(model: ReducedModel) -> None:
 
 def _save(model: ReducedModel, path: str | os.PathLike[str]) -> None:
     """Write the record."""
-    square = ("row", "column")
-    variables = {
-        "mass": store.Variable(model.mass, square, "kg"),
-        "damping": store.Variable(model.damping, square, "N s/m"),
-        "stiffness": store.Variable(model.stiffness, square, "N/m"),
-        "interface": store.Variable(np.array(model.interface, dtype=object), ("interface",)),
-        "axis": store.Variable(np.array(["x", "y", "z"], dtype=object), ("axis",)),
-        "selection": store.Variable(model.selection, ("interface", "column")),
-        "directions": store.Variable(model.directions, ("interface", "axis")),
-        "base_load": store.Variable(model.base_load, ("row", "axis"), "kg"),
-        "natural_frequency": store.Variable(model.natural_frequencies_hz, ("mode",), "Hz"),
-    }
-    if model.normals is not None:
-        variables["normals"] = store.Variable(model.normals, ("interface", "axis"))
-    if model.recovery is not None and model.coordinates is not None:
-        variables["recovery"] = store.Variable(model.recovery, ("dof", "column"))
-        variables["coordinates"] = store.Variable(model.coordinates, ("node", "axis"), "m")
-    if model.residual_flexibility is not None:
-        variables["residual_flexibility"] = store.Variable(model.residual_flexibility, ("interface", "force"), "m/N")
+    arrays = {name: (getattr(model, name), *layout) for name, layout in _ARRAYS.items()}
+    variables = {name: store.Variable(*entry) for name, entry in arrays.items() if entry[0] is not None}
+    variables["interface"] = store.Variable(np.array(model.interface, dtype=object), ("interface",))
+    variables["axis"] = store.Variable(np.array(["x", "y", "z"], dtype=object), ("axis",))
+    variables["natural_frequency"] = store.Variable(model.natural_frequencies_hz, ("mode",), "Hz")
     if model.outputs:
         variables["output"] = store.Variable(np.array(model.outputs, dtype=object), ("output",))
-        variables["output_rows"] = store.Variable(model.output_rows, ("output", "column"))
-        if model.output_residual is not None:
-            variables["output_residual"] = store.Variable(model.output_residual, ("output", "force"))
-    if model.residual_recovery is not None:
-        variables["residual_recovery"] = store.Variable(model.residual_recovery, ("dof", "force"), "m/N")
     if model.blocks:
         variables["blocks"] = store.Variable(np.array(model.blocks, np.int64), ("block",))
     attributes = {
@@ -346,28 +349,22 @@ def _save(model: ReducedModel, path: str | os.PathLike[str]) -> None:
 
 
 def _fields(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The fields of the model whose record `save` wrote. Raises files.store.StoreError."""
+    """Return the fields of the model whose record `save` wrote. Raises files.store.StoreError."""
     values, attributes = store.load(path, _KIND)
-    fields = {name: values[name] for name in ("mass", "damping", "stiffness", "selection", "directions", "base_load")}
-    for name, values_of in fields.items():
-        if np.iscomplexobj(values_of):
+    required = {name: values[name] for name in _REQUIRED}
+    for name, array in required.items():
+        if np.iscomplexobj(array):
             raise store.StoreError(f"{path}: {name}: expected real numbers, not complex ones")
-        if not np.all(np.isfinite(values_of)):
+        if not np.all(np.isfinite(array)):
             raise store.StoreError(f"{path}: {name}: holds entries that are not finite")
     return dict(
-        **fields,
+        **required,
+        **{name: values.get(name) for name in _ARRAYS if name not in _REQUIRED},
         interface=tuple(values["interface"]),
+        outputs=tuple(values.get("output", ())),
+        blocks=tuple(values.get("blocks", ())),
         damping_ratio=attributes.get("damping_ratio"),
         fixed_interface_modes=attributes["fixed_interface_modes"],
         free_modes=attributes.get("free_modes", 0),
-        blocks=tuple(values.get("blocks", ())),
-        residual_flexibility=values.get("residual_flexibility"),
-        outputs=tuple(values.get("output", ())),
-        output_rows=values.get("output_rows"),
-        output_residual=values.get("output_residual"),
-        residual_recovery=values.get("residual_recovery"),
-        normals=values.get("normals"),
         provenance=json.loads(attributes["provenance"]),
-        recovery=values.get("recovery"),
-        coordinates=values.get("coordinates"),
     )

@@ -1,4 +1,4 @@
-"""One door to every reduction: `reduce(matrices, interface, basis=...)`."""
+"""One function for every reduction: `reduce(matrices, interface, basis=...)`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases import craig_bampton, free_interface
-from vanedamp.rom.bases.craig_bampton import Factorize, ReductionError, superlu
+from vanedamp.rom.bases.projection import Factorize, ReductionError, superlu
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
@@ -25,7 +25,7 @@ def reduce(
     quasi_static: int = 0,
     characteristic: int = 6,
 ) -> ReducedModel:
-    """The reduced model of a structure at its interface.
+    """Return the reduced model of a structure at its interface.
 
     basis  "craig-bampton"  constraint modes and fixed-interface modes (Craig and Bampton 1968)
            "rubin"          natural modes and residual attachment modes with their mass (Rubin 1975)
@@ -33,14 +33,14 @@ def reduce(
                             ReducedModel.residual_flexibility
            "massless"       as "macneal", made of a Craig-Bampton model's own modes: after Monjaraz-Tec, Gross and Krack
                             (2022), for models that exist in Craig-Bampton form already
-           "truncated"      natural modes alone: nothing of the interface is static, the baseline
+           "truncated"      natural modes only, no static part of the interface: the baseline
 
-    modes          natural or fixed-interface modes kept
-    quasi_static   further blocks of quasi-static coordinates (bases.craig_bampton.reduce,
-    bases.free_interface.reduce_free) characteristic constraint modes kept of patches of kind "full"; all but natural
-    modes need these
+    modes           natural or fixed-interface modes kept
+    quasi_static    further blocks of quasi-static coordinates, of the bases "craig-bampton" and "rubin"
+    characteristic  characteristic constraint modes kept of patches of kind "full", of "craig-bampton" and "massless"
 
-    Raises ReductionError for an unknown basis, and what the two functions named raise.
+    Raises ReductionError for an unknown basis, and as bases.craig_bampton.reduce and bases.free_interface.reduce_free
+    do.
     """
     check_basis(basis)
     if basis in ("craig-bampton", "massless"):

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy import linalg
 
-from vanedamp.rom.dense_modes import check_elastic, halved, krylov, rigid_motions, spectrum
-from vanedamp.rom.fields import ReducedModelError
+from vanedamp.modal.algebra import orthonormal, symmetric_part
+from vanedamp.rom.checks import ReducedModelError
+from vanedamp.rom.dense_modes import check_elastic, count_rigid_motions, spectrum
+from vanedamp.rom.krylov import krylov
 from vanedamp.rom.reduced import ReducedModel
 
 
 def truncated(model: ReducedModel, modes: int, blocks: int | None = None) -> ReducedModel:
-    """A model with its first `modes` modes, and its first `blocks` blocks of quasi-static coordinates, alone.
+    """Return the model with only its first `modes` modes and its first `blocks` blocks of quasi-static coordinates.
 
     The static interface stays exact: with fixed-interface modes anyway; of free-interface modes, the blocks and the
-    residual flexibility take up what those dropped give statically. A damping ratio holds for the modes of the
+    residual flexibility take over the static part of the dropped ones. A damping ratio holds for the modes of the
     smaller model; any other C is cut. Raises ReducedModelError when more are asked for than there are.
     """
     if not 0 <= modes <= model.modes:
@@ -37,7 +40,7 @@ def truncated(model: ReducedModel, modes: int, blocks: int | None = None) -> Red
 
 
 def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedModel:
-    """Free-interface modes beyond `modes` go; the blocks are built anew in the space of what is dropped."""
+    """Drop free-interface modes beyond `modes`, and rebuild the blocks in the space of the dropped ones."""
     first = model.size - model.free_modes
     kept = np.arange(first, first + modes)
     dropped = np.setdiff1d(np.arange(model.size), kept)
@@ -45,13 +48,13 @@ def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedMode
     inertia, rigidity = (matrix[np.ix_(dropped, dropped)] for matrix in (model.mass, model.stiffness))
     own: list[np.ndarray] = []
     if (blocks or model.residual_flexibility is not None) and dropped.size:
-        check_elastic(rigid_motions(rigidity, *spectrum(inertia, rigidity)), 0)
+        check_elastic(count_rigid_motions(rigidity, *spectrum(inertia, rigidity)), 0)
         static = np.linalg.solve(rigidity, model.selection[:, dropped].T)
         if model.residual_flexibility is not None:
             lost = np.zeros((model.size, len(model.interface)))
             lost[dropped] = static
             changes |= residual_fields(model, lost)
-        own = krylov(static, rigidity, inertia, blocks)
+        own = krylov(static, partial(np.linalg.solve, rigidity), inertia, blocks)
     basis = np.zeros((model.size, sum(block.shape[1] for block in own) + modes))
     if own:
         basis[dropped, : basis.shape[1] - modes] = np.hstack(own)
@@ -62,7 +65,7 @@ def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedMode
 
 
 def massless(model: ReducedModel, modes: int) -> ReducedModel:
-    """A model's own lowest `modes` natural modes; the rest of its flexibility, statically: a massless boundary.
+    """Return a model's own lowest `modes` natural modes, with the rest of its flexibility as a massless boundary.
 
     MacNeal (1971), Computers and Structures 1(4), in modal coordinates eta with the interface's forces f,
 
@@ -82,7 +85,7 @@ def massless(model: ReducedModel, modes: int) -> ReducedModel:
 
 
 def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
-    """A model's own lowest `modes` natural modes after residual attachment modes, with their mass (Rubin 1975).
+    """Return a model's own lowest `modes` natural modes after residual attachment modes, with their mass (Rubin 1975).
 
     As many more coordinates as the interface has independent ones; its flexibility stays exact. Raises
     ReducedModelError for all of the modes, or fewer than the structure has rigid motions.
@@ -93,13 +96,13 @@ def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
     check_elastic(model.rigid_modes, modes)
     dropped = shapes[:, modes:]
     static = (model.selection @ dropped).T / squares[modes:, None]
-    block = np.hstack(krylov(static, np.diag(squares[modes:]), np.eye(len(static)), 1))
+    block = orthonormal(static, np.eye(len(static)))
     kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (block.shape[1],)}
     return model.projected(np.hstack([dropped @ block, shapes[:, :modes]]), **kept)
 
 
 def boundary_form(model: ReducedModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass (singular), damping and stiffness (k + n, k + n) in (u, eta) of a model with a massless boundary.
+    """Return mass (singular), damping and stiffness (k + n, k + n) in (u, eta) of a model with a massless boundary.
 
     Eliminates the forces, f = G^-1 (u - selection eta). Raises ReducedModelError unless G is positive definite.
     """
@@ -113,11 +116,11 @@ def boundary_form(model: ReducedModel) -> tuple[np.ndarray, np.ndarray, np.ndarr
     mass, damping, stiffness = (
         linalg.block_diag(np.zeros((size, size)), matrix) for matrix in (model.mass, model.damping, model.stiffness)
     )
-    return mass, damping, halved(stiffness + rows.T @ np.linalg.solve(residual, rows))
+    return mass, damping, symmetric_part(stiffness + rows.T @ np.linalg.solve(residual, rows))
 
 
 def residual_fields(model: ReducedModel, static: np.ndarray) -> dict[str, Any]:
-    """The residual fields of a model after the response q = static @ f (n, k) has become part of them."""
+    """Return the residual fields of a model after the response q = static @ f (n, k) has become part of them."""
 
     def grown(rows: np.ndarray | None, before: np.ndarray | None) -> np.ndarray | None:
         if rows is None:
@@ -127,7 +130,7 @@ def residual_fields(model: ReducedModel, static: np.ndarray) -> dict[str, Any]:
     flexibility = grown(model.selection, model.residual_flexibility)
     assert flexibility is not None
     return {
-        "residual_flexibility": halved(flexibility),
+        "residual_flexibility": symmetric_part(flexibility),
         "residual_recovery": grown(model.recovery, model.residual_recovery),
         "output_residual": grown(model.output_rows, model.output_residual),
     }

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.studies.interrupts import swallowed_interrupts_again
 
 BAD_INPUT = 2
@@ -78,7 +79,7 @@ def _told(error: Exception, file: str | None) -> str | None:
         remedy = _FINITE_ELEMENTS if package in _SYSTEM else f"pip install {_ON_PYPI.get(package, package)}"
         return None if package in ("", "vanedamp") else f"needs {package}, which cannot be loaded ({error}): {remedy}"
     # bad input has error classes of our own; any other ValueError is a fault of the program
-    return _located(str(error), file) if type(error).__module__.split(".")[0] == "vanedamp" else None
+    return _located(str(error), file) if isinstance(error, VanedampError) else None
 
 
 def _refuse(message: str) -> int:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from petsc4py import PETSc
 from scipy import linalg, optimize, sparse
 from scipy.sparse.linalg import eigsh, spsolve
 
@@ -91,6 +92,15 @@ def test_all_modes_of_a_range(beam):
         solve_modes(beam, max_frequency=1.001 * many[4], min_frequency=0.999 * many[4] + 0.001 * many[5])
     with pytest.raises(SolverError, match="min_frequency: expected"):
         solve_modes(beam, max_frequency=low, min_frequency=high)
+
+
+def test_the_options_of_petsc_stay_as_they_were(beam):
+    """They are the process's own: other code in it may use PETSc, too."""
+    before = PETSc.Options().getAll()
+    assert not any(key.startswith("vanedamp") for key in before)
+    modes = solve_modes(beam, 3)
+    solve_modes(beam, max_frequency=1.001 * modes.frequencies_hz[2], min_frequency=0.999 * modes.frequencies_hz[0])
+    assert PETSc.Options().getAll() == before
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3])

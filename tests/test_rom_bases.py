@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy import linalg
 
+from tests.tools.reduction_errors import full_receptance, receptance_errors, static_stiffness_error
 from tests.tools.small_structures import rod, truss
 from vanedamp.modal.matrices import Patch
-from vanedamp.rom import checks
 from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, patch_motions
 from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 from vanedamp.rom.reduction import BASES, ReductionError, reduce
@@ -64,7 +64,7 @@ def test_receptance_of_a_rod_converges(basis, order):
     frequencies = np.array([0.3, 0.6, 0.7])
     omega = 2 * np.pi * frequencies
     exact = (np.tan(omega) / omega)[:, None, None]
-    errors = [checks.receptance_errors(truncated(rod_model(basis), modes), frequencies, exact) for modes in (8, 16)]
+    errors = [receptance_errors(truncated(rod_model(basis), modes), frequencies, exact) for modes in (8, 16)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(np.full(3, order), abs=0.4)
 
 
@@ -85,7 +85,7 @@ def test_static_stiffness_is_exact(basis):
     interface = Interface.on_patches(matrices, ENDS)
     model = reduce(matrices, interface, basis, 5)
     for smaller in (model, truncated(model, 2)):
-        assert checks.static_stiffness_error(smaller, matrices, interface) < 1e-9
+        assert static_stiffness_error(smaller, matrices, interface) < 1e-9
 
 
 def test_truncation_of_free_modes_is_reduction_with_fewer():
@@ -203,10 +203,10 @@ def test_blocks_can_be_dropped():
     assert rich.blocks == (2, 2)
     assert truncated(rich, 4, 0).receptance([0.2]) == pytest.approx(plain.receptance([0.2]), rel=1e-9)
     errors = [
-        checks.receptance_errors(
+        receptance_errors(
             replace(truncated(rich, 4, blocks), damping_ratio=None, damping=np.zeros((4 + 2 + 2 * blocks,) * 2)),
             [0.08],
-            checks.full_receptance(truss(), interface, [0.08]),
+            full_receptance(truss(), interface, [0.08]),
         )[0]
         for blocks in (0, 1, 2)
     ]
@@ -230,7 +230,7 @@ def test_six_motions_of_a_rigid_patch():
     motion = (shift + np.cross(turn, matrices.coordinates - centroid)).ravel()
     assert interface.vectors.T @ motion == pytest.approx(np.concatenate([shift, turn]), rel=1e-12)
     model = reduce(matrices, interface, modes=4)
-    assert checks.static_stiffness_error(model, matrices, interface) < 1e-9
+    assert static_stiffness_error(model, matrices, interface) < 1e-9
     chosen = patch_motions("a", "a", ("y", "rz"), "average")
     assert [item.label for item in chosen] == ["a.y", "a.rz"]
     with pytest.raises(InterfaceError, match="expected motions out of x, y, z, rx, ry, rz, not 'rot'"):
@@ -257,7 +257,7 @@ def test_characteristic_constraint_modes_span_the_full_node_set():
     errors = []
     for count in (0, 3, 6, 11):
         small = reduce(matrices, interface, modes=6, characteristic=count, keep_recovery=True)
-        assert checks.static_stiffness_error(small, matrices, interface) < 1e-9
+        assert static_stiffness_error(small, matrices, interface) < 1e-9
         assert np.abs(small.recovery[interface.full, -6:]).max() < 1e-10
         assert interface.vectors.T @ small.recovery == pytest.approx(small.selection, abs=1e-10)
         errors.append((2 * np.pi * small.natural_frequencies_hz[:2]) ** 2 / full[:2] - 1.0)

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from vanedamp.rom import checks
+from tests.tools.reduction_errors import (
+    captured_mass,
+    frequency_errors,
+    full_receptance,
+    receptance_errors,
+    static_stiffness_error,
+    with_modal_damping,
+)
 from vanedamp.rom.bases.craig_bampton import reduce
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.truncation import truncated
@@ -39,9 +46,9 @@ def references(cluster, interface, modes, frequencies):
     """
     from vanedamp.modal.eigen import factorize
 
-    undamped = checks.full_receptance(cluster, interface, frequencies, factorize)
+    undamped = full_receptance(cluster, interface, frequencies, factorize)
     displacements = modes.shapes @ interface.vectors
-    return undamped, checks.with_modal_damping(
+    return undamped, with_modal_damping(
         undamped, frequencies, modes.frequencies_hz, displacements, cluster.damping_ratio
     )
 
@@ -53,11 +60,11 @@ def test_interface_moves_as_it_says(model, interface):
 def test_static_stiffness_is_exact(cluster, interface, model):
     from vanedamp.modal.eigen import factorize
 
-    assert checks.static_stiffness_error(truncated(model, 3), cluster, interface, factorize) < 1e-9
+    assert static_stiffness_error(truncated(model, 3), cluster, interface, factorize) < 1e-9
 
 
 def test_frequencies(model, cluster_modes):
-    errors = [checks.frequency_errors(truncated(model, modes), cluster_modes.frequencies_hz[:3]) for modes in (3, 10)]
+    errors = [frequency_errors(truncated(model, modes), cluster_modes.frequencies_hz[:3]) for modes in (3, 10)]
     assert np.min(errors) > -1e-9
     assert np.max(errors[0]) < 2e-6
     assert np.max(errors[1]) < 1e-7
@@ -66,7 +73,7 @@ def test_frequencies(model, cluster_modes):
 def test_reduced_mass(cluster, model, cluster_modes):
     from vanedamp.modal.participation import effective_masses
 
-    captured = checks.captured_mass(model, cluster)
+    captured = captured_mass(model, cluster)
     carried = effective_masses(cluster_modes, cluster)[:3].sum(axis=0) / cluster.movable_mass
     assert np.all(captured < 1.0)
     assert np.all(captured > carried - 1e-6)
@@ -75,8 +82,8 @@ def test_reduced_mass(cluster, model, cluster_modes):
 def test_receptance(cluster, interface, model, cluster_modes):
     frequencies = cluster_modes.frequencies_hz[0] * np.array([1.002, 3.2])
     undamped, damped = references(cluster, interface, cluster_modes, frequencies)
-    assert checks.receptance_errors(model, frequencies, undamped).max() < 2e-5
-    assert checks.receptance_errors(model, frequencies, damped).max() < 1e-4
+    assert receptance_errors(model, frequencies, undamped).max() < 2e-5
+    assert receptance_errors(model, frequencies, damped).max() < 1e-4
 
 
 @pytest.mark.slow
@@ -92,15 +99,15 @@ def test_receptance_up_to_one_and_a_half_times_the_third_frequency(cluster, inte
     undamped, damped = references(cluster, interface, cluster_modes, frequencies)
     for modes, error in ((3, 3e-4), (10, 2e-5)):
         smaller = truncated(model, modes)
-        assert checks.receptance_errors(smaller, frequencies, undamped).max() < error
-        assert checks.receptance_errors(smaller, frequencies, damped).max() < error + 1e-4
+        assert receptance_errors(smaller, frequencies, undamped).max() < error
+        assert receptance_errors(smaller, frequencies, damped).max() < error + 1e-4
 
 
 @pytest.mark.slow
 def test_frequencies_without_quasi_static_modes(plain, cluster_modes):
     errors = np.array(
         [
-            checks.frequency_errors(truncated(plain, modes), cluster_modes.frequencies_hz[:3])
+            frequency_errors(truncated(plain, modes), cluster_modes.frequencies_hz[:3])
             for modes in (0, 1, 2, 3, 5, 10, 20, 30, 40, 50)
         ]
     )

@@ -30,6 +30,16 @@ def chain(**changes):
     return ReducedModel.from_matrices(mass, stiffness, interface, **values)
 
 
+def test_masses_on_a_spring():
+    """Two of them at one coordinate add up; the damping stays, and is no longer that of a ratio."""
+    model = ReducedModel.from_matrices([[2.0]], [[8.0]], {"tip": [1.0]}, damping_ratio=0.01)
+    heavier = model.with_masses([("tip", 10.0), ("tip", 20.0)])
+    assert heavier.natural_frequencies_hz == pytest.approx([0.5 / (2.0 * np.pi)], rel=1e-12)
+    assert (heavier.damping, heavier.damping_ratio) == (model.damping, None)
+    with pytest.raises(ReducedModelError, match="no interface coordinate 'root'"):
+        model.with_masses([("root", 1.0)])
+
+
 def test_one_degree_of_freedom_in_closed_form():
     model = ReducedModel.from_matrices([[2.0]], [[800.0]], {"x": [1.0]}, damping_ratio=0.1)
     assert model.natural_frequencies_hz == pytest.approx([20.0 / (2 * np.pi)], rel=1e-14)

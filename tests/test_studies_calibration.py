@@ -11,7 +11,7 @@ from tests.tools.input_files import BLOCK, changed
 from vanedamp.modal.correlation import MeasuredShapes, observed_shapes
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.frf import Frf
-from vanedamp.modal.test_data import write_frf, write_shapes
+from vanedamp.modal.measurements import write_frf, write_shapes
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import BAD_INPUT, main

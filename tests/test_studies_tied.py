@@ -1,11 +1,9 @@
 """Meshed bodies against added masses: the same fixed frequency, and what differs is told apart."""
 
-import numpy as np
 import pytest
 
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.case.glued_bodies import compare_tied, loaded_frequency
+from vanedamp.studies.case.glued_bodies import compare_tied
 from vanedamp.studies.case.tables import Case
 
 CASE = """
@@ -46,11 +44,6 @@ def test_meshed_bodies_and_added_masses_agree(tmp_path):
     assert abs(found.difference) < 2e-3
     assert 0.0 < found.stiffening < 2e-3
     assert found.soft_hz < found.tied_hz
-
-
-def test_masses_on_a_spring():
-    model = ReducedModel.from_matrices([[2.0]], [[8.0]], {"tip": [1.0]}, damping_ratio=0.0)
-    assert loaded_frequency(model, {"tip": 30.0}) == pytest.approx(0.5 / (2.0 * np.pi), rel=1e-12)
 
 
 def test_refuses_a_case_without_bodies(tmp_path):

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vanedamp.coupling.scene.scene import Scene
     from vanedamp.coupling.sweep.record import Sweep
     from vanedamp.coupling.sweep.sweep import sweep
+    from vanedamp.files.errors import VanedampError
     from vanedamp.files.toml_input import InputError
     from vanedamp.modal.eigen import Modes, solve_modes
     from vanedamp.modal.matrices import SystemMatrices
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "Scene", "Status", "Sweep",
-    "SystemMatrices", "reduce", "rigid_model", "simulate", "solve_modes", "sweep",
+    "SystemMatrices", "VanedampError", "reduce", "rigid_model", "simulate", "solve_modes", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -45,6 +46,7 @@ _HOMES = {
     "Status": "coupling.response.response",
     "Sweep": "coupling.sweep.sweep",
     "SystemMatrices": "modal.matrices",
+    "VanedampError": "files.errors",
     "reduce": "rom.reduction",
     "rigid_model": "modal.rigid_model",
     "simulate": "coupling.engine",

@@ -31,7 +31,7 @@ from vanedamp.coupling.system.transient import timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.contact_pulse import Collision, pulse
 from vanedamp.rom.dense_modes import spectrum
-from vanedamp.rom.error_estimate import Choice, choose, grid, natural_ladder, rigid_errors
+from vanedamp.rom.error_estimate import Choice, choose, frequency_grid, natural_ladder, rigid_errors
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
 
@@ -173,7 +173,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
         if label not in model.interface:
             raise InputError(f"structure: no interface label '{label}'; it has {', '.join(model.interface)}")
     driven = [scene.excitation.frequency for scene in scenes]
-    frequencies = grid(model, min(driven), max(driven))
+    frequencies = frequency_grid(model, min(driven), max(driven))
 
     def collisions(smaller: ReducedModel) -> list[Collision]:
         if any(map(_needs_residual, scenes)) and not _yields(smaller):

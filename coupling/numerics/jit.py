@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from numba import config, njit
 
+from vanedamp.files.errors import VanedampError
+
 #: start of a counter: a literal 0 has a type of its own, for which numba would compile all that it is handed to again
 ZERO = np.int64(0)
 
@@ -25,7 +27,7 @@ _MARKS = ("@entry", "@kernel", "@inlined")
 _PACKAGE = Path(__file__).parents[2]
 
 
-class CacheError(ValueError):
+class CacheError(VanedampError):
     """Compiled functions have no folder to be kept in: every process would compile them again, for a minute."""
 
 

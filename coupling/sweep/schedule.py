@@ -10,6 +10,7 @@ import numpy as np
 
 from vanedamp.coupling.sweep.grid import Grid, PointList
 from vanedamp.coupling.sweep.worker import Block, Finished, Task, broken, run_points, tasks_of
+from vanedamp.files.errors import VanedampError
 
 # few enough points that workers end together, and that a killed sweep loses little
 _MOST_PER_TASK = 16
@@ -17,7 +18,7 @@ _MOST_PER_TASK = 16
 _IN_FLIGHT = 512
 
 
-class SweepError(ValueError):
+class SweepError(VanedampError):
     """A sweep that cannot go on: its workers are gone."""
 
 

@@ -1,1 +1,1 @@
-"""The reduction bases: Craig-Bampton, and the free-interface ones of Rubin and MacNeal."""
+"""Reduction bases: `craig_bampton`, `free_interface` (Rubin, MacNeal), and `projection`, which they share."""

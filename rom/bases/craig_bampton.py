@@ -17,17 +17,15 @@ from the same factors (Craig and Hale 1988, J. Guidance 11(6), block-Krylov comp
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict
-from typing import Any, Protocol
-
 import numpy as np
-import scipy
 from scipy import linalg, sparse
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
+from scipy.sparse.linalg import ArpackError
 
+from vanedamp.modal.algebra import column_signs, orthogonal, orthonormal, symmetric_part
 from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.rom.bases.projection import Factorize, ReductionError, project, superlu
 from vanedamp.rom.interface import Interface
+from vanedamp.rom.krylov import directions, krylov, lowest_modes
 from vanedamp.rom.reduced import ReducedModel
 
 # a round trip through a well-posed matrix loses 5 to 8 digits, through a singular one all of them
@@ -36,29 +34,6 @@ _ROUND_TRIP = 1e-2
 _OWN_SHARE = 1e-10
 # lowest eigenvalue of the mass of fields of unit norm that a factorisation stands
 _SMALLEST = 1e-14
-
-
-class ReductionError(ValueError):
-    """A structure that cannot be reduced as asked; the message tells what to change."""
-
-
-class Solver(Protocol):
-    """A factorised matrix."""
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution for a right-hand side (n,) or (n, k), of the same shape."""
-
-
-Factorize = Callable[[sparse.csr_array], Solver]
-
-
-def superlu(matrix: sparse.csr_array) -> Solver:
-    """SciPy's sparse LU, at hand everywhere; from some 30 000 DOFs on MUMPS factorises several times faster."""
-    options = {"SymmetricMode": True}
-    try:
-        return splu(sparse.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options=options)
-    except RuntimeError as error:
-        raise ReductionError(f"the matrix of size {matrix.shape[0]} is singular ({error})") from error
 
 
 def reduce(
@@ -70,14 +45,14 @@ def reduce(
     quasi_static: bool | int = False,
     characteristic: int = 6,
 ) -> ReducedModel:
-    """The structure in its interface displacements and the lowest fixed-interface modes (0 modes: Guyan's reduction).
+    """Reduce a structure to its interface displacements and lowest fixed-interface modes (none: Guyan's reduction).
 
     factorize      solves with a symmetric indefinite matrix, such as modal.eigen.factorize
     keep_recovery  keep the basis, to reconstruct full displacements
     quasi_static   insert the quasi-static modes between interface and fixed-interface modes: for the price of as many
                    coordinates as the interface has, frequencies and receptances are right by orders of magnitude more;
-                   a number: so many blocks of them, each the quasi-static response to the inertia of the one before
-    characteristic how many characteristic constraint modes an interface with patches of kind "full" keeps; its own
+                   a number: that many blocks of them, each the quasi-static response to the inertia of the one before
+    characteristic number of characteristic constraint modes kept of patches of kind "full"; the interface's own
                    coordinates stay statically exact
 
     Raises ReductionError for more modes than the structure has, and when it can move with its interface held.
@@ -91,25 +66,21 @@ def reduce(
     fixed = _fixed_interface_modes(held, stiffness, mass, modes)
     blocks = _quasi_static_blocks(held, mass, constraint, fixed, int(quasi_static))
     basis = np.hstack([constraint, *blocks, fixed])
-    recovery = interface.motions @ basis
-    return ReducedModel.from_matrices(
-        _symmetrised(basis.T @ (mass @ basis)),
-        _symmetrised(basis.T @ (stiffness @ basis)),
-        dict(zip(interface.labels, np.eye(len(interface.labels), basis.shape[1]), strict=True)),
-        damping_ratio=matrices.damping_ratio,
-        directions=dict(zip(interface.labels, interface.directions, strict=True)),
-        normals=interface.normals,
-        base_load=recovery.T @ (matrices.mass @ matrices.rigid_translations()),
+    return project(
+        matrices, interface,
+        mass=symmetric_part(basis.T @ (mass @ basis)),
+        stiffness=symmetric_part(basis.T @ (stiffness @ basis)),
+        basis=basis,
+        selection=np.eye(len(interface.labels), basis.shape[1]),
+        blocks=blocks,
+        origin={"basis": "craig-bampton", "modes": modes, "quasi_static": int(quasi_static)},
+        keep_recovery=keep_recovery,
         fixed_interface_modes=modes,
-        blocks=tuple(block.shape[1] for block in blocks),
-        provenance=provenance(matrices, interface, "craig-bampton", modes, int(quasi_static)),
-        recovery=recovery if keep_recovery else None,
-        coordinates=matrices.coordinates if keep_recovery else None,
-    )
+    )  # fmt: skip
 
 
 def _boundary(interface: Interface, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What is held: functionals (n, b) of the nodes of full patches, and of what else the interface has.
+    """Return the held functionals (n, b): of the nodes of full patches, and of the rest of the interface.
 
     Second, the interface coordinates (k, b) in these.
     """
@@ -125,15 +96,15 @@ def _boundary(interface: Interface, vectors: np.ndarray) -> tuple[np.ndarray, np
 def _characteristic(
     constraint: np.ndarray, stiffness: sparse.csr_array, mass: sparse.csr_array, labels: np.ndarray, count: int
 ) -> np.ndarray:
-    """(b, k + count) boundary displacements: of least energy for unit interface coordinates, then characteristic modes.
+    """Return boundary displacements (b, k + count): static ones of unit interface coordinates, characteristic modes.
 
     Castanier, Tan and Pierre (2001), AIAA J. 39(6): the lowest modes of the constraint modes' own stiffness and mass.
-    What they share with the former is taken out, so that each moves the interface as its place says.
+    They are made free of the former, so that only these move the interface coordinates.
     """
     size, own = len(labels[0]), len(labels)
     if not 0 <= count <= size - own:
         raise ReductionError(f"characteristic: expected 0 to {size - own} (the boundary has no more), not {count}")
-    condensed, inertia = (_symmetrised(constraint.T @ (matrix @ constraint)) for matrix in (stiffness, mass))
+    condensed, inertia = (symmetric_part(constraint.T @ (matrix @ constraint)) for matrix in (stiffness, mass))
     scale = np.abs(condensed).max()
     saddle = np.block([[condensed, scale * labels.T], [scale * labels, np.zeros((own, own))]])
     static = np.linalg.solve(saddle, np.eye(size + own)[:, size:] * scale)[:size]
@@ -163,17 +134,17 @@ class _Held:
             )
 
     def constraint_modes(self) -> np.ndarray:
-        """(n, k) displacements of least strain energy for a unit displacement of every interface coordinate."""
+        """Return displacements (n, k) of least strain energy for a unit displacement of every interface coordinate."""
         given = np.vstack([np.zeros((self.size, self.count)), np.diag(self._scale)])
         return self._factor.solve(given)[: self.size]
 
     def solve(self, load: np.ndarray) -> np.ndarray:
-        """Displacements (n,) or (n, m) under loads of that shape, interface held."""
+        """Return displacements (n,) or (n, m) under loads of that shape, interface held."""
         return self._factor.solve(np.concatenate([load, np.zeros((self.count, *load.shape[1:]))]))[: self.size]
 
 
 def _fixed_interface_modes(held: _Held, stiffness: sparse.csr_array, mass: sparse.csr_array, modes: int) -> np.ndarray:
-    """(n, modes) mass-normalised, by frequency.
+    """Return mass-normalised modes (n, modes), by frequency.
 
     The inverse of the held stiffness maps into W^T q = 0 and is self-adjoint in the inner product of the mass, so that
     Lanczos on it finds the held modes and never sees the interface; small structures are solved densely.
@@ -185,98 +156,50 @@ def _fixed_interface_modes(held: _Held, stiffness: sparse.csr_array, mass: spars
         )
     if modes == 0:
         return np.empty((held.size, 0))
-    directions = max(2 * modes + 1, 20)
-    if directions < most:
-        shapes = _lanczos(held, stiffness, mass, modes, directions)
+    if directions(modes) < most:
+        try:
+            shapes = lowest_modes(stiffness, mass, modes, held.solve)[1]
+        except ArpackError as error:
+            raise ReductionError(f"modes: not all {modes} fixed-interface modes converged ({error})") from error
     else:
         inertia = mass.toarray()
         flexibility = inertia @ held.solve(np.eye(held.size)) @ inertia
         wanted = [held.size - modes, held.size - 1]
-        shapes = linalg.eigh(_symmetrised(flexibility), inertia, subset_by_index=wanted)[1][:, ::-1]
-    return shapes * mode_signs(shapes)
-
-
-def _lanczos(
-    held: _Held, stiffness: sparse.csr_array, mass: sparse.csr_array, modes: int, directions: int
-) -> np.ndarray:
-    inverse = LinearOperator(stiffness.shape, matvec=held.solve, dtype=float)
-    start = held.solve(np.random.default_rng(0).standard_normal(held.size))
-    try:
-        values, shapes = eigsh(stiffness, modes, mass, sigma=0.0, OPinv=inverse, v0=start, ncv=directions)
-    except ArpackError as error:
-        raise ReductionError(f"modes: not all {modes} fixed-interface modes converged ({error})") from error
-    return shapes[:, np.argsort(values)]
+        shapes = linalg.eigh(symmetric_part(flexibility), inertia, subset_by_index=wanted)[1][:, ::-1]
+    return shapes * column_signs(shapes)
 
 
 def _quasi_static_blocks(
     held: _Held, mass: sparse.csr_array, constraint: np.ndarray, fixed: np.ndarray, count: int
 ) -> list[np.ndarray]:
-    """Blocks (n, m <= k), each M-orthonormal, without combinations that blocks before and fixed-interface modes have.
+    """Return blocks (n, m <= k), M-orthonormal, without combinations that blocks before and fixed-interface modes have.
 
     They are not made orthogonal to the latter: a truncated model keeps them whole.
     """
-    blocks: list[np.ndarray] = []
-    lag, known = constraint, fixed
+    if count == 0:
+        return []
     unit = constraint / np.sqrt(np.einsum("ij,ij->j", constraint, mass @ constraint))
-    for _ in range(count):
-        lag = held.solve(mass @ lag)
-        if blocks:
-            before = np.hstack(blocks)
-            lag = lag - before @ np.linalg.lstsq(before.T @ (mass @ before), before.T @ (mass @ lag), rcond=None)[0]
-        values, vectors = np.linalg.eigh(lag.T @ (mass @ lag))
-        kept = values > _OWN_SHARE * values[-1]
-        lag = lag @ (vectors[:, kept] / np.sqrt(values[kept]))
-        rest = _without(lag, known, mass)
-        shares, vectors = np.linalg.eigh(rest.T @ (mass @ rest))
-        own = _independent(lag @ vectors, shares, np.hstack([unit, fixed, *blocks]), mass)
-        if own == 0:
-            break
-        turns = vectors[:, -own:]
-        blocks.append(lag @ turns * mode_signs(lag @ turns))
-        known = np.hstack([known, _without(rest @ turns / np.sqrt(shares[-own:]), known, mass)])
-        lag = blocks[-1]
-    return blocks
+
+    def select(block: np.ndarray, before: list[np.ndarray]) -> np.ndarray:
+        known = [fixed]
+        for other in before:
+            known.append(orthonormal(other, mass, known))
+        rest = orthogonal(block, mass, known)
+        shares, turns = np.linalg.eigh(rest.T @ (mass @ rest))
+        block = block @ turns
+        own = block[:, len(shares) - _independent(block, shares, np.hstack([unit, fixed, *before]), mass) :]
+        return own * column_signs(own)
+
+    return krylov(held.solve(mass @ constraint), held.solve, mass, count, select)
 
 
 def _independent(fields: np.ndarray, shares: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> int:
-    """How many of the last fields (n, m), whose own shares ascend, leave the mass of all together well conditioned.
+    """Count the last fields (n, m), their own shares ascending, that leave the mass of all together well conditioned.
 
-    A share that is small beside known fields which are nearly dependent already multiplies with theirs.
+    A small share multiplies with those of known fields that are nearly dependent, so it does not decide by itself.
     """
     for count in range(int(np.count_nonzero(shares > _OWN_SHARE)), 0, -1):
         together = np.hstack([known, fields[:, -count:]])
         if np.linalg.eigvalsh(together.T @ (mass @ together))[0] > _SMALLEST:
             return count
     return 0
-
-
-def _without(fields: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
-    """Fields (n, m) without what M-orthonormal ones have of them."""
-    for _ in range(2):  # twice is enough
-        fields = fields - known @ (known.T @ (mass @ fields))
-    return fields
-
-
-def mode_signs(shapes: np.ndarray) -> np.ndarray:
-    """(m,) +-1 that make the largest component positive; near ties go to the first, so round-off does not choose."""
-    size = np.abs(shapes)
-    first = np.argmax(size > (1.0 - 1e-6) * size.max(axis=0), axis=0)
-    return np.sign(shapes[first, np.arange(shapes.shape[1])])
-
-
-def _symmetrised(matrix: np.ndarray) -> np.ndarray:
-    return 0.5 * (matrix + matrix.T)
-
-
-def provenance(
-    matrices: SystemMatrices, interface: Interface, basis: str, modes: int, quasi_static: int
-) -> dict[str, Any]:
-    """Where a reduced model comes from, JSON-able."""
-    return {
-        "matrices": dict(matrices.provenance),
-        "interface": [asdict(item) | {"direction": list(item.direction)} for item in interface.coordinates],
-        "basis": basis,
-        "modes": modes,
-        "quasi_static": quasi_static,
-        "versions": {"numpy": np.__version__, "scipy": scipy.__version__},
-    }

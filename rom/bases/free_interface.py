@@ -1,4 +1,4 @@
-"""Free-interface reduction: natural modes, and what the interface's forces strain besides.
+"""Free-interface reduction: natural modes, and residual attachment modes of the interface's forces.
 
 Rubin (1975), AIAA J. 13(8): natural modes phi_j and residual attachment modes, the part of the static response to unit
 forces w at the interface that the modes lack,
@@ -16,11 +16,13 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackError
 
+from vanedamp.modal.algebra import affine_fields, column_signs, ritz_values, symmetric_part
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.rom.bases.craig_bampton import Factorize, ReductionError, Solver, mode_signs, provenance, superlu
+from vanedamp.rom.bases.projection import Factorize, ReductionError, Solver, project, superlu
 from vanedamp.rom.interface import Interface, rigid_basis
+from vanedamp.rom.krylov import directions, krylov, lowest_modes
 from vanedamp.rom.reduced import ReducedModel
 
 # of the squared frequency of uniform strains: small beside those of modes, far above round-off of the factorisation
@@ -28,8 +30,7 @@ _SHIFT = 1e-4
 _RIGID = 1e-9
 _ROUNDS = 200
 _CONVERGED = 1e-12
-# share of its own that an attachment mode needs beside the others; of it that the modes have left of the response
-_OWN_SHARE = 1e-10
+# share of the static response that the modes have left, below which an attachment mode is round-off
 _LEFT = 1e-9
 
 
@@ -41,9 +42,9 @@ def reduce_free(
     keep_recovery: bool = False,
     blocks: int = 1,
 ) -> ReducedModel:
-    """The structure in its lowest `modes` natural modes after `blocks` blocks of residual attachment modes.
+    """Reduce a structure to its lowest `modes` natural modes, after `blocks` blocks of residual attachment modes.
 
-    blocks = 0: the modes alone; 1: Rubin's basis; more: higher orders of the residual's inertia. The other arguments
+    blocks = 0: the modes only; 1: Rubin's basis; more: higher orders of the residual's inertia. The other arguments
     are those of bases.craig_bampton.reduce. Raises ReductionError for fewer modes than the structure has rigid motions,
     or more than it has at all, and for a structure with a mechanism.
     """
@@ -59,72 +60,52 @@ def reduce_free(
     squares, shapes = _natural_modes(shifted, stiffness, mass, modes, shift, rigid)
     attached = _attachments(shifted, mass, squares, shapes, vectors, shift, blocks)
     basis = np.hstack([*attached, shapes])
-    recovery = interface.motions @ basis
-    lead = sum(block.shape[1] for block in attached)
-    return ReducedModel.from_matrices(
-        _uncoupled(basis.T @ (mass @ basis), lead, np.ones(modes)),
-        _uncoupled(basis.T @ (stiffness @ basis), lead, squares),
-        dict(zip(interface.labels, vectors.T @ basis, strict=True)),
-        damping_ratio=matrices.damping_ratio,
-        directions=dict(zip(interface.labels, interface.directions, strict=True)),
-        normals=interface.normals,
-        base_load=recovery.T @ (matrices.mass @ matrices.rigid_translations()),
+    lead = basis.shape[1] - modes
+    return project(
+        matrices, interface,
+        mass=_uncoupled(basis.T @ (mass @ basis), lead, np.ones(modes)),
+        stiffness=_uncoupled(basis.T @ (stiffness @ basis), lead, squares),
+        basis=basis,
+        selection=vectors.T @ basis,
+        blocks=attached,
+        origin={"basis": "rubin" if blocks else "truncated", "modes": modes, "quasi_static": blocks},
+        keep_recovery=keep_recovery,
         free_modes=modes,
-        blocks=tuple(block.shape[1] for block in attached),
-        provenance=provenance(matrices, interface, "rubin" if blocks else "truncated", modes, blocks),
-        recovery=recovery if keep_recovery else None,
-        coordinates=matrices.coordinates if keep_recovery else None,
-    )
+    )  # fmt: skip
 
 
 def _rigid_motions(
     matrices: SystemMatrices, interface: Interface, stiffness: sparse.csr_array, mass: sparse.csr_array
 ) -> tuple[int, float]:
-    """How many rigid motions the supports leave, and the squared frequency of uniform strains (a Ritz value)."""
-    offsets = matrices.coordinates - matrices.coordinates.mean(axis=0)
-    offsets = offsets / (np.abs(offsets).max() or 1.0)
-    affine = np.einsum("na,ij->niaj", np.column_stack([np.ones(len(offsets)), offsets]), np.eye(3))
-    scale = _ritz_values(matrices.stiffness, matrices.mass, affine.reshape(matrices.size, -1))[-1]
-    motions = rigid_basis(offsets)
+    """Return the number of rigid motions that the supports leave, and the squared frequency of uniform strains."""
+    scale = ritz_values(matrices.stiffness, matrices.mass, affine_fields(matrices.coordinates))[-1]
+    motions = rigid_basis(matrices.coordinates - matrices.coordinates.mean(axis=0))
     if matrices.fixed.size:
         motions = motions @ linalg.null_space(motions[matrices.fixed], rcond=1e-9)
     if motions.shape[1] == 0:
         return 0, float(scale)
-    values = _ritz_values(stiffness, mass, interface.motions.T @ motions)
+    values = ritz_values(stiffness, mass, interface.motions.T @ motions)
     return int(np.count_nonzero(values < _RIGID * scale)), float(scale)
-
-
-def _ritz_values(stiffness: sparse.csr_array, mass: sparse.csr_array, fields: np.ndarray) -> np.ndarray:
-    inertia = fields.T @ (mass @ fields)
-    values, turns = np.linalg.eigh(inertia)
-    kept = values > 1e-10 * values[-1]
-    basis = turns[:, kept] / np.sqrt(values[kept])
-    return np.linalg.eigvalsh(basis.T @ (fields.T @ (stiffness @ fields)) @ basis)
 
 
 def _natural_modes(
     shifted: Solver, stiffness: sparse.csr_array, mass: sparse.csr_array, modes: int, shift: float, rigid: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Squared frequencies (modes,), those of rigid motions exactly zero, and mass-normalised shapes (n, modes)."""
+    """Return squared frequencies (modes,), zero for rigid motions, and mass-normalised shapes (n, modes)."""
     size = mass.shape[0]
-    directions = max(2 * modes + 1, 20)
     if modes == 0:
         return np.empty(0), np.empty((size, 0))
-    if directions < size:
-        inverse = LinearOperator(stiffness.shape, matvec=shifted.solve, dtype=float)
-        start = shifted.solve(np.random.default_rng(0).standard_normal(size))
+    if directions(modes) < size:
         try:
-            squares, shapes = eigsh(stiffness, modes, mass, sigma=-shift, OPinv=inverse, v0=start, ncv=directions)
+            squares, shapes = lowest_modes(stiffness, mass, modes, shifted.solve, shift)
         except ArpackError as error:
             raise ReductionError(f"modes: not all {modes} natural modes converged ({error})") from error
-        order = np.argsort(squares)
-        squares, shapes = squares[order], shapes[:, order]
     else:
         squares, shapes = linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=[0, modes - 1])
     if np.any(squares[rigid:] <= 0.0):
         raise ReductionError("the structure has a mechanism: parts of it move without strain; support or join them")
     squares[:rigid] = 0.0
-    return squares, shapes * mode_signs(shapes)
+    return squares, shapes * column_signs(shapes)
 
 
 def _attachments(
@@ -136,35 +117,26 @@ def _attachments(
     shift: float,
     count: int,
 ) -> list[np.ndarray]:
-    """Blocks (n, m <= k) of residual attachment modes, M-orthonormal."""
-    blocks: list[np.ndarray] = []
+    """Return blocks (n, m <= k) of residual attachment modes, M-orthonormal."""
+    if count == 0:
+        return []
     inertia = mass @ shapes
-    load = vectors - inertia @ (shapes.T @ vectors)
+
+    def static(load: np.ndarray) -> np.ndarray:
+        return _static(shifted, mass, shapes, inertia, load, shift)
+
+    known = shapes.T @ vectors
+    block = static(vectors - inertia @ known)
     elastic = squares > 0.0
-    known_part = np.linalg.norm((shapes.T @ vectors)[elastic] / squares[elastic, None], axis=0)
-    for index in range(count):
-        block = _static(shifted, mass, shapes, inertia, load, shift)
-        norms = np.sqrt(np.einsum("ij,ij->j", block, mass @ block))
-        left = norms > (_LEFT * known_part if index == 0 else 0.0)
-        if not np.any(left):
-            break
-        block = block[:, left] / norms[left]
-        for known in [*blocks, *blocks]:
-            block = block - known @ (known.T @ (mass @ block))
-        values, turns = np.linalg.eigh(block.T @ (mass @ block))
-        own = values > _OWN_SHARE
-        if not np.any(own):
-            break
-        block = block @ (turns[:, own] / np.sqrt(values[own]))
-        blocks.append(block * mode_signs(block))
-        load = mass @ blocks[-1]
-    return blocks
+    known_part = np.linalg.norm(known[elastic] / squares[elastic, None], axis=0)
+    left = np.sqrt(np.einsum("ij,ij->j", block, mass @ block)) > _LEFT * known_part
+    return [found * column_signs(found) for found in krylov(block[:, left], static, mass, count)]
 
 
 def _static(
     shifted: Solver, mass: sparse.csr_array, shapes: np.ndarray, inertia: np.ndarray, load: np.ndarray, shift: float
 ) -> np.ndarray:
-    """K^-1 load without the kept modes, for loads that these do not feel."""
+    """Return K^-1 load without the kept modes, for loads that these do not feel."""
     response = np.zeros_like(load)
     for _ in range(_ROUNDS if shift else 1):
         before = response
@@ -176,6 +148,5 @@ def _static(
 
 
 def _uncoupled(matrix: np.ndarray, lead: int, diagonal: np.ndarray) -> np.ndarray:
-    """The attachments' block and the modes' diagonal, which round-off alone couples."""
-    block = matrix[:lead, :lead]
-    return linalg.block_diag(0.5 * (block + block.T), np.diag(diagonal))
+    """Return the attachments' block and the modes' diagonal: all else is round-off."""
+    return linalg.block_diag(symmetric_part(matrix[:lead, :lead]), np.diag(diagonal))

@@ -15,10 +15,10 @@ from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable, save
 from vanedamp.files.toml_input import InputError, nearest
 from vanedamp.modal.frf import Frf, FrfError, Poles, identify
+from vanedamp.modal.measurements import read_frf, read_shapes
 from vanedamp.modal.model_updating import Tuning, tune
 from vanedamp.modal.rigid_model import RigidModel, rigid_model
 from vanedamp.modal.stress import HotSpot
-from vanedamp.modal.test_data import read_frf, read_shapes
 from vanedamp.studies.case.calibration_tables import CalibrationTable, TuneTable
 from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, modal_analysis
 from vanedamp.studies.case.tables import Case, MaterialTable

@@ -20,15 +20,15 @@ from vanedamp.modal.correlation import mode_like
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.elasticity import Solid
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
+from vanedamp.modal.measurements import read_shapes
 from vanedamp.modal.mesh_import import convert
 from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import ParticipationError, effective_masses, first_bending
 from vanedamp.modal.rigid_model import RigidModel, fatigue_amplitude, rigid_model
 from vanedamp.modal.stress import HotSpot, hot_spot
-from vanedamp.modal.test_data import read_shapes
 from vanedamp.modal.units import doubts
 from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
-from vanedamp.rom.error_estimate import LadderError, choose, grid, rigid_errors
+from vanedamp.rom.error_estimate import LadderError, choose, frequency_grid, rigid_errors
 from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, normal_direction
 from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
@@ -334,4 +334,4 @@ def reduction(
 
 def _of_interest(model: ReducedModel, max_frequency: float | None) -> np.ndarray:
     top = max_frequency or 1.5 * float(model.natural_frequencies_hz[model.rigid_modes])
-    return grid(model, 0.05 * top if model.rigid_modes else 0.0, top)
+    return frequency_grid(model, 0.05 * top if model.rigid_modes else 0.0, top)

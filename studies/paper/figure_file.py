@@ -23,10 +23,9 @@ import numpy as np
 import tomli_w
 from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
-from scipy.linalg import eigh
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.scene.structures import Rigid, Rom
 from vanedamp.coupling.sweep.grid import FREQUENCY
 from vanedamp.coupling.system.reduced_model_file import reduced_model
 from vanedamp.files.store import load, replacing
@@ -181,17 +180,14 @@ def with_frequencies(scene: Scene, frequencies: Frequencies, points: int) -> Sce
 def linear_peaks(scene: Scene) -> list[float]:
     """First natural frequencies with all bodies fixed and without them, Hz, of a rigid or a reduced structure."""
     structure = scene.structure
-    floors = {cavity.name: cavity.labels()[2] for cavity in scene.cavity}
     if isinstance(structure, Rom):
+        floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
         model = _whole(structure)
-        mass, stiffness = np.array(model.mass), model.stiffness
-        rows = {name: model.row(str(label)) for name, label in floors.items()}
-    else:
-        mass, stiffness = np.array([[structure.mass]]), np.array([[structure.stiffness]])  # type: ignore[union-attr]
-        rows = dict.fromkeys(floors, np.ones(1))
-    fixed = mass + sum(damper.mass * np.outer(rows[damper.cavity], rows[damper.cavity]) for damper in scene.damper)
-    squares = {float(eigh(stiffness, inertia, eigvals_only=True)[0]) for inertia in (fixed, mass)}
-    return sorted(math.sqrt(square) / (2 * math.pi) for square in squares)
+        fixed = model.with_masses((floors[damper.cavity], damper.mass) for damper in scene.damper)
+        return sorted({float(item.natural_frequencies_hz[0]) for item in (fixed, model)})
+    assert isinstance(structure, Rigid)
+    masses = {structure.mass, structure.mass + sum(damper.mass for damper in scene.damper)}
+    return sorted(math.sqrt(structure.stiffness / mass) / (2 * math.pi) for mass in masses)
 
 
 def write_scene(scene: Scene, path: Path) -> None:

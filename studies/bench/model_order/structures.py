@@ -24,16 +24,21 @@ def cluster_model(degree: int, modes: int) -> ReducedModel:
 _ROD_MODES, _BEAM_ELEMENTS, _CLUSTER_MODES = 40, 8, 12
 
 
-def rod_model() -> ReducedModel:
-    """Clamped unit rod in Craig-Bampton form: constraint mode x, fixed-interface modes sqrt(2) sin(j pi x)."""
-    order = np.arange(1, _ROD_MODES + 1)
-    mass, stiffness = np.eye(_ROD_MODES + 1), np.diag(np.append(1.0, (order * np.pi) ** 2))
+def rod_model(modes: int = _ROD_MODES, per_stiffness: float | None = None) -> ReducedModel:
+    """Clamped unit rod in Craig-Bampton form: constraint mode x, fixed-interface modes sqrt(2) sin(j pi x).
+
+    per_stiffness: s, damping in proportion to the stiffness; left out: the damping ratio 0.01 of every mode.
+    """
+    order = np.arange(1, modes + 1)
+    mass, stiffness = np.eye(modes + 1), np.diag(np.append(1.0, (order * np.pi) ** 2))
     mass[0, 0] = 1.0 / 3.0
     mass[0, 1:] = mass[1:, 0] = -math.sqrt(2.0) * (-1.0) ** order / (order * np.pi)
-    row = np.eye(_ROD_MODES + 1)[0]
     return ReducedModel.from_matrices(
-        mass, stiffness, {"tip": row}, damping_ratio=0.01, fixed_interface_modes=_ROD_MODES
-    )
+        mass, stiffness, {"tip": np.eye(modes + 1)[0]},
+        damping=None if per_stiffness is None else per_stiffness * stiffness,
+        damping_ratio=0.01 if per_stiffness is None else None,
+        fixed_interface_modes=modes,
+    )  # fmt: skip
 
 
 def beam_model(*others: int) -> ReducedModel:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import linalg
 
+from tests.tools.reduction_errors import full_receptance, receptance_errors
 from tests.tools.small_structures import rod, truss
-from vanedamp.rom import checks
 from vanedamp.rom import error_estimate as ladder
 from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
@@ -31,7 +31,7 @@ def coarse():
     interface = Interface.on_patches(matrices, [InterfaceCoordinate(label, label, (0, 1, 0)) for label in labels])
     first, second, third = solve_modes(matrices, 3).frequencies_hz
     frequencies = np.array([0.3 * first, 0.97 * first, 1.002 * first, 1.5 * first, 1.01 * second, 1.2 * third])
-    return matrices, interface, frequencies, checks.full_receptance(matrices, interface, frequencies, factorize)
+    return matrices, interface, frequencies, full_receptance(matrices, interface, frequencies, factorize)
 
 
 def within_five(rich, basis, frequencies, reference, counts):
@@ -39,7 +39,7 @@ def within_five(rich, basis, frequencies, reference, counts):
     compared = 0
     for modes in counts:
         model = basis_model(rich, basis, modes)
-        truth = checks.receptance_errors(model, frequencies, reference)
+        truth = receptance_errors(model, frequencies, reference)
         estimate = ladder.frf_errors(model, rich if basis == "massless" else truncated(rich, modes), frequencies)
         seen = truth > 1e-9  # what round-off leaves of the reference
         assert np.all(estimate[seen] < 5 * truth[seen]), (basis, modes)
@@ -89,20 +89,20 @@ def test_choice_keeps_its_promise():
     interface = Interface.on_patches(matrices, ENDS)
     every = reduce(matrices, interface, modes=28)
     rich = rich_model(matrices, interface, "craig-bampton", 20)
-    frequencies = ladder.grid(rich, 0.0, 2.0 * rich.natural_frequencies_hz[0])
+    frequencies = ladder.frequency_grid(rich, 0.0, 2.0 * rich.natural_frequencies_hz[0])
     rungs = basis_ladder(rich, "craig-bampton", frequencies)
     for tolerance in (0.1, 1e-2, 1e-4):
         choice = ladder.choose(rungs, tolerance, 1.0)
         chosen = choice.chosen.modes
         assert choice.met
-        true = checks.receptance_errors(truncated(rich, chosen, 1), frequencies, every.receptance(frequencies))
+        true = receptance_errors(truncated(rich, chosen, 1), frequencies, every.receptance(frequencies))
         assert true.max() < 1.01 * tolerance
 
 
 def test_natural_ladder_ends_at_the_whole_model():
     matrices = replace(truss(), damping_ratio=0.01)
     whole = reduce(matrices, Interface.on_patches(matrices, ENDS), modes=6)
-    frequencies = ladder.grid(whole, 0.0, 0.1)
+    frequencies = ladder.frequency_grid(whole, 0.0, 0.1)
     rungs = ladder.natural_ladder(whole, frequencies, ["a"])
     assert rungs[-1].receptance < 1e-12
     assert [rung.modes for rung in rungs] == list(range(1, whole.size + 1))
@@ -118,5 +118,5 @@ def test_natural_ladder_ends_at_the_whole_model():
 def test_frequencies_of_comparison_hold_resonances_that_have_a_height(ratio):
     """Without damping the receptance has no value at a natural frequency, or one that round-off makes."""
     model = ReducedModel.from_matrices(np.eye(2), np.diag([1.0, 9.0]), {"tip": [1.0, 1.0]}, damping_ratio=ratio)
-    found = np.isin(model.natural_frequencies_hz, ladder.grid(model, 0.01, 1.0))
+    found = np.isin(model.natural_frequencies_hz, ladder.frequency_grid(model, 0.01, 1.0))
     assert np.all(found == (ratio > 0.0))

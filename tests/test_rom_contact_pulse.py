@@ -6,7 +6,7 @@ from scipy import integrate
 
 from vanedamp.coupling.scene.contact_laws import damping_ratio
 from vanedamp.rom import error_estimate as ladder
-from vanedamp.rom.contact_pulse import Collision, contact_frequency, pulse, pulse_spectrum, share_above
+from vanedamp.rom.contact_pulse import Collision, pulse, pulse_spectrum, share_above
 from vanedamp.rom.reduced import ReducedModel
 
 
@@ -29,9 +29,6 @@ def test_pulse_of_a_free_wall(restitution):
     assert found.transform == pytest.approx((1 + restitution) * reduced, rel=1e-6)
     if restitution == 1.0:
         assert found.duration == pytest.approx(np.pi * np.sqrt(reduced / spring), rel=1e-7)
-        assert contact_frequency(1 / np.sqrt(wall), Collision("wall", mass, spring)) == pytest.approx(
-            0.5 / found.duration, rel=1e-7
-        )
 
 
 def test_pulse_with_modes_against_integration():

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import Frf, FrfError
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".bunv")
-#: what the two columns of a response in a CSV may be
+#: meanings of the two columns of a response in a CSV
 COLUMNS = ("real-imaginary", "magnitude-degrees", "magnitude-radians")
 _PLACE = ("x", "y", "z", "dx", "dy", "dz")
 # specific data types of UFF 58, record 9
@@ -28,16 +29,16 @@ _QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _NORMAL_MODE, _COMPLEX_MODE, _FRF = 2, 3, 4
 
 
-class ExchangeError(ValueError):
+class MeasurementError(VanedampError):
     """A file of shapes or responses that cannot be read or written; the message names the file and the remedy."""
 
 
 def read_shapes(path: str | os.PathLike[str]) -> MeasuredShapes:
-    """Measured mode shapes from a CSV or universal file.
+    """Read measured mode shapes from a CSV or universal file.
 
     CSV: a header `x, y, z, dx, dy, dz, <mode>, ...`, then a row for every measured displacement: its point (m), its
     direction, and its value in every mode, as 0.5 or 0.5+0.1j; a mode's name is its frequency in Hz, if it is a number.
-    Universal: datasets 15 (nodes) and 55 (normal or complex modes). Raises ExchangeError.
+    Universal: datasets 15 (nodes) and 55 (normal or complex modes). Raises MeasurementError.
     """
     file = _existing(path)
     return _shapes_of_universal(file) if file.suffix.lower() in _UNIVERSAL else _shapes_of_csv(file)
@@ -62,23 +63,23 @@ def write_shapes(shapes: MeasuredShapes, path: str | os.PathLike[str]) -> None:
 
 
 def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns: str | None = None) -> Frf:
-    """A frequency response from a CSV or universal file (dataset 58, function type 4).
+    """Read a frequency response from a CSV or universal file (dataset 58, function type 4).
 
-    CSV: the frequency (Hz), then two columns for every response; `quantity` says what they are. A universal file says
-    itself.
+    CSV: the frequency (Hz), then two columns for every response; `quantity` says of which kind. A universal file
+    says so itself.
 
-    columns  one of COLUMNS; left out: as the words of the header line tell (real, imag; magnitude, phase in deg or
+    columns  one of COLUMNS; left out: as the header line says (real, imag; magnitude, phase in deg or
              rad), or else real and imaginary parts. Columns that look like magnitude and phase, without a word that
              says so, are refused
 
-    Raises ExchangeError.
+    Raises MeasurementError.
     """
     file = _existing(path)
     if file.suffix.lower() in _UNIVERSAL:
         return _frf_of_universal(file)
     header, rows = _numbers(file)
     if rows.shape[1] < 3 or rows.shape[1] % 2 == 0:
-        raise ExchangeError(
+        raise MeasurementError(
             f"{file}: expected the columns frequency, real part, imaginary part (or magnitude and phase; and more "
             f"pairs), not {rows.shape[1]}"
         )
@@ -90,36 +91,36 @@ def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns
             return frf
         angle = np.radians(second) if kind == "magnitude-degrees" else second
         return Frf(rows[:, 0], first * np.exp(1j * angle), quantity)
-    except (ExchangeError, FrfError) as error:
-        raise ExchangeError(f"{file}: {error}") from error
+    except (MeasurementError, FrfError) as error:
+        raise MeasurementError(f"{file}: {error}") from error
 
 
 def _columns(given: str | None, header: Sequence[str], first: np.ndarray, second: np.ndarray) -> str:
-    """Which of COLUMNS the pairs (k, n) of a CSV are."""
+    """Return which of COLUMNS the pairs (k, n) of a CSV are."""
     if given is not None and given not in COLUMNS:
-        raise ExchangeError(f"columns: expected one of {', '.join(COLUMNS)}, not {given!r}")
-    told = given or _told(header, second)
-    if told is None:
+        raise MeasurementError(f"columns: expected one of {', '.join(COLUMNS)}, not {given!r}")
+    kind = given or _header_kind(header, second)
+    if kind is None:
         one_sign = np.all(first > 0.0, axis=1) | np.all(first < 0.0, axis=1)
         turns = (np.abs(second).max(axis=1) <= 361.0) & (np.ptp(second, axis=1) > 0.1)
         if np.any(one_sign & turns):
-            raise ExchangeError(
+            raise MeasurementError(
                 "columns: a response's first column keeps its sign, its second one looks like a phase; say what they "
                 f"are by a header line or by columns = one of {', '.join(COLUMNS)}"
             )
-        told = "real-imaginary"
-    if told != "real-imaginary" and np.any(first < 0.0):
-        raise ExchangeError("columns: a magnitude is negative; expected linear magnitudes, not decibels")
-    return told
+        kind = "real-imaginary"
+    if kind != "real-imaginary" and np.any(first < 0.0):
+        raise MeasurementError("columns: a magnitude is negative; expected linear magnitudes, not decibels")
+    return kind
 
 
-def _told(header: Sequence[str], second: np.ndarray) -> str | None:
-    """What the words of a header line say of the first pair of columns; None where they say nothing."""
+def _header_kind(header: Sequence[str], second: np.ndarray) -> str | None:
+    """Return which of COLUMNS the header line says that the first pair is; None where it does not say."""
     if len(header) < 3:
         return None
     one, other = header[1].lower(), header[2].lower()
     if re.search(r"\bdb\b|_db|decibel", one):
-        raise ExchangeError(f"columns: {header[1]!r}: expected linear magnitudes, not decibels")
+        raise MeasurementError(f"columns: {header[1]!r}: expected linear magnitudes, not decibels")
     if re.search(r"phase|\barg|angle", other):
         if re.search(r"deg|\u00b0", other):
             return "magnitude-degrees"
@@ -127,7 +128,7 @@ def _told(header: Sequence[str], second: np.ndarray) -> str | None:
             return "magnitude-radians"
         if np.abs(second).max() > 2.02 * np.pi:
             return "magnitude-degrees"
-        raise ExchangeError(
+        raise MeasurementError(
             f"columns: {header[2]!r}: in degrees or radians? Say so there, or by columns = magnitude-degrees or "
             "magnitude-radians"
         )
@@ -148,23 +149,23 @@ def write_frf(frf: Frf, path: str | os.PathLike[str]) -> None:
 def _existing(path: str | os.PathLike[str]) -> Path:
     file = Path(path)
     if not file.is_file():
-        raise ExchangeError(f"{file}: no such file")
+        raise MeasurementError(f"{file}: no such file")
     return file
 
 
 def _shapes_of_csv(file: Path) -> MeasuredShapes:
     rows = _table(file)
     if not rows or [word.strip() for word in rows[0][:6]] != list(_PLACE) or len(rows[0]) < 7:
-        raise ExchangeError(f"{file}: expected the header {','.join(_PLACE)},<mode>,... in the first line")
+        raise MeasurementError(f"{file}: expected the header {','.join(_PLACE)},<mode>,... in the first line")
     names, body = rows[0][6:], rows[1:]
     values = np.empty((len(body), len(rows[0])), dtype=complex)
     for number, row in enumerate(body, start=2):
         if len(row) != len(rows[0]):
-            raise ExchangeError(f"{file}: line {number} has {len(row)} columns, the header has {len(rows[0])}")
+            raise MeasurementError(f"{file}: line {number} has {len(row)} columns, the header has {len(rows[0])}")
         try:
             values[number - 2] = [complex(word.replace(" ", "")) for word in row]
         except ValueError as error:
-            raise ExchangeError(f"{file}: line {number}: expected numbers ({error})") from error
+            raise MeasurementError(f"{file}: line {number}: expected numbers ({error})") from error
     shapes = values[:, 6:].T
     return _measured(
         file,
@@ -176,16 +177,16 @@ def _shapes_of_csv(file: Path) -> MeasuredShapes:
 
 
 def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
-    """The words of a header line, if there is one, and the rows of numbers of a CSV file."""
+    """Return the words of a header line, if there is one, and the rows of numbers of a CSV file."""
     rows, header = _table(file), []
     if rows and np.isnan(_number(rows[0][0])):
         header, rows = [word.strip() for word in rows[0]], rows[1:]
     try:
         values = np.array([[float(word) for word in row] for row in rows])
     except ValueError as error:
-        raise ExchangeError(f"{file}: expected rows of numbers, all of the same length ({error})") from error
+        raise MeasurementError(f"{file}: expected rows of numbers, all of the same length ({error})") from error
     if values.ndim != 2:
-        raise ExchangeError(f"{file}: holds no rows of numbers")
+        raise MeasurementError(f"{file}: holds no rows of numbers")
     return header, values
 
 
@@ -193,7 +194,7 @@ def _table(file: Path) -> list[list[str]]:
     try:
         text = file.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ExchangeError(f"{file}: not a text file ({error})") from error
+        raise MeasurementError(f"{file}: not a text file ({error})") from error
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     return list(csv.reader(lines))
 
@@ -209,14 +210,14 @@ def _measured(file: Path, **values: Any) -> MeasuredShapes:
     try:
         return MeasuredShapes(**values)
     except ValueError as error:
-        raise ExchangeError(f"{file}: {error}") from error
+        raise MeasurementError(f"{file}: {error}") from error
 
 
 def _pyuff() -> Any:
     try:
         return importlib.import_module("pyuff")
     except ImportError as error:
-        raise ExchangeError("universal files need pyuff: pip install pyuff; CSV files need nothing") from error
+        raise MeasurementError("universal files need pyuff: pip install pyuff; CSV files need nothing") from error
 
 
 def _datasets(file: Path) -> list[dict[str, Any]]:
@@ -226,7 +227,7 @@ def _datasets(file: Path) -> list[dict[str, Any]]:
         wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58)))
         return [universal.read_sets(int(index)) for index in wanted]
     except Exception as error:  # pyuff raises what its parsing meets
-        raise ExchangeError(f"{file}: not a universal file that pyuff can read ({error})") from error
+        raise MeasurementError(f"{file}: not a universal file that pyuff can read ({error})") from error
 
 
 def _shapes_of_universal(file: Path) -> MeasuredShapes:
@@ -238,14 +239,14 @@ def _shapes_of_universal(file: Path) -> MeasuredShapes:
             nodes |= dict(zip(np.asarray(dataset["node_nums"], dtype=int).tolist(), points, strict=True))
     modes = [d for d in datasets if d["type"] == 55 and d["analysis_type"] in (_NORMAL_MODE, _COMPLEX_MODE)]
     if not nodes or not modes:
-        raise ExchangeError(f"{file}: holds no nodes (dataset 15) or no mode shapes (dataset 55)")
+        raise MeasurementError(f"{file}: holds no nodes (dataset 15) or no mode shapes (dataset 55)")
     numbers = np.asarray(modes[0]["node_nums"], dtype=int)
     for mode in modes:
         if not np.array_equal(np.asarray(mode["node_nums"], dtype=int), numbers):
-            raise ExchangeError(f"{file}: the modes are given at different nodes; give all of them at the same")
+            raise MeasurementError(f"{file}: the modes are given at different nodes; give all of them at the same")
     missing = sorted(set(numbers.tolist()) - set(nodes))
     if missing:
-        raise ExchangeError(f"{file}: node {missing[0]} of the shapes has no coordinates in dataset 15")
+        raise MeasurementError(f"{file}: node {missing[0]} of the shapes has no coordinates in dataset 15")
     shapes = np.array([np.column_stack([mode["r1"], mode["r2"], mode["r3"]]).ravel() for mode in modes])
     frequencies = [m["freq"] if "freq" in m else abs(m["eig"]) / (2 * np.pi) for m in modes]
     # exact zeros in every mode are axes that no sensor looked along
@@ -264,11 +265,13 @@ def _shapes_to_universal(shapes: MeasuredShapes, target: Path) -> None:
     axes = np.abs(shapes.directions).argmax(axis=1)
     signs = np.take_along_axis(shapes.directions, axes[:, None], axis=1)[:, 0]
     if not np.allclose(np.abs(signs), 1.0, rtol=0.0, atol=1e-12):
-        raise ExchangeError(f"{target}: a universal file holds displacements along x, y and z alone; write CSV instead")
+        raise MeasurementError(
+            f"{target}: a universal file holds displacements along x, y and z only; write CSV instead"
+        )
     points, number = np.unique(shapes.points, axis=0, return_inverse=True)
     number = number.ravel()
     if len(np.unique(3 * number + axes)) < len(axes):
-        raise ExchangeError(f"{target}: two values for one point and axis; a universal file holds one")
+        raise MeasurementError(f"{target}: two values for one point and axis; a universal file holds one")
     labels = np.arange(1, len(points) + 1)
     prepare = _pyuff()
     zero = np.zeros(len(points), dtype=int)
@@ -316,21 +319,21 @@ def _mode_dataset(
 def _frf_of_universal(file: Path) -> Frf:
     found = [d for d in _datasets(file) if d["type"] == 58 and d["func_type"] == _FRF]
     if not found:
-        raise ExchangeError(f"{file}: holds no frequency response (dataset 58, function type {_FRF})")
+        raise MeasurementError(f"{file}: holds no frequency response (dataset 58, function type {_FRF})")
     kinds = {int(d["ordinate_spec_data_type"]) for d in found}
     if len(kinds) > 1 or not kinds <= set(_QUANTITIES):
-        raise ExchangeError(
+        raise MeasurementError(
             f"{file}: expected responses of one kind, displacement (8), velocity (11) or acceleration (12)"
         )
     frequencies = np.asarray(found[0]["x"], dtype=float)
     for dataset in found:
         if not np.array_equal(np.asarray(dataset["x"], dtype=float), frequencies):
-            raise ExchangeError(f"{file}: the responses have different frequencies; export them over one axis")
+            raise MeasurementError(f"{file}: the responses have different frequencies; export them over one axis")
     labels = tuple(f"{d['rsp_node']}:{d['rsp_dir']}/{d['ref_node']}:{d['ref_dir']}" for d in found)
     try:
         return Frf(frequencies, np.array([d["data"] for d in found]), _QUANTITIES[kinds.pop()], labels)
     except FrfError as error:
-        raise ExchangeError(f"{file}: {error}") from error
+        raise MeasurementError(f"{file}: {error}") from error
 
 
 def _frf_to_universal(frf: Frf, target: Path) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import Frf
-from vanedamp.modal.test_data import ExchangeError, read_frf, read_shapes, write_frf, write_shapes
+from vanedamp.modal.measurements import MeasurementError, read_frf, read_shapes, write_frf, write_shapes
 
 
 def shapes(kind=float, axes=True):
@@ -72,7 +72,7 @@ def test_responses_round_trip(tmp_path, name):
 )
 def test_bad_shapes_are_told(tmp_path, text, message):
     (tmp_path / "bad.csv").write_text(text)
-    with pytest.raises(ExchangeError, match=message) as told:
+    with pytest.raises(MeasurementError, match=message) as told:
         read_shapes(tmp_path / "bad.csv")
     assert str(tmp_path / "bad.csv") in str(told.value)
 
@@ -88,14 +88,14 @@ def test_bad_shapes_are_told(tmp_path, text, message):
 )
 def test_bad_responses_are_told(tmp_path, text, message):
     (tmp_path / "bad.csv").write_text(text)
-    with pytest.raises(ExchangeError, match=message):
+    with pytest.raises(MeasurementError, match=message):
         read_frf(tmp_path / "bad.csv")
 
 
 def test_universal_files_hold_axes_alone(tmp_path):
-    with pytest.raises(ExchangeError, match="write CSV instead"):
+    with pytest.raises(MeasurementError, match="write CSV instead"):
         write_shapes(shapes(axes=False), tmp_path / "shapes.unv")
-    with pytest.raises(ExchangeError, match="no such file"):
+    with pytest.raises(MeasurementError, match="no such file"):
         read_shapes(tmp_path / "none.csv")
 
 
@@ -138,15 +138,15 @@ def test_magnitude_and_phase(tmp_path, header, columns, degrees):
 )
 def test_columns_that_may_be_magnitude_and_phase_are_refused(tmp_path, header, columns, degrees, told):
     polar(tmp_path, header, degrees)
-    with pytest.raises(ExchangeError, match=told) as refused:
+    with pytest.raises(MeasurementError, match=told) as refused:
         read_frf(tmp_path / "polar.csv", columns=columns)
     assert str(refused.value).startswith(str(tmp_path / "polar.csv"))
 
 
 def test_a_negative_magnitude_is_refused(tmp_path):
     (tmp_path / "polar.csv").write_text("1,-60,0\n2,-40,-90\n3,-60,-180\n")
-    with pytest.raises(ExchangeError, match="a magnitude is negative; expected linear magnitudes, not decibels"):
+    with pytest.raises(MeasurementError, match="a magnitude is negative; expected linear magnitudes, not decibels"):
         read_frf(tmp_path / "polar.csv", columns="magnitude-degrees")
-    with pytest.raises(ExchangeError, match="keeps its sign"):
+    with pytest.raises(MeasurementError, match="keeps its sign"):
         read_frf(tmp_path / "polar.csv")
     assert read_frf(tmp_path / "polar.csv", columns="real-imaginary").values[0, 0] == -60.0

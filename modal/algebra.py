@@ -1,0 +1,66 @@
+"""Linear algebra that modes and reduced models share, in plain numpy: Ritz values, signs of shapes, symmetric parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+Matrix = TypeVar("Matrix")
+
+# share of a field (in its squared norm) that the others and the blocks must not determine
+_OWN_SHARE = 1e-10
+
+
+def symmetric_part(matrix: Matrix) -> Matrix:
+    """Return (A + A^T) / 2 of a dense or sparse matrix."""
+    given: Any = matrix
+    part: Matrix = 0.5 * (given + given.T)
+    return part
+
+
+def orthogonal(fields: np.ndarray, mass: Any, known: Sequence[np.ndarray]) -> np.ndarray:
+    """Return fields (n, m) without their components along M-orthonormal blocks (n, k)."""
+    for block in [*known, *known]:  # twice is enough (Parlett 1980, The Symmetric Eigenvalue Problem, section 6-9)
+        fields = fields - block @ (block.T @ (mass @ fields))
+    return fields
+
+
+def orthonormal(fields: np.ndarray, mass: Any, known: Sequence[np.ndarray] = ()) -> np.ndarray:
+    """Return M-orthonormal combinations (n, j <= m) of fields (n, m), M-orthogonal to M-orthonormal blocks.
+
+    Fields without mass, and combinations that the other fields and the blocks determine but for round-off, are left
+    out: j may be zero.
+    """
+    norms = np.sqrt(np.einsum("ij,ij->j", fields, mass @ fields))
+    rest = orthogonal(fields[:, norms > 0.0] / norms[norms > 0.0], mass, known)
+    values, turns = np.linalg.eigh(rest.T @ (mass @ rest))
+    own = values > _OWN_SHARE
+    return np.asarray(rest @ (turns[:, own] / np.sqrt(values[own])))
+
+
+def ritz_values(stiffness: Any, mass: Any, fields: np.ndarray) -> np.ndarray:
+    """Return the Ritz values of K x = lambda M x in the span of fields (n, m), ascending, one a dimension of it."""
+    left, singular, _ = np.linalg.svd(fields, full_matrices=False)
+    basis = orthonormal(left[:, singular > 1e-8 * singular[0]], mass)
+    return np.linalg.eigvalsh(symmetric_part(basis.T @ (stiffness @ basis)))
+
+
+def affine_fields(coordinates: np.ndarray) -> np.ndarray:
+    """Return the displacements (3 n, 12) of n nodes that are constant or linear in space, each about 1 in size."""
+    offsets = coordinates - coordinates.mean(axis=0)
+    offsets = offsets / (np.abs(offsets).max() or 1.0)
+    terms = np.column_stack([np.ones(len(offsets)), offsets])
+    return np.einsum("na,ij->niaj", terms, np.eye(3)).reshape(coordinates.size, -1)
+
+
+def leading_sign(values: np.ndarray) -> float:
+    """Return the sign of the largest value; near ties go to the first, so that round-off does not choose."""
+    size = np.abs(values)
+    return float(np.sign(values[np.argmax(size > (1.0 - 1e-6) * size.max())]))
+
+
+def column_signs(shapes: np.ndarray) -> np.ndarray:
+    """Return the signs (m,) that make the largest component of every column (n, m) positive."""
+    return np.array([leading_sign(shape) for shape in shapes.T])

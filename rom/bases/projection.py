@@ -1,0 +1,89 @@
+"""Parts that the bases share: the factorisation they solve with, and the reduced model of a basis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any, Protocol
+
+import numpy as np
+import scipy
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from vanedamp.files.errors import VanedampError
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.rom.interface import Interface
+from vanedamp.rom.reduced import ReducedModel
+
+
+class ReductionError(VanedampError):
+    """A structure that cannot be reduced as asked; the message says what to change."""
+
+
+class Solver(Protocol):
+    """A factorised matrix."""
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """Return the solution for a right-hand side (n,) or (n, k), of the same shape."""
+
+
+Factorize = Callable[[sparse.csr_array], Solver]
+
+
+def superlu(matrix: sparse.csr_array) -> Solver:
+    """Factorise by SciPy's sparse LU, which needs nothing else; from 30 000 DOFs on MUMPS is several times faster.
+
+    Raises ReductionError for a singular matrix.
+    """
+    options = {"SymmetricMode": True}
+    try:
+        return splu(sparse.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options=options)
+    except RuntimeError as error:
+        raise ReductionError(f"the matrix of size {matrix.shape[0]} is singular ({error})") from error
+
+
+def project(
+    matrices: SystemMatrices,
+    interface: Interface,
+    mass: np.ndarray,
+    stiffness: np.ndarray,
+    basis: np.ndarray,
+    selection: np.ndarray,
+    blocks: Sequence[np.ndarray],
+    origin: dict[str, Any],
+    keep_recovery: bool,
+    fixed_interface_modes: int = 0,
+    free_modes: int = 0,
+) -> ReducedModel:
+    """Return the reduced model of a basis (n, m) of the motions that the interface leaves to the structure.
+
+    mass, stiffness  (m, m) projected onto the basis
+    selection        (k, m) interface displacements of the basis
+    blocks           blocks of quasi-static modes in it
+    origin           which basis of how many modes and blocks, for the provenance
+
+    The numbers of modes are those of ReducedModel.
+    """
+    recovery = interface.motions @ basis
+    coordinates = [asdict(item) | {"direction": list(item.direction)} for item in interface.coordinates]
+    return ReducedModel.from_matrices(
+        mass,
+        stiffness,
+        dict(zip(interface.labels, selection, strict=True)),
+        damping_ratio=matrices.damping_ratio,
+        directions=dict(zip(interface.labels, interface.directions, strict=True)),
+        normals=interface.normals,
+        base_load=recovery.T @ (matrices.mass @ matrices.rigid_translations()),
+        fixed_interface_modes=fixed_interface_modes,
+        free_modes=free_modes,
+        blocks=tuple(block.shape[1] for block in blocks),
+        provenance={
+            "matrices": dict(matrices.provenance),
+            "interface": coordinates,
+            **origin,
+            "versions": {"numpy": np.__version__, "scipy": scipy.__version__},
+        },
+        recovery=recovery if keep_recovery else None,
+        coordinates=matrices.coordinates if keep_recovery else None,
+    )
