@@ -11,7 +11,7 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.store import load
 from vanedamp.studies.paper.figure_file import Effort
-from vanedamp.studies.paper.runner import MODES, Session, prepare, study, tell
+from vanedamp.studies.paper.runner import MODES, Session, prepare, print_claims, study
 from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.report.pictures import mode_picture, summary_picture
 from vanedamp.studies.report.results import CLAIMS
@@ -47,7 +47,7 @@ def run_demo(folder: Path, workers: int | None = None) -> Path:
         for name in FIGURES:
             begun = time.perf_counter()
             found = study(name, session)
-            tell(found, time.perf_counter() - begun)
+            print_claims(found, time.perf_counter() - begun)
             results += [*(folder / source for source in found.sources), folder / f"{name}{CLAIMS}"]
     from vanedamp.studies.report.page import write_report
     from vanedamp.studies.report.results import collect

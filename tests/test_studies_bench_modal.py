@@ -6,7 +6,7 @@ import json
 import pytest
 
 from vanedamp.studies.bench.modes import measure as bench_modal
-from vanedamp.studies.bench.modes.measure import Effort, run_bench, tell
+from vanedamp.studies.bench.modes.measure import Effort, print_summary, run_bench
 
 TINY = Effort(sizes=(0.008,), rounds=1, limit=120.0)
 
@@ -37,7 +37,7 @@ def test_table_and_figure(folder, capsys):
         rows = list(csv.DictReader(stream))
     assert [row["solver"] for row in rows][:2] == ["assembly", "SLEPc, CHOLMOD"]
     assert (folder / "bench_modal.png").read_bytes().startswith(b"\x89PNG")
-    tell(json.loads((folder / "bench_modal.json").read_text()))
+    print_summary(json.loads((folder / "bench_modal.json").read_text()))
     shown = capsys.readouterr().out
     assert "degrees of freedom" in shown
     assert "at or ahead of each" in shown or "behind" in shown

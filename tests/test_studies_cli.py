@@ -20,7 +20,7 @@ from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrix_files import read_folder
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, _parser, main
-from vanedamp.studies.commands import all as commands
+from vanedamp.studies.commands.support.messages import write_result
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = """
@@ -431,7 +431,7 @@ def test_failing_write_leaves_the_old_files(folder, monkeypatch, capfd):
     assert capfd.readouterr().err == "vanedamp: no space left on device\n"
     monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(StoreError, match=r"response.json: cannot be written \(no space"):
-        commands._write_json("response.json", {})
+        write_result("response.json", {})
     monkeypatch.undo()
     for name in ("response.h5", "response.json"):
         assert (folder / name).read_text() == "precious"
@@ -465,7 +465,7 @@ def test_commands_of_the_readme_are_understood(capsys):
     lines = [line.split("#")[0].split() for line in text.splitlines() if line.startswith("    vanedamp ")]
     assert len(lines) >= 5
     for _, *arguments in lines:
-        assert _parser().parse_args(arguments).command == arguments[0]
+        assert _parser(arguments[0]).parse_args(arguments).command == arguments[0]
     described = {line.split("`")[1].split()[1] for line in text.splitlines() if line.startswith("| `vanedamp ")}
     with pytest.raises(SystemExit):
         main(["--help"])

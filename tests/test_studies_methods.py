@@ -99,7 +99,7 @@ def test_work_precision_leaves_its_results(tmp_path, capsys):
     assert set(chart["absent"]) <= set(PEERS)
     cvode = [point for point in chart["points"] if point["method"] == "SUNDIALS CVODE"]
     assert "SUNDIALS CVODE" in chart["absent"] or cvode[0]["error"] < 1e-3
-    work_precision.tell(result)
+    work_precision.print_summary(result)
     assert "exact engine is" in capsys.readouterr().out
 
 

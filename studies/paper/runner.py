@@ -59,7 +59,7 @@ class Session:
 
 
 def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None, resume: bool = False) -> list[Study]:
-    """Compute the named studies (default: all) into a folder, and tell their claims. Raises InputError."""
+    """Compute the named studies (default: all) into a folder, and print their claims. Raises InputError."""
     for name in names:
         if name not in NAMES:
             raise InputError(f"no study '{name}'; {nearest(name, list(NAMES))}")
@@ -75,7 +75,7 @@ def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None,
         for name in names or NAMES:
             begun = time.perf_counter()
             studies.append(study(name, session))
-            tell(studies[-1], time.perf_counter() - begun)
+            print_claims(studies[-1], time.perf_counter() - begun)
     print(f"\n{folder}: {time.perf_counter() - started:.0f} s; for a page: vanedamp report {folder} -o report.html")
     return studies
 
@@ -231,7 +231,7 @@ def _written(found: Study, folder: Path) -> Study:
     return found
 
 
-def tell(found: Study, seconds: float) -> None:
+def print_claims(found: Study, seconds: float) -> None:
     """Print a study's claims: what the paper says, what comes out here, the verdict."""
     print(f"\n{found.study}: {found.title} ({seconds:.1f} s)")
     for claim in found.claims:

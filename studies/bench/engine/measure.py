@@ -81,7 +81,7 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     return result
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print the ratios."""
     one, modes, bodies = result["one_mode"], result["modes"], result["bodies"]
     print(f"one mode, one body, two impacts a period: {1e6 * one['time']['engine']['median']:.2f} us a period")

@@ -99,7 +99,7 @@ def run_work_precision(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     return result
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print for every chart whether the exact engine is on its Pareto front."""
     for name, chart in result["charts"].items():
         better = chart["dominated_by"]

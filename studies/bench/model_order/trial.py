@@ -172,7 +172,7 @@ def summary(verdicts: Sequence[Verdict]) -> dict[str, Any]:
     }
 
 
-def tell_trial(result: dict[str, Any]) -> None:
+def print_trial(result: dict[str, Any]) -> None:
     """Print the verdicts."""
     print("automatic choice: scene, tolerance, modes, estimated and true error (95 %), cost, cheapest model, ratio")
     for row in result["verdicts"]:

@@ -84,7 +84,7 @@ def _write(result: Mapping[str, Any], folder: Path) -> None:
     modal_figure(result, folder / "bench_modal.png")
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print times, memory and ratios."""
     for entry in result["sizes"]:
         assembly = entry["assembly"]

@@ -111,7 +111,7 @@ def _write_maps(maps: Mapping[str, Any], path: Path) -> None:
         write_csv(path, ("map", "x", "y", "value"), rows)
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print how far each measured edge lies from its limit."""
     for name, part in result["parts"].items():
         if "limit" in part["curves"]:

@@ -89,7 +89,7 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     return result
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print times, memory and efficiency."""
     for entry in result["sizes"]:
         print(

@@ -9,37 +9,55 @@ import stat
 from argparse import Namespace
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 from vanedamp.files.store import destination
 from vanedamp.files.toml_input import InputError
 
-#: options of the command line that name a file
-_OUTPUTS = ("output", "json", "vtk")
+
+class Outputs(NamedTuple):
+    """The files that a command writes, each with the option that names it."""
+
+    files: tuple[tuple[str, Path], ...]
+
+    def keep(self, inputs: Iterable[str | Path]) -> None:
+        """Refuse outputs that would take the place of an input. Raises InputError."""
+        for option, path in self.files:
+            refuse_input(option, path, inputs)
 
 
-def check_outputs(arguments: Namespace, **suffixes: tuple[str, ...]) -> None:
-    """Refuse files that could not be written, before the work. `--json` onto standard output becomes `-`."""
+def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: tuple[str, ...]) -> Outputs:
+    """Refuse files that could not be written, before the work. Raises InputError.
+
+    The files are those of `--output`, of `--json` (standard output becomes `-` and is none), of the options that
+    suffixes names with the endings that they may have, and one beside the result that the user did not name.
+    """
     if _is_stdout(getattr(arguments, "json", None) or "-"):
         arguments.json = "-"
-    for option, path in _outputs(arguments):
+    named = [(option, getattr(arguments, option, None)) for option in dict.fromkeys(("output", "json", *suffixes))]
+    given = [*named, ("output", beside)]
+    outputs = Outputs(
+        tuple(
+            (f"--{option}", Path(name))
+            for option, name in given
+            if name is not None and (option, name) != ("json", "-")
+        )
+    )
+    for option, path in outputs.files:
         trouble = _trouble(path)
         if trouble is not None:
-            raise InputError(f"--{option} {path}: {trouble}")
-        if path.suffix not in suffixes.get(option, (path.suffix,)):
-            raise InputError(f"--{option} {path}: expected a file name ending in {' or '.join(suffixes[option])}")
+            raise InputError(f"{option} {path}: {trouble}")
+        endings = suffixes.get(option.removeprefix("--"), (path.suffix,))
+        if path.suffix not in endings:
+            raise InputError(f"{option} {path}: expected a file name ending in {' or '.join(endings)}")
         if _is_stdout(path):
-            raise InputError(f"--{option} {path}: is standard output, where the summary goes; name another file")
-    for (one, first), (other, second) in itertools.combinations(_outputs(arguments), 2):
+            raise InputError(f"{option} {path}: is standard output, where the summary goes; name another file")
+    for (one, first), (other, second) in itertools.combinations(outputs.files, 2):
         if _same(first, second):
-            raise InputError(f"--{one} and --{other}: both are {second}; name two files")
-    named = getattr(arguments, "input", None)
-    keep(arguments, [named] if named is not None else arguments.inputs)
-
-
-def keep(arguments: Namespace, inputs: Iterable[str | Path]) -> None:
-    """Refuse outputs that would take the place of an input."""
-    for option, path in _outputs(arguments):
-        refuse_input(f"--{option}", path, inputs)
+            raise InputError(f"{one} and {other}: both are {second}; name two files")
+    named_input = getattr(arguments, "input", None)
+    outputs.keep(getattr(arguments, "inputs", []) if named_input is None else [named_input])
+    return outputs
 
 
 def refuse_input(option: str, path: Path, inputs: Iterable[str | Path]) -> None:
@@ -50,7 +68,7 @@ def refuse_input(option: str, path: Path, inputs: Iterable[str | Path]) -> None:
 
 
 def output_folder(arguments: Namespace) -> Path:
-    """The folder that a command writes, perhaps not there yet."""
+    """Return the folder that a command writes, perhaps not there yet. Raises InputError for a file."""
     folder = Path(arguments.output)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--output {folder}: expected a folder, not a file")
@@ -58,20 +76,12 @@ def output_folder(arguments: Namespace) -> Path:
 
 
 def checkpoint_file(output: str | None) -> Path | None:
-    """Where a sweep keeps what is finished: beside its result, if that is a file."""
+    """Return where a sweep keeps finished points: beside its result, if that is a file."""
     return None if output is None or destination(output) is None else Path(f"{output}.partial")
 
 
-def _outputs(arguments: Namespace) -> list[tuple[str, Path]]:
-    """The outputs named, with their options; a sweep's checkpoint is one."""
-    given = [(option, getattr(arguments, option, None)) for option in _OUTPUTS]
-    if arguments.command == "sweep":
-        given.append(("output", checkpoint_file(arguments.output)))
-    return [(option, Path(name)) for option, name in given if name is not None and (option, name) != ("json", "-")]
-
-
 def _trouble(path: Path) -> str | None:
-    """Why a file cannot be written; None where it can."""
+    """Say why a file cannot be written; None where it can."""
     try:
         target = destination(path)
     except OSError as error:
@@ -89,7 +99,7 @@ def _trouble(path: Path) -> str | None:
 
 
 def _same(one: Path, other: Path) -> bool:
-    """Whether two names are one file; /dev/null takes everything."""
+    """Say whether two names are one file; /dev/null takes everything."""
     if one.exists() and other.exists():
         return os.path.samefile(one, other) and not os.path.samefile(one, os.devnull)
     return os.path.realpath(one) == os.path.realpath(other)
