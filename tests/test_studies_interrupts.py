@@ -104,7 +104,7 @@ def check(process, folder):
 @pytest.mark.parametrize(
     ("event", "end", "count"),
     [
-        ("import", "vanedamp.studies.commands.sweep", 1),
+        ("import", "vanedamp.studies.commands.support.outputs", 1),
         ("open", "scene.toml", 1),
         ("import", "vanedamp.coupling.sweep.sweep", 1),
         ("import", "numba.core.caching", 1),
