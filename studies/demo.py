@@ -12,9 +12,9 @@ from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.store import load
 from vanedamp.studies.paper.figure_file import Effort
 from vanedamp.studies.paper.runner import MODES, Session, prepare, print_claims, study
+from vanedamp.studies.report.claims import CLAIMS
 from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.report.pictures import mode_picture, summary_picture
-from vanedamp.studies.report.results import CLAIMS
 from vanedamp.studies.workers import WorkerPool, available_cores
 
 #: figures of the paper, with fewer frequencies and periods than `vanedamp paper` takes

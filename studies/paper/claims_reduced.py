@@ -10,7 +10,7 @@ import numpy as np
 from vanedamp.coupling.response.response import Response
 from vanedamp.studies.paper.claims_rigid import Curves, claim, verdict
 from vanedamp.studies.paper.curve import Curve
-from vanedamp.studies.report.results import Claim
+from vanedamp.studies.report.claims import Claim
 
 
 def fig12(found: Curves) -> list[Claim]:

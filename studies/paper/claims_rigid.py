@@ -13,7 +13,7 @@ import numpy as np
 
 from vanedamp.studies.paper.curve import Curve
 from vanedamp.studies.paper.figure_file import Bar
-from vanedamp.studies.report.results import Claim
+from vanedamp.studies.report.claims import Claim
 
 Curves = Mapping[str, list[Curve]]
 #: reductions that differ by less are the same

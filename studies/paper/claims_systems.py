@@ -6,7 +6,7 @@ import numpy as np
 
 from vanedamp.studies.paper.claims_rigid import Curves, claim, verdict
 from vanedamp.studies.paper.curve import Curve
-from vanedamp.studies.report.results import Claim
+from vanedamp.studies.report.claims import Claim
 
 #: shares of the load at which friction carries the body along, of the file's normal loads
 LOADS = (0.01, 0.1, 0.3, 0.6, 1.2)

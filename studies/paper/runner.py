@@ -33,7 +33,7 @@ from vanedamp.studies.paper import claims_systems as systems
 from vanedamp.studies.paper import plots as paper_plots
 from vanedamp.studies.paper.curve import Curve, curves
 from vanedamp.studies.paper.figure_file import FOLDER, Bar, Effort, PaperFigure, Structure, write_scene
-from vanedamp.studies.report.results import CLAIMS, Claim, Study
+from vanedamp.studies.report.claims import CLAIMS, Claim, Study
 from vanedamp.studies.terminal import progress
 from vanedamp.studies.workers import workers
 
