@@ -11,7 +11,7 @@ import h5py
 
 from vanedamp.files.store import StoreError
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.extensions import ExtensionPoint
+from vanedamp.studies.extensions import ExtensionError, ExtensionPoint
 
 SECTIONS = ExtensionPoint(
     "section of the report", "vanedamp.studies.report.sections", "vanedamp.report_sections",
@@ -77,8 +77,14 @@ class Results:
 
 
 def sections() -> dict[str, Section]:
-    """Return the sections by the kind of result that they show, in the order of the page."""
-    return {section.KIND: section for section in SECTIONS.all().values()}
+    """Return the sections by the kind of result that they show, in the order of the page. Raises ExtensionError."""
+    known: dict[str, Section] = {}
+    for section in SECTIONS.all().values():
+        if section.KIND in known:
+            files = f"{known[section.KIND].__file__} and {section.__file__}"
+            raise ExtensionError(f"two sections of the report show results of the kind {section.KIND}: {files}")
+        known[section.KIND] = section
+    return known
 
 
 def short_names(paths: Iterable[str]) -> dict[str, str]:
