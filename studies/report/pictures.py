@@ -38,21 +38,20 @@ def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
         return picture.read_bytes() if finished.returncode == 0 else None
 
 
-def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: str | Path) -> None:
+def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path) -> None:
     """PNG of the mode beside the forced response: undamped, with bodies, with the bodies fixed."""
-    import matplotlib
+    from matplotlib.image import imread
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from vanedamp.studies.figures import GREY, draw_grid, save, subplots
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.6), width_ratios=[1, 1.25], layout="constrained")
+    figure, (left, right) = subplots(1, 2, size=(12, 4.6), width_ratios=[1, 1.25])
     left.axis("off")
     if mode_png is not None:
-        left.imshow(plt.imread(io.BytesIO(mode_png)))
+        left.imshow(imread(io.BytesIO(mode_png)))
         left.set_title("first bending mode of the cluster", fontsize=11)
     curves: list[tuple[np.ndarray, str, dict[str, Any]]] = [
-        (response.undamped, "undamped", {"color": "#7a7f87", "linestyle": ":"}),
-        (response.fixed, "bodies fixed", {"color": "#7a7f87", "linestyle": "--"}),
+        (response.undamped, "undamped", {"color": GREY, "linestyle": ":"}),
+        (response.fixed, "bodies fixed", {"color": GREY, "linestyle": "--"}),
         (response.damped_max, "loose bodies, maximum", {"color": "#9fc1ea", "marker": ".", "linewidth": 0.8}),
         (response.damped_mean, "loose bodies, mean of peaks", {"color": "#1f5fa8", "linewidth": 2.0}),
     ]
@@ -62,11 +61,9 @@ def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: str 
     right.set_ylabel("amplitude / undamped maximum")
     right.set_title(f"forced response, {response.name}", fontsize=11)
     right.set_ylim(bottom=0.0)
-    right.grid(color="#e6e8eb")
+    draw_grid(right)
     right.legend(frameon=False)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=110)
-    plt.close(figure)
+    save(figure, path, dpi=110)
 
 
 def save_vtk(modes: Modes, coordinates: np.ndarray, cells: np.ndarray, cell_type: int, path: str | Path) -> None:

@@ -6,22 +6,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.ticker import NullFormatter
 
-from vanedamp.files.store import replacing
+from vanedamp.studies.figures import save, subplots
 
 _SHADES = LinearSegmentedColormap.from_list("failure", ["#f8fafc", "#fca5a5"])
 
 
 def maps_figure(maps: Mapping[str, Any], path: Path) -> None:
     """A panel a map: shares of failure as shades, measured edges as points, analytic limits as lines."""
-    figure, axes = plt.subplots(2, 4, figsize=(19, 9), layout="constrained")
+    figure, axes = subplots(2, 4, size=(19, 9))
     for panel, (name, made) in zip(axes.flat, maps.items(), strict=True):
         modes = "modes" in made["x_label"]
         shades = _SHADES.reversed() if modes else _SHADES
@@ -41,6 +37,4 @@ def maps_figure(maps: Mapping[str, Any], path: Path) -> None:
         panel.set_xlabel(made["x_label"])
         panel.set_ylabel(made["y_label"])
         panel.legend(fontsize=9, loc="lower right" if modes else "best")
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=130, format="png")
-    plt.close(figure)
+    save(figure, path)
