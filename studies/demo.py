@@ -46,9 +46,9 @@ def run_demo(folder: Path, workers: int | None = None) -> Path:
         session = Session(structure, folder, pool, EFFORT)
         for name in FIGURES:
             begun = time.perf_counter()
-            found = study(name, session)
-            print_claims(found, time.perf_counter() - begun)
-            results += [*(folder / source for source in found.sources), folder / f"{name}{CLAIMS}"]
+            figure = study(name, session)
+            print_claims(figure, time.perf_counter() - begun)
+            results += [*(folder / source for source in figure.sources), folder / f"{name}{CLAIMS}"]
     from vanedamp.studies.report.page import write_report
     from vanedamp.studies.report.results import collect
 

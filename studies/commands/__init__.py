@@ -20,7 +20,7 @@ from vanedamp.studies.extensions import ExtensionPoint
 
 
 class Command(Protocol):
-    """What the command line needs of a command."""
+    """The contract of a command."""
 
     SUMMARY: str
 

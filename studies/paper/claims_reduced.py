@@ -13,9 +13,9 @@ from vanedamp.studies.paper.curve import Curve
 from vanedamp.studies.report.claims import Claim
 
 
-def fig12(found: Curves) -> list[Claim]:
+def fig12(curves: Curves) -> list[Claim]:
     """Undamped, damped, fixed."""
-    reduced, rigid = found["reduced"][0], found["rigid"][0]
+    reduced, rigid = curves["reduced"][0], curves["rigid"][0]
     return [
         _level(reduced, rigid),
         _onset(reduced),

@@ -42,17 +42,19 @@ def panels_picture(panels: Mapping[str, Mapping[str, Curve]], title: str, path: 
     save(figure, path, dpi=110)
 
 
-def orientations_picture(found: Mapping[str, Sequence[Curve]], angles: Sequence[float], title: str, path: Path) -> None:
+def orientations_picture(
+    curves: Mapping[str, Sequence[Curve]], angles: Sequence[float], title: str, path: Path
+) -> None:
     """Horizontal and vertical responses, and the tops over the angle."""
-    found = {label: of for label, of in found.items() if "starts" not in label}
+    curves = {label: of for label, of in curves.items() if "starts" not in label}
     figure, (first, second, third) = subplots(1, 3, size=(16, 5.2))
     for axes, index, name in ((first, 0, "horizontal"), (second, -1, "vertical")):
-        _linear(axes, found["single"][index])
-        for (label, of), colour in zip(found.items(), COLOURS, strict=False):
+        _linear(axes, curves["single"][index])
+        for (label, of), colour in zip(curves.items(), COLOURS, strict=False):
             style = "--" if "aside" in label else "-"  # they lie on the single one
             axes.plot(of[index].frequency, 100 * of[index].smooth, style, color=colour, label=label)
         _finish(axes, f"{name}: smoothed means")
-    for (label, of), colour in zip(found.items(), COLOURS, strict=False):
+    for (label, of), colour in zip(curves.items(), COLOURS, strict=False):
         tops = [100 * float(curve.smooth.max()) for curve in of]
         spread = [100 * curve.peak().confidence for curve in of]
         style = "--" if "aside" in label else "-"
@@ -68,13 +70,13 @@ def orientations_picture(found: Mapping[str, Sequence[Curve]], angles: Sequence[
     save(figure, path, dpi=110)
 
 
-def history_picture(response: Response, reference: float, title: str, path: Path, shown: int = 30) -> None:
+def history_picture(response: Response, reference: float, title: str, path: Path, last: int = 30) -> None:
     """The last periods with a mark at every impact, the peaks of the periods, and the times between impacts."""
     figure = Figure(figsize=(12, 7), layout="constrained")
     grid = figure.add_gridspec(2, 2)
     top, left, right = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
     period = 1 / response.frequency
-    begin = (response.periods - shown) * period
+    begin = (response.periods - last) * period
     late = response.time >= begin
     time, motion = response.time[late], response.displacement[late] / reference
     top.plot(1e3 * time, motion, color=COLOURS[0], label="structure")
@@ -87,7 +89,7 @@ def history_picture(response: Response, reference: float, title: str, path: Path
     top.set_ylim(top=1.45 * motion.max())
     top.set_xlabel("time, ms")
     top.set_ylabel("displacement / undamped maximum")
-    top.set_title(f"the last {shown} periods")
+    top.set_title(f"the last {last} periods")
     top.legend(ncols=3, loc="upper right", fontsize=9)
     left.plot(
         np.arange(1, response.periods + 1),
@@ -145,13 +147,13 @@ def mistuning_picture(
     save(figure, path, dpi=110)
 
 
-def systems_picture(found: Mapping[str, Sequence[Curve]], title: str, path: Path) -> None:
+def systems_picture(curves: Mapping[str, Sequence[Curve]], title: str, path: Path) -> None:
     """The best of each system, and its tops."""
     figure, (left, right) = subplots(1, 2, size=(14.5, 5.6), width_ratios=[1.5, 1])
-    _linear(left, found["single_body"][0])
+    _linear(left, curves["single_body"][0])
     labels, tops, means, colours = [], [], [], []
     numbers: dict[str, Sequence[Any]] = {"friction_damper": FORCES, "rotating": LOADS}
-    for (name, of), colour in zip(found.items(), COLOURS, strict=False):
+    for (name, of), colour in zip(curves.items(), COLOURS, strict=False):
         best = min(of, key=top)
         left.plot(best.frequency, 100 * best.mean, ".", color=colour, markersize=3, alpha=0.6)
         line = best.smooth if best.impacts.any() else best.mean

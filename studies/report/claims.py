@@ -10,7 +10,7 @@ CLAIMS = ".claims.json"
 
 @dataclass(frozen=True)
 class Claim:
-    """What a study was to show, what it shows, and a verdict: "shown", "partly" or "not shown"."""
+    """A statement of the paper, our figures, and a verdict: "shown", "partly" or "not shown"."""
 
     claim: str
     ours: str

@@ -15,7 +15,7 @@ import plotly.offline
 
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest, replacing
-from vanedamp.studies.headline import shown
+from vanedamp.studies.headline import format_value
 from vanedamp.studies.report.charts import Chart, chart
 from vanedamp.studies.report.results import Results, Section, sections
 
@@ -89,7 +89,11 @@ def _environment(names: Mapping[str, str]) -> jinja2.Environment:
         loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True, trim_blocks=True, lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )  # fmt: skip
-    environment.filters |= {"shown": shown, "name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
+    environment.filters |= {
+        "shown": format_value,
+        "name": names.__getitem__,
+        "anchor": lambda file: _anchor(names[file]),
+    }
     environment.globals["plot"] = environment.get_template("plot.html").make_module().plot  # type: ignore[attr-defined]
     return environment
 
@@ -125,10 +129,10 @@ def _flat(data: Any, path: str = "") -> dict[str, str]:
     elif isinstance(data, list | tuple):
         return {path: ", ".join(map(str, data))}
     else:
-        return {path: format_value(data)}
+        return {path: format_setting(data)}
     return {key: text for name, value in items for key, text in _flat(value, name).items()}
 
 
-def format_value(value: Any) -> str:
+def format_setting(value: Any) -> str:
     """Return a value as text, floats in eight digits."""
     return f"{value:.8g}" if isinstance(value, float) else str(value)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -12,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import vanedamp
 from vanedamp.files.store import load, replacing
+from vanedamp.studies.workers import run_module
 
 if TYPE_CHECKING:
     from vanedamp.modal.eigen import Modes
@@ -21,7 +19,6 @@ if TYPE_CHECKING:
 
 #: largest displacement in a picture, as a share of the structure's size
 _EXAGGERATION = 0.06
-_ROOT = Path(vanedamp.__file__).parent.parent
 
 
 def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
@@ -32,9 +29,10 @@ def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
     """
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "mode.png"
-        command = [sys.executable, "-m", "vanedamp.studies.report.pictures", str(modes_file), str(mode), str(picture)]
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(_ROOT), os.environ.get("PYTHONPATH", "")])}
-        finished = subprocess.run(command, env=environment, capture_output=True, check=False)
+        # what VTK complains of need not be text
+        finished = run_module(
+            "vanedamp.studies.report.pictures", str(modes_file), str(mode), str(picture), errors="replace"
+        )
         return picture.read_bytes() if finished.returncode == 0 else None
 
 

@@ -36,7 +36,7 @@ class Result:
 
 
 class Section(Protocol):
-    """What the report needs of a section; the folder `sections` says more."""
+    """The contract of a section; the folder `sections` says more."""
 
     KIND: str
     __file__: str

@@ -55,7 +55,7 @@ _ROUNDS, _LENGTHS = 3, (50, 150)
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is computed."""
+    """Sizes of models, numbers of runs and lengths of them."""
 
     degree: int
     modes: tuple[int, ...]

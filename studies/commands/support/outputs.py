@@ -107,6 +107,6 @@ def _same(one: Path, other: Path) -> bool:
 
 def _is_stdout(path: str | Path) -> bool:
     with contextlib.suppress(OSError):
-        found = os.stat(path)
-        return os.path.samestat(found, os.fstat(1)) and not os.path.samestat(found, os.stat(os.devnull))
+        status = os.stat(path)
+        return os.path.samestat(status, os.fstat(1)) and not os.path.samestat(status, os.stat(os.devnull))
     return False

@@ -15,7 +15,7 @@ from vanedamp.studies.report.charts import Chart
 from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, model_name
 from vanedamp.studies.report.forced_response_charts import energy_figure, mistuning_figure, responses_figure
 from vanedamp.studies.report.map_chart import map_axes, map_figure, map_rows
-from vanedamp.studies.report.page import Page, format_value
+from vanedamp.studies.report.page import Page, format_setting
 from vanedamp.studies.report.results import Result
 
 ORDER = 10
@@ -49,7 +49,7 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
 def _scene(sweep: Sweep) -> dict[str, Any]:
     """Return the scene as data, with the sweep's axes in short."""
     axes = {
-        path: f"{len(values)} values, {format_value(values[0])} to {format_value(values[-1])}"
+        path: f"{len(values)} values, {format_setting(values[0])} to {format_setting(values[-1])}"
         for path, values in sweep.axes.items()
     }
     return sweep.scene.to_dict() | {"sweep": axes}
