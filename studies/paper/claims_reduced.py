@@ -1,4 +1,4 @@
-"""What the paper says of its three-dimensional model, and what the reduced model shows in its place (Figs. 12, 13)."""
+"""The paper's claims on its three-dimensional model, and what the reduced model shows instead (Figs. 12, 13)."""
 
 from __future__ import annotations
 

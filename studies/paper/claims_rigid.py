@@ -1,4 +1,4 @@
-"""What the paper says of each figure computed with rigid models, and what these models show.
+"""The paper's claims on each figure computed with rigid models, and what these models show.
 
 Claims are in words of our own. A verdict is a rule on figures; where a claim holds in part or not, `why` says what the
 model has or lacks. Amplitudes are relative to the undamped maximum.

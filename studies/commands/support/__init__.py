@@ -1,1 +1,1 @@
-"""What several commands need: arguments, output files, messages, scenes, a budget."""
+"""Shared by several commands: arguments, output files, messages, scenes, a budget."""
