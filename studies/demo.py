@@ -11,10 +11,10 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.store import load
 from vanedamp.studies.paper.figure_file import Effort
-from vanedamp.studies.paper.runner import MODES, Session, prepare, study, tell
+from vanedamp.studies.paper.runner import MODES, Session, prepare, print_claims, study
+from vanedamp.studies.report.claims import CLAIMS
 from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.report.pictures import mode_picture, summary_picture
-from vanedamp.studies.report.results import CLAIMS
 from vanedamp.studies.workers import WorkerPool, available_cores
 
 #: figures of the paper, with fewer frequencies and periods than `vanedamp paper` takes
@@ -46,9 +46,9 @@ def run_demo(folder: Path, workers: int | None = None) -> Path:
         session = Session(structure, folder, pool, EFFORT)
         for name in FIGURES:
             begun = time.perf_counter()
-            found = study(name, session)
-            tell(found, time.perf_counter() - begun)
-            results += [*(folder / source for source in found.sources), folder / f"{name}{CLAIMS}"]
+            figure = study(name, session)
+            print_claims(figure, time.perf_counter() - begun)
+            results += [*(folder / source for source in figure.sources), folder / f"{name}{CLAIMS}"]
     from vanedamp.studies.report.page import write_report
     from vanedamp.studies.report.results import collect
 

@@ -1,6 +1,6 @@
-"""What a damped curve comes to, like beside like: its top over that of the undamped curve in the same range.
+"""The key figures of a damped curve, like beside like: its top over that of the undamped curve in the same range.
 
-The linear curves are known between the points of a sweep, the damped one at its points alone; so the headline says how
+The linear curves are known between the points of a sweep, the damped one at its points only; so the headline says how
 many of these are left out, whether the top lies at an edge of the range, and whether the points are too coarse.
 """
 
@@ -69,37 +69,37 @@ class Headline:
 
     @property
     def too_coarse(self) -> bool:
-        """Whether a step beside a resonance is wider than the resonance: a top may hide there."""
+        """Say whether a step beside a resonance is wider than the resonance: a top may hide there."""
         return self.spacing > self.half_power_width > 0.0
 
     @property
     def remarks(self) -> list[str]:
-        """What keeps the ratio from being that of two resonance peaks."""
-        found = []
+        """Reasons that keep the ratio from being that of two resonance peaks."""
+        remarks = []
         if self.undamped_at_edge:
-            found.append("no undamped resonance lies within the range")
+            remarks.append("no undamped resonance lies within the range")
         if self.peak_at_edge:
-            found.append("the damped peak lies at an edge of the range, and may be higher beyond it")
+            remarks.append("the damped peak lies at an edge of the range, and may be higher beyond it")
         if self.too_coarse:
-            found.append(
+            remarks.append(
                 f"points {self.spacing:.3g} Hz apart are too coarse for a resonance {self.half_power_width:.3g} Hz wide"
             )
         if self.points_left_out:
-            found.append(f"{self.points_left_out} of {self.points} points are left out, which are not ok")
-        return found
+            remarks.append(f"{self.points_left_out} of {self.points} points are left out, which are not ok")
+        return remarks
 
     def sentence(self, axis: str, units: str, low: Any, high: Any) -> str:
         """The headline for people; low, high: the range along the axis."""
         unit = "" if units == "1" else f" {units}"
         if not math.isfinite(self.damped_peak):
             return f"no damped peak: {self.points_left_out} of {self.points} points are not ok"
-        at = f"{axis} = {shown(self.damped_peak_at)}{unit}"
+        at = f"{axis} = {format_value(self.damped_peak_at)}{unit}"
         if not math.isfinite(self.peak_ratio):
             text = f"damped peak (mean) {self.damped_peak:.4g} m, at {at}; the undamped one has no bound"
         elif self.undamped_at_edge or axis != FREQUENCY:
             text = (
                 f"highest damped mean {self.peak_ratio:.3f} of the highest undamped amplitude {self.undamped_peak:.4g} "
-                f"m from {shown(low)} to {shown(high)}{unit}, at {at}"
+                f"m from {format_value(low)} to {format_value(high)}{unit}, at {at}"
             )
         else:
             text = (
@@ -112,7 +112,7 @@ class Headline:
         return asdict(self) | {"peak_ratio": self.peak_ratio, "too_coarse": self.too_coarse}
 
 
-def shown(value: Any) -> str:
+def format_value(value: Any) -> str:
     """A value of an axis in a few digits; text as it is."""
     return str(value) if isinstance(value, str) else f"{value:.6g}"
 
@@ -159,7 +159,7 @@ def headline(
 
 
 def reference_of(undamped: np.ndarray, peaks: Mapping[str, float]) -> float:
-    """What charts divide amplitudes by, m: the undamped maximum, or where that has no bound, that of the points."""
+    """Return what charts divide amplitudes by, m: the undamped maximum, of the points where the peak has no bound."""
     known = float(peaks.get("undamped_peak", math.nan))
     return known if 0.0 < known < math.inf else float(np.nan_to_num(undamped).max(initial=0.0)) or math.nan
 

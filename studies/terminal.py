@@ -1,4 +1,4 @@
-"""What people see on a terminal: progress bars and summaries."""
+"""Progress bars on a terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
         def show(done: int, total: int) -> None:
             if bar.total is None:
-                bar.initial = bar.n = done  # what was done before tells nothing of the rate
+                bar.initial = bar.n = done  # what was done before says nothing of the rate
             bar.total = total
             bar.update(done - bar.n)
 

@@ -1,20 +1,28 @@
-"""Worker processes for sweeps."""
+"""Processes: a pool for sweeps, and one for a single task."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 
 from vanedamp.studies.interrupts import uninterrupted_children
 
+#: folder that holds the package vanedamp
+_ROOT = Path(__file__).parents[2]
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
 
 class WorkerPool(Executor):
-    """A process pool that starts anew after the death of a worker, which breaks a pool of the standard library."""
+    """A process pool that starts again after the death of a worker, which breaks a pool of the standard library."""
 
     def __init__(self, count: int) -> None:
         self._max_workers = count
@@ -61,7 +69,7 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def workers(count: int | None) -> Iterator[Executor | None]:
-    """Worker processes with the engine compiled, one for every core unless told; None for a single one."""
+    """Worker processes with the engine compiled, one for every core by default; None for a single one."""
     count = count or available_cores()
     if count == 1:
         yield None
@@ -71,6 +79,22 @@ def workers(count: int | None) -> Iterator[Executor | None]:
 
         pool.submit(warm_up).result()
         yield pool
+
+
+def run_module(module: str, *arguments: str, threads: int | None = None, **options: Any) -> CompletedProcess[str]:
+    """Run a module of ours in a process of its own and wait for its end.
+
+    threads: of each numerical library, left to them by default; options: those of subprocess.run. Raises
+    subprocess.TimeoutExpired.
+    """
+    environment = dict(os.environ)
+    if threads is not None:
+        environment |= dict.fromkeys(_THREADS, str(threads))
+    paths = [str(_ROOT), *filter(None, [environment.get("PYTHONPATH")])]
+    return subprocess.run(
+        [sys.executable, "-m", module, *arguments], env=environment | {"PYTHONPATH": os.pathsep.join(paths)},
+        capture_output=True, text=True, check=False, **options,
+    )  # fmt: skip
 
 
 def available_cores() -> int:

@@ -199,7 +199,7 @@ def test_commands_are_understood(example):
         words = shlex.split(line, comments=True) if "<(" not in line else []
         if "vanedamp" in words:
             arguments = words[words.index("vanedamp") + 1 :]
-            assert _parser().parse_args(arguments).command == arguments[0]
+            assert _parser(arguments[0]).parse_args(arguments).command == arguments[0]
         elif words[:1] == ["make"]:
             assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
 

@@ -15,7 +15,7 @@ from vanedamp.studies.bench.engine.hand_written_loop import (
     lean_loop,
     plain_loop,
 )
-from vanedamp.studies.bench.engine.measure import Effort, run_bench, tell
+from vanedamp.studies.bench.engine.measure import Effort, print_summary, run_bench
 from vanedamp.studies.bench.engine.reference_solutions import solve_with_events, truth
 from vanedamp.studies.cli import BAD_INPUT, main
 
@@ -116,7 +116,7 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     assert {row["part"] for row in rows} >= {"one mode", "bodies", "costs", "modes, free"}
     for name in ("bench_one_mode.png", "bench_scaling.png"):
         assert (tmp_path / "bench" / name).read_bytes().startswith(b"\x89PNG")
-    tell(result)
+    print_summary(result)
     assert "engine / lean loop" in capsys.readouterr().out
 
 

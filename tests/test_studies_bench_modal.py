@@ -6,7 +6,7 @@ import json
 import pytest
 
 from vanedamp.studies.bench.modes import measure as bench_modal
-from vanedamp.studies.bench.modes.measure import Effort, run_bench, tell
+from vanedamp.studies.bench.modes.measure import Effort, print_summary, run_bench
 
 TINY = Effort(sizes=(0.008,), rounds=1, limit=120.0)
 
@@ -37,7 +37,7 @@ def test_table_and_figure(folder, capsys):
         rows = list(csv.DictReader(stream))
     assert [row["solver"] for row in rows][:2] == ["assembly", "SLEPc, CHOLMOD"]
     assert (folder / "bench_modal.png").read_bytes().startswith(b"\x89PNG")
-    tell(json.loads((folder / "bench_modal.json").read_text()))
+    print_summary(json.loads((folder / "bench_modal.json").read_text()))
     assert "degrees of freedom" in capsys.readouterr().out
 
 
@@ -54,7 +54,7 @@ def test_solvers_that_need_less_time_are_named(ratio, told, folder, capsys):
     for other in entry["ratio"].values():
         other["modes"] = 0.5
     entry["ratio"]["superlu"]["modes"] = ratio
-    tell(result | {"ahead": bench_modal._ahead(result["sizes"])})
+    print_summary(result | {"ahead": bench_modal._ahead(result["sizes"])})
     assert capsys.readouterr().out.splitlines()[-1].startswith(told)
 
 

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from vanedamp.coupling.sweep.grid import grid
-from vanedamp.studies.bench.sweep.measure import Effort, _efficiency, run_bench, tell
+from vanedamp.studies.bench.sweep.measure import Effort, _efficiency, print_summary, run_bench
 from vanedamp.studies.bench.sweep.worker import measure, scene
 
 TINY = Effort((4, 8), 8, 1)
@@ -45,5 +45,5 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     assert [row["points"] for row in rows] == ["8", "8", "4", "8"]
     with Image.open(tmp_path / "bench" / "bench_sweep.png") as picture:
         assert picture.width > 1000
-    tell(result)
+    print_summary(result)
     assert "parallel efficiency by the processor" in capsys.readouterr().out

@@ -21,7 +21,7 @@ from vanedamp.modal.eigen import Modes
 from vanedamp.modal.matrix_files import read_folder
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.commands import all as commands
+from vanedamp.studies.commands.support.messages import write_result
 
 
 def change(path, old, new):
@@ -315,7 +315,7 @@ def test_newtons_law_on_several_modes_is_told(command, tables, modes, told, fold
         (["modal", "case.toml", "--vtk", "modes.stl"], "expected a file name ending in .vtu or .vtk"),
         (["mesh", "case.toml", "-o", "block.vtk"], "expected a file name ending in .msh"),
         (["report", "case.toml", "-o", "report.html"], "case.toml: not a readable HDF5 file"),
-        (["report", ".", "-o", "report.html"], "no results of modal, reduce, run, sweep, optimise or paper"),
+        (["report", ".", "-o", "report.html"], "no results that a report shows (sweep, response, .claims.json, "),
         (["report", "nowhere", "-o", "report.html"], "nowhere: no such file or folder"),
         (["report", ".", "-o", "report.pdf"], "expected a file name ending in .html"),
     ],
@@ -382,7 +382,7 @@ def test_failing_write_leaves_the_old_files(folder, monkeypatch, capfd):
     assert capfd.readouterr().err == "vanedamp: no space left on device\n"
     monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(StoreError, match=r"response.json: cannot be written \(no space"):
-        commands._write_json("response.json", {})
+        write_result("response.json", {})
     monkeypatch.undo()
     for name in ("response.h5", "response.json"):
         assert (folder / name).read_text() == "precious"

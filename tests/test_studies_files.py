@@ -170,7 +170,7 @@ def small_files():
         (["modal", "case.toml", "--vtk", "modes.vtu"], "modes.vtu", 3000),
         (["modal", "case.toml", "--vtk", "modes.vtk"], "modes.vtk", 3000),
         (["matrices", "case.toml", "-o", "matrices"], "matrices/stiffness.mtx", 60000),
-        (["report", "response.h5", "-o", "report.html"], "report.html", 100_000),
+        (["report", "response.h5", "-o", "report.html"], "report.html", 2_000),
     ],
 )
 def test_full_disk(arguments, output, most, folder, small_files, capfd, monkeypatch):

@@ -16,7 +16,7 @@ from vanedamp.coupling.sweep.sweep import sweep as run_sweep
 from vanedamp.files.store import finite
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.cli import main
-from vanedamp.studies.headline import shown
+from vanedamp.studies.headline import format_value
 from vanedamp.studies.report.forced_response import forced_responses, model_name, resonance_grid
 
 DATA = {
@@ -220,9 +220,9 @@ def test_command_writes_the_headline(tmp_path, capsys):
 
 
 def test_shown():
-    assert shown(2388.0881234) == "2388.09"
-    assert shown(3) == "3"
-    assert shown("newton") == "newton"
+    assert format_value(2388.0881234) == "2388.09"
+    assert format_value(3) == "3"
+    assert format_value("newton") == "newton"
 
 
 @pytest.mark.parametrize("num", [41, 81, 201])

@@ -15,7 +15,9 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.commands import all as commands
+from vanedamp.studies.commands import optimise as optimise_command
+from vanedamp.studies.commands import run as run_command
+from vanedamp.studies.commands import sweep as sweep_command
 
 #: s without an answer after which a command counts as stuck
 PATIENCE = 10
@@ -34,7 +36,8 @@ def folder(tmp_path, monkeypatch):
     rows = [f"{f},{z.real},{z.imag}" for f, z in zip(frequencies, response, strict=True)]
     (tmp_path / "frf.csv").write_text("frequency,real,imaginary\n" + "\n".join(rows))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(commands, "progress", patient)
+    for command in (run_command, sweep_command, optimise_command):
+        monkeypatch.setattr(command, "progress", patient)
     explicit = PRESCRIBED | {"solver": {"method": "penalty"}}
     for scene in (SCENE, ROM_SCENE, PRESCRIBED, explicit):  # compiled functions take a minute once
         simulate(validate(Scene, scene, "warm-up"))

@@ -105,7 +105,7 @@ def test_work_precision_leaves_its_results(tmp_path, capsys):
     else:
         assert list(chart["absent"]) == ["SUNDIALS CVODE"]
         assert not cvode
-    work_precision.tell(result)
+    work_precision.print_summary(result)
     assert "exact engine is" in capsys.readouterr().out
 
 

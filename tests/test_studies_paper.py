@@ -171,17 +171,18 @@ def folder(tmp_path_factory):
 
 
 def test_claims_have_their_structure(folder):
-    found = collect([folder])
-    assert [Path(file).name for file in found.studies] == [f"{name}.claims.json" for name in ("fig10", "fig19", "fig9")]
-    for file, made in found.studies.items():
-        assert made.study == Path(file).name.removesuffix(".claims.json")
-        assert made.title
-        assert made.claims
-        for source in made.sources:
+    studies = collect([folder]).kinds[".claims.json"]
+    assert [Path(file).name for file in studies] == [f"{name}.claims.json" for name in ("fig10", "fig19", "fig9")]
+    for file, result in studies.items():
+        study = result.record
+        assert study.study == Path(file).name.removesuffix(".claims.json")
+        assert study.title
+        assert study.claims
+        for source in study.sources:
             assert isinstance(Sweep.load(folder / source), Sweep)
             assert Scene.load(folder / source.replace(".h5", ".toml")) == Sweep.load(folder / source).scene
-        assert (folder / f"{made.study}.png").stat().st_size > 10_000
-        for claim in made.claims:
+        assert (folder / f"{study.study}.png").stat().st_size > 10_000
+        for claim in study.claims:
             assert claim.claim
             assert claim.ours
             assert claim.verdict in ("shown", "partly", "not shown")

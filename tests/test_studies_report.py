@@ -20,10 +20,10 @@ from vanedamp.files.store import Variable, load, save, write_json
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import main
-from vanedamp.studies.report import page as module
 from vanedamp.studies.report.mode_chart import sharp_edges, surface
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
+from vanedamp.studies.report.sections import modes as modes_section
 
 RESONANCE = 100.0 / (2 * np.pi)
 DATA = {
@@ -90,7 +90,7 @@ def decoded(value):
 def test_curves_are_in_the_page(page, results):
     found = charts(page)
     kinds = ("response", "mistuning", "energy")
-    expected = {f"{kind}-{group}" for kind in kinds for group in (0, 2)} | {"history-1", "map-3", "mode-0"}
+    expected = {f"{kind}-{group}" for kind in kinds for group in (0, 1)} | {"history-0", "map-0", "mode-0"}
     assert set(found) == expected
     one, two = (Sweep.load(results / f"sweep_{name}.h5") for name in ("one", "two"))
     expected = {
@@ -117,7 +117,7 @@ def test_curves_are_in_the_page(page, results):
 
 def test_time_history_is_that_of_the_run(page, results):
     values, _ = load(results / "run.h5", "response")
-    structure, impacts, body = charts(page)["history-1"]
+    structure, impacts, body = charts(page)["history-0"]
     np.testing.assert_allclose(structure["x"], 1e3 * values["time"])
     np.testing.assert_allclose(structure["y"], 1e6 * values["displacement"])
     np.testing.assert_allclose(body["y"], 1e6 * values["body_displacement"][:, 0])
@@ -130,7 +130,7 @@ def test_time_history_is_that_of_the_run(page, results):
 
 def test_map_is_in_order_of_its_axes(page, results):
     record = Sweep.load(results / "fig9_gaps.h5")
-    (trace,) = charts(page)["map-3"]
+    (trace,) = charts(page)["map-0"]
     np.testing.assert_allclose(trace["y"], [100, 200, 300, 400])
     values = np.reshape(trace["z"], (4, len(FREQUENCIES))) if np.ndim(trace["z"]) == 1 else trace["z"]
     np.testing.assert_allclose(values, record.amplitude_mean[[3, 1, 2, 0]] / 1e-3)
@@ -141,7 +141,7 @@ def test_study_has_its_claims_and_its_sweeps(page):
     assert "Half is &lt; enough" in page
     for verdict in ("shown", "not shown"):
         assert re.search(rf'class="verdict \w+">{verdict}<', page)
-    names = {trace["legendgroup"] for trace in charts(page)["response-2"]}
+    names = {trace["legendgroup"] for trace in charts(page)["response-1"]}
     assert names == {f"gaps, c1.gap = {gap} µm" for gap in (100, 200, 300, 400)}
 
 
@@ -203,7 +203,7 @@ def test_tables_hold_the_results(page, results):
 
 
 def test_files_of_other_kinds_are_passed_over_in_folders_only(results):
-    assert len(collect([results]).sweeps) == 3
+    assert len(collect([results]).kinds["sweep"]) == 3
     with pytest.raises(InputError, match=r"other.h5: holds no result"):
         collect([results / "other.h5"])
 
@@ -216,8 +216,8 @@ def test_sweeps_alone_make_a_page(results, tmp_path):
 
 
 def test_page_without_a_picture_says_so(results, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "mode_picture", lambda *_: None)
-    monkeypatch.setattr(module, "small_surface", lambda _: None)
+    monkeypatch.setattr(modes_section, "mode_picture", lambda *_: None)
+    monkeypatch.setattr(modes_section, "small_surface", lambda _: None)
     write_report(collect([results / "modes.h5"]), tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "No picture: this machine cannot render one" in text

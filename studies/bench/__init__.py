@@ -1,1 +1,19 @@
-"""Benchmarks."""
+"""Benchmarks of `vanedamp bench`: each folder here is one, and other packages add theirs.
+
+A benchmark is a package (or any module) with
+
+    SUMMARY             what it measures, in a line of --help without a full stop
+    run(folder, quick)  measure, write results and figures into a folder, print a summary; quick: in seconds, roughly
+    NAME                if it is not the folder's
+    ORDER               place in --help
+
+Import what is heavy inside `run`. What several benchmarks need is in the files of this folder.
+"""
+
+from __future__ import annotations
+
+from vanedamp.studies.extensions import ExtensionPoint
+
+BENCHMARKS = ExtensionPoint(
+    "benchmark", "vanedamp.studies.bench", "vanedamp.benchmarks", ("SUMMARY", "run"), folders=True
+)

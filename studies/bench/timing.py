@@ -42,13 +42,13 @@ def spread(values: np.ndarray) -> dict[str, float]:
     return {"median": float(median), "low": float(low), "high": float(high)}
 
 
-def shown(values: Mapping[str, float]) -> str:
-    """Median and quartiles for people."""
+def format_spread(values: Mapping[str, float]) -> str:
+    """Return median and quartiles as text."""
     return f"{values['median']:8.3g}  ({values['low']:.3g} to {values['high']:.3g})"
 
 
 def machine() -> dict[str, Any]:
-    """What the times were taken on."""
+    """Return the machine that the times were taken on."""
     information = Path("/proc/cpuinfo")
     text = information.read_text(encoding="utf-8") if information.is_file() else ""
     models = [line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("model name")]

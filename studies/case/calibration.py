@@ -66,7 +66,7 @@ class Calibration:
             "rigid": asdict(self.rigid),
             "damping": self._damping(),
             "excitation": self._excitation(),
-            "tuning": None if self.tuning is None else _told(self.tuning, self.case),
+            "tuning": None if self.tuning is None else _tuning_json(self.tuning, self.case),
             "warnings": list(self.warnings),
             "wall_time_s": self.wall_time_s,
         }
@@ -95,15 +95,15 @@ class Calibration:
         save(path, "calibration", variables, attributes)
 
     def _damping(self) -> dict[str, Any]:
-        told: dict[str, Any] = {"ratio": self.rigid.damping_ratio, "source": "case"}
+        damping: dict[str, Any] = {"ratio": self.rigid.damping_ratio, "source": "case"}
         if self.poles is not None and self.pole is not None:
-            told |= {
+            damping |= {
                 "source": "frf",
                 "deviation": float(self.poles.deviations[self.pole, 1]),
                 "frequency_hz": float(self.poles.frequencies_hz[self.pole]),
                 "misfit": self.poles.misfit,
             }
-        return told
+        return damping
 
     def _excitation(self) -> dict[str, Any] | None:
         spot, amplitude = self.analysis.hot_spot, self.analysis.amplitude
@@ -142,9 +142,11 @@ def calibrate(case: Case) -> Calibration:
         poles = _poles(frf, band, table.damping.modes, frequency)
         pole = poles.nearest(frequency)
         ratio = float(poles.damping_ratios[pole])
-        found = float(poles.frequencies_hz[pole])
-        _check_near(found, frequency)
-        warnings += tuple(f"calibration.damping: {told}" for told in _doubts(frf, band, poles.misfit, found, frequency))
+        measured = float(poles.frequencies_hz[pole])
+        _check_near(measured, frequency)
+        warnings += tuple(
+            f"calibration.damping: {doubt}" for doubt in _doubts(frf, band, poles.misfit, measured, frequency)
+        )
     rigid = rigid_model(analysis.modes, analysis.first_bending, analysis.functional, case.response_label, ratio)
     return Calibration(structure.case, analysis, rigid, tuning, poles, pole, warnings, time.perf_counter() - started)
 
@@ -194,12 +196,12 @@ def _poles(frf: Frf, band: tuple[float, float], count: int, frequency: float) ->
         ) from error
 
 
-def _doubts(frf: Frf, band: tuple[float, float], misfit: float, found: float, computed: float) -> Iterator[str]:
-    """What is odd about the mode that was found in a band of a response."""
-    if abs(found / computed - 1.0) > _OFF:
+def _doubts(frf: Frf, band: tuple[float, float], misfit: float, measured: float, computed: float) -> Iterator[str]:
+    """Yield what is odd about the mode measured in a band of a response."""
+    if abs(measured / computed - 1.0) > _OFF:
         yield (
-            f"the response's mode lies at {found:.6g} Hz, {found / computed - 1.0:+.1%} off the computed first bending "
-            f"({computed:.6g} Hz); tune the stiffness to measured frequencies"
+            f"the response's mode lies at {measured:.6g} Hz, {measured / computed - 1.0:+.1%} off the computed first "
+            f"bending ({computed:.6g} Hz); tune the stiffness to measured frequencies"
         )
     if misfit > _MISSED:
         yield (
@@ -214,10 +216,10 @@ def _doubts(frf: Frf, band: tuple[float, float], misfit: float, found: float, co
         )
 
 
-def _check_near(found: float, computed: float) -> None:
-    if abs(found / computed - 1.0) > _NEAR:
+def _check_near(measured: float, computed: float) -> None:
+    if abs(measured / computed - 1.0) > _NEAR:
         raise InputError(
-            f"calibration.damping: the nearest pole of the response lies at {found:.6g} Hz, the first bending at "
+            f"calibration.damping: the nearest pole of the response lies at {measured:.6g} Hz, the first bending at "
             f"{computed:.6g} Hz; check the band, or tune the frequencies first"
         )
 
@@ -231,7 +233,7 @@ def _spot(spot: HotSpot, share: float, amplitude: float) -> dict[str, Any]:
     }
 
 
-def _told(tuning: Tuning, case: Case) -> dict[str, Any]:
+def _tuning_json(tuning: Tuning, case: Case) -> dict[str, Any]:
     return {
         "factor": dict(zip(tuning.names, tuning.factors.tolist(), strict=True)),
         "deviation": dict(zip(tuning.names, tuning.deviations.tolist(), strict=True)),

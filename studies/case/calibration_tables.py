@@ -52,7 +52,7 @@ class TuneTable:
 
 @dataclass(frozen=True, config=STRICT)
 class CalibrationTable:
-    """What `vanedamp calibrate` uses beside the case itself; `share` of the fatigue strength sets the excitation,
+    """The data of `vanedamp calibrate` beside the case itself; `share` of the fatigue strength sets the excitation,
     looked for in the volume groups `hot_spot` (left out: all)."""
 
     share: Annotated[Real, Field(gt=0, le=1)] = 0.7

@@ -84,10 +84,10 @@ class External:
         """
         table = self.matrices
         folder = Path(path).parent
-        found = {} if table.file is None else read_matrices(folder / table.file)
+        in_file = {} if table.file is None else read_matrices(folder / table.file)
         names = {key: getattr(table, key) for key in ("mass", "stiffness", "damping", "base_load")}
         matrices = {
-            key: table.mass_scale * _matrix(f"matrices.{key}", name, found, folder)
+            key: table.mass_scale * _matrix(f"matrices.{key}", name, in_file, folder)
             for key, name in names.items()
             if name
         }
@@ -113,20 +113,20 @@ def _doubts(model: ReducedModel) -> tuple[str, ...]:
     eigenvalue, shape = linalg.eigh(model.stiffness, model.mass, subset_by_index=[first, first])
     most = float(np.max((model.selection @ shape) ** 2))
     frequency = float(np.sqrt(eigenvalue[0])) / (2.0 * np.pi)
-    return tuple(f"units: {told}" for told in model_doubts(1.0 / most if most else np.inf, frequency))
+    return tuple(f"units: {doubt}" for doubt in model_doubts(1.0 / most if most else np.inf, frequency))
 
 
-def _matrix(key: str, name: str, found: dict[str, np.ndarray], folder: Path) -> np.ndarray:
-    if name.lower() in found:
-        return found[name.lower()]
-    if "" in found:
+def _matrix(key: str, name: str, in_file: dict[str, np.ndarray], folder: Path) -> np.ndarray:
+    if name.lower() in in_file:
+        return in_file[name.lower()]
+    if "" in in_file:
         raise InputError("matrices.file: holds one matrix without a name; name the file as mass or stiffness instead")
-    if found and not Path(name).suffix:
-        raise InputError(f"{key}: no matrix {name!r} in the file; {nearest(name.lower(), list(found))}")
-    alone = {} if Path(name).suffix == "" else read_matrices(folder / name)
-    if "" not in alone:
+    if in_file and not Path(name).suffix:
+        raise InputError(f"{key}: no matrix {name!r} in the file; {nearest(name.lower(), list(in_file))}")
+    own = {} if Path(name).suffix == "" else read_matrices(folder / name)
+    if "" not in own:
         raise InputError(
             f"{key}: {name!r} is the name of a matrix, or of a file of several: name the file in matrices.file and the "
             "matrix here; or here a file of one matrix (.mtx, .npy, scipy's save_npz)"
         )
-    return alone[""]
+    return own[""]

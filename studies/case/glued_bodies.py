@@ -1,6 +1,6 @@
 """Bodies glued into their cavities: meshed as a part of the cluster, against masses added to a reduced model.
 
-The second is what scenes assume of a body that sticks. It knows the tangential motion of the floor alone; the meshed
+The second is what scenes assume of a body that sticks. It knows the tangential motion of the floor only; the meshed
 body also moves radially and turns, and stiffens the shroud that it is glued to. The record tells one from the other.
 """
 

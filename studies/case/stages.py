@@ -35,7 +35,7 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.calibration_tables import CalibrationTable
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 
-# a mode so near the first bending, relative, that moves its point with such a share of its compliance, is told
+# a mode so near the first bending, relative, that moves its point with such a share of its compliance, is reported
 _NEAR, _NOTABLE = 0.02, 0.01
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
@@ -262,8 +262,8 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
     """A warning when sizes, masses, sound speeds or the first straining frequency hint at wrong units."""
     matrices = structure.matrices
     materials = {name: (table.young, table.density) for name, table in structure.case.material.items()}
-    found = doubts(materials, float(np.ptp(matrices.coordinates, axis=0).max()), matrices.total_mass, first_hz)
-    return tuple(f"units: {told}" for told in found)
+    remarks = doubts(materials, float(np.ptp(matrices.coordinates, axis=0).max()), matrices.total_mass, first_hz)
+    return tuple(f"units: {remark}" for remark in remarks)
 
 
 def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:
@@ -277,23 +277,23 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, mo
     places = solid.stress_points()
     apart = 0.02 * np.ptp(places, axis=0).max()
     shapes = linalg.eigh(model.stiffness, model.mass)[1][:, :modes]
-    found: list[int] = []
+    picked: list[int] = []
     for shape in shapes.T:
         stress = np.array(solid.von_mises(model.recovery @ shape))
-        for place in found:
+        for place in picked:
             stress[np.linalg.norm(places - places[place], axis=1) < apart] = 0.0
         for _ in range(spots):
             if not stress.any():
-                raise InputError(f"hot spots: {len(found)} are all that lie 2 % of the structure's size apart")
-            found.append(int(np.argmax(stress)))
-            stress[np.linalg.norm(places - places[found[-1]], axis=1) < apart] = 0.0
-    values = np.array([solid.stress_components(column, np.array(found)) for column in model.recovery.T])
+                raise InputError(f"hot spots: {len(picked)} are all that lie 2 % of the structure's size apart")
+            picked.append(int(np.argmax(stress)))
+            stress[np.linalg.norm(places - places[picked[-1]], axis=1) < apart] = 0.0
+    values = np.array([solid.stress_components(column, np.array(picked)) for column in model.recovery.T])
     residual = None
     if model.residual_recovery is not None:
-        static = np.array([solid.stress_components(column, np.array(found)) for column in model.residual_recovery.T])
-        residual = {f"hot{index + 1}": static[:, :, index].T for index in range(len(found))}
-    stresses = {f"hot{index + 1}": values[:, :, index].T for index in range(len(found))}
-    spots_at = {f"hot{index + 1}": places[place].tolist() for index, place in enumerate(found)}
+        static = np.array([solid.stress_components(column, np.array(picked)) for column in model.residual_recovery.T])
+        residual = {f"hot{index + 1}": static[:, :, index].T for index in range(len(picked))}
+    stresses = {f"hot{index + 1}": values[:, :, index].T for index in range(len(picked))}
+    spots_at = {f"hot{index + 1}": places[place].tolist() for index, place in enumerate(picked)}
     model = replace(model, provenance=dict(model.provenance) | {"hot_spots": spots_at})
     return with_stresses(model, stresses, residual)
 

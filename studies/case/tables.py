@@ -51,7 +51,7 @@ class MeshFile:
 
     @property
     def foreign(self) -> bool:
-        """Whether another program than gmsh wrote it."""
+        """Say whether another program than gmsh wrote it."""
         return not self.file.lower().endswith(".msh")
 
 
@@ -127,7 +127,7 @@ class MaterialTable:
 
     @property
     def elastic(self) -> Material:
-        """What the finite elements need of it."""
+        """Return what the finite elements need of it."""
         from vanedamp.modal.elasticity import Material  # dolfinx is slow to load, and a bad file wants a quick answer
 
         return Material(self.young, self.poisson, self.density)
@@ -165,7 +165,7 @@ class ElasticTable:
 
     @property
     def springs(self) -> ElasticSupport:
-        """What the finite elements need of it."""
+        """Return what the finite elements need of it."""
         from vanedamp.modal.elasticity import ElasticSupport
 
         return ElasticSupport(self.stiffness, self.normal, self.tangential)
@@ -376,8 +376,10 @@ def _check_group(key: str, group: str, known: Mapping[str, list[str]]) -> None:
     if any(group in names for names in known.values()):
         return
     (kind, names), *others = known.items()
-    told = "".join(f"; {other} groups: {', '.join(sorted(found))}" for other, found in others if found)
-    raise InputError(f"{key}: no {kind} group '{group}' in the mesh; it has {', '.join(sorted(names)) or 'none'}{told}")
+    elsewhere = "".join(f"; {other} groups: {', '.join(sorted(groups))}" for other, groups in others if groups)
+    raise InputError(
+        f"{key}: no {kind} group '{group}' in the mesh; it has {', '.join(sorted(names)) or 'none'}{elsewhere}"
+    )
 
 
 def _known(word: str, known: Iterable[str]) -> str:

@@ -37,7 +37,7 @@ class Optimum:
 
     @property
     def reduction(self) -> float:
-        """What is taken from the undamped amplitude, as designed."""
+        """Share of the undamped amplitude that is taken away, as designed."""
         return 1.0 - self.amplitude
 
     @property
@@ -61,7 +61,7 @@ class Optimum:
 
 @dataclass(frozen=True, eq=False)
 class Optimisation:
-    """What an optimisation found. Amplitudes are those in the band (worst or mean, as the study says) over `reference`.
+    """Result of an optimisation. Amplitudes are those in the band (worst or mean, as the study says) over `reference`.
 
     study              the [optimise] table and the scene, as plain data
     mass, amplitude    kg of the structure and m of X: what mass ratio and gap ratio refer to

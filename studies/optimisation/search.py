@@ -80,7 +80,7 @@ def optimise(
         undamped=frozen(responses["nominal"][1]),
         nominal_response=frozen(responses["nominal"][0]),
         robust_response=frozen(responses["robust"][0]),
-        headlines={name: _of_band(found) for name, found in headlines.items()},
+        headlines={name: _of_band(headline) for name, headline in headlines.items()},
         scenes=trial.scenes,
         trouble=trial.trouble,
         wall_time_s=took,
@@ -128,10 +128,10 @@ class _Trial:
 
     def optimum(self, design: Design) -> Optimum:
         """Both amplitudes of a design."""
-        found = self.nominal([design]), self.robust([design])
-        for amplitudes, robust in zip(found, (False, True), strict=True):
+        both = self.nominal([design]), self.robust([design])
+        for amplitudes, robust in zip(both, (False, True), strict=True):
             self._remember([design], amplitudes, robust)
-        return Optimum(design, float(found[0][0]), float(found[1][0]))
+        return Optimum(design, float(both[0][0]), float(both[1][0]))
 
     def response(self, design: Design) -> tuple[np.ndarray, np.ndarray]:
         """Amplitudes (f,) over the reference of a design, nan where its run is not ok, and without bodies."""
@@ -164,11 +164,11 @@ class _Trial:
             self._remember(designs, amplitudes, judge == self.robust)
             return amplitudes
 
-        found = differential_evolution(
+        minimum = differential_evolution(
             objective, bounds, init=first[:size], maxiter=max(table.evaluations // size - 1, 1), tol=0.0, polish=False,
             seed=table.seed, updating="deferred", vectorized=True, integrality=[name == "bodies" for name in names],
         )  # fmt: skip
-        return self._design(found.x)
+        return self._design(minimum.x)
 
     def best_designs(self, best: Design) -> np.ndarray:
         """The best designs so far (s, variables), that one first, as the first generation of another search."""
@@ -238,9 +238,9 @@ _KEYS = (
 )  # fmt: skip
 
 
-def _of_band(found: Headline) -> dict[str, Any]:
-    """What a headline says of the measure in the band."""
-    data: dict[str, Any] = finite(found.to_json())
+def _of_band(headline: Headline) -> dict[str, Any]:
+    """Return the figures of a headline that are about the measure in the band."""
+    data: dict[str, Any] = finite(headline.to_json())
     return {key: data[key] for key in _KEYS}
 
 
@@ -254,18 +254,19 @@ def _sentence(
         of = f"the highest undamped amplitude in the band, {study.reference:.3g} m"
     else:
         of = "the undamped maximum (worst in the band)"
-    text = f"{_told(nominal.design, study)} takes {nominal.reduction:.0%} of {of}"
+    text = f"{_format_design(nominal.design, study)} takes {nominal.reduction:.0%} of {of}"
     if asdict(table.tolerances) != _NONE:
         kind = "at worst" if table.over_tolerances == "worst" else "in the mean"
         text += (
-            f", {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: {_told(robust.design, study)} "
-            f"takes {robust.reduction:.0%}, {robust.reduction_tolerances:.0%} {kind}"
+            f", {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: "
+            f"{_format_design(robust.design, study)} takes {robust.reduction:.0%}, "
+            f"{robust.reduction_tolerances:.0%} {kind}"
         )
-    remarks = dict.fromkeys(remark for found in headlines.values() for remark in found.remarks)
+    remarks = dict.fromkeys(remark for headline in headlines.values() for remark in headline.remarks)
     return f"{'; '.join([text, *remarks])}. {scenes} scenes in {took:.0f} s."
 
 
-def _told(design: Design, study: Study) -> str:
+def _format_design(design: Design, study: Study) -> str:
     bodies = "1 body" if design.bodies == 1 else f"{design.bodies} bodies"
     return (
         f"{bodies} of together {design.mass_ratio:.2%} of the mass ({1e3 * design.mass_ratio * study.mass:.3g} g) with "

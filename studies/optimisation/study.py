@@ -38,7 +38,7 @@ Counts = Annotated[
 
 @dataclass(frozen=True, config=STRICT)
 class Variables:
-    """What is chosen, each [lowest, highest] or one value: mass of all bodies over that of the structure, free travel
+    """The variables, each [lowest, highest] or one value: mass of all bodies over that of the structure, free travel
     over the undamped maximum X, number of bodies."""
 
     mass_ratio: Bounds = (0.005, 0.05)
@@ -75,7 +75,7 @@ class Map:
 
 @dataclass(frozen=True, config=STRICT)
 class Optimise:
-    """What is best, and how it is sought.
+    """The objective, and how it is minimised.
 
     band: excitation frequencies, Hz; measure: of a run; over_band, over_tolerances: what counts of a band's and of the
     tolerances' values; samples: of the tolerances, by Latin hypercube; evaluations: designs that each of the two
@@ -200,7 +200,7 @@ class Study(NamedTuple):
         return linear_responses(Points(self.with_bodies(design.bodies), {}).scene(point))
 
     def point(self, design: Design, deviation: Mapping[str, float], frequency: float) -> dict[str, Any]:
-        """What a design, off by a deviation of the tolerances, changes in the scene with its number of bodies."""
+        """Return what a design, off by a deviation of the tolerances, changes in the scene with its bodies."""
         scene, first = self.scene, self.scene.damper[0]
         gap = design.gap_ratio * self.amplitude * (1 + deviation["gap"])
         level = scene.excitation.resonance_amplitude or scene.excitation.force

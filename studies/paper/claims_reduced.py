@@ -1,4 +1,4 @@
-"""What the paper says of its three-dimensional model, and what the reduced model shows in its place (Figs. 12, 13)."""
+"""The paper's claims on its three-dimensional model, and what the reduced model shows instead (Figs. 12, 13)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from vanedamp.coupling.response.response import Response
 from vanedamp.studies.paper.claims_rigid import Curves, claim, verdict
 from vanedamp.studies.paper.curve import Curve
-from vanedamp.studies.report.results import Claim
+from vanedamp.studies.report.claims import Claim
 
 
-def fig12(found: Curves) -> list[Claim]:
+def fig12(curves: Curves) -> list[Claim]:
     """Undamped, damped, fixed."""
-    reduced, rigid = found["reduced"][0], found["rigid"][0]
+    reduced, rigid = curves["reduced"][0], curves["rigid"][0]
     return [
         _level(reduced, rigid),
         _onset(reduced),

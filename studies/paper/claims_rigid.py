@@ -1,4 +1,4 @@
-"""What the paper says of each figure computed with rigid models, and what these models show.
+"""The paper's claims on each figure computed with rigid models, and what these models show.
 
 Claims are in words of our own. A verdict is a rule on figures; where a claim holds in part or not, `why` says what the
 model has or lacks. Amplitudes are relative to the undamped maximum.
@@ -13,7 +13,7 @@ import numpy as np
 
 from vanedamp.studies.paper.curve import Curve
 from vanedamp.studies.paper.figure_file import Bar
-from vanedamp.studies.report.results import Claim
+from vanedamp.studies.report.claims import Claim
 
 Curves = Mapping[str, list[Curve]]
 #: reductions that differ by less are the same
@@ -34,9 +34,9 @@ def verdict(shown: bool | np.bool_, partly: bool | np.bool_ = False) -> str:
     return SHOWN if shown else PARTLY if partly else NOT_SHOWN
 
 
-def fig9(found: Curves) -> list[Claim]:
+def fig9(curves: Curves) -> list[Claim]:
     """Gap: reference, reference/2, reference/10."""
-    gaps = dict(zip(("reference", "reference/2", "reference/10"), found[""], strict=True))
+    gaps = dict(zip(("reference", "reference/2", "reference/10"), curves[""], strict=True))
     peaks = {name: curve.peak() for name, curve in gaps.items()}
     tops = {name: float(curve.largest.max()) for name, curve in gaps.items()}
     half = gaps["reference/2"]
@@ -73,26 +73,26 @@ def fig9(found: Curves) -> list[Claim]:
     ]  # fmt: skip
 
 
-def fig10(found: Curves) -> list[Claim]:
+def fig10(curves: Curves) -> list[Claim]:
     """One body against two."""
     kinds = ("single", "separate", "shared")
-    reductions = {name: 1 - float(found[name][0].smooth.max()) for name in kinds}
-    peaks = {name: found[name][0].peak() for name in kinds}
+    reductions = {name: 1 - float(curves[name][0].smooth.max()) for name in kinds}
+    peaks = {name: curves[name][0].peak() for name in kinds}
     figures = {f"reduction_{name}": value for name, value in reductions.items()}
     figures |= {f"peak_{name}": peak.height for name, peak in peaks.items()}
-    told = ", ".join(f"{name} {value:.1%}" for name, value in reductions.items())
+    text = ", ".join(f"{name} {value:.1%}" for name, value in reductions.items())
     like_single = reductions["separate"] >= reductions["single"] - _SLACK
     return [
         claim(
             "Two halves in cavities of their own damp no worse than the single body of the same mass.",
-            f"reductions of the smoothed means: {told}",
+            f"reductions of the smoothed means: {text}",
             verdict(like_single),
             "On one mode, halves with equal gaps see the same wall motion and do what the whole body does.",
             figures,
         ),
         claim(
             "Two bodies in cavities of their own damp no worse than in one cavity together.",
-            f"reductions: {told}; highest means: separate {peaks['separate']}, shared {peaks['shared']}",
+            f"reductions: {text}; highest means: separate {peaks['separate']}, shared {peaks['shared']}",
             verdict(reductions["separate"] >= reductions["shared"] - _SLACK, like_single),
             "In one cavity the halves have two steady states near their peak: they move together and damp like the "
             "single body, or lose energy to each other as well and damp better (fig14).",
@@ -105,10 +105,10 @@ def fig10(found: Curves) -> list[Claim]:
 _TOGETHER = 0.3
 
 
-def fig14(found: Curves) -> list[Claim]:
+def fig14(curves: Curves) -> list[Claim]:
     """Single, double, quad; horizontal to vertical."""
-    tops = {name: [float(curve.smooth.max()) for curve in of] for name, of in found.items()}
-    slack = {name: [2 * curve.peak().confidence + 0.01 for curve in of] for name, of in found.items()}
+    tops = {name: [float(curve.smooth.max()) for curve in of] for name, of in curves.items()}
+    slack = {name: [2 * curve.peak().confidence + 0.01 for curve in of] for name, of in curves.items()}
     kinds = ("single", "double", "quad", "double_aside", "quad_aside")
     level = {name: tops[name][0] for name in kinds}
     upright = {name: tops[name][-1] for name in kinds}
@@ -120,10 +120,10 @@ def fig14(found: Curves) -> list[Claim]:
     figures = {f"{name}_horizontal": value for name, value in level.items()} | {
         f"{name}_vertical": value for name, value in upright.items()
     }
-    told = ", ".join(f"{name.replace('_', ' ')} {value:.3f}" for name, value in level.items())
+    text = ", ".join(f"{name.replace('_', ' ')} {value:.3f}" for name, value in level.items())
     light = "Gravity is a sixteen-hundredth of the walls' acceleration here, so that it matters only to a body at rest."
     best = min(level, key=lambda name: level[name])
-    together = {name: np.array([curve.mean for curve in found[f"{name}_starts"]]) for name in ("double", "quad")}
+    together = {name: np.array([curve.mean for curve in curves[f"{name}_starts"]]) for name in ("double", "quad")}
     share = {name: float(np.mean(means > _TOGETHER)) for name, means in together.items()}
     worst = {name: float(means.max()) for name, means in together.items()}
     figures |= {f"together_{name}": value for name, value in share.items()}
@@ -131,7 +131,7 @@ def fig14(found: Curves) -> list[Claim]:
     return [
         claim(
             "Horizontally, several bodies damp better than one.",
-            f"tops of the smoothed means: {told}",
+            f"tops of the smoothed means: {text}",
             verdict(max(multi.values()) < level["single"] - 0.01, min(multi.values()) < level["single"] - 0.01),
             "In a row they do, but rows have several steady states near their peak: of the runs from different "
             f"starts there, {share['double']:.0%} of the halves' and {share['quad']:.0%} of the quarters' end with "
@@ -178,12 +178,12 @@ def fig14(found: Curves) -> list[Claim]:
 _BARS = ("light", "nominal", "heavy")
 
 
-def fig19(found: Curves, bar: Bar, mass: float) -> list[Claim]:
+def fig19(curves: Curves, bar: Bar, mass: float) -> list[Claim]:
     """Mass by +-6 %, with the gap and without; bar: of nominal mass (kg)."""
-    reference = found["nominal"][0].reference
+    reference = curves["nominal"][0].reference
     change = 0.06 * bar.length(mass)
-    peaks = {name: found[name][0].peak() for name in found}
-    tops = {name: float(found[name][0].largest.max()) for name in found}
+    peaks = {name: curves[name][0].peak() for name in curves}
+    tops = {name: float(curves[name][0].largest.max()) for name in curves}
     real, highest = [peaks[name].height for name in _BARS], [tops[name] for name in _BARS]
     alone = [peaks[f"{name}_same_gap"].height for name in _BARS]
     figures = {name: peak.height for name, peak in peaks.items()} | {f"{name}_max": top for name, top in tops.items()}
@@ -234,11 +234,11 @@ def regime(curve: Curve, half_gap: float, restitution: float) -> tuple[np.ndarra
     return curve.periodic & (np.abs(curve.impacts - 2) < 1e-9) & (theta < MOST_THETA), attached
 
 
-def mistuning(found: Curves, half_gaps: list[float], restitution: float) -> list[Claim]:
+def mistuning(curves: Curves, half_gaps: list[float], restitution: float) -> list[Claim]:
     """Attached mass in the 1:1 regime; half_gaps: of the curves, in undamped amplitudes."""
     errors: list[float] = []
     fractions: list[float] = []
-    for curve, half in zip(found[""], half_gaps, strict=True):
+    for curve, half in zip(curves[""], half_gaps, strict=True):
         chosen, closed = regime(curve, half, restitution)
         errors += (curve.attached[chosen] / closed[chosen] - 1).tolist()
         fractions += curve.attached[chosen].tolist()

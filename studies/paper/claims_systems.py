@@ -6,7 +6,7 @@ import numpy as np
 
 from vanedamp.studies.paper.claims_rigid import Curves, claim, verdict
 from vanedamp.studies.paper.curve import Curve
-from vanedamp.studies.report.results import Claim
+from vanedamp.studies.report.claims import Claim
 
 #: shares of the load at which friction carries the body along, of the file's normal loads
 LOADS = (0.01, 0.1, 0.3, 0.6, 1.2)
@@ -19,10 +19,10 @@ NAMES = {
 }  # fmt: skip
 
 
-def claims(found: Curves) -> list[Claim]:
+def claims(curves: Curves) -> list[Claim]:
     """Each system beside the multi-body damper, by the tops of the smoothed means."""
-    multi = _top(found, "multi_body")
-    return [_friction_damper(found, multi), _bodies(found, multi), _particles(found, multi), *_rotating(found)]
+    multi = _top(curves, "multi_body")
+    return [_friction_damper(curves, multi), _bodies(curves, multi), _particles(curves, multi), *_rotating(curves)]
 
 
 def top(curve: Curve) -> float:
@@ -30,30 +30,30 @@ def top(curve: Curve) -> float:
     return float((curve.smooth if curve.impacts.any() else curve.mean).max())
 
 
-def _top(found: Curves, name: str) -> float:
-    return top(found[name][0])
+def _top(curves: Curves, name: str) -> float:
+    return top(curves[name][0])
 
 
-def _friction_damper(found: Curves, multi: float) -> Claim:
-    heights = [top(curve) for curve in found["friction_damper"]]
+def _friction_damper(curves: Curves, multi: float) -> Claim:
+    heights = [top(curve) for curve in curves["friction_damper"]]
     best = int(np.argmin(heights))
     low, high = min(heights), max(heights)
-    highest = found["multi_body"][0].peak().height
+    highest = curves["multi_body"][0].peak().height
     return claim(
         "Free bodies replace the spring-loaded friction damper, without a change of the structure.",
         f"four bodies {multi:.3f} (highest mean {highest:.3f}); friction damper {low:.3f} with its best normal force "
         f"({FORCES[best]} times the exciting force), up to {high:.3f} with {FORCES[-1]} times",
         verdict(highest < 1.1 * low, multi < 0.6),
         "The friction damper needs a casing to act on and the right normal force; it stiffens the cluster, so that "
-        f"its peak moves up, to {found['friction_damper'][best].peak().frequency:.0f} Hz.",
+        f"its peak moves up, to {curves['friction_damper'][best].peak().frequency:.0f} Hz.",
         {"multi_body": multi, "multi_body_highest": highest, "friction_damper_best": low, "friction_damper_worst": high}
         | {f"force_{force}": height for force, height in zip(FORCES, heights, strict=True)},
     )  # fmt: skip
 
 
-def _bodies(found: Curves, multi: float) -> Claim:
-    single, many = _top(found, "single_body"), _top(found, "many_cavities")
-    highest = found["multi_body"][0].peak()
+def _bodies(curves: Curves, multi: float) -> Claim:
+    single, many = _top(curves, "single_body"), _top(curves, "many_cavities")
+    highest = curves["multi_body"][0].peak()
     return claim(
         "Several bodies in a cavity do more than a single-body impact damper or a body in each of many cavities.",
         f"tops of the smoothed means: four in a row {multi:.3f} (highest mean {highest}), one body {single:.3f}, "
@@ -65,8 +65,8 @@ def _bodies(found: Curves, multi: float) -> Claim:
     )
 
 
-def _particles(found: Curves, multi: float) -> Claim:
-    curve, top = found["particles"][0], _top(found, "particles")
+def _particles(curves: Curves, multi: float) -> Claim:
+    curve, top = curves["particles"][0], _top(curves, "particles")
     peak = curve.peak()
     return claim(
         "A cavity filled with small bodies damps, too.",
@@ -78,9 +78,9 @@ def _particles(found: Curves, multi: float) -> Claim:
     )
 
 
-def _rotating(found: Curves) -> list[Claim]:
-    heights = [top(curve) for curve in found["rotating"]]
-    stuck = found["rotating"][-1]
+def _rotating(curves: Curves) -> list[Claim]:
+    heights = [top(curve) for curve in curves["rotating"]]
+    stuck = curves["rotating"][-1]
     apart = float(np.max(np.abs(stuck.mean / stuck.fixed - 1)))
     figures = {f"load_{load:g}": height for load, height in zip(LOADS, heights, strict=True)}
     return [

@@ -39,7 +39,7 @@ _QUANTITY = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?) ([a-z_]+)")
 
 @dataclass(frozen=True)
 class Structure:
-    """What the quantities of a figure are multiples of: the rigid model of the first bending, and its excitation.
+    """The units of a figure's quantities: the rigid model of the first bending, and its excitation.
 
     mass (kg), stiffness (N/m), damping_ratio, frequency (Hz) of the rigid model; amplitude (m) of its undamped
     resonance; rom: file of the reduced model.
@@ -106,7 +106,7 @@ class Effort:
     transient: int
 
     def of(self, scene: Scene) -> Scene:
-        """The scene with so many periods."""
+        """Return the scene with this many periods."""
         return scene.replace({"time.periods": self.periods, "time.transient": self.transient})
 
 
@@ -216,8 +216,8 @@ def _scaled(data: Any, structure: Structure) -> Any:
         return {key: _scaled(value, structure) for key, value in data.items()}
     if isinstance(data, list):
         return [_scaled(value, structure) for value in data]
-    found = _QUANTITY.fullmatch(data) if isinstance(data, str) else None
-    return data if found is None else float(found[1]) * structure.unit(found[2])
+    match = _QUANTITY.fullmatch(data) if isinstance(data, str) else None
+    return data if match is None else float(match[1]) * structure.unit(match[2])
 
 
 def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,16 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vanedamp.coupling.response.response import Response
-from vanedamp.files.store import replacing
+from vanedamp.studies.figures import draw_grid, save, subplots
 from vanedamp.studies.paper.claims_rigid import MOST_THETA, attached_closed_form, regime
 from vanedamp.studies.paper.claims_systems import FORCES, LOADS, NAMES, top
 from vanedamp.studies.paper.curve import Curve
@@ -26,37 +22,39 @@ _GREY, _DARK = "#94a3b8", "#475569"
 
 def responses_picture(curves: Mapping[str, Curve], title: str, path: Path, linear: str | None = None) -> None:
     """Forced responses of curves by their labels, with the undamped and fixed curves of one (default: the first)."""
-    figure, axes = plt.subplots(figsize=(9.5, 5.2), layout="constrained")
+    figure, axes = subplots(size=(9.5, 5.2))
     _linear(axes, curves[linear or next(iter(curves))])
     for (label, curve), colour in zip(curves.items(), COLOURS, strict=False):
         _damped(axes, curve, label, colour)
     _finish(axes, title)
-    _save(figure, path)
+    save(figure, path, dpi=110)
 
 
 def panels_picture(panels: Mapping[str, Mapping[str, Curve]], title: str, path: Path) -> None:
     """The same, in panels side by side by their titles."""
-    figure, row = plt.subplots(1, len(panels), figsize=(5.6 * len(panels), 5.2), sharey=True, layout="constrained")
+    figure, row = subplots(1, len(panels), size=(5.6 * len(panels), 5.2), sharey=True)
     for axes, (name, curves) in zip(row, panels.items(), strict=True):
         _linear(axes, next(iter(curves.values())))
         for (label, curve), colour in zip(curves.items(), COLOURS, strict=False):
             _damped(axes, curve, label, colour)
         _finish(axes, name, ylabel=axes is row[0])
     figure.suptitle(title)
-    _save(figure, path)
+    save(figure, path, dpi=110)
 
 
-def orientations_picture(found: Mapping[str, Sequence[Curve]], angles: Sequence[float], title: str, path: Path) -> None:
+def orientations_picture(
+    curves: Mapping[str, Sequence[Curve]], angles: Sequence[float], title: str, path: Path
+) -> None:
     """Horizontal and vertical responses, and the tops over the angle."""
-    found = {label: of for label, of in found.items() if "starts" not in label}
-    figure, (first, second, third) = plt.subplots(1, 3, figsize=(16, 5.2), layout="constrained")
+    curves = {label: of for label, of in curves.items() if "starts" not in label}
+    figure, (first, second, third) = subplots(1, 3, size=(16, 5.2))
     for axes, index, name in ((first, 0, "horizontal"), (second, -1, "vertical")):
-        _linear(axes, found["single"][index])
-        for (label, of), colour in zip(found.items(), COLOURS, strict=False):
+        _linear(axes, curves["single"][index])
+        for (label, of), colour in zip(curves.items(), COLOURS, strict=False):
             style = "--" if "aside" in label else "-"  # they lie on the single one
             axes.plot(of[index].frequency, 100 * of[index].smooth, style, color=colour, label=label)
         _finish(axes, f"{name}: smoothed means")
-    for (label, of), colour in zip(found.items(), COLOURS, strict=False):
+    for (label, of), colour in zip(curves.items(), COLOURS, strict=False):
         tops = [100 * float(curve.smooth.max()) for curve in of]
         spread = [100 * curve.peak().confidence for curve in of]
         style = "--" if "aside" in label else "-"
@@ -66,19 +64,19 @@ def orientations_picture(found: Mapping[str, Sequence[Curve]], angles: Sequence[
     third.set_ylabel("top of the smoothed mean / undamped maximum, %")
     third.set_ylim(bottom=0)
     third.set_title("tops; bars: 95 % confidence of the highest mean")
-    third.grid(True, color="#e2e8f0")
+    draw_grid(third)
     third.legend(fontsize=8)
     figure.suptitle(title)
-    _save(figure, path)
+    save(figure, path, dpi=110)
 
 
-def history_picture(response: Response, reference: float, title: str, path: Path, shown: int = 30) -> None:
+def history_picture(response: Response, reference: float, title: str, path: Path, last: int = 30) -> None:
     """The last periods with a mark at every impact, the peaks of the periods, and the times between impacts."""
-    figure = plt.figure(figsize=(12, 7), layout="constrained")
+    figure = Figure(figsize=(12, 7), layout="constrained")
     grid = figure.add_gridspec(2, 2)
     top, left, right = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
     period = 1 / response.frequency
-    begin = (response.periods - shown) * period
+    begin = (response.periods - last) * period
     late = response.time >= begin
     time, motion = response.time[late], response.displacement[late] / reference
     top.plot(1e3 * time, motion, color=COLOURS[0], label="structure")
@@ -91,7 +89,7 @@ def history_picture(response: Response, reference: float, title: str, path: Path
     top.set_ylim(top=1.45 * motion.max())
     top.set_xlabel("time, ms")
     top.set_ylabel("displacement / undamped maximum")
-    top.set_title(f"the last {shown} periods")
+    top.set_title(f"the last {last} periods")
     top.legend(ncols=3, loc="upper right", fontsize=9)
     left.plot(
         np.arange(1, response.periods + 1),
@@ -111,16 +109,16 @@ def history_picture(response: Response, reference: float, title: str, path: Path
     right.set_ylabel("number")
     right.legend(fontsize=9)
     for axes in (top, left, right):
-        axes.grid(True, color="#e2e8f0")
+        draw_grid(axes)
     figure.suptitle(title)
-    _save(figure, path)
+    save(figure, path, dpi=110)
 
 
 def mistuning_picture(
     curves: Sequence[Curve], half_gaps: Sequence[float], restitution: float, title: str, path: Path
 ) -> None:
     """Attached mass fraction over the amplitude in half gaps, beside the closed form."""
-    figure, axes = plt.subplots(figsize=(9.5, 5.2), layout="constrained")
+    figure, axes = subplots(size=(9.5, 5.2))
     for curve, half, colour in zip(curves, half_gaps, COLOURS, strict=False):
         chosen, _ = regime(curve, half, restitution)
         hit = curve.impacts > 0
@@ -144,18 +142,18 @@ def mistuning_picture(
     axes.set_xlabel("amplitude / half gap")
     axes.set_ylabel("attached mass fraction")
     axes.set_title(title)
-    axes.grid(True, color="#e2e8f0")
+    draw_grid(axes)
     axes.legend(fontsize=9)
-    _save(figure, path)
+    save(figure, path, dpi=110)
 
 
-def systems_picture(found: Mapping[str, Sequence[Curve]], title: str, path: Path) -> None:
+def systems_picture(curves: Mapping[str, Sequence[Curve]], title: str, path: Path) -> None:
     """The best of each system, and its tops."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(14.5, 5.6), width_ratios=[1.5, 1], layout="constrained")
-    _linear(left, found["single_body"][0])
+    figure, (left, right) = subplots(1, 2, size=(14.5, 5.6), width_ratios=[1.5, 1])
+    _linear(left, curves["single_body"][0])
     labels, tops, means, colours = [], [], [], []
     numbers: dict[str, Sequence[Any]] = {"friction_damper": FORCES, "rotating": LOADS}
-    for (name, of), colour in zip(found.items(), COLOURS, strict=False):
+    for (name, of), colour in zip(curves.items(), COLOURS, strict=False):
         best = min(of, key=top)
         left.plot(best.frequency, 100 * best.mean, ".", color=colour, markersize=3, alpha=0.6)
         line = best.smooth if best.impacts.any() else best.mean
@@ -179,7 +177,7 @@ def systems_picture(found: Mapping[str, Sequence[Curve]], title: str, path: Path
     )
     _finish(left, "means (points) and smoothed means; of several loads the best")
     figure.suptitle(title)
-    _save(figure, path)
+    save(figure, path, dpi=110)
 
 
 def _linear(axes: Axes, curve: Curve) -> None:
@@ -203,11 +201,5 @@ def _finish(axes: Axes, title: str, ylabel: bool = True) -> None:
     axes.set_ylim(0, 105)
     axes.margins(x=0)
     axes.set_title(title)
-    axes.grid(True, color="#e2e8f0")
+    draw_grid(axes)
     axes.legend(fontsize=8)
-
-
-def _save(figure: Figure, path: Path) -> None:
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=110)
-    plt.close(figure)

@@ -27,13 +27,10 @@ from vanedamp.files.store import StoreError, digest, finite, load, write_json
 from vanedamp.files.toml_input import InputError, nearest, read_toml, validate
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.paper import claims_reduced as paper_reduced
-from vanedamp.studies.paper import claims_rigid as paper_claims
-from vanedamp.studies.paper import claims_systems as systems
-from vanedamp.studies.paper import plots as paper_plots
+from vanedamp.studies.paper import claims_reduced, claims_rigid, claims_systems, plots
 from vanedamp.studies.paper.curve import Curve, curves
 from vanedamp.studies.paper.figure_file import FOLDER, Bar, Effort, PaperFigure, Structure, write_scene
-from vanedamp.studies.report.results import CLAIMS, Claim, Study
+from vanedamp.studies.report.claims import CLAIMS, Claim, Study
 from vanedamp.studies.terminal import progress
 from vanedamp.studies.workers import workers
 
@@ -59,7 +56,7 @@ class Session:
 
 
 def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None, resume: bool = False) -> list[Study]:
-    """Compute the named studies (default: all) into a folder, and tell their claims. Raises InputError."""
+    """Compute the named studies (default: all) into a folder, and print their claims. Raises InputError."""
     for name in names:
         if name not in NAMES:
             raise InputError(f"no study '{name}'; {nearest(name, list(NAMES))}")
@@ -75,7 +72,7 @@ def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None,
         for name in names or NAMES:
             begun = time.perf_counter()
             studies.append(study(name, session))
-            tell(studies[-1], time.perf_counter() - begun)
+            print_claims(studies[-1], time.perf_counter() - begun)
     print(f"\n{folder}: {time.perf_counter() - started:.0f} s; for a page: vanedamp report {folder} -o report.html")
     return studies
 
@@ -83,24 +80,24 @@ def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None,
 def prepare(folder: Path, resume: bool = False) -> Structure:
     """The shipped cluster's modes.h5 and rom.h5 in a folder; resume: unless they are there, of this case and mesh."""
     case, mesh, source = folder / "case.toml", folder / "vane_cluster.msh", FOLDER / "case.toml"
-    found, reduced = folder / "modes.h5", folder / "rom.h5"
+    modes, reduced = folder / "modes.h5", folder / "rom.h5"
     same = all(old.is_file() and old.read_bytes() == new.read_bytes() for old, new in ((case, source), (mesh, SHIPPED)))
-    if not (resume and same and _made_by_us(found, reduced, MODES)):
+    if not (resume and same and _made_by_us(modes, reduced, MODES)):
         shutil.copyfile(SHIPPED, mesh)
         shutil.copyfile(source, case)
         from vanedamp.studies.case.stages import assemble, modal_analysis, reduction
         from vanedamp.studies.case.tables import Case
 
         structure = assemble(Case.load(case))
-        modal_analysis(structure).save(found)
+        modal_analysis(structure).save(modes)
         reduction(structure, MODES).save(reduced)
-    return Structure.load(found, reduced)
+    return Structure.load(modes, reduced)
 
 
-def _made_by_us(found: Path, reduced: Path, modes: int) -> bool:
+def _made_by_us(modes: Path, reduced: Path, count: int) -> bool:
     try:
-        _, attributes = load(found, "modes")
-        return json.loads(attributes["versions"]) == versions() and ReducedModel.load(reduced).modes == modes
+        _, attributes = load(modes, "modes")
+        return json.loads(attributes["versions"]) == versions() and ReducedModel.load(reduced).modes == count
     except (StoreError, KeyError):
         return False
 
@@ -110,15 +107,15 @@ def study(name: str, session: Session) -> Study:
     if name == "fig13":
         return _history(session)
     figure = PaperFigure.load(name, session.structure, session.effort)
-    found = {curve: _swept(figure, curve, session) for curve in figure.scenes}
-    read = {curve: curves(sweep, curve.replace("_", " ") or name) for curve, sweep in found.items()}
+    sweeps = {curve: _swept(figure, curve, session) for curve in figure.scenes}
+    read = {curve: curves(sweep, curve.replace("_", " ") or name) for curve, sweep in sweeps.items()}
     claims = _claims(figure, read)
     _picture(figure, read, session.folder / f"{name}.png")
-    trouble = sum(int((sweep.status != "ok").sum()) for sweep in found.values())
+    trouble = sum(int((sweep.status != "ok").sum()) for sweep in sweeps.values())
     if trouble:
-        told = f" ({trouble} of {sum(sweep.status.size for sweep in found.values())} points are not ok.)"
-        claims = [replace(claim, why=(claim.why + told).strip()) for claim in claims]
-    return _written(Study(name, figure.title, [f"{figure.stem(curve)}.h5" for curve in found], claims), session.folder)
+        failed = f" ({trouble} of {sum(sweep.status.size for sweep in sweeps.values())} points are not ok.)"
+        claims = [replace(claim, why=(claim.why + failed).strip()) for claim in claims]
+    return _written(Study(name, figure.title, [f"{figure.stem(curve)}.h5" for curve in sweeps], claims), session.folder)
 
 
 def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
@@ -149,56 +146,56 @@ def _kept(path: Path) -> Sweep | None:
         return None
 
 
-def _claims(figure: PaperFigure, found: dict[str, list[Curve]]) -> list[Claim]:
+def _claims(figure: PaperFigure, by_name: dict[str, list[Curve]]) -> list[Claim]:
     first = next(iter(figure.scenes.values()))
-    reference = next(iter(found.values()))[0].reference
+    reference = next(iter(by_name.values()))[0].reference
     match figure.name:
         case "fig9":
-            return paper_claims.fig9(found)
+            return claims_rigid.fig9(by_name)
         case "fig10":
-            return paper_claims.fig10(found)
+            return claims_rigid.fig10(by_name)
         case "fig12":
-            return paper_reduced.fig12(found)
+            return claims_reduced.fig12(by_name)
         case "fig14":
-            return paper_claims.fig14(found)
+            return claims_rigid.fig14(by_name)
         case "fig19":
             bar = validate(Bar, read_toml(FOLDER / "fig19.toml")["bar"], "bar")
-            return paper_claims.fig19(found, bar, figure.scenes["nominal"].damper[0].mass)
+            return claims_rigid.fig19(by_name, bar, figure.scenes["nominal"].damper[0].mass)
         case "mistuning":
-            return paper_claims.mistuning(found, _half_gaps(first, reference), first.damper[0].restitution)
-    return systems.claims(found)
+            return claims_rigid.mistuning(by_name, _half_gaps(first, reference), first.damper[0].restitution)
+    return claims_systems.claims(by_name)
 
 
-def _picture(figure: PaperFigure, found: dict[str, list[Curve]], path: Path) -> None:
+def _picture(figure: PaperFigure, by_name: dict[str, list[Curve]], path: Path) -> None:
     title = figure.title
     match figure.name:
         case "fig9":
             names = ("reference", "reference/2", "reference/10")
-            paper_plots.responses_picture(dict(zip(names, found[""], strict=True)), title, path)
+            plots.responses_picture(dict(zip(names, by_name[""], strict=True)), title, path)
         case "fig14":
             scene = figure.scenes["single"]
             angles = scene.sweep_points()[0]["gravity.orientation_deg"]
-            paper_plots.orientations_picture(_named(found), angles.tolist(), title, path)
+            plots.orientations_picture(_named(by_name), angles.tolist(), title, path)
         case "fig19":
-            both = _named(found)
+            both = _named(by_name)
             ours = {name: of[0] for name, of in both.items()}
             panels = {
                 "mass and gap by the bar's length": {n: c for n, c in ours.items() if "gap" not in n},
                 "mass alone, gap reference/2": {n.removesuffix(" same gap"): c for n, c in ours.items() if "gap" in n},
             }
-            paper_plots.panels_picture(panels, title, path)
+            plots.panels_picture(panels, title, path)
         case "mistuning":
             first = figure.scenes[""]
-            gaps = _half_gaps(first, found[""][0].reference)
-            paper_plots.mistuning_picture(found[""], gaps, first.damper[0].restitution, title, path)
+            gaps = _half_gaps(first, by_name[""][0].reference)
+            plots.mistuning_picture(by_name[""], gaps, first.damper[0].restitution, title, path)
         case "systems":
-            paper_plots.systems_picture(found, title, path)
+            plots.systems_picture(by_name, title, path)
         case _:
-            paper_plots.responses_picture({name: of[0] for name, of in _named(found).items()}, title, path)
+            plots.responses_picture({name: of[0] for name, of in _named(by_name).items()}, title, path)
 
 
-def _named(found: dict[str, list[Curve]]) -> dict[str, list[Curve]]:
-    return {name.replace("_", " "): of for name, of in found.items()}
+def _named(by_name: dict[str, list[Curve]]) -> dict[str, list[Curve]]:
+    return {name.replace("_", " "): of for name, of in by_name.items()}
 
 
 def _half_gaps(scene: Scene, reference: float) -> list[float]:
@@ -212,8 +209,8 @@ def _history(session: Session) -> Study:
     figure = PaperFigure.load("fig12", session.structure, session.effort)
     runs = {}
     for curve, of in figure.scenes.items():
-        found = curves(_swept(figure, curve, session), curve)[0]
-        scene = of.replace({"excitation.frequency": found.peak().frequency, "sweep": {}, "time": data["time"]})
+        damped = curves(_swept(figure, curve, session), curve)[0]
+        scene = of.replace({"excitation.frequency": damped.peak().frequency, "sweep": {}, "time": data["time"]})
         aside = scene.replace({"damper.0.position": data["aside"] * scene.cavity[0].gap})
         runs[curve] = scene, simulate(scene, events=True, samples_per_period=data["samples"]), simulate(aside)
     scene, response, alike = runs["reduced"]
@@ -221,20 +218,20 @@ def _history(session: Session) -> Study:
     write_scene(scene, folder / "fig13.toml")
     response.save(folder / "fig13_response.h5", {"versions": versions(), "scene": scene.to_dict()})
     title = f"{data['title']}, {response.frequency:.1f} Hz"
-    paper_plots.history_picture(response, session.structure.amplitude, title, folder / "fig13.png")
-    claims = paper_reduced.fig13(response, runs["rigid"][1], alike)
+    plots.history_picture(response, session.structure.amplitude, title, folder / "fig13.png")
+    claims = claims_reduced.fig13(response, runs["rigid"][1], alike)
     return _written(Study("fig13", title, ["fig13_response.h5"], claims), folder)
 
 
-def _written(found: Study, folder: Path) -> Study:
-    write_json(folder / f"{found.study}{CLAIMS}", finite(asdict(found)))
-    return found
+def _written(study: Study, folder: Path) -> Study:
+    write_json(folder / f"{study.study}{CLAIMS}", finite(asdict(study)))
+    return study
 
 
-def tell(found: Study, seconds: float) -> None:
+def print_claims(study: Study, seconds: float) -> None:
     """Print a study's claims: what the paper says, what comes out here, the verdict."""
-    print(f"\n{found.study}: {found.title} ({seconds:.1f} s)")
-    for claim in found.claims:
+    print(f"\n{study.study}: {study.title} ({seconds:.1f} s)")
+    for claim in study.claims:
         rows = [("paper", claim.claim), ("here", claim.ours), (claim.verdict, claim.why)]
         for head, text in rows:
             lines = textwrap.wrap(text, 105) or [""]

@@ -13,7 +13,7 @@ from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
 from vanedamp.coupling.sweep.grid import FREQUENCY
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.store import frozen
-from vanedamp.studies.headline import Headline, headline, reference_of, shown
+from vanedamp.studies.headline import Headline, format_value, headline, reference_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +46,14 @@ class ForcedResponse:
     @property
     def sentence(self) -> str:
         """The headline for people."""
-        told = self.headline.sentence(self.axis, self.units, self.x[0], self.x[-1])
-        return f"{self.name}: {told}"
+        sentence = self.headline.sentence(self.axis, self.units, self.x[0], self.x[-1])
+        return f"{self.name}: {sentence}"
 
     def to_json(self) -> dict[str, Any]:
         """The headline as plain data: what the curve is of, its range, its figures and the sentence."""
         ends = [value.item() if isinstance(value, np.generic) else value for value in (self.x[0], self.x[-1])]
-        told = {"name": self.name, "axis": self.axis, "range": ends}
-        return told | self.headline.to_json() | {"sentence": self.sentence}
+        curve = {"name": self.name, "axis": self.axis, "range": ends}
+        return curve | self.headline.to_json() | {"sentence": self.sentence}
 
 
 def model_name(scene: Scene) -> str:
@@ -132,7 +132,7 @@ def quantity(value: Any, units: str) -> str:
     factor, larger = for_people(units)
     if factor != 1.0 and not isinstance(value, str):
         return f"{value * factor:.4g} {larger}"
-    return f"{shown(value)} {units}".removesuffix(" 1")
+    return f"{format_value(value)} {units}".removesuffix(" 1")
 
 
 def resonance_grid(start: float, stop: float, peaks: list[float], width: float, num: int) -> np.ndarray:

@@ -26,7 +26,7 @@ def optimisation_figure(record: Optimisation) -> go.Figure:
     ):
         figure.add_scatter(
             x=[100 * optimum.design.mass_ratio], y=[optimum.design.gap_ratio], mode="markers",
-            name=f"{name}: {_told(optimum)}", hovertext=_told(optimum), hoverinfo="text+name",
+            name=f"{name}: {_format_optimum(optimum)}", hovertext=_format_optimum(optimum), hoverinfo="text+name",
             marker={"symbol": symbol, "size": 15, "color": colour, "line": {"color": "#111827", "width": 1.5}},
         )  # fmt: skip
     figure.update_xaxes(title_text="mass of the bodies over that of the structure, %")
@@ -38,7 +38,7 @@ def optimisation_figure(record: Optimisation) -> go.Figure:
     return figure
 
 
-def _told(optimum: Optimum) -> str:
+def _format_optimum(optimum: Optimum) -> str:
     return (
         f"{_bodies(optimum.design.bodies)}, {optimum.reduction:.0%}, within the tolerances "
         f"{optimum.reduction_tolerances:.0%}"

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -12,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import vanedamp
 from vanedamp.files.store import load, replacing
+from vanedamp.studies.workers import run_module
 
 if TYPE_CHECKING:
     from vanedamp.modal.eigen import Modes
@@ -21,7 +19,6 @@ if TYPE_CHECKING:
 
 #: largest displacement in a picture, as a share of the structure's size
 _EXAGGERATION = 0.06
-_ROOT = Path(vanedamp.__file__).parent.parent
 
 
 def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
@@ -32,27 +29,27 @@ def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
     """
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "mode.png"
-        command = [sys.executable, "-m", "vanedamp.studies.report.pictures", str(modes_file), str(mode), str(picture)]
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(_ROOT), os.environ.get("PYTHONPATH", "")])}
-        finished = subprocess.run(command, env=environment, capture_output=True, check=False)
+        # what VTK complains of need not be text
+        finished = run_module(
+            "vanedamp.studies.report.pictures", str(modes_file), str(mode), str(picture), errors="replace"
+        )
         return picture.read_bytes() if finished.returncode == 0 else None
 
 
-def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: str | Path) -> None:
+def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path) -> None:
     """PNG of the mode beside the forced response: undamped, with bodies, with the bodies fixed."""
-    import matplotlib
+    from matplotlib.image import imread
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from vanedamp.studies.figures import GREY, draw_grid, save, subplots
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.6), width_ratios=[1, 1.25], layout="constrained")
+    figure, (left, right) = subplots(1, 2, size=(12, 4.6), width_ratios=[1, 1.25])
     left.axis("off")
     if mode_png is not None:
-        left.imshow(plt.imread(io.BytesIO(mode_png)))
+        left.imshow(imread(io.BytesIO(mode_png)))
         left.set_title("first bending mode of the cluster", fontsize=11)
     curves: list[tuple[np.ndarray, str, dict[str, Any]]] = [
-        (response.undamped, "undamped", {"color": "#7a7f87", "linestyle": ":"}),
-        (response.fixed, "bodies fixed", {"color": "#7a7f87", "linestyle": "--"}),
+        (response.undamped, "undamped", {"color": GREY, "linestyle": ":"}),
+        (response.fixed, "bodies fixed", {"color": GREY, "linestyle": "--"}),
         (response.damped_max, "loose bodies, maximum", {"color": "#9fc1ea", "marker": ".", "linewidth": 0.8}),
         (response.damped_mean, "loose bodies, mean of peaks", {"color": "#1f5fa8", "linewidth": 2.0}),
     ]
@@ -62,11 +59,9 @@ def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: str 
     right.set_ylabel("amplitude / undamped maximum")
     right.set_title(f"forced response, {response.name}", fontsize=11)
     right.set_ylim(bottom=0.0)
-    right.grid(color="#e6e8eb")
+    draw_grid(right)
     right.legend(frameon=False)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=110)
-    plt.close(figure)
+    save(figure, path, dpi=110)
 
 
 def save_vtk(modes: Modes, coordinates: np.ndarray, cells: np.ndarray, cell_type: int, path: str | Path) -> None:

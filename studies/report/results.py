@@ -1,70 +1,94 @@
-"""Results in files: what a report is made of."""
+"""Results in files: what a report is made of. Each kind is read by its section (studies.report.sections)."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import h5py
 
-from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.files.store import StoreError, load
-from vanedamp.files.toml_input import InputError, validate
-from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.optimisation.record import Optimisation
-from vanedamp.studies.report.time_history import History
+from vanedamp.files.store import StoreError
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.extensions import ExtensionError, ExtensionPoint
 
-CLAIMS = ".claims.json"
-
-
-@dataclass(frozen=True)
-class Claim:
-    """What a study was to show, what it shows, and a verdict: "shown", "partly" or "not shown"."""
-
-    claim: str
-    ours: str
-    verdict: str
-    why: str = ""
-    figures: dict[str, float | str | bool | None] = field(default_factory=dict)
+SECTIONS = ExtensionPoint(
+    "section of the report", "vanedamp.studies.report.sections", "vanedamp.report_sections",
+    ("KIND", "load", "section", "__file__"),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Study:
-    """A study of several results; sources: names of their files, beside its own."""
+class Result:
+    """The result in a file.
 
-    study: str
-    title: str
-    sources: list[str]
-    claims: list[Claim]
+    record      what its section shows
+    provenance  how it was made, as nested data; None if the page has no table of that
+    scene       what was run, as nested data, for the page's comparison of scenes
+    parts       names of files beside its own whose results stand within its section
+    """
+
+    record: Any
+    provenance: Mapping[str, Any] | None = None
+    scene: Mapping[str, Any] | None = None
+    parts: tuple[str, ...] = ()
+
+
+class Section(Protocol):
+    """The contract of a section; the folder `sections` says more."""
+
+    KIND: str
+    __file__: str
+
+    def load(self, path: Path) -> Result:
+        """Read a file of the kind. Raises StoreError or InputError."""
+
+    def section(self, results: Mapping[str, Result], page: Any) -> Any:
+        """Return what the template shows of results by the path of their file; page: a studies.report.page.Page."""
 
 
 @dataclass(frozen=True)
 class Results:
-    """Records by the path of their file."""
+    """Results by kind, in the order of the page, and by the path of their file."""
 
-    modes: dict[str, tuple[dict[str, Any], dict[str, Any]]] = field(default_factory=dict)
-    reduced: dict[str, ReducedModel] = field(default_factory=dict)
-    sweeps: dict[str, Sweep] = field(default_factory=dict)
-    histories: dict[str, History] = field(default_factory=dict)
-    optimisations: dict[str, Optimisation] = field(default_factory=dict)
-    studies: dict[str, Study] = field(default_factory=dict)
+    kinds: dict[str, dict[str, Result]]
+
+    @property
+    def by_file(self) -> dict[str, Result]:
+        """All results by the path of their file."""
+        return {file: result for results in self.kinds.values() for file, result in results.items()}
 
     @property
     def files(self) -> list[str]:
         """Every file that was read."""
-        return [file for records in vars(self).values() for file in records]
+        return list(self.by_file)
 
     @property
     def names(self) -> dict[str, str]:
-        """What to call every file of a record."""
-        return short_names([*self.modes, *self.reduced, *self.sweeps, *self.histories, *self.optimisations])
+        """The short name of every file whose provenance the page tells."""
+        return short_names(file for file, result in self.by_file.items() if result.provenance is not None)
+
+    def parts(self, file: str) -> list[str]:
+        """Return the files whose results stand within the section of a file."""
+        results = self.by_file
+        paths = [str(Path(file).with_name(name)) for name in results[file].parts]
+        return [path for path in paths if path in results and not results[path].parts]
+
+
+def sections() -> dict[str, Section]:
+    """Return the sections by the kind of result that they show, in the order of the page. Raises ExtensionError."""
+    known: dict[str, Section] = {}
+    for section in SECTIONS.all().values():
+        if section.KIND in known:
+            files = f"{known[section.KIND].__file__} and {section.__file__}"
+            raise ExtensionError(f"two sections of the report show results of the kind {section.KIND}: {files}")
+        known[section.KIND] = section
+    return known
 
 
 def short_names(paths: Iterable[str]) -> dict[str, str]:
-    """The shortest ends of paths that tell them apart: names of files, with folders where names are the same."""
+    """Return the shortest ends of paths that distinguish them: file names, with folders where names are the same."""
     parts = {path: Path(path).resolve().parts for path in paths}
     names = {}
     for path, mine in parts.items():
@@ -76,61 +100,41 @@ def short_names(paths: Iterable[str]) -> dict[str, str]:
 
 
 def collect(paths: Sequence[str | Path]) -> Results:
-    """The results in files, and in all .h5 and .claims.json files of folders (others there are passed over).
+    """Read the results in files, and in all files of folders that may hold any (others there are passed over).
 
     Raises InputError for a file that is none, and when there is nothing to report.
     """
-    results = Results()
+    known = sections()
+    results = Results({kind: {} for kind in known})
     for path in map(Path, paths):
         if not path.exists():
             raise InputError(f"{path}: no such file or folder")
-        for file in _candidates(path) if path.is_dir() else [path]:
-            if not _read(file, results) and not path.is_dir():
-                raise InputError(f"{file}: holds no result of modal, reduce, run, sweep, optimise or paper")
-    if not any(vars(results).values()):
-        raise InputError(f"{', '.join(map(str, paths))}: no results of modal, reduce, run, sweep, optimise or paper")
+        for file in _candidates(path, known) if path.is_dir() else [path]:
+            kind = _kind(file, known)
+            if kind in known:
+                results.kinds[kind][str(file)] = known[kind].load(file)
+            elif not path.is_dir():
+                raise InputError(f"{file}: holds no result that a report shows ({', '.join(known)})")
+    if not results.files:
+        raise InputError(f"{', '.join(map(str, paths))}: no results that a report shows ({', '.join(known)})")
     return results
 
 
-def _candidates(folder: Path) -> list[Path]:
+def _endings(kinds: Iterable[str]) -> list[str]:
+    """Kinds that are endings of files; all others are attributes of HDF5 files."""
+    return [kind for kind in kinds if kind.startswith(".")]
+
+
+def _candidates(folder: Path, kinds: Iterable[str]) -> list[Path]:
     """Files of a folder that may be results; what a killed command has left half written is hidden."""
-    found = [*sorted(folder.glob("*.h5")), *sorted(folder.glob(f"*{CLAIMS}"))]
-    return [file for file in found if not file.name.startswith(".")]
+    files = [file for ending in (".h5", *_endings(kinds)) for file in sorted(folder.glob(f"*{ending}"))]
+    return [file for file in files if not file.name.startswith(".")]
 
 
-def _read(file: Path, results: Results) -> bool:
-    """Read a file into its place. Returns False for one that is no result."""
-    name = str(file)
-    if name.endswith(CLAIMS):
-        results.studies[name] = validate(Study, _json(file), name)
-        return True
-    match _kind(file):
-        case "modes":
-            results.modes[name] = load(file, "modes")
-        case "reduced-model":
-            results.reduced[name] = ReducedModel.load(file)
-        case "sweep":
-            results.sweeps[name] = Sweep.load(file)
-        case "response":
-            results.histories[name] = History.load(file)
-        case "optimisation":
-            results.optimisations[name] = Optimisation.load(file)
-        case _:
-            return False
-    return True
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON ({error})") from error
-    if not isinstance(data, dict):
-        raise InputError(f"{path}: expected an object with study, title, sources and claims")
-    return data
-
-
-def _kind(path: Path) -> str | None:
+def _kind(path: Path, kinds: Iterable[str]) -> str:
+    for ending in _endings(kinds):
+        if path.name.endswith(ending):
+            return ending
     try:
         with h5py.File(path, "r") as file:
             return str(file.attrs.get("kind"))

@@ -65,7 +65,7 @@ class History:
         return 1.0 / float(self.measures["frequency"])
 
     def late(self) -> History:
-        """The last periods alone, as many as a page carries."""
+        """Return the last periods only, as many as a page carries."""
         begin = self.time[-1] - _MOST_PERIODS * self.period
         kept, hit = self.time >= begin, self.impacts >= begin
         return History(
@@ -110,7 +110,7 @@ def history_figure(history: History) -> go.Figure:
 
 
 def _walls(scene: Scene | None) -> list[float]:
-    """Where bodies alone in their cavities end, m."""
+    """Return where bodies that are alone in their cavities end, m."""
     if scene is None:
         return []
     alone = [cavity.gap for cavity in scene.cavity if sum(damper.cavity == cavity.name for damper in scene.damper) == 1]

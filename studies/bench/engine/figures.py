@@ -2,37 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
-
-from vanedamp.studies.bench.style import _BLUE, _GOLD, _GREEN, _GREY, _RED, _curve, _save
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator
+
+from vanedamp.studies.figures import BLUE, GOLD, GREEN, GREY, RED, draw_grid, save, subplots
 
 
 def one_mode_figure(result: Mapping[str, Any], path: Path) -> None:
     """Error of the state against time per period: engine, hand-written loops, solve_ivp."""
     one = result["one_mode"]
-    figure, axes = plt.subplots(figsize=(7.5, 5), layout="constrained")
+    figure, axes = subplots(size=(7.5, 5))
     looks = {
-        "engine": ("o", _BLUE),
-        "plain loop": ("v", _GREEN),
-        "lean loop": ("^", _GREEN),
-        "complete loop": ("s", _GREEN),
+        "engine": ("o", BLUE),
+        "plain loop": ("v", GREEN),
+        "lean loop": ("^", GREEN),
+        "complete loop": ("s", GREEN),
     }
     for name, (marker, colour) in looks.items():
         _point(axes, one["time"][name], one["error"][name], name, marker=marker, color=colour)
     solvers = [name for name in one["time"] if name not in looks]
     times = [1e6 * one["time"][name]["median"] for name in solvers]
     errors = [one["error"][name] for name in solvers]
-    axes.loglog(times, errors, "D-", color=_RED, label="solve_ivp, DOP853 with events")
+    axes.loglog(times, errors, "D-", color=RED, label="solve_ivp, DOP853 with events")
     for name, time, error in zip(solvers, times, errors, strict=True):
         axes.annotate(
             f"rtol {name.split()[1]}",
@@ -46,29 +42,27 @@ def one_mode_figure(result: Mapping[str, Any], path: Path) -> None:
     axes.set_xlabel("CPU time per excitation period, µs")
     axes.set_ylabel(f"largest error of the state over {one['checked_periods']} periods, relative")
     axes.set_title("one mode, one body, two impacts a period")
-    axes.grid(True, which="major", color="#e2e8f0")
+    draw_grid(axes)
     axes.legend(loc="center")
-    _save(figure, path)
+    save(figure, path, dpi=150)
 
 
 def scaling_figure(result: Mapping[str, Any], path: Path) -> None:
     """Time against modes and bodies, and what a period consists of."""
-    figure, (left, middle, right) = plt.subplots(
-        1, 3, figsize=(14, 4.6), width_ratios=[1.2, 1, 0.8], layout="constrained"
-    )
+    figure, (left, middle, right) = subplots(1, 3, size=(14, 4.6), width_ratios=[1.2, 1, 0.8])
     modes = result["modes"]
-    for (use, entry), colour in zip(modes["uses"].items(), (_GREEN, _BLUE, _GOLD, _RED), strict=True):
+    for (use, entry), colour in zip(modes["uses"].items(), (GREEN, BLUE, GOLD, RED), strict=True):
         label = f"{use} ({entry['awake'][-1]:.1f} of {modes['counts'][-1]} awake)"
-        _curve(left, modes["counts"], entry["time"], label, color=colour, marker="o")
+        _draw_times(left, modes["counts"], entry["time"], label, color=colour, marker="o")
     left.set_xlabel("modes of the structure")
     left.set_title("one body, n modes")
     left.set_ylim(top=left.get_ylim()[1] * 4)
     left.legend(fontsize=9, loc="upper left")
     bodies = result["bodies"]
     counts = np.array(bodies["counts"])
-    _curve(middle, counts, bodies["time"], "exact engine", color=_BLUE, marker="o")
+    _draw_times(middle, counts, bodies["time"], "exact engine", color=BLUE, marker="o")
     start = 1e6 * bodies["time"][0]["median"]
-    middle.plot(counts, start * counts, "--", color=_GREY, label="in proportion to n")
+    middle.plot(counts, start * counts, "--", color=GREY, label="in proportion to n")
     middle.set_xticks(counts, [str(count) for count in counts])
     middle.minorticks_off()
     middle.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -78,9 +72,9 @@ def scaling_figure(result: Mapping[str, Any], path: Path) -> None:
     middle.legend(fontsize=9)
     for axes in (left, middle):
         axes.set_ylabel("CPU time per excitation period, µs")
-        axes.grid(True, which="major", color="#e2e8f0")
+        draw_grid(axes)
     _parts(right, result["costs"])
-    _save(figure, path)
+    save(figure, path, dpi=150)
 
 
 def _parts(axes: Axes, costs: Mapping[str, Any]) -> None:
@@ -93,7 +87,7 @@ def _parts(axes: Axes, costs: Mapping[str, Any]) -> None:
     labels = [f"{part['number']:.3g} x {1e9 * part['cost']:.0f} ns" for part in costs["counted"].values()]
     labels += [f"{value:.2f} µs" for value in values[len(counted) :]]
     places = [0, 1, 2, 3.5, 4.5, 5.5]
-    bars = axes.barh(places, values, color=[_BLUE] * len(counted) + [_GOLD] * len(timed))
+    bars = axes.barh(places, values, color=[BLUE] * len(counted) + [GOLD] * len(timed))
     axes.bar_label(bars, labels, padding=3)
     axes.set_yticks(places, names)
     axes.invert_yaxis()
@@ -106,3 +100,13 @@ def _point(axes: Axes, time: Mapping[str, float], error: float, label: str, **lo
     median = 1e6 * time["median"]
     spread = [[median - 1e6 * time["low"]], [1e6 * time["high"] - median]]
     axes.errorbar([median], [error], xerr=spread, label=label, linestyle="none", capsize=2, markersize=8, **look)
+
+
+def _draw_times(
+    axes: Axes, counts: Sequence[int] | np.ndarray, times: Sequence[Mapping[str, float]], label: str, **look: Any
+) -> None:
+    """Draw medians, with the quartiles as bars, over counts."""
+    low, median, high = (np.array([1e6 * time[key] for time in times]) for key in ("low", "median", "high"))
+    axes.errorbar(counts, median, yerr=[median - low, high - median], label=label, capsize=2, **look)
+    axes.set_xscale("log")
+    axes.set_yscale("log")

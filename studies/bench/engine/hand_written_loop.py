@@ -57,7 +57,7 @@ class ImpactOscillator(NamedTuple):
 def plain_loop(case: ImpactOscillator, periods: int) -> tuple[np.ndarray, np.ndarray]:
     """States (periods + 1, 4) x, x', r, r' at the periods' starts and largest |x| (periods,) at the brackets.
 
-    Exponential, sine and cosine are taken anew at every bracket.
+    Exponential, sine and cosine are evaluated again at every bracket.
     """
     section, peak, account = np.empty((periods + 1, 4)), np.zeros(periods), np.zeros((1, len(ACCOUNT)))
     _march(case, periods, _PLAIN, section, peak, account)
@@ -65,7 +65,7 @@ def plain_loop(case: ImpactOscillator, periods: int) -> tuple[np.ndarray, np.nda
 
 
 def lean_loop(case: ImpactOscillator, periods: int) -> tuple[np.ndarray, np.ndarray]:
-    """What the plain loop does, from bracket to bracket by one complex product and a table of the forced part."""
+    """Do as the plain loop, from bracket to bracket by one complex product and a table of the forced part."""
     section, peak, account = np.empty((periods + 1, 4)), np.zeros(periods), np.zeros((1, len(ACCOUNT)))
     _march(case, periods, _LEAN, section, peak, account)
     return section, peak

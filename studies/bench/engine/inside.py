@@ -1,4 +1,4 @@
-"""What only the engine's inside can tell a benchmark: modes that are awake, time of a period and of its parts.
+"""Measurements inside the engine: modes that are awake, time of a period and of its parts.
 
 The one file of `studies` that reaches behind `coupling.engine.simulate`.
 """

@@ -21,11 +21,11 @@ from scipy.optimize import nnls
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import write_csv, write_json
-from vanedamp.studies.bench.engine import scenes as scenes
+from vanedamp.studies.bench.engine import scenes
 from vanedamp.studies.bench.engine.hand_written_loop import ImpactOscillator, complete_loop, lean_loop, plain_loop
 from vanedamp.studies.bench.engine.inside import awake_modes, time_of_a_period, time_of_parts
 from vanedamp.studies.bench.engine.reference_solutions import solve_with_events, truth
-from vanedamp.studies.bench.timing import Clock, in_turns, machine, seconds, shown, spread
+from vanedamp.studies.bench.timing import Clock, format_spread, in_turns, machine, seconds, spread
 from vanedamp.studies.terminal import progress
 
 _SEED = 20_260_101
@@ -81,19 +81,19 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     return result
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print the ratios."""
     one, modes, bodies = result["one_mode"], result["modes"], result["bodies"]
     print(f"one mode, one body, two impacts a period: {1e6 * one['time']['engine']['median']:.2f} us a period")
     for name, ratio in one["ratio"].items():
-        print(f"  {name:38} {shown(ratio)}")
+        print(f"  {name:38} {format_spread(ratio)}")
     print("  largest error: " + ", ".join(f"{name} {error:.1e}" for name, error in one["error"].items()))
     print(f"{modes['counts'][-1]} modes / 1 mode")
     for use, entry in modes["uses"].items():
-        print(f"  {use:38} {shown(entry['ratio'])}, {entry['awake'][-1]:.1f} modes awake on average")
+        print(f"  {use:38} {format_spread(entry['ratio'])}, {entry['awake'][-1]:.1f} modes awake on average")
     print("time of n bodies / (n x time of one)")
     for count, ratio in zip(bodies["counts"], bodies["per_body"], strict=True):
-        print(f"  {count:<38} {shown(ratio)}")
+        print(f"  {count:<38} {format_spread(ratio)}")
     costs = result["costs"]
     print("a period of one mode and one body, us")
     for name, part in costs["counted"].items():
@@ -138,21 +138,21 @@ def _modes(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
     uses: dict[str, dict[str, Any]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for use in scenes.USES:
-            made = [scenes.reduced(Path(folder), count, use) for count in effort.modes]
+            reduced = [scenes.reduced(Path(folder), count, use) for count in effort.modes]
             lengths = effort.hard if use == _HARD else effort.calm
             clocks: dict[str, Clock] = {
                 str(count): partial(time_of_a_period, scene, lengths)
-                for count, scene in zip(effort.modes, made, strict=True)
+                for count, scene in zip(effort.modes, reduced, strict=True)
             }
             times = in_turns(clocks, effort.rounds, rng)
             first, last = (times[str(count)] for count in (effort.modes[0], effort.modes[-1]))
             windows = [
-                simulate(scene.replace({"time.periods": lengths[1], "time.transient": lengths[0]})) for scene in made
+                simulate(scene.replace({"time.periods": lengths[1], "time.transient": lengths[0]})) for scene in reduced
             ]
             uses[use] = {
                 "time": [spread(values) for values in times.values()],
                 "ratio": spread(last / first),
-                "awake": [awake_modes(scene, *lengths) for scene in made],
+                "awake": [awake_modes(scene, *lengths) for scene in reduced],
                 "impacts_per_period": [response.impacts_per_period for response in windows],
                 "status": [response.status.value for response in windows],
             }
@@ -164,12 +164,12 @@ def _modes(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
 
 def _bodies(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
     """Time against the number of bodies in cavities of their own."""
-    made = {str(count): scenes.bodies(count) for count in _COUNTS}
+    varied = {str(count): scenes.bodies(count) for count in _COUNTS}
     lengths = (effort.engine[0], sum(effort.engine) // 2)
     times = in_turns(
-        {name: partial(time_of_a_period, scene, lengths) for name, scene in made.items()}, effort.rounds, rng
+        {name: partial(time_of_a_period, scene, lengths) for name, scene in varied.items()}, effort.rounds, rng
     )
-    responses = [simulate(scene.replace({"time.periods": lengths[1]})) for scene in made.values()]
+    responses = [simulate(scene.replace({"time.periods": lengths[1]})) for scene in varied.values()]
     return {
         "counts": list(_COUNTS),
         "time": [spread(values) for values in times.values()],
@@ -184,19 +184,21 @@ def _bodies(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _costs(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
-    """What a period of the one-mode scene consists of.
+    """Return what a period of the one-mode scene consists of.
 
     counted: periods' ends, events and evaluations of the search with what one of each costs, fitted to scenes that
     differ in their numbers; timed: seconds a period of the engine's search and account, and what is left of it.
     """
-    made = [scenes.one_mode(*factors) for factors in _VARIED]
-    clocks: dict[str, Clock] = {str(i): partial(time_of_a_period, scene, effort.engine) for i, scene in enumerate(made)}
+    varied = [scenes.one_mode(*factors) for factors in _VARIED]
+    clocks: dict[str, Clock] = {
+        str(i): partial(time_of_a_period, scene, effort.engine) for i, scene in enumerate(varied)
+    }
     times = np.array([np.median(values) for values in in_turns(clocks, effort.rounds, rng).values()])
-    counts = np.array([_counts(scene, effort.engine) for scene in made])
+    counts = np.array([_counts(scene, effort.engine) for scene in varied])
     # relative errors count, so that the cheap scenes have their say
     costs, _ = nnls(counts / times[:, None], np.ones(len(times)))
     reference = _VARIED.index((1.0, 1.0))
-    timed = time_of_parts(made[reference], effort.settle, effort.rounds)
+    timed = time_of_parts(varied[reference], effort.settle, effort.rounds)
     return {
         "counted": {
             name: {"number": float(number), "cost": float(cost)}

@@ -35,14 +35,14 @@ def solve_with_events(case: ImpactOscillator, periods: int, rtol: float) -> np.n
     atol = rtol * half * np.array([1.0, omega, 1.0, omega])
     while t < end:
         wanted = times[(times > t) & (times <= end)]
-        found = solve_ivp(
+        arc = solve_ivp(
             motion, (t, end), y, "DOP853", t_eval=wanted, events=(left, right), rtol=rtol, atol=atol
         )  # fmt: skip
-        states.append(np.reshape(found.y, (4, -1)).T)  # a list if no wanted time was reached
-        if found.status != 1:
+        states.append(np.reshape(arc.y, (4, -1)).T)  # a list if no wanted time was reached
+        if arc.status != 1:
             break
-        side = 0 if len(found.t_events[0]) else 1
-        t, y = float(found.t_events[side][-1]), found.y_events[side][-1].copy()
+        side = 0 if len(arc.t_events[0]) else 1
+        t, y = float(arc.t_events[side][-1]), arc.y_events[side][-1].copy()
         impulse = pair * (y[1] - y[3])
         y[1:] = y[1] - impulse / case.mass, y[0] + (half if side else -half), y[3] + impulse / case.body
     absolute = np.concatenate(states)

@@ -36,7 +36,7 @@ def one_mode(frequency: float = 1.0, gap: float = 1.0) -> Scene:
 
 
 def settled(scene: Scene, periods: int) -> Scene:
-    """The scene of one body with the state that it has after so many periods as its initial state."""
+    """The scene of one body with the state that it has after a number of periods as its initial state."""
     response = simulate(scene.replace({"time.periods": periods}))
     state = {
         "initial.displacement": response.section[-1, 0],

@@ -7,16 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
 
-from vanedamp.files.store import replacing
 from vanedamp.studies.bench.methods.peers import PEERS
 from vanedamp.studies.bench.methods.scenes import STEPPING
+from vanedamp.studies.figures import GREY, draw_grid, save, subplots
 
 _COLOURS = (
     "#1d4f91", "#c2410c", "#15803d", "#65a30d", "#0e7490", "#7e22ce", "#be185d", "#a16207", "#111827", "#64748b",
@@ -30,7 +26,7 @@ _METHODS = ("exact engine", *STEPPING, "solve_ivp, DOP853 with events", *PEERS)
 def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
     """A panel a scene: error against CPU time per period, and the model ladder if there is one."""
     charts, drawn = result["charts"], []
-    figure, axes = plt.subplots(2, 4, figsize=(21, 10), layout="constrained")
+    figure, axes = subplots(2, 4, size=(21, 10))
     panels = list(axes.flat)
     for panel, (name, chart) in zip(panels, charts.items(), strict=False):
         _chart(panel, name, chart)
@@ -47,7 +43,7 @@ def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
         legend = dict(zip(labels, handles, strict=True)) | legend
     names = [name for name in _METHODS if name in legend]
     figure.legend([legend[name] for name in names], names, loc="outside lower center", ncols=6)
-    _save(figure, path)
+    save(figure, path)
 
 
 def _chart(axes: Axes, name: str, chart: Mapping[str, Any]) -> None:
@@ -73,7 +69,7 @@ def _chart(axes: Axes, name: str, chart: Mapping[str, Any]) -> None:
     axes.set_title(f"{name}\n{front}" + (f"\n{note}" if note else "") + absent, fontsize=9)
     axes.set_xlabel("CPU time per period, µs")
     axes.set_ylabel("error of the state" if chart["repeats"] else "error of the mean amplitude")
-    axes.grid(True, which="major", color="#e2e8f0")
+    draw_grid(axes)
 
 
 def _ladder(axes: Axes, ladder: Mapping[str, Any]) -> None:
@@ -87,7 +83,7 @@ def _ladder(axes: Axes, ladder: Mapping[str, Any]) -> None:
         f"whole mesh, {full['free_dofs']} DOFs\none curve, extrapolated: {full['curve_days']:.2g} days",
         (1e6 * full["time"], full["error"]), (-8, 12), textcoords="offset points", ha="right", fontsize=9,
     )  # fmt: skip
-    axes.axhline(0.02, color="#7a7f87", linestyle="--")
+    axes.axhline(0.02, color=GREY, linestyle="--")
     axes.set_title(
         f"cluster: exact engine with n modes (against {ladder['modes'][-1]}), whole mesh\nat 2 % the reduced "
         f"model is {ladder['speed_up']['factor']:.3g} times faster",
@@ -95,7 +91,7 @@ def _ladder(axes: Axes, ladder: Mapping[str, Any]) -> None:
     )
     axes.set_xlabel("CPU time per period, µs")
     axes.set_ylabel("error of the first three periods' peaks")
-    axes.grid(True, which="major", color="#e2e8f0")
+    draw_grid(axes)
 
 
 def wrap(reason: str) -> str:
@@ -112,7 +108,7 @@ def _curve(axes: Axes, curve: Mapping[str, Any]) -> None:
     for value, style, colour, label in (
         (curve["fixed_hz"][0], "-", _COLOURS[0], "fixed, reduced"),
         (curve["fixed_hz"][1], "--", _COLOURS[1], "fixed, whole mesh"),
-        (curve["onset_hz"], ":", "#7a7f87", "onset"),
+        (curve["onset_hz"], ":", GREY, "onset"),
     ):
         axes.axvline(value, linestyle=style, color=colour, label=label)
     axes.set_title(
@@ -121,18 +117,18 @@ def _curve(axes: Axes, curve: Mapping[str, Any]) -> None:
     )  # fmt: skip
     axes.set_xlabel("excitation frequency, Hz")
     axes.set_ylabel("mean amplitude, µm")
-    axes.grid(True, which="major", color="#e2e8f0")
+    draw_grid(axes)
     axes.legend(fontsize=8)
 
 
 def stability_figure(result: Mapping[str, Any], path: Path) -> None:
     """A panel a part: measured edges of failure as points, analytic limits as lines."""
-    figure, axes = plt.subplots(2, 4, figsize=(19, 9), layout="constrained")
+    figure, axes = subplots(2, 4, size=(19, 9))
     for panel, (name, part) in zip(axes.flat, result["parts"].items(), strict=True):
         for (curve, values), colour in zip(part["curves"].items(), _COLOURS, strict=False):
             line = curve in ("limit", "1 - duration / step")
             panel.plot(
-                part["x"], values, "--" if line else "o", color="#7a7f87" if line else colour,
+                part["x"], values, "--" if line else "o", color=GREY if line else colour,
                 label="analytic limit" if curve == "limit" else curve,
             )  # fmt: skip
         if part["log"]:
@@ -143,12 +139,6 @@ def stability_figure(result: Mapping[str, Any], path: Path) -> None:
         panel.set_title(name)
         panel.set_xlabel(part["x_label"])
         panel.set_ylabel(part["y_label"])
-        panel.grid(True, which="major", color="#e2e8f0")
+        draw_grid(panel)
         panel.legend(fontsize=9)
-    _save(figure, path)
-
-
-def _save(figure: Any, path: Path) -> None:
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=130, format="png")
-    plt.close(figure)
+    save(figure, path)

@@ -53,11 +53,11 @@ def ladder(folder: Path, counts: tuple[int, ...], rounds: int, rng: np.random.Ge
     """
     cluster = Cluster(folder)
     finest = cluster.scene(counts[-1]).replace({"damper.0.velocity": _START})
-    made = {count: finest.replace({"structure.modes": count}) for count in counts}
-    clocks: dict[str, Clock] = {str(n): partial(time_of_a_period, scene, (500, 2000)) for n, scene in made.items()}
+    variants = {count: finest.replace({"structure.modes": count}) for count in counts}
+    clocks: dict[str, Clock] = {str(n): partial(time_of_a_period, scene, (500, 2000)) for n, scene in variants.items()}
     times = in_turns(clocks, rounds, rng)
     peaks = {
-        n: simulate(scene.replace({"time.periods": _FIRST, "time.transient": 0})).peak for n, scene in made.items()
+        n: simulate(scene.replace({"time.periods": _FIRST, "time.transient": 0})).peak for n, scene in variants.items()
     }
     best = peaks[counts[-1]]
     errors = [float(np.abs(peak / best - 1).max()) for peak in peaks.values()]
@@ -91,8 +91,8 @@ def curve(folder: Path, effort: CurveEffort = CurveEffort()) -> dict[str, Any]:
     at, amplitudes = _damped(scene, ours[1], ours[0], effort.points)
 
     def mesh(frequency: float) -> tuple[float, int, float]:
-        made = scene.replace({"excitation.frequency": frequency})
-        run = explicit_run(matrices, interface, made, 2 * math.pi * ours[0], effort.periods)
+        excited = scene.replace({"excitation.frequency": frequency})
+        run = explicit_run(matrices, interface, excited, 2 * math.pi * ours[0], effort.periods)
         late = slice(effort.dropped, None)
         return float(run.peak[late].mean()), int(run.impacts[late].sum()), run.seconds_per_step * run.steps
 

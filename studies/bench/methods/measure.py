@@ -28,7 +28,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.studies.bench.engine.hand_written_loop import ImpactOscillator
 from vanedamp.studies.bench.engine.inside import time_of_a_period
 from vanedamp.studies.bench.engine.reference_solutions import truth
-from vanedamp.studies.bench.methods import scenes as scenes
+from vanedamp.studies.bench.methods import scenes
 from vanedamp.studies.bench.methods.full_mesh_comparison import CurveEffort, curve, ladder
 from vanedamp.studies.bench.methods.peers import PEERS, PeerRun, run_peer
 from vanedamp.studies.bench.timing import Clock, in_turns, machine, spread
@@ -39,7 +39,7 @@ _SEED = 20_260_102
 _SAMPLES, _LEAST = 10, 40
 #: error of a state that is as good as zero
 _FLOOR = 1e-13
-#: status of a run that was not made, and the tolerance of solve_ivp for means
+#: status of a run that was left out, and the tolerance of solve_ivp for means
 DEAR, _ONE = "too dear for a mean", 1e-4
 EXACT, IVP = "exact engine", "solve_ivp, DOP853 with events"
 
@@ -81,14 +81,14 @@ def run_work_precision(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     result: dict[str, Any] = {"machine": machine(), "seed": _SEED, "effort": asdict(effort), "charts": {}}
     folder.mkdir(parents=True, exist_ok=True)
     with progress("work-precision") as report, tempfile.TemporaryDirectory() as temporary:
-        made = _scenes(effort, Path(temporary))
-        for done, (name, (scene, repeats)) in enumerate(made.items()):
-            report(done, len(made) + 2)
+        by_name = _scenes(effort, Path(temporary))
+        for done, (name, (scene, repeats)) in enumerate(by_name.items()):
+            report(done, len(by_name) + 2)
             result["charts"][name] = _chart(scene, repeats, effort, rng)
         if effort.modes is not None:
             result["ladder"] = ladder(Path(temporary), effort.ladder, effort.rounds, rng)
         if effort.curve is not None:
-            report(len(made) + 1, len(made) + 2)
+            report(len(by_name) + 1, len(by_name) + 2)
             result["curve"] = curve(Path(temporary), effort.curve)
     result["wall_time_s"] = time.perf_counter() - started
     write_json(folder / "work_precision.json", result)
@@ -99,7 +99,7 @@ def run_work_precision(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     return result
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print for every chart whether the exact engine is on its Pareto front."""
     for name, chart in result["charts"].items():
         better = chart["dominated_by"]
@@ -111,15 +111,15 @@ def tell(result: Mapping[str, Any]) -> None:
 def _scenes(effort: Effort, folder: Path) -> dict[str, tuple[Scene, bool]]:
     """Scenes by name, and whether they repeat."""
     checked = {"time.periods": effort.checked, "time.transient": 0}
-    made = {
+    by_name = {
         "periodic 1:1 impact": (scenes.periodic(3000).replace(checked), True),
         "chatter": (scenes.chatter().replace(checked), True),
         "single damper, non-periodic": (scenes.single(), False),
         "double damper in one cavity, non-periodic": (scenes.double(), False),
     }
     if effort.modes is not None:
-        made["cluster, reduced model"] = (scenes.Cluster(folder).scene(effort.modes), False)
-    return made
+        by_name["cluster, reduced model"] = (scenes.Cluster(folder).scene(effort.modes), False)
+    return by_name
 
 
 def _chart(scene: Scene, repeats: bool, effort: Effort, rng: np.random.Generator) -> dict[str, Any]:

@@ -40,16 +40,16 @@ class CvodeRun(IvpRun):
     """The run of coupling.methods.scipy_ivp.run with CVODE in the place of scipy's solver."""
 
     def _integrate(self, grid: np.ndarray) -> Arc:
-        found = self._solve(grid)
-        event = len(found.t_events) > 0 if found.t_events is not None else False
+        arc = self._solve(grid)
+        event = len(arc.t_events) > 0 if arc.t_events is not None else False
         # the start, and the event, are no points of the grid
-        last = len(found.t) - (1 if event else 0)
-        times, states = found.t[1:last], found.y[1:last].T
+        last = len(arc.t) - (1 if event else 0)
+        times, states = arc.t[1:last], arc.y[1:last].T
         if not event:
-            end, y = (times[-1], states[:, -1]) if found.success else (self.time, self.y)
-            return Arc(times, states, None, end - self.time, y, found.nfev, not found.success)
-        who = int(np.flatnonzero(found.i_events[-1])[0])
-        return Arc(times, states, who, float(found.t_events[-1]) - self.time, found.y_events[-1], found.nfev)
+            end, y = (times[-1], states[:, -1]) if arc.success else (self.time, self.y)
+            return Arc(times, states, None, end - self.time, y, arc.nfev, not arc.success)
+        event_function = int(np.flatnonzero(arc.i_events[-1])[0])
+        return Arc(times, states, event_function, float(arc.t_events[-1]) - self.time, arc.y_events[-1], arc.nfev)
 
     def _solve(self, grid: np.ndarray) -> CVODEResult:
         from sksundae.cvode import CVODE

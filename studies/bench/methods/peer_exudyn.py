@@ -26,15 +26,15 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
 
     if any(damper.stiffness is not None for damper in scene.friction_damper):
         raise InputError("Exudyn: this set-up knows no spring before a slider")
-    made = coupled(scene, round(setting))
-    turn = _coordinates(made)
-    units = _Units(made)
+    equations = coupled(scene, round(setting))
+    turn = _coordinates(equations)
+    units = _Units(equations)
     container = exudyn.SystemContainer()
     world = container.AddSystem()
-    node, kept = _model(world, made, turn, units)
+    node, kept = _model(world, equations, turn, units)
     sensor = world.AddSensor(_sensor(node))
     world.Assemble()
-    settings = _settings(periods, len(made.system.phase) - 1)
+    settings = _settings(periods, len(equations.system.phase) - 1)
     started = time.thread_time()
     try:
         world.SolveDynamic(settings, solverType=exudyn.DynamicSolverType.GeneralizedAlpha, showHints=False)
@@ -45,22 +45,22 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     stored = np.asarray(world.GetSensorStoredData(sensor))
     q = np.full((periods * round(setting) + 1, len(turn)), np.nan)
     q[np.rint(stored[:, 0] * round(setting)).astype(int)] = stored[:, 1:] @ turn.T * units.length
-    q[0] = made.motion.q
-    return tracked(made, q, samples, seconds)
+    q[0] = equations.motion.q
+    return tracked(equations, q, samples, seconds)
 
 
 class _Units:
     """Scales of length (m), time (s), mass (kg) and force (N)."""
 
-    def __init__(self, made: Coupled) -> None:
-        gaps = made.rows.gap[np.isfinite(made.rows.gap)]
-        self.length, self.time, self.mass = float(gaps.min()), made.rows.period, float(made.rows.mass.min())
+    def __init__(self, equations: Coupled) -> None:
+        gaps = equations.rows.gap[np.isfinite(equations.rows.gap)]
+        self.length, self.time, self.mass = float(gaps.min()), equations.rows.period, float(equations.rows.mass.min())
         self.force = self.mass * self.length / self.time**2
 
 
-def _coordinates(made: Coupled) -> np.ndarray:
+def _coordinates(equations: Coupled) -> np.ndarray:
     """Matrix (N, N) from Exudyn's coordinates to ours: the floor's displacement replaces the mode with most of it."""
-    system, n = made.system, made.system.modes
+    system, n = equations.system, equations.system.modes
     back = np.eye(len(system.mass))
     moved = system.J[:, :n][np.abs(system.J[:, :n]).max(axis=1, initial=0.0) > 0]
     if len(moved):
@@ -73,7 +73,7 @@ def _coordinates(made: Coupled) -> np.ndarray:
     return np.linalg.inv(back)
 
 
-def _model(world: Any, made: Coupled, turn: np.ndarray, units: _Units) -> tuple[Any, list[Any]]:
+def _model(world: Any, equations: Coupled, turn: np.ndarray, units: _Units) -> tuple[Any, list[Any]]:
     """Put the scene into an Exudyn system. Returns the node of all coordinates, and what must live as long."""
     from exudyn.advancedUtilities import CreateSymbolicUserFunction
     from exudyn.itemInterface import (
@@ -84,7 +84,7 @@ def _model(world: Any, made: Coupled, turn: np.ndarray, units: _Units) -> tuple[
         ObjectGenericODE2,
     )
 
-    system, motion, size = made.system, made.motion, len(turn)
+    system, motion, size = equations.system, equations.motion, len(turn)
     there = np.linalg.inv(turn)
     rate = units.time / units.length
     node = world.AddNode(NodeGenericODE2(
@@ -111,9 +111,9 @@ def _model(world: Any, made: Coupled, turn: np.ndarray, units: _Units) -> tuple[
     for r, row in enumerate(system.J @ turn):
         ends = [next((markers[i] for i in range(size) if sign * row[i] > 0.5), ground) for sign in (-1, 1)]
         if r >= system.friction_rows:
-            world.AddObject(_contact(world, ends, made, r, units))
+            world.AddObject(_contact(world, ends, equations, r, units))
         elif system.limit[r] > 0:
-            world.AddObject(_friction(ends, made, r, units))
+            world.AddObject(_friction(ends, equations, r, units))
     return node, kept
 
 
@@ -128,14 +128,14 @@ def _load(cosine: float, sine: float) -> Any:
     return names["load"]
 
 
-def _contact(world: Any, ends: list[Any], made: Coupled, r: int, units: _Units) -> Any:
+def _contact(world: Any, ends: list[Any], equations: Coupled, r: int, units: _Units) -> Any:
     from exudyn.itemInterface import NodeGenericData, ObjectContactCoordinate
 
-    system, steps = made.system, len(made.system.phase) - 1
+    system, steps = equations.system, len(equations.system.phase) - 1
     rigid = np.isinf(system.spring[r])
     if rigid:  # as long a contact as that of our penalty methods
         duration = 2 * steps ** (1 / 3) / steps
-        stiffness = (np.pi / duration) ** 2 / (made.rows.delassus[r, r] * units.mass)
+        stiffness = (np.pi / duration) ** 2 / (equations.rows.delassus[r, r] * units.mass)
         law = {
             "impactModel": 2, "restitutionCoefficient": float(system.restitution[r]), "minimumImpactVelocity": 1e-3
         }  # fmt: skip
@@ -151,12 +151,12 @@ def _contact(world: Any, ends: list[Any], made: Coupled, r: int, units: _Units) 
     )  # fmt: skip
 
 
-def _friction(ends: list[Any], made: Coupled, r: int, units: _Units) -> Any:
+def _friction(ends: list[Any], equations: Coupled, r: int, units: _Units) -> Any:
     from exudyn.itemInterface import ObjectConnectorCoordinateSpringDamperExt
 
-    force = float(made.system.limit[r]) / units.force
+    force = float(equations.system.limit[r]) / units.force
     # as for our explicit penalty method
-    slow = 2 * force * made.rows.delassus[r, r] * units.mass / (len(made.system.phase) - 1)
+    slow = 2 * force * equations.rows.delassus[r, r] * units.mass / (len(equations.system.phase) - 1)
     return ObjectConnectorCoordinateSpringDamperExt(
         markerNumbers=ends, dynamicFrictionForce=force, frictionProportionalZone=float(slow)
     )

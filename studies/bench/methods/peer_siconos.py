@@ -21,15 +21,15 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     if scene.contact.law != "newton" or any(damper.stiffness is not None for damper in scene.friction_damper):
         raise InputError("Siconos: its kernel has no law of a unilateral spring with a dashpot for Lagrangian systems")
     steps = round(setting)
-    made = coupled(scene, steps)
-    simulation, structure, kept = _model(made, periods)
-    system, h = made.system, made.system.step
+    equations = coupled(scene, steps)
+    simulation, structure, kept = _model(equations, periods)
+    system, h = equations.system, equations.system.step
     angle = system.omega * h * (np.arange(steps) + 0.5)
     loads = np.outer(np.cos(angle), system.load[:, 0]) - np.outer(np.sin(angle), system.load[:, 1]) + system.weight
     # views of its own memory, taken once: each call would leave one behind
     force, place = structure.fExt(), structure.q()
     q = np.zeros((periods * steps + 1, len(system.mass)))
-    q[0] = made.motion.q
+    q[0] = equations.motion.q
     started = time.thread_time()
     for k in range(periods * steps):
         force[:] = loads[k % steps]
@@ -38,20 +38,20 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
         q[k + 1] = place
     seconds = time.thread_time() - started
     del kept
-    return tracked(made, q, samples, seconds)
+    return tracked(equations, q, samples, seconds)
 
 
-def _model(made: Coupled, periods: int) -> tuple[Any, Any, list[Any]]:
+def _model(equations: Coupled, periods: int) -> tuple[Any, Any, list[Any]]:
     """Simulation, dynamical system, and what must live as long as they do."""
     import siconos.kernel as kernel
 
-    system, motion = made.system, made.motion
+    system, motion = equations.system, equations.motion
     h = system.step
     structure = kernel.LagrangianLinearTIDS(
         motion.q.copy(), motion.v.copy(), np.diag(system.mass), np.diag(system.stiffness), system.damping.copy()
     )
     structure.setFExtPtr(np.zeros(len(motion.q)))
-    world = kernel.NonSmoothDynamicalSystem(0.0, (periods + 1) * made.rows.period)
+    world = kernel.NonSmoothDynamicalSystem(0.0, (periods + 1) * equations.rows.period)
     world.insertDynamicalSystem(structure)
     kept: list[Any] = [world]
     friction = False

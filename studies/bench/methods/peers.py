@@ -26,7 +26,7 @@ _DEEPEST = 0.1
 
 @dataclass(frozen=True)
 class PeerRun:
-    """What a peer leaves behind.
+    """The result of a peer.
 
     status: words of coupling.response.response.Status; peak (periods,): largest |x|, m; samples (k, 1 + b):
     displacement and slips at equidistant times, m; penetration relative to the free travel; seconds: CPU time of the
@@ -57,7 +57,7 @@ PEERS = {
 
 
 def run_peer(name: str, scene: Scene, periods: int, setting: float, samples: int = 0) -> PeerRun:
-    """Run a scene over so many periods, with that many samples of each.
+    """Run a scene over a number of periods, with samples of each.
 
     Raises InputError where the peer is not installed or cannot express the scene.
     """
@@ -91,14 +91,14 @@ def coupled(scene: Scene, steps: int) -> Coupled:
     return Coupled(system, rows, motion)
 
 
-def tracked(made: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:
-    """What a run of equal steps leaves behind. q: (periods * steps + 1, N) coordinates at the steps."""
-    system, steps = made.system, len(made.system.phase) - 1
+def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:
+    """Return the result of a run of equal steps. q: (periods * steps + 1, N) coordinates at the steps."""
+    system, steps = equations.system, len(equations.system.phase) - 1
     periods = (len(q) - 1) // steps
     phase = np.tile(system.phase[:-1], (periods, 1))
     x = q[:-1] @ system.response + system.table[0] * phase[:, 0] - system.table[1] * phase[:, 1]
     every = np.arange(0, periods * steps, steps // samples) if samples else np.zeros(0, int)
-    slips = q[every] @ system.J[: len(made.rows.mass)].T
+    slips = q[every] @ system.J[: len(equations.rows.mass)].T
     gaps = system.J @ q.T + system.offset[:, None]
     # no number is deeper than any
     deep = float(np.nan_to_num((-gaps / system.gap[:, None]).max(initial=0.0), nan=np.inf))

@@ -6,28 +6,23 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
-from matplotlib.figure import Figure
-
-from vanedamp.files.store import replacing
+from vanedamp.studies.figures import BLUE, GOLD, GREEN, GREY, RED, VIOLET, draw_grid, save, subplots
 
 _COLOURS = {
-    "newton": "#c2410c",
-    "compliant": "#1d4f91",
-    "compliant and residual": "#15803d",
-    "residual alone": "#6d28d9",
-    "massless": "#a16207",
+    "newton": RED,
+    "compliant": BLUE,
+    "compliant and residual": GREEN,
+    "residual alone": VIOLET,
+    "massless": GOLD,
 }
 _MARKERS = dict(zip(_COLOURS, "osDv^", strict=True))
 
 
 def bar_figure(bar: Mapping[str, Any], path: Path) -> None:
     """Errors of the falling bar against the number of its modes."""
-    figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained")
+    figure, axes = subplots(1, 2, size=(10.5, 4.4))
     modes = np.array(bar["modes"])
     for axis, what in zip(axes, ("time", "height"), strict=True):
         for law, errors in bar[what].items():
@@ -36,16 +31,16 @@ def bar_figure(bar: Mapping[str, Any], path: Path) -> None:
             axis.loglog(modes[shown], values[shown], "-", color=_COLOURS[law], marker=_MARKERS[law], label=law)
         axis.set_xlabel("modes of the bar")
         axis.set_ylabel(f"error of the second apex's {what}, relative")
-        axis.grid(True, which="major", color="#e2e8f0")
-    axes[0].loglog(modes, 0.02 / modes, "--", color="#7a7f87", label="first order")
+        draw_grid(axis)
+    axes[0].loglog(modes, 0.02 / modes, "--", color=GREY, label="first order")
     axes[0].legend()
     figure.suptitle("elastic bar on a wall (Doyen, Ern and Piperno 2011), restitution 1")
-    _save(figure, path)
+    save(figure, path)
 
 
 def cluster_figure(cluster: Mapping[str, Any], path: Path) -> None:
     """Error of the damped response against its cost, all laws against one model, and the responses with most modes."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12.5, 5.0), layout="constrained")
+    figure, (left, right) = subplots(1, 2, size=(12.5, 5.0))
     reference = cluster["reference"]
     noise = np.linalg.norm(cluster["laws"][reference["law"]]["confidence"][-1]) / cluster["undamped"]
     noise /= np.sqrt(len(cluster["frequencies_hz"]))
@@ -61,23 +56,23 @@ def cluster_figure(cluster: Mapping[str, Any], path: Path) -> None:
             label=f"{law}, {cluster['modes'][-1]} modes", **style,
         )  # fmt: skip
     if noise > 0.0:
-        left.axhline(noise, ls=":", color="#7a7f87", label="95 % confidence of the reference")
+        left.axhline(noise, ls=":", color=GREY, label="95 % confidence of the reference")
     left.set_xlabel("CPU time per excitation period, µs")
     left.set_ylabel("rms error of the mean amplitude, of the undamped peak")
     left.set_title(f"against one model: {reference['law']}, {reference['modes']} modes; figures: modes", fontsize=10)
     right.set_xlabel("excitation frequency, Hz")
     right.set_ylabel("mean amplitude, of the undamped peak")
     for axis in (left, right):
-        axis.grid(True, which="major", color="#e2e8f0")
+        draw_grid(axis)
     right.legend(fontsize=8)
     if noise > 0.0:
         left.legend(*([item[-1]] for item in left.get_legend_handles_labels()), fontsize=8, loc="lower right")
-    _save(figure, path)
+    save(figure, path)
 
 
 def auto_figure(auto: Mapping[str, Any], path: Path) -> None:
     """The automatic choice: true error against the tolerance, and cost against that of the cheapest model."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.5, 4.8), layout="constrained")
+    figure, (left, right) = subplots(1, 2, size=(11.5, 4.8))
     kinds = list(dict.fromkeys(row["scene"].split()[0] for row in auto["verdicts"]))
     for kind, colour, marker in zip(kinds, _COLOURS.values(), "osD", strict=False):
         rows = [row for row in auto["verdicts"] if row["scene"].startswith(kind)]
@@ -88,21 +83,15 @@ def auto_figure(auto: Mapping[str, Any], path: Path) -> None:
         errors, bars = (np.array([row[what] for row in rows]) / tolerances for what in ("error", "confidence"))
         left.errorbar(places, errors, bars, fmt=marker, color=colour, label=kind, elinewidth=0.8, ms=5)
         right.semilogx(places, [row["ratio"] for row in rows], marker, color=colour, label=kind, ms=5)
-    left.axhline(1.0, ls="--", color="#7a7f87", label="tolerance")
+    left.axhline(1.0, ls="--", color=GREY, label="tolerance")
     left.set_xscale("log")
     left.set_ylim(bottom=0.0)
     left.set_ylabel("true error over tolerance (bars: 95 %)")
-    right.axhline(2.0, ls="--", color="#7a7f87", label="twice the cheapest")
+    right.axhline(2.0, ls="--", color=GREY, label="twice the cheapest")
     right.set_ylim(bottom=0.0)
     right.set_ylabel("cost over that of the cheapest model within the tolerance")
     for axis in (left, right):
         axis.set_xlabel("tolerance, of the undamped peak (scenes side by side)")
-        axis.grid(True, which="major", color="#e2e8f0")
+        draw_grid(axis)
         axis.legend(fontsize=8)
-    _save(figure, path)
-
-
-def _save(figure: Figure, path: Path) -> None:
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=130)
-    plt.close(figure)
+    save(figure, path)

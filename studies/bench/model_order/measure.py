@@ -30,7 +30,7 @@ from vanedamp.studies.bench.model_order.bar_on_wall import LAWS as BAR_LAWS
 from vanedamp.studies.bench.model_order.bar_on_wall import bounce
 from vanedamp.studies.bench.model_order.scenes import SEED
 from vanedamp.studies.bench.model_order.structures import cluster_model
-from vanedamp.studies.bench.model_order.trial import run_trial, summary, tell_trial
+from vanedamp.studies.bench.model_order.trial import print_trial, run_trial, summary
 from vanedamp.studies.bench.timing import Clock, in_turns, machine
 from vanedamp.studies.terminal import progress
 
@@ -55,7 +55,7 @@ _ROUNDS, _LENGTHS = 3, (50, 150)
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is computed."""
+    """Sizes of models, numbers of runs and lengths of them."""
 
     degree: int
     modes: tuple[int, ...]
@@ -163,7 +163,7 @@ def _scene(file: Path, modes: int, contact: Mapping[str, Any], mass: float, freq
     return validate(Scene, data, "scene")
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print the errors."""
     bar, cluster = result["bar"], result["cluster"]
     print("bar on a wall, error of the second apex's time, by modes " + ", ".join(map(str, bar["modes"])))
@@ -173,4 +173,4 @@ def tell(result: Mapping[str, Any]) -> None:
     print(f"cluster, error of the mean amplitude against {finest}, by modes " + ", ".join(map(str, cluster["modes"])))
     for law, entry in cluster["laws"].items():
         print(f"  {law:22} " + "  ".join(f"{error:.1e}" for error in entry["error"]))
-    tell_trial(result["auto"])
+    print_trial(result["auto"])

@@ -62,14 +62,14 @@ def trials(folder: Path, seed: int, counts: dict[str, int]) -> list[Trial]:
     "wide", a band far beyond the damped peak.
     """
     generator = np.random.default_rng(seed)
-    found = []
+    drawn = []
     for name, count in counts.items():
         structure = name.split()[0]
         file = folder / f"auto_{structure}.h5"
         if not file.exists():
             _MODELS[structure]().save(file)
-        found += [_trial(name, file, generator) for _ in range(count)]
-    return found
+        drawn += [_trial(name, file, generator) for _ in range(count)]
+    return drawn
 
 
 def _cluster() -> ReducedModel:

@@ -37,7 +37,7 @@ _ROUNDS, _LENGTHS = 3, (50, 150)
 class Verdict:
     """One scene and tolerance: what was chosen, what it turned out to be, and the cheapest model within the tolerance.
 
-    Models by `shown`; errors in units of the undamped peak; confidence: of the error, 95 %; costs in s per period.
+    Models by `format_model`; errors in units of the undamped peak; confidence: of the error, 95 %; costs in s a period.
     """
 
     scene: str
@@ -52,7 +52,7 @@ class Verdict:
 
     @property
     def kept(self) -> bool:
-        """Whether the error is within the tolerance."""
+        """Say whether the error is within the tolerance."""
         return self.error <= self.tolerance
 
     @property
@@ -64,7 +64,7 @@ class Verdict:
 def run_trial(
     folder: Path, seed: int, counts: dict[str, int], periods: int, report: Callable[[int, int], None]
 ) -> list[Verdict]:
-    """Verdicts of so many scenes of each structure; written to auto.csv of the folder."""
+    """Return verdicts of a number of scenes of each structure, written to auto.csv of the folder."""
     drawn = trials(folder, seed, counts)
     verdicts: list[Verdict] = []
     for index, trial in enumerate(drawn):
@@ -85,18 +85,18 @@ def judge(trial: Trial, name: str, periods: int) -> list[Verdict]:
     kinds = _kinds(chosen.values())
     deviations, confidences = errors(scenes, kinds, trial.undamped, periods)
     costs = _costs(scenes[len(scenes) // 2], kinds)
-    found = []
+    verdicts = []
     for tolerance, estimate in chosen.items():
         place = kinds.index((estimate["modes"], estimate["attached"]))
         within = [i for i, error in enumerate(deviations) if error <= tolerance]
         best = min(within, key=lambda i: costs[i])
-        found.append(
+        verdicts.append(
             Verdict(
-                name, tolerance, shown(kinds[place]), float(estimate["error"]), float(deviations[place]),
-                float(confidences[place]), float(costs[place]), shown(kinds[best]), float(costs[best]),
+                name, tolerance, format_model(kinds[place]), float(estimate["error"]), float(deviations[place]),
+                float(confidences[place]), float(costs[place]), format_model(kinds[best]), float(costs[best]),
             )
         )  # fmt: skip
-    return found
+    return verdicts
 
 
 def chosen_for(trial: Trial, tolerance: float) -> dict[str, Any]:
@@ -108,8 +108,8 @@ def chosen_for(trial: Trial, tolerance: float) -> dict[str, Any]:
     return estimate
 
 
-def shown(kind: Kind) -> str:
-    """A model for people: "3", or "3+" with attachment modes."""
+def format_model(kind: Kind) -> str:
+    """Return a model as text: "3", or "3+" with attachment modes."""
     return f"{kind[0]}{'+' * kind[1]}"
 
 
@@ -145,10 +145,11 @@ def errors(
 def _costs(scene: Scene, kinds: Sequence[Kind]) -> np.ndarray:
     """Seconds per period (kinds,), medians over the rounds."""
     clocks = {
-        shown(kind): partial(time_of_a_period, _fixed(scene, kind, _LENGTHS[1], _STARTS[0]), _LENGTHS) for kind in kinds
+        format_model(kind): partial(time_of_a_period, _fixed(scene, kind, _LENGTHS[1], _STARTS[0]), _LENGTHS)
+        for kind in kinds
     }
     times = in_turns(clocks, _ROUNDS, np.random.default_rng(0))
-    return np.array([np.median(times[shown(kind)]) for kind in kinds])
+    return np.array([np.median(times[format_model(kind)]) for kind in kinds])
 
 
 def _fixed(scene: Scene, kind: Kind, periods: int, start: float) -> Scene:
@@ -161,7 +162,7 @@ def _fixed(scene: Scene, kind: Kind, periods: int, start: float) -> Scene:
 
 
 def summary(verdicts: Sequence[Verdict]) -> dict[str, Any]:
-    """How many kept their tolerance, and within twice the cheapest cost, and the largest of both ratios."""
+    """Return how many kept their tolerance, and within twice the cheapest cost, and the largest of both ratios."""
     return {
         "verdicts": [asdict(item) | {"kept": item.kept, "ratio": item.ratio} for item in verdicts],
         "number": len(verdicts),
@@ -172,7 +173,7 @@ def summary(verdicts: Sequence[Verdict]) -> dict[str, Any]:
     }
 
 
-def tell_trial(result: dict[str, Any]) -> None:
+def print_trial(result: dict[str, Any]) -> None:
     """Print the verdicts."""
     print("automatic choice: scene, tolerance, modes, estimated and true error (95 %), cost, cheapest model, ratio")
     for row in result["verdicts"]:

@@ -6,18 +6,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from matplotlib import pyplot as plt
-
-from vanedamp.studies.bench.style import _BLUE, _GOLD, _GREEN, _GREY, _RED, _save
+from vanedamp.studies.figures import BLUE, GOLD, GREEN, GREY, RED, draw_grid, save, subplots
 
 
 def modal_figure(result: Mapping[str, Any], path: Path) -> None:
     """Processor time and peak memory against the degrees of freedom, a line a solver."""
     from vanedamp.studies.bench.modes.solvers import COUNT, NAMES
 
-    figure, panels = plt.subplots(1, 3, figsize=(14, 4.6), layout="constrained")
+    figure, panels = subplots(1, 3, size=(14, 4.6))
     titles = ("factorisation", f"{COUNT} modes with it", "peak memory")
-    colours = dict(zip(NAMES, (_BLUE, _GREY, _RED, _GOLD, _GREEN), strict=True))
+    colours = dict(zip(NAMES, (BLUE, GREY, RED, GOLD, GREEN), strict=True))
     sizes = [entry for entry in result["sizes"] if entry["assembly"]["status"] == "ok"]
     for axes, title, part in zip(panels, titles, ("factorisation", "modes", "peak_bytes"), strict=True):
         for name, label in NAMES.items():
@@ -34,6 +32,6 @@ def modal_figure(result: Mapping[str, Any], path: Path) -> None:
         axes.set_xticks([], minor=True)
         axes.set_xlabel("degrees of freedom")
         axes.set_ylabel("GB" if part == "peak_bytes" else "processor time, s")
-        axes.grid(True, which="major", color="#e2e8f0")
+        draw_grid(axes)
     panels[0].legend(fontsize=9)
-    _save(figure, path)
+    save(figure, path, dpi=150)

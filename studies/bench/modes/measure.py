@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Mapping
@@ -20,16 +18,14 @@ from typing import Any
 
 import numpy as np
 
-import vanedamp
 from vanedamp.files.store import write_csv, write_json
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.vane_cluster import build
 from vanedamp.studies.bench.modes.solvers import COUNT, NAMES, OURS
 from vanedamp.studies.bench.timing import machine
 from vanedamp.studies.terminal import progress
+from vanedamp.studies.workers import run_module
 
-_ROOT = Path(vanedamp.__file__).parent.parent
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # frequencies that differ by more than this between two solvers are another answer
 _AGREE = 1e-7
 
@@ -84,7 +80,7 @@ def _write(result: Mapping[str, Any], folder: Path) -> None:
     modal_figure(result, folder / "bench_modal.png")
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print times, memory and ratios."""
     for entry in result["sizes"]:
         assembly = entry["assembly"]
@@ -93,14 +89,14 @@ def tell(result: Mapping[str, Any]) -> None:
             continue
         print(f"{assembly['dofs']} degrees of freedom: assembly {assembly['assembly']['cpu_s']:.2f} s, "
               f"{assembly['peak_bytes'] / 1e9:.2f} GB")  # fmt: skip
-        for name, found in entry["solvers"].items():
-            if found["status"] != "ok":
-                print(f"  {NAMES[name]:34} {found['status']}")
+        for name, run in entry["solvers"].items():
+            if run["status"] != "ok":
+                print(f"  {NAMES[name]:34} {run['status']}")
                 continue
             ratio = "" if name == OURS else f", ours / this {entry['ratio'][name]['modes']:.2f}"
             print(
-                f"  {NAMES[name]:34} factorisation {found['factorisation']['cpu_s']:8.2f} s, with {COUNT} modes "
-                f"{found['modes']['cpu_s']:8.2f} s, peak {found['peak_bytes'] / 1e9:.2f} GB{ratio}"
+                f"  {NAMES[name]:34} factorisation {run['factorisation']['cpu_s']:8.2f} s, with {COUNT} modes "
+                f"{run['modes']['cpu_s']:8.2f} s, peak {run['peak_bytes'] / 1e9:.2f} GB{ratio}"
             )
     for name, reason in result["absent"].items():
         print(f"not measured: {NAMES[name]} ({reason})")
@@ -109,7 +105,7 @@ def tell(result: Mapping[str, Any]) -> None:
 
 
 def _solvers() -> tuple[list[str], dict[str, str]]:
-    """What can be measured, and why the rest cannot."""
+    """Return the solvers that are installed, and why the others are not."""
     if importlib.util.find_spec("sksparse") is None:
         return [name for name in NAMES if name != "cholmod"], {
             "cholmod": "scikit-sparse is not installed: apt-get install libsuitesparse-dev, pip install scikit-sparse"
@@ -119,26 +115,23 @@ def _solvers() -> tuple[list[str], dict[str, str]]:
 
 def _rounds(name: str, matrices: Path, effort: Effort) -> dict[str, Any]:
     """Medians over the rounds; the first trouble ends them."""
-    found = []
+    runs = []
     for _ in range(effort.rounds):
-        found.append(_process(effort.limit, name, str(matrices), str(COUNT)))
-        if found[-1]["status"] != "ok":
-            return found[-1]
+        runs.append(_process(effort.limit, name, str(matrices), str(COUNT)))
+        if runs[-1]["status"] != "ok":
+            return runs[-1]
     middle = {
-        part: {clock: float(np.median([f[part][clock] for f in found])) for clock in ("cpu_s", "wall_s")}
+        part: {clock: float(np.median([run[part][clock] for run in runs])) for clock in ("cpu_s", "wall_s")}
         for part in ("factorisation", "modes")
     }
-    peaks = {key: max(f[key] for f in found) for key in ("loaded_bytes", "peak_bytes")}
-    return middle | peaks | {"status": "ok", "eigenvalues": found[0]["eigenvalues"]}
+    peaks = {key: max(run[key] for run in runs) for key in ("loaded_bytes", "peak_bytes")}
+    return middle | peaks | {"status": "ok", "eigenvalues": runs[0]["eigenvalues"]}
 
 
 def _process(limit: float, *arguments: str) -> dict[str, Any]:
     """One measurement in a process of its own, on one thread; its trouble is a status."""
-    environment = os.environ | dict.fromkeys(_THREADS, "1")
-    environment["PYTHONPATH"] = os.pathsep.join([str(_ROOT), environment.get("PYTHONPATH", "")]).rstrip(os.pathsep)
-    command = [sys.executable, "-m", "vanedamp.studies.bench.modes.worker", *arguments]
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=limit, check=False)
+        done = run_module("vanedamp.studies.bench.modes.worker", *arguments, threads=1, timeout=limit)
     except subprocess.TimeoutExpired:
         return {"status": f"more than {limit:g} s"}
     if done.returncode != 0:
@@ -149,9 +142,9 @@ def _process(limit: float, *arguments: str) -> dict[str, Any]:
 
 
 def _agree(solvers: Mapping[str, Any]) -> bool:
-    """Whether all solvers found the same frequencies."""
-    found = [np.array(s["eigenvalues"]) for s in solvers.values() if s["status"] == "ok"]
-    return all(bool(np.all(np.abs(values / found[0] - 1.0) < 2.0 * _AGREE)) for values in found)
+    """Say whether all solvers give the same frequencies."""
+    values = [np.array(s["eigenvalues"]) for s in solvers.values() if s["status"] == "ok"]
+    return all(bool(np.all(np.abs(each / values[0] - 1.0) < 2.0 * _AGREE)) for each in values)
 
 
 def _ratios(solvers: Mapping[str, Any]) -> dict[str, Any]:
@@ -186,11 +179,11 @@ def _write_csv(result: Mapping[str, Any], path: Path) -> None:
             (dofs, "assembly", assembly["status"], "", times.get("cpu_s"), times.get("wall_s"),
              assembly.get("peak_bytes"))
         )  # fmt: skip
-        for name, found in entry["solvers"].items():
-            factor, modes = found.get("factorisation", {}), found.get("modes", {})
+        for name, run in entry["solvers"].items():
+            factor, modes = run.get("factorisation", {}), run.get("modes", {})
             rows.append(
-                (dofs, NAMES[name], found["status"], factor.get("cpu_s"), modes.get("cpu_s"), modes.get("wall_s"),
-                 found.get("peak_bytes"))
+                (dofs, NAMES[name], run["status"], factor.get("cpu_s"), modes.get("cpu_s"), modes.get("wall_s"),
+                 run.get("peak_bytes"))
             )  # fmt: skip
     header = ("dofs", "solver", "status", "factorisation_cpu_s", "modes_cpu_s", "modes_wall_s", "peak_bytes")
     write_csv(path, header, rows)

@@ -77,9 +77,9 @@ def run_stability(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
             result["parts"][name] = part(effort)
         if effort.maps is not None:
             result["maps"] = {}
-            for done, (name, mapped) in enumerate(MAPS.items()):
+            for done, (name, make) in enumerate(MAPS.items()):
                 report(len(parts) + done, len(parts) + len(MAPS))
-                result["maps"][name] = mapped(effort.maps)
+                result["maps"][name] = make(effort.maps)
     result = finite(result | {"wall_time_s": time.perf_counter() - started})
     write_json(folder / "stability.json", result)
     points = (
@@ -103,15 +103,15 @@ def _write_maps(maps: Mapping[str, Any], path: Path) -> None:
     """One line a point of a map."""
     rows = (
         (name, x, y, value)
-        for name, made in maps.items()
-        for y, row in zip(made["y"], made["value"], strict=True)
-        for x, value in zip(made["x"], row, strict=True)
+        for name, mapped in maps.items()
+        for y, row in zip(mapped["y"], mapped["value"], strict=True)
+        for x, value in zip(mapped["x"], row, strict=True)
     )
     if maps:
         write_csv(path, ("map", "x", "y", "value"), rows)
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print how far each measured edge lies from its limit."""
     for name, part in result["parts"].items():
         if "limit" in part["curves"]:
@@ -119,8 +119,8 @@ def tell(result: Mapping[str, Any]) -> None:
             print(f"{name:16} measured / analytic limit {ratio.min():.3f} to {ratio.max():.3f}")
         else:
             print(f"{name:16} {part['summary']}")
-    for name, made in result.get("maps", {}).items():
-        ratio = np.array(made["edge"], float) / np.array(made["limit"], float)
+    for name, mapped in result.get("maps", {}).items():
+        ratio = np.array(mapped["edge"], float) / np.array(mapped["limit"], float)
         known = ratio[np.isfinite(ratio)]
         print(f"map of {name}: edge / analytic limit {known.min():.3f} to {known.max():.3f}, {len(known)} columns")
 
@@ -214,8 +214,8 @@ def _rebound(options: Mapping[str, Any], shift: float) -> float:
         time={"periods": 1, "transient": 0},
     )  # fmt: skip
     # two metres to the wall at 10 m/s: one collision in the first 0.4 s
-    made = scene(tables, dict(options) | {"steps_per_period": steps, "penetration": 0.5})
-    response = simulate(made, samples_per_period=1000)
+    thrown = scene(tables, dict(options) | {"steps_per_period": steps, "penetration": 0.5})
+    response = simulate(thrown, samples_per_period=1000)
     way = response.body_displacement[:, 0]
     return float(abs(way[390] - way[380]) / (10 * speed / steps))
 
@@ -229,9 +229,9 @@ def missed_impacts(effort: Effort) -> dict[str, Any]:
         for turn in range(effort.runs):
             steps = 20 + 4 * turn / effort.runs  # not a whole number of them to the first touch
             touch = ratio / steps  # periods that the wall is beyond the resting body
-            made = touching(touch)
-            flawless += simulate(made).counters["impacts"] == 0
-            tried = steps_over(made, 1 / steps)
+            touched = touching(touch)
+            flawless += simulate(touched).counters["impacts"] == 0
+            tried = steps_over(touched, 1 / steps)
             lost += tried
         missed.append(lost / effort.runs)
         exact.append(flawless / effort.runs)
@@ -253,13 +253,13 @@ def restitution_and_modes(effort: Effort) -> dict[str, Any]:
     compliant: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
         for count in effort.modes:
-            made = {law: against_rod(str(rod(Path(folder), count)), 0.1, law) for law in ("newton", "compliant")}
-            rows, _, _ = rows_of(made["newton"], linear_structure(made["newton"]))
+            by_law = {law: against_rod(str(rod(Path(folder), count)), 0.1, law) for law in ("newton", "compliant")}
+            rows, _, _ = rows_of(by_law["newton"], linear_structure(by_law["newton"]))
             measured.append(float(1 / (rows.floor[0] ** 2).sum()))
             k = np.arange(1, count + 1)
             limit.append(float(1 / 3 - (2 / (k * math.pi) ** 2).sum()))  # Schur complement of the tip's mass
-            newton.append(first_impulse(made["newton"]))
-            compliant.append(first_impulse(made["compliant"]))
+            newton.append(first_impulse(by_law["newton"]))
+            compliant.append(first_impulse(by_law["compliant"]))
     return {
         "x_label": "fixed-interface modes", "y_label": "contact mass; momentum given in the first impact",
         "x": [float(count) for count in effort.modes], "log": False, "summary":

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import eigvalsh
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.studies.bench.stability import scenes as failing
+from vanedamp.studies.bench.stability import scenes
 from vanedamp.studies.bench.stability.macro_step import largest_stable
 
 #: exchanges and orders of extrapolation of a co-simulation, by the name of their map
@@ -52,12 +52,12 @@ def contact_map(effort: MapEffort) -> dict[str, Any]:
         return 2 / math.sqrt(eigvalsh(matrix, np.diag([1.0, mass]))[-1])
 
     def fails(stiffness: float, step: float) -> bool:
-        tables = failing.pressed(mass, stiffness, restitution=1.0)
-        return failing.bounces(tables, {"method": "penalty"}, mass / stiffness, math.floor(1 / step))
+        tables = scenes.pressed(mass, stiffness, restitution=1.0)
+        return scenes.bounces(tables, {"method": "penalty"}, mass / stiffness, math.floor(1 / step))
 
     limits = np.array([limit(stiffness) for stiffness in stiffnesses])
-    made = _map(stiffnesses, limits, fails, effort)
-    return made | {"x_label": "contact stiffness, N/m", "y_label": "step, periods"}
+    grid = _map(stiffnesses, limits, fails, effort)
+    return grid | {"x_label": "contact stiffness, N/m", "y_label": "step, periods"}
 
 
 def friction_map(effort: MapEffort) -> dict[str, Any]:
@@ -66,25 +66,25 @@ def friction_map(effort: MapEffort) -> dict[str, Any]:
     limits = 2 * speeds * mass / (1 + mass)
 
     def fails(slow: float, step: float) -> bool:
-        return failing.unsteady(mass, slow, math.floor(1 / step))
+        return scenes.unsteady(mass, slow, math.floor(1 / step))
 
-    made = _map(speeds, limits, fails, effort)
-    return made | {"x_label": "slip speed of the regularisation, m/s", "y_label": "step, periods"}
+    grid = _map(speeds, limits, fails, effort)
+    return grid | {"x_label": "slip speed of the regularisation, m/s", "y_label": "step, periods"}
 
 
 def cosimulation_map(effort: MapEffort, exchange: str, hold: int) -> dict[str, Any]:
     """Co-simulation, macro-step against ratio of masses: spectral radius of the linear macro-step."""
     masses = np.geomspace(0.4, 4, effort.across)
-    pairs = {float(mass): failing.coupled_pair(float(mass)) for mass in masses}
+    pairs = {float(mass): scenes.coupled_pair(float(mass)) for mass in masses}
     limits = np.array([largest_stable(mass, *pair[1:], exchange, hold) for mass, pair in pairs.items()])
     solver = {"method": "cosim", "exchange": exchange, "hold": hold, "substeps": 40}
 
     def fails(mass: float, step: float) -> bool:
         tables, stiffness, _ = pairs[float(mass)]
-        return failing.restless(tables, solver, mass / stiffness, math.floor(1 / step))
+        return scenes.restless(tables, solver, mass / stiffness, math.floor(1 / step))
 
-    made = _map(masses, limits, fails, effort)
-    return made | {"x_label": "mass of the body / mass of the structure", "y_label": "macro-step, periods"}
+    grid = _map(masses, limits, fails, effort)
+    return grid | {"x_label": "mass of the body / mass of the structure", "y_label": "macro-step, periods"}
 
 
 def missed_map(effort: MapEffort) -> dict[str, Any]:
@@ -102,14 +102,14 @@ def missed_map(effort: MapEffort) -> dict[str, Any]:
         lost = 0
         for turn in range(effort.phases):
             shift = turn / effort.phases * step
-            lost += failing.steps_over(failing.touching(touch), step, shift)
+            lost += scenes.steps_over(scenes.touching(touch), step, shift)
         return lost / effort.phases
 
     for speed in speeds:
-        response = simulate(failing.touching(math.asin(speed) / math.pi))
+        response = simulate(scenes.touching(math.asin(speed) / math.pi))
         exact[0] += response.counters["impacts"] == 0
-    made = _map(speeds, limits, lambda speed, step: share(speed, step) > 0, effort, share)
-    return made | {
+    grid = _map(speeds, limits, lambda speed, step: share(speed, step) > 0, effort, share)
+    return grid | {
         "x_label": "closing speed / largest speed of the wall", "y_label": "step, periods", "missed_by_exact": exact[0]
     }  # fmt: skip
 
@@ -128,7 +128,7 @@ def newton_map(effort: MapEffort) -> dict[str, Any]:
         files = {n: str(rod(Path(folder), n)) for n in {0, *effort.modes}}
 
         def left(modes: int, mass: float) -> float:
-            ours, rigid = (failing.first_impulse(failing.against_rod(files[n], mass, "newton")) for n in (modes, 0))
+            ours, rigid = (scenes.first_impulse(scenes.against_rod(files[n], mass, "newton")) for n in (modes, 0))
             return ours / rigid
 
         value = np.array([[left(n, float(mass)) for n in effort.modes] for mass in masses])

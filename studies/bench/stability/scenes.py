@@ -49,7 +49,7 @@ def pressed(mass: float, stiffness: float, restitution: float) -> dict[str, Any]
 
 
 def bounces(tables: Mapping[str, Any], solver: Mapping[str, Any], static: float, steps: int) -> bool:
-    """Whether the body leaves its wall by more than three times its static compression, or the run fails."""
+    """Say whether the body leaves its wall by more than three times its static compression, or the run fails."""
     response = simulate(scene(tables, dict(solver) | {"steps_per_period": steps}))
     if response.status not in (Status.OK, Status.ENERGY):
         return True
@@ -61,13 +61,13 @@ def coupled_pair(mass: float) -> tuple[dict[str, Any], float, float]:
     stiffness = contact_stiffness(mass)
     tables = pressed(mass, stiffness, restitution=0.7)
     tables["structure"] = STRUCTURE | {"damping": DAMPING}
-    made = scene(tables, {})
-    rows, _, _ = rows_of(made, linear_structure(made))
+    pair = scene(tables, {})
+    rows, _, _ = rows_of(pair, linear_structure(pair))
     return tables, stiffness, float(rows.dashpot[-2])
 
 
 def restless(tables: Mapping[str, Any], solver: Mapping[str, Any], static: float, steps: int) -> bool:
-    """Whether a body on a wall with a dashpot does not come to rest at its static compression, or the run fails."""
+    """Say whether a body on a wall with a dashpot does not come to rest at its static compression, or the run fails."""
     response = simulate(scene(tables, dict(solver) | {"steps_per_period": steps}))
     if response.status not in (Status.OK, Status.ENERGY):
         return True
@@ -75,7 +75,7 @@ def restless(tables: Mapping[str, Any], solver: Mapping[str, Any], static: float
 
 
 def unsteady(mass: float, slow: float, steps: int) -> bool:
-    """Whether a body on a floor with regularised friction does not come to rest; slow: its slip speed, m/s."""
+    """Say whether a body on a floor with regularised friction does not come to rest; slow: its slip speed, m/s."""
     tables = data(
         gravity={"acceleration": 0.0}, cavity=[{"name": "c", "gap": 1e3}],
         damper=[{"cavity": "c", "mass": mass, "friction": 1.0, "normal_load": 1.0, "velocity": 0.2 * slow}],
@@ -98,11 +98,11 @@ def touching(touch: float) -> Scene:
     return scene(tables, {})
 
 
-def steps_over(made: Scene, step: float, start: float = 0.0) -> bool:
-    """Whether scipy's event search with steps of that length misses the first touch of the wall and the body."""
+def steps_over(touch: Scene, step: float, start: float = 0.0) -> bool:
+    """Say whether scipy's event search with steps of that length misses the first touch of the wall and the body."""
     from scipy.integrate import solve_ivp
 
-    half = made.cavity[0].gap / 2
+    half = touch.cavity[0].gap / 2
 
     def gap(t: float, y: np.ndarray) -> float:
         return float(half - abs(y[0] - math.sin(2 * math.pi * t)))
@@ -110,8 +110,8 @@ def steps_over(made: Scene, step: float, start: float = 0.0) -> bool:
     def motion(_t: float, _y: np.ndarray) -> list[float]:
         return [0.0]
 
-    found = solve_ivp(motion, (start, 0.5), [0.0], "DOP853", events=gap, max_step=step, first_step=step, rtol=1e-3)
-    return not len(found.t_events[0])
+    solution = solve_ivp(motion, (start, 0.5), [0.0], "DOP853", events=gap, max_step=step, first_step=step, rtol=1e-3)
+    return not len(solution.t_events[0])
 
 
 def against_rod(file: str, mass: float, law: str) -> Scene:
@@ -125,7 +125,7 @@ def against_rod(file: str, mass: float, law: str) -> Scene:
     ), {})  # fmt: skip
 
 
-def first_impulse(made: Scene) -> float:
+def first_impulse(struck: Scene) -> float:
     """Momentum given in the first impact, N s."""
-    response = simulate(made, events=True)
+    response = simulate(struck, events=True)
     return abs(next(event.impulse for event in response.event_list if event.kind == "impact"))

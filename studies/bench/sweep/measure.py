@@ -1,4 +1,4 @@
-"""How sweeps scale: time, parallel efficiency and memory of a rigid model's sweep of up to 100 000 scenes.
+"""Scaling of sweeps: time, parallel efficiency and memory of a rigid model's sweep of up to 100 000 scenes.
 
 Efficiency is time of one process over processes times their time. By the clock it suffers from whatever else the
 machine does; so it is also taken from seconds of the processors: what one process needs, over processes times the
@@ -9,9 +9,6 @@ does nothing else.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Mapping
@@ -21,15 +18,13 @@ from typing import Any
 
 import numpy as np
 
-import vanedamp
 from vanedamp.files.store import write_csv, write_json
 from vanedamp.studies.bench.sweep.worker import PERIODS
-from vanedamp.studies.bench.timing import machine, shown, spread
+from vanedamp.studies.bench.timing import format_spread, machine, spread
 from vanedamp.studies.terminal import progress
-from vanedamp.studies.workers import available_cores
+from vanedamp.studies.workers import available_cores, run_module
 
 TARGET = 0.85
-_ROOT = Path(vanedamp.__file__).parent.parent
 _COLUMNS = (
     "points", "workers", "wall_s", "main_cpu_s", "worker_cpu_s", "main_peak_bytes", "worker_peak_bytes", "file_bytes",
     "load",
@@ -63,8 +58,8 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
         for turn in range(effort.rounds):
             report(2 * turn, total)
             counts = (1, cores) if turn % 2 == 0 else (cores, 1)
-            made = {count: _process(effort.compared, count) for count in counts}
-            pair = {count: made[count] for count in (1, cores)}
+            runs = {count: _process(effort.compared, count) for count in counts}
+            pair = {count: runs[count] for count in (1, cores)}
             result["pairs"].append(
                 {"one": pair[1], "all": pair[cores], "efficiency": _efficiency(pair[1], pair[cores])}
             )
@@ -89,7 +84,7 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     return result
 
 
-def tell(result: Mapping[str, Any]) -> None:
+def print_summary(result: Mapping[str, Any]) -> None:
     """Print times, memory and efficiency."""
     for entry in result["sizes"]:
         print(
@@ -99,8 +94,8 @@ def tell(result: Mapping[str, Any]) -> None:
             f"file {entry['file_bytes'] / 1e6:.2f} MB"
         )
     for name, values in result["efficiency"].items():
-        print(f"parallel efficiency by the {name:9} {shown(values)}  target {result['target']}")
-    print(f"share of the main process in the processors' time {shown(result['overhead'])}")
+        print(f"parallel efficiency by the {name:9} {format_spread(values)}  target {result['target']}")
+    print(f"share of the main process in the processors' time {format_spread(result['overhead'])}")
     print(f"load of the machine at the beginning: {result['machine']['load']:.1f}")
 
 
@@ -114,18 +109,16 @@ def _efficiency(one: Mapping[str, Any], many: Mapping[str, Any]) -> dict[str, fl
 
 
 def _overhead(many: Mapping[str, Any]) -> float:
-    """What handing out, collecting and writing takes of all processor time."""
+    """Return the share of all processor time that handing out, collecting and writing take."""
     own: float = many["main_cpu_s"]
     return own / (own + sum(many["worker_cpu_s"]))
 
 
 def _process(points: int, workers: int) -> dict[str, Any]:
     """One sweep in a process of its own, one thread a process."""
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    environment["PYTHONPATH"] = os.pathsep.join([str(_ROOT), environment.get("PYTHONPATH", "")]).rstrip(os.pathsep)
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "vanedamp.studies.bench.sweep.worker", str(points), str(workers), folder]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        done = run_module("vanedamp.studies.bench.sweep.worker", str(points), str(workers), folder, threads=1)
+    done.check_returncode()
     result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return result
 

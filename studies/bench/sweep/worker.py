@@ -29,7 +29,7 @@ PERIODS, TRANSIENT = 200, 0
 
 
 class _Use(NamedTuple):
-    """What a process has used: seconds of the processor, and at most so many bytes."""
+    """Seconds of the processor that a process has used, and its peak of bytes."""
 
     process: int
     cpu_s: float
@@ -77,12 +77,12 @@ def measure(points: int, count: int, folder: Path) -> dict[str, Any]:
 
 
 def _uses(pool: Executor | None, count: int) -> dict[int, _Use]:
-    """What this process and each worker have used, by process."""
-    found = {use.process: use for use in [_use(0.0)]}
-    while pool is not None and len(found) < count + 1:
+    """Return what this process and each worker have used, by process."""
+    uses = {use.process: use for use in [_use(0.0)]}
+    while pool is not None and len(uses) < count + 1:
         tried: Iterable[_Use] = pool.map(_use, [0.2] * count)
-        found |= {use.process: use for use in tried}
-    return found
+        uses |= {use.process: use for use in tried}
+    return uses
 
 
 def _use(pause: float) -> _Use:

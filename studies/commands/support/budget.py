@@ -1,4 +1,4 @@
-"""What a command would take, estimated before the work: what nobody would wait for, or has memory for, is refused.
+"""The cost of a command, estimated before the work: what nobody would wait for, or has memory for, is refused.
 
 Known costs are those of one body on a rigid structure (docs/accuracy.md); richer scenes take more. The bounds are
 generous: whoever meets one has most likely slipped by some powers of ten.

@@ -1,0 +1,25 @@
+"""`vanedamp demo`: the whole pipeline on the shipped mesh."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from vanedamp.studies.commands.support.arguments import add_output, add_workers
+
+ORDER = 120
+SUMMARY = "the whole pipeline on the shipped mesh"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take the folder and a number of processes."""
+    add_output(parser, "DIR")
+    parser.set_defaults(output="out")
+    add_workers(parser)
+
+
+def run(arguments: Namespace) -> None:
+    """Run the demonstration."""
+    from vanedamp.studies.commands.support.outputs import output_folder
+    from vanedamp.studies.demo import run_demo
+
+    run_demo(output_folder(arguments), arguments.workers)

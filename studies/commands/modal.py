@@ -1,0 +1,69 @@
+"""`vanedamp modal`: natural frequencies, effective masses, rigid model of the first bending."""
+
+from __future__ import annotations
+
+import importlib.util
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
+from typing import Any
+
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
+
+ORDER = 20
+SUMMARY = "natural frequencies, effective masses, rigid model of the first bending"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a case, the result files and one for ParaView."""
+    add_input(parser, "CASE.toml")
+    add_output(parser, "MODES.h5")
+    add_json(parser)
+    parser.add_argument("--vtk", metavar="FILE.vtu", help="the mode shapes for ParaView (.vtu or .vtk)")
+
+
+def run(arguments: Namespace) -> None:
+    """Compute the modes, and what follows from them."""
+    from vanedamp.studies.case.tables import Case
+    from vanedamp.studies.commands.support.messages import print_warnings, write_result
+    from vanedamp.studies.commands.support.outputs import check_outputs
+
+    outputs = check_outputs(arguments, vtk=(".vtu", ".vtk"))
+    if arguments.vtk and importlib.util.find_spec("pyvista") is None:  # before the work
+        raise ModuleNotFoundError("--vtk writes with it", name="pyvista")
+    case = Case.load(arguments.input)
+    outputs.keep(case.files)
+    from vanedamp.studies.case.stages import assemble, modal_analysis
+
+    analysis = modal_analysis(assemble(case))
+    if arguments.output:
+        analysis.save(arguments.output)
+    if arguments.vtk:
+        from vanedamp.studies.report.pictures import save_vtk
+
+        variables, cell_type = analysis.mesh()
+        save_vtk(analysis.modes, variables["coordinates"].values, variables["cell"].values, cell_type, arguments.vtk)
+    result = analysis.to_json()
+    write_result(arguments.json, result)
+    print_warnings(arguments.input, analysis.warnings)
+    if arguments.json != "-":
+        _print_summary(result)
+
+
+def _print_summary(result: Mapping[str, Any]) -> None:
+    """Print modes, effective masses and the rigid model."""
+    print("mode  frequency/Hz   effective mass x, y, z / kg        residual")
+    rows = zip(result["frequency_hz"], result["effective_mass"], result["residual"], strict=True)
+    for index, (frequency, masses, residual) in enumerate(rows):
+        mark = "  first bending" if index == result["first_bending"] else ""
+        print(
+            f"{index + 1:4}  {frequency:12.2f}   " + "  ".join(f"{m:9.5f}" for m in masses) + f"   {residual:.1e}{mark}"
+        )
+    rigid = result["rigid"]
+    if rigid:
+        print(
+            f"rigid model at {rigid['at']}: mass {rigid['mass']:.5g} kg, stiffness {rigid['stiffness']:.5g} N/m, "
+            f"damping {rigid['damping']:.4g} N s/m"
+        )
+    if "fatigue" in result:
+        fatigue = result["fatigue"]
+        print(f"amplitude at {fatigue['share']:.0%} of the fatigue strength: {fatigue['amplitude']:.4g} m")

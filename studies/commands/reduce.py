@@ -1,0 +1,99 @@
+"""`vanedamp reduce`: a reduced model at the case's interface, with an estimate of its error."""
+
+from __future__ import annotations
+
+import time
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, count, hertz, ratio
+
+ORDER = 50
+SUMMARY = "reduced model at the case's interface"
+#: hot spots are 2 % of the structure's size apart, and each is six outputs of the model
+_MOST_SPOTS = 1000
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a case, the result files, the basis and its size."""
+    add_input(parser, "CASE.toml")
+    add_output(parser, "ROM.h5")
+    add_json(parser)
+    parser.add_argument(
+        "--modes", type=_modes, default=12, metavar="N|auto",
+        help="modes to keep, or as few as the tolerance needs (default: %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--basis", default="craig-bampton", metavar="BASIS",
+        help="craig-bampton (default), rubin, macneal, massless or truncated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--tolerance", type=ratio, default=0.01, metavar="R", help="error of --modes auto (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--max-frequency", type=hertz, metavar="HZ",
+        help="up to which the error is estimated (default: 1.5 times the first natural frequency)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--hot-spots", type=_spots, default=0, metavar="N",
+        help="keep the stresses at the N most stressed places of the first mode as outputs",
+    )  # fmt: skip
+
+
+def run(arguments: Namespace) -> None:
+    """Reduce the case."""
+    from dataclasses import replace
+
+    from vanedamp.files.toml_input import InputError
+    from vanedamp.rom.reduction import check_basis
+    from vanedamp.studies.case.tables import Case
+    from vanedamp.studies.commands.support.messages import print_warnings, write_result
+    from vanedamp.studies.commands.support.outputs import check_outputs
+
+    outputs = check_outputs(arguments)
+    check_basis(arguments.basis)
+    case = Case.load(arguments.input)
+    outputs.keep(case.files)
+    if not case.interface:
+        raise InputError("interface: missing; a reduction needs at least one [interface.<label>] table")
+    from vanedamp.studies.case.stages import assemble, reduction, unit_doubts, with_hot_spots
+
+    started = time.perf_counter()
+    structure = assemble(case)
+    spots = arguments.hot_spots
+    model = reduction(
+        structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, bool(spots)
+    )
+    if spots:
+        model = replace(
+            with_hot_spots(structure, model, spots), recovery=None, residual_recovery=None, coordinates=None
+        )
+    estimate = model.provenance["estimate"]
+    if arguments.output:
+        model.save(arguments.output)
+    result = {
+        "frequency_hz": model.natural_frequencies_hz.tolist(),
+        "modes": model.modes,
+        "basis": arguments.basis,
+        "interface": list(model.interface),
+        "outputs": list(model.outputs),
+        "estimate": estimate,
+        "warnings": list(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))),
+        "wall_time_s": time.perf_counter() - started,
+    }
+    write_result(arguments.json, result)
+    print_warnings(arguments.input, result["warnings"])
+    if arguments.json != "-":
+        kind = "natural" if model.free_modes else "fixed-interface"
+        print(f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}")
+        print(f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz")
+        print("frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8]))
+
+
+def _modes(text: str) -> int | None:
+    return None if text == "auto" else count(text)
+
+
+def _spots(text: str) -> int:
+    if count(text) > _MOST_SPOTS:
+        raise ArgumentTypeError(f"expected at most {_MOST_SPOTS}, not {text}")
+    return int(text)

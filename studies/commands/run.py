@@ -1,0 +1,53 @@
+"""`vanedamp run`: one scene at one excitation frequency."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import Any
+
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, count
+from vanedamp.studies.terminal import progress
+
+ORDER = 70
+SUMMARY = "one scene at one excitation frequency"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a scene, the result files and what to keep."""
+    add_input(parser, "SCENE.toml")
+    add_output(parser, "RESPONSE.h5")
+    add_json(parser)
+    parser.add_argument("--events", action="store_true", help="keep the list of events")
+    parser.add_argument("--samples", type=count, default=0, metavar="N", help="keep N samples of every period")
+
+
+def run(arguments: Namespace) -> None:
+    """Simulate the scene."""
+    from vanedamp.studies.commands.support.messages import write_result
+    from vanedamp.studies.commands.support.outputs import check_outputs
+
+    outputs = check_outputs(arguments)
+    from vanedamp.studies.commands.support.scenes import load_scene, print_model_order, print_resonance
+
+    scene = load_scene(arguments.input, outputs)
+    from vanedamp.coupling.engine import simulate
+    from vanedamp.files.provenance import versions
+    from vanedamp.studies.commands.support.budget import check_run
+
+    check_run(scene, arguments.samples)
+
+    with progress("run") as report:
+        response = simulate(scene, arguments.events, arguments.samples, progress=report)
+    if arguments.output:
+        response.save(arguments.output, {"versions": versions(), "scene": scene.to_dict()})
+    result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)
+    print_model_order(arguments.input, response.estimate, response.warnings)
+    write_result(arguments.json, result)
+    if arguments.json != "-":
+        for name, value in result.items():
+            if not isinstance(value, dict | list):
+                print(f"{name:24} {_format(value)}")
+
+
+def _format(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,1 @@
+"""Shared by several commands: arguments, output files, messages, scenes, a budget."""

@@ -1,0 +1,63 @@
+"""Arguments that several commands take, and the types of their values."""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentParser, ArgumentTypeError
+from collections.abc import Callable
+
+
+def add_input(parser: ArgumentParser, source: str) -> None:
+    """Take an input file."""
+    parser.add_argument("input", metavar=source, help="input file, SI units")
+
+
+def add_output(parser: ArgumentParser, output: str, required: bool = False) -> None:
+    """Take `-o`: a file or a folder to write."""
+    parser.add_argument("-o", "--output", metavar=output, required=required, help="result file")
+
+
+def add_json(parser: ArgumentParser) -> None:
+    """Take `--json`: a file for machines, or - for standard output."""
+    parser.add_argument(
+        "--json", metavar="FILE", help="the result for machines; - writes it to standard output and nothing else"
+    )
+
+
+def add_workers(parser: ArgumentParser) -> None:
+    """Take `--workers`: a number of processes."""
+    parser.add_argument("--workers", type=positive_count, metavar="N", help="processes (default: one for every core)")
+
+
+def count(text: str) -> int:
+    """Return a whole number that is not negative."""
+    if not text.isdecimal():
+        raise ArgumentTypeError(f"expected a count, not {text!r}")
+    return int(text)
+
+
+def positive_count(text: str) -> int:
+    """Return a whole number of at least one."""
+    if count(text) == 0:
+        raise ArgumentTypeError("expected at least 1")
+    return int(text)
+
+
+def ratio(text: str) -> float:
+    """Return a number between 0 and 1."""
+    return _number(text, "a number between 0 and 1", lambda value: 0.0 < value < 1.0)
+
+
+def hertz(text: str) -> float:
+    """Return a frequency."""
+    return _number(text, "a frequency in Hz", lambda value: 0.0 < value < math.inf)
+
+
+def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not fits(value):
+        raise ArgumentTypeError(f"expected {expected}, not {text!r}")
+    return value

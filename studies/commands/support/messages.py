@@ -1,0 +1,30 @@
+"""Results for machines on standard output or in a file, and warnings on standard error."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from vanedamp.files.store import finite, json_text, write_json
+
+
+def write_result(target: str | None, result: Mapping[str, Any]) -> None:
+    """Write a result as JSON: to a file, to standard output (-), or nowhere."""
+    if target is None:
+        return
+    if target == "-":
+        print(json_text(finite(result)), end="")
+    else:
+        write_json(target, finite(result))
+
+
+def print_note(source: str, message: str) -> None:
+    """Print what a user should know wherever the results go, with the file that it is about."""
+    print(f"vanedamp: {source}: {message}", file=sys.stderr)
+
+
+def print_warnings(source: str, warnings: Iterable[str]) -> None:
+    """Print warnings about an input file."""
+    for warning in warnings:
+        print_note(source, f"warning: {warning}")

@@ -1,0 +1,112 @@
+"""The files of a command: outputs that can be written, that are no inputs, and each a file of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import stat
+from argparse import Namespace
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from vanedamp.files.store import destination
+from vanedamp.files.toml_input import InputError
+
+
+class Outputs(NamedTuple):
+    """The files that a command writes, each with the option that names it."""
+
+    files: tuple[tuple[str, Path], ...]
+
+    def keep(self, inputs: Iterable[str | Path]) -> None:
+        """Refuse outputs that would take the place of an input. Raises InputError."""
+        for option, path in self.files:
+            refuse_input(option, path, inputs)
+
+
+def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: tuple[str, ...]) -> Outputs:
+    """Refuse files that could not be written, before the work. Raises InputError.
+
+    The files are those of `--output`, of `--json` (standard output becomes `-` and is none), of the options that
+    suffixes names with the endings that they may have, and one beside the result that the user did not name.
+    """
+    if _is_stdout(getattr(arguments, "json", None) or "-"):
+        arguments.json = "-"
+    named = [(option, getattr(arguments, option, None)) for option in dict.fromkeys(("output", "json", *suffixes))]
+    given = [*named, ("output", beside)]
+    outputs = Outputs(
+        tuple(
+            (f"--{option}", Path(name))
+            for option, name in given
+            if name is not None and (option, name) != ("json", "-")
+        )
+    )
+    for option, path in outputs.files:
+        trouble = _trouble(path)
+        if trouble is not None:
+            raise InputError(f"{option} {path}: {trouble}")
+        endings = suffixes.get(option.removeprefix("--"), (path.suffix,))
+        if path.suffix not in endings:
+            raise InputError(f"{option} {path}: expected a file name ending in {' or '.join(endings)}")
+        if _is_stdout(path):
+            raise InputError(f"{option} {path}: is standard output, where the summary goes; name another file")
+    for (one, first), (other, second) in itertools.combinations(outputs.files, 2):
+        if _same(first, second):
+            raise InputError(f"{one} and {other}: both are {second}; name two files")
+    named_input = getattr(arguments, "input", None)
+    outputs.keep(getattr(arguments, "inputs", []) if named_input is None else [named_input])
+    return outputs
+
+
+def refuse_input(option: str, path: Path, inputs: Iterable[str | Path]) -> None:
+    """Refuse an output that would take the place of an input."""
+    for file in inputs:
+        if path.exists() and os.path.exists(file) and _same(path, Path(file)):
+            raise InputError(f"{option} {path}: is an input ({file}), which would be lost; name another file")
+
+
+def output_folder(arguments: Namespace) -> Path:
+    """Return the folder that a command writes, perhaps not there yet. Raises InputError for a file."""
+    folder = Path(arguments.output)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--output {folder}: expected a folder, not a file")
+    return folder
+
+
+def checkpoint_file(output: str | None) -> Path | None:
+    """Return where a sweep keeps finished points: beside its result, if that is a file."""
+    return None if output is None or destination(output) is None else Path(f"{output}.partial")
+
+
+def _trouble(path: Path) -> str | None:
+    """Say why a file cannot be written; None where it can."""
+    try:
+        target = destination(path)
+    except OSError as error:
+        return f"cannot be written ({error.strerror})"
+    if path.is_dir():
+        return "is a folder"
+    if target is None:
+        kind = path.stat().st_mode
+        if stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
+            return "is a disk or a socket; expected a file, a pipe or a device such as /dev/null"
+        return None if os.access(path, os.W_OK) else "cannot be written to"
+    if not target.parent.is_dir():
+        return "its folder does not exist"
+    return None if os.access(target.parent, os.W_OK) else "its folder cannot be written to"
+
+
+def _same(one: Path, other: Path) -> bool:
+    """Say whether two names are one file; /dev/null takes everything."""
+    if one.exists() and other.exists():
+        return os.path.samefile(one, other) and not os.path.samefile(one, os.devnull)
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
+def _is_stdout(path: str | Path) -> bool:
+    with contextlib.suppress(OSError):
+        status = os.stat(path)
+        return os.path.samestat(status, os.fstat(1)) and not os.path.samestat(status, os.stat(os.devnull))
+    return False

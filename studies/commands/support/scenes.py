@@ -1,0 +1,57 @@
+"""Scenes of a command: loaded and checked, and what was chosen for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.resonance import chosen_resonance
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.commands.support.messages import print_note, print_warnings
+from vanedamp.studies.commands.support.outputs import Outputs
+
+
+def load_scene(path: str, outputs: Outputs) -> Scene:
+    """Load a scene that moves and whose files are there; none of them may be an output. Raises InputError."""
+    scene = Scene.load(path)
+    outputs.keep(scene.files)
+    if isinstance(scene.structure, Rom) and not Path(scene.structure.file).is_file():
+        raise InputError(f"structure.file: no such file {scene.structure.file}; `vanedamp reduce` writes one")
+    if not scene.moved:
+        raise InputError(
+            "excitation: nothing moves the structure; give force, base_acceleration or resonance_amplitude, or an "
+            "[initial] state"
+        )
+    return scene
+
+
+def print_model_order(source: str, estimate: Mapping[str, Any] | None, warnings: Iterable[str]) -> None:
+    """Print which model `modes = "auto"` has chosen and why, and warnings."""
+    if estimate is not None:
+        print_note(source, f"structure.modes: {estimate['sentence']}")
+    print_warnings(source, warnings)
+
+
+def print_resonance(source: str, scene: Scene) -> dict[str, Any]:
+    """Print which resonance `resonance_amplitude` belongs to where there are several.
+
+    Returns `resonance` of the results for machines, nothing without such a level.
+    """
+    level = scene.excitation.resonance_amplitude
+    if level is None:
+        return {}
+    if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+        scene = replace(scene, structure=replace(scene.structure, modes=None))
+    resonance = chosen_resonance(scene)
+    force = level / resonance.flexibility
+    if resonance.modes > 1:
+        print_note(
+            source,
+            f"excitation.resonance_amplitude: of the resonance at {resonance.frequency:.6g} Hz (mode "
+            f"{resonance.mode + 1}), force {force:.4g} N; resonance_near names another",
+        )
+    return {"resonance": {"frequency": resonance.frequency, "mode": resonance.mode, "force": force}}

@@ -1,0 +1,95 @@
+"""`vanedamp sweep`: a run at every point of a grid; finished points are kept beside the result and survive a kill."""
+
+from __future__ import annotations
+
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, add_workers
+from vanedamp.studies.terminal import progress
+
+if TYPE_CHECKING:
+    from vanedamp.coupling.sweep.record import Sweep
+    from vanedamp.studies.report.forced_response import ForcedResponse
+
+ORDER = 80
+SUMMARY = "a run at every point of the scene's [sweep] grid"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a scene, the result files and how to run it."""
+    add_input(parser, "SCENE.toml")
+    add_output(parser, "SWEEP.h5")
+    add_json(parser)
+    add_workers(parser)
+    parser.add_argument(
+        "--resume", action="store_true",
+        help="resume from the checkpoint, or fail; without it, resume if there is a checkpoint, otherwise start",
+    )  # fmt: skip
+
+
+def run(arguments: Namespace) -> None:
+    """Run the grid."""
+    from vanedamp.files.store import clear_leftovers
+    from vanedamp.files.toml_input import InputError
+    from vanedamp.studies.commands.support.messages import write_result
+    from vanedamp.studies.commands.support.outputs import check_outputs, checkpoint_file
+    from vanedamp.studies.workers import workers
+
+    checkpoint = checkpoint_file(arguments.output)
+    outputs = check_outputs(arguments, beside=checkpoint)
+    if arguments.resume and (checkpoint is None or not checkpoint.exists()):
+        raise InputError(
+            "--resume: name the result with -o, its checkpoint lies beside it"
+            if checkpoint is None
+            else f"--resume: nothing to resume, there is no checkpoint {checkpoint}; leave --resume out to begin"
+        )
+    from vanedamp.studies.commands.support.scenes import load_scene, print_model_order, print_resonance
+
+    scene = load_scene(arguments.input, outputs)
+    from vanedamp.coupling.sweep.checkpoint import Checkpoint, clear
+    from vanedamp.coupling.sweep.grid import grid
+    from vanedamp.coupling.sweep.sweep import sweep
+    from vanedamp.files.provenance import versions
+    from vanedamp.studies.commands.support.budget import check_sweep
+    from vanedamp.studies.report.forced_response import forced_responses
+
+    check_sweep(scene, arguments.workers)
+    # processes are slow to start: a bad grid or the checkpoint of another sweep is reported first
+    points, provenance = grid(scene), {"versions": versions()}
+    resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
+    print_model_order(arguments.input, points.estimate, points.warnings)
+    resonance = print_resonance(arguments.input, points.base)
+    with workers(arguments.workers) as pool, progress("sweep") as report:
+        started = time.perf_counter()
+        result = sweep(points, pool, report, checkpoint, provenance)
+    if arguments.output:
+        result.save(arguments.output)
+    seconds = time.perf_counter() - started
+    # times are not kept in the result, which is the same however it came about
+    speed = {
+        "points_resumed": resumed, "wall_time_s": seconds, "points_per_second": (points.size - resumed) / seconds
+    }  # fmt: skip
+    responses = forced_responses(result)
+    headlines = [response.to_json() for response in responses]
+    write_result(arguments.json, result.to_json() | speed | resonance | {"headlines": headlines})
+    if checkpoint is not None:
+        clear(checkpoint)
+        clear_leftovers(arguments.output)
+    if arguments.json != "-":
+        _print_summary(result, responses)
+        print(f"{points.size} points, {resumed} of them from the checkpoint, in {seconds:.1f} s")
+
+
+def _print_summary(result: Sweep, responses: Sequence[ForcedResponse]) -> None:
+    """Print the headlines, and how many points are not ok."""
+    for response in responses:
+        if not response.reference > 0:
+            print(f"{response.name}: nothing excites the structure, and there is no undamped maximum to compare with")
+            continue
+        print(response.sentence)
+    bad = [status for status in result.status.ravel() if status != "ok"]
+    if bad:
+        print(f"{len(bad)} of {result.status.size} points are not ok, such as: {bad[0]}")

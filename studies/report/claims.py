@@ -1,0 +1,29 @@
+"""The claims of a study: a file of its own beside the results that they rest on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+#: ending of the file
+CLAIMS = ".claims.json"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper, our figures, and a verdict: "shown", "partly" or "not shown"."""
+
+    claim: str
+    ours: str
+    verdict: str
+    why: str = ""
+    figures: dict[str, float | str | bool | None] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study of several results; sources: names of their files, beside its own."""
+
+    study: str
+    title: str
+    sources: list[str]
+    claims: list[Claim]

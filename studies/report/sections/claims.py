@@ -1,0 +1,35 @@
+"""Studies: their claims with a verdict each, and the results that they rest on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.studies.report.claims import CLAIMS, Study
+from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.results import Result
+
+ORDER = 30
+KIND = CLAIMS
+
+
+def load(path: Path) -> Result:
+    """Read what `vanedamp paper` wrote. Raises InputError."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{path}: not JSON ({error})") from error
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: expected an object with study, title, sources and claims")
+    study = validate(Study, data, str(path))
+    return Result(study, parts=tuple(study.sources))
+
+
+def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
+    """Return every study, and the sections of its results."""
+    return [
+        {"study": result.record, "parts": page.parts(file, result.record.study)} for file, result in results.items()
+    ]

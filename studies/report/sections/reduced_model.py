@@ -1,0 +1,35 @@
+"""Reduced models: frequencies, and the mass that an impact feels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.results import Result
+
+ORDER = 60
+KIND = "reduced-model"
+
+
+def load(path: Path) -> Result:
+    """Read what `vanedamp reduce` or `vanedamp import` wrote."""
+    model = ReducedModel.load(path)
+    return Result(model, {key: value for key, value in model.provenance.items() if key != "scene"})
+
+
+def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
+    """Return the tables of every model."""
+    return [_reduction(file, result.record) for file, result in results.items()]
+
+
+def _reduction(file: str, model: ReducedModel) -> dict[str, Any]:
+    return {
+        "file": file,
+        "interface": [(label, model.contact_mass(label)) for label in model.interface],
+        "modes": model.modes,
+        "frequencies": model.natural_frequencies_hz,
+        "damping_ratio": model.damping_ratio,
+    }

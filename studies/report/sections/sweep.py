@@ -1,0 +1,114 @@
+"""Sweeps: forced responses along an axis, impact mistuning, where the energy goes, and maps over two axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import LOSSES
+from vanedamp.studies.report.charts import Chart
+from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, model_name
+from vanedamp.studies.report.forced_response_charts import energy_figure, mistuning_figure, responses_figure
+from vanedamp.studies.report.map_chart import map_axes, map_figure, map_rows
+from vanedamp.studies.report.page import Page, format_setting
+from vanedamp.studies.report.results import Result
+
+ORDER = 10
+KIND = "sweep"
+#: curves of a section's charts, and of one sweep that a map shows as a whole; of more, evenly chosen ones are drawn
+_MOST_CURVES, _MOST_BESIDE_MAP = 12, 5
+#: figure and measures of each chart of responses
+_CHARTS = {
+    "response": (responses_figure, ("undamped", "fixed", "damped_max", "damped_mean")),
+    "mistuning": (mistuning_figure, ("attached_mass_fraction", "impacts_per_period")),
+    "energy": (energy_figure, LOSSES),
+}
+
+
+def load(path: Path) -> Result:
+    """Read what `vanedamp sweep` wrote."""
+    sweep = Sweep.load(path)
+    provenance = {key: value for key, value in sweep.provenance.items() if key != "scene"}
+    return Result(sweep, provenance, _scene(sweep))
+
+
+def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
+    """Return the groups of responses that share an axis, and the maps."""
+    sweeps = {file: result.record for file, result in results.items()}
+    return {
+        "groups": [_group(group, page) for group in _by_axis(_responses(sweeps, page))],
+        "maps": [_map(file, sweep, page) for file, sweep in sweeps.items() if map_axes(sweep)],
+    }
+
+
+def _scene(sweep: Sweep) -> dict[str, Any]:
+    """Return the scene as data, with the sweep's axes in short."""
+    axes = {
+        path: f"{len(values)} values, {format_setting(values[0])} to {format_setting(values[-1])}"
+        for path, values in sweep.axes.items()
+    }
+    return sweep.scene.to_dict() | {"sweep": axes}
+
+
+def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
+    """Return the curves of sweeps; those of a study are named after their files, others after their models."""
+    models = [model_name(sweep.scene) for sweep in sweeps.values()]
+    responses = []
+    for model, (file, sweep) in zip(models, sweeps.items(), strict=True):
+        stem = page.names[file].removesuffix(".h5")
+        if page.study is not None:
+            name = stem.removeprefix(page.study).strip("_").replace("_", " ") or model
+        else:
+            name = model if models.count(model) == 1 else f"{model} ({stem})"
+        responses += _curves(file, sweep, name, max(1, _MOST_CURVES // len(sweeps)))
+    return responses
+
+
+def _curves(file: str, sweep: Sweep, name: str, most: int) -> list[ForcedResponse]:
+    responses = [replace(response, source=file) for response in forced_responses(sweep, name)]
+    if map_axes(sweep) is not None:
+        most = min(most, _MOST_BESIDE_MAP)
+    if len(responses) <= most:
+        return responses
+    return [responses[index] for index in np.linspace(0, len(responses) - 1, most).round().astype(int)]
+
+
+def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
+    """Group the responses that share a chart: those along the same axis."""
+    axes = dict.fromkeys(response.axis for response in responses)
+    return [[response for response in responses if response.axis == axis] for axis in axes]
+
+
+def _group(responses: Sequence[ForcedResponse], page: Page) -> dict[str, Any]:
+    axis, sources = responses[0].axis, [response.source for response in responses]
+    charts = {
+        kind: page.chart(kind, figure(responses), ("response", axis, *columns), _table(responses, columns), sources)
+        for kind, (figure, columns) in _CHARTS.items()
+    }
+    return charts | {"axis": axis, "units": responses[0].units, "rows": [_key_figures(r) for r in responses]}
+
+
+def _table(responses: Sequence[ForcedResponse], columns: Sequence[str]) -> Iterator[list[Any]]:
+    """Yield a line a point: name, place on the axis, and the columns in SI units."""
+    for response in responses:
+        shares = dict(zip(LOSSES, response.energy_share.T, strict=True))
+        values = [shares[name] if name in shares else getattr(response, name) for name in columns]
+        yield from ([response.name, *line] for line in np.column_stack([response.x, *values]).tolist())
+
+
+def _key_figures(response: ForcedResponse) -> dict[str, Any]:
+    return {
+        "name": response.name,
+        "headline": response.headline,
+        "impacts": float(np.nan_to_num(response.impacts_per_period).max()),
+    }
+
+
+def _map(file: str, sweep: Sweep, page: Page) -> Chart:
+    header = ("panel", *(map_axes(sweep) or ()), "relative_amplitude")
+    return page.chart("map", map_figure(sweep), header, map_rows(sweep), [file])
