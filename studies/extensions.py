@@ -13,11 +13,13 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from vanedamp.files.errors import VanedampError
+
 #: place of a part that has no ORDER: after those that have one
 _LAST = 1000
 
 
-class ExtensionError(ValueError):
+class ExtensionError(VanedampError):
     """A part of another package that cannot be used."""
 
 
