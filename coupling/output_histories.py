@@ -18,7 +18,7 @@ from vanedamp.coupling.model_order.selection import settle
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.reduced_model_file import reduced_model
 from vanedamp.files.toml_input import InputError
 
@@ -47,7 +47,7 @@ def histories(scene: Scene, outputs: Sequence[str], samples_per_period: int = 10
         known = ", ".join(model.outputs) or "none"
         raise InputError(f"outputs: no output {(unknown or ['?'])[0]!r} in {structure.file}; it has {known}")
     shapes = eigh(model.stiffness, model.mass)[1]
-    scale = float(np.abs(linear_structure(scene).response).max())
+    scale = float(np.abs(assemble(scene).of_structure.response).max())
     values, times, status = [], np.zeros(0), Status.OK
     for name in outputs:
         row = model.output_rows[model.outputs.index(name)] @ shapes

@@ -1,5 +1,7 @@
 """Compiled functions are compiled anew when the code that they hold has changed, and only then."""
 
+import pickle
+
 import pytest
 
 from vanedamp.coupling.numerics import jit
@@ -40,3 +42,18 @@ def test_data_behind_records_does_not_date_it(digest):
 
 def test_a_caller_does_not_date_its_callee(digest):
     assert digest("caller", "callee") == digest(None, "callee")
+
+
+def test_a_cache_of_another_version_is_no_cache(tmp_path):
+    """Its index may name records that are no more."""
+    index = tmp_path / "index.nbi"
+    index.write_bytes(pickle.dumps("0") + b"cvanedamp.coupling.system.system\nNoRecord\n.")
+
+    def load():
+        with index.open("rb") as file:
+            pickle.load(file)
+            return pickle.load(file)
+
+    with pytest.raises(AttributeError):
+        load()
+    assert jit._forgiving(load)() == {}

@@ -12,24 +12,25 @@ from scipy.linalg import expm, null_space
 
 from vanedamp.coupling.exact.subsystem_assembly import add_flow, empty_flows
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.constraints import rows_of
-from vanedamp.coupling.system.modal_structure import LinearStructure
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.modal_basis import ModalBasis
 from vanedamp.files.toml_input import validate
 
 OMEGA = 1.3
 
 
-def system(seed, modes, bodies, labels, proportional=False):
-    """Rows of random structures: `labels` is "one" or "three" functionals a cavity; two bodies share the first one."""
+def random_system(seed, modes, bodies, labels, proportional=False):
+    """A random system: `labels` is "one" or "three" functionals a cavity; two bodies share the first one."""
     rng = np.random.default_rng([seed, modes, bodies])
     cavities = max(bodies - 1, 1)
+    sides = ("floor",) if labels == "one" else ("left", "right", "floor")
     scene = validate(
         Scene,
         {
-            "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
-            "excitation": {"frequency": OMEGA / (2 * np.pi)},
+            "structure": {"model": "rom", "file": "not read"},
+            "excitation": {"frequency": OMEGA / (2 * np.pi), "at": "force", "force": 1.0},
             "gravity": {"acceleration": 1.0, "orientation_deg": 40.0},
-            "cavity": [{"name": f"c{i}", "gap": 1.0} for i in range(cavities)],
+            "cavity": [{"name": f"c{i}", "gap": 1.0} | {side: f"{side}{i}" for side in sides} for i in range(cavities)],
             "damper": [
                 {"cavity": f"c{max(i - 1, 0)}", "mass": rng.uniform(0.05, 0.5), "friction": 0.3, "position": 0.1 * i}
                 for i in range(bodies)
@@ -37,32 +38,22 @@ def system(seed, modes, bodies, labels, proportional=False):
         },
         "scene",
     )
-    floor, left, right = (rng.uniform(-1.0, 1.0, (cavities, modes)) for _ in range(3))
-    if labels == "one":
-        left = right = floor
     half = rng.normal(size=(modes, modes))
     damping = np.diag(rng.uniform(0.01, 0.3, modes)) if proportional else 0.05 * half @ half.T + 0.01 * np.eye(modes)
-    structure = LinearStructure(
-        omega=OMEGA,
-        stiffness=np.sort(rng.uniform(0.5, 25.0, modes)),
-        damping=damping,
-        response=rng.uniform(-1.0, 1.0, modes),
-        floor=floor,
-        left=left,
-        right=right,
-        casing=np.zeros((0, modes)),
-        force=-1j * rng.uniform(-1.0, 1.0, modes),
-        base_acceleration=-0.4j * np.cos(np.arange(cavities)),
-        gravity=np.array([scene.gravity.components(np.zeros(3))] * cavities),
-        displacement=np.zeros(modes),
-        velocity=np.zeros(modes),
-    )
-    return rows_of(scene, structure)[0], rng
+    rows = {"force": rng.uniform(-1.0, 1.0, modes)}
+    rows |= {f"{side}{i}": rng.uniform(-1.0, 1.0, modes) for side in sides for i in range(cavities)}
+    along = dict.fromkeys(rows, np.array([1.0, 0.0, 0.0]))
+    unknown = dict.fromkeys(rows, np.zeros(3))
+    stiffness = np.sort(rng.uniform(0.5, 25.0, modes))
+    system = assemble(scene, ModalBasis(stiffness, damping, np.zeros((modes, 3)), rows, along, unknown, {}))
+    # a base that moves at an angle of its own to each cavity
+    shaken = 0.4j * system.of_bodies.mass * np.cos(np.maximum(np.arange(bodies) - 1, 0))
+    return system._replace(load=np.r_[-1j * rng.uniform(-1.0, 1.0, modes), shaken], alike=False), rng
 
 
-def keys(rows):
+def keys(system):
     """Every set of independent closed rows, as flags (r,) and as numbers."""
-    jacobian = np.hstack([rows.structure, rows.bodies])
+    jacobian = system.J
     for flags in itertools.product([False, True], repeat=len(jacobian)):
         key = np.array(flags[::-1])
         closed = np.flatnonzero(key)
@@ -70,17 +61,17 @@ def keys(rows):
             yield key, closed
 
 
-def by_exponential(rows, closed, loads, q, qd, times):
+def by_exponential(system, closed, loads, q, qd, times):
     """(q, q', constraint forces) at `times`: the generator of (q, q', 1, sin, cos) with constraints on q''."""
-    n, b = len(rows.stiffness), len(rows.mass)
+    n, b = system.modes, system.bodies
     size = n + b
-    jacobian = np.hstack([rows.structure, rows.bodies])[closed]
-    inverse = np.diag(np.r_[np.ones(n), 1 / rows.mass])
+    jacobian = system.J[closed]
+    inverse = np.diag(1 / system.mass)
     free = np.zeros((size, 2 * size + 3))
-    free[:n, :n], free[:n, size : size + n] = -np.diag(rows.stiffness), -rows.damping
+    free[:n, :n], free[:n, size : size + n] = -np.diag(system.of_structure.stiffness), -system.of_structure.damping
     free[:, -3] = loads
     # harmonic loads are the real part of (amplitude exp(i omega t)), in phase with the sine
-    free[:, -2] = -np.r_[rows.force, rows.inertia].imag
+    free[:, -2] = -system.load.imag
     multiplier = -np.linalg.solve(jacobian @ inverse @ jacobian.T, jacobian @ inverse @ free)
     generator = np.zeros((2 * size + 3, 2 * size + 3))
     generator[:size, size : 2 * size] = np.eye(size)
@@ -91,17 +82,18 @@ def by_exponential(rows, closed, loads, q, qd, times):
     return states[:, :size], states[:, size : 2 * size], states @ multiplier.T
 
 
-def by_flow(rows, closed, flows, loads, q, qd, times):
+def by_flow(system, closed, flows, loads, q, qd, times):
     """The same from the records of one subsystem, as coupling.exact.subsystem_assembly documents them."""
-    n, m = len(rows.stiffness), flows.modes[0]
+    n, m = system.modes, flows.modes[0]
     p, rate = np.r_[q[:n], qd[:n]], flows.eigenvalue[0, :m]
     constant = (flows.static[0] @ loads + flows.held[0] @ q[:n])[:n]
     shape = flows.shape[0, :, :m]
     amplitude = np.r_[1.0, flows.project[0, 1:m] @ (p - np.r_[constant, np.zeros(n)] - shape[:, 0].real)]
     coordinates, displacement, force = [], [], []
-    drift = rows.bodies @ flows.body_acceleration[0] @ loads[n:]
-    speed = rows.structure @ qd[:n] + rows.bodies @ qd[n:]
-    acceleration = rows.structure @ (loads[:n] - rows.stiffness * constant) + rows.bodies @ (loads[n:] / rows.mass)
+    drift = system.of_bodies.J @ flows.body_acceleration[0] @ loads[n:]
+    speed = system.J @ qd
+    on_structure = loads[:n] - system.of_structure.stiffness * constant
+    acceleration = system.J @ np.r_[on_structure, loads[n:] / system.of_bodies.mass]
     level = -flows.closed_inverse[0] @ acceleration
     for t in times:
         now = amplitude * np.exp(rate * t)
@@ -112,23 +104,23 @@ def by_flow(rows, closed, flows, loads, q, qd, times):
     return np.array(coordinates), np.array(displacement), np.array(force)
 
 
-def check(rows, rng):
-    n, b = len(rows.stiffness), len(rows.mass)
-    jacobian = np.hstack([rows.structure, rows.bodies])
+def check(system, rng):
+    n, b = system.modes, system.bodies
+    jacobian = system.J
     times = np.array([1e-3, 0.3, 2.0, 10.0])
     checked = 0
-    for key, closed in keys(rows):
+    for key, closed in keys(system):
         allowed = null_space(jacobian[closed]) if len(closed) else np.eye(n + b)
         if allowed.shape[1] == 0:
             continue
         q, qd = rng.normal(size=n + b), allowed @ rng.normal(size=allowed.shape[1])
-        loads = np.r_[rng.normal(size=n) * 0.3, rows.weight + 0.1 * rng.normal(size=b)]
-        flows = add_flow(empty_flows(rows), rows, key)
-        expected_q, expected_qd, expected_force = by_exponential(rows, closed, loads, q, qd, times)
-        coordinates, displacement, force = by_flow(rows, closed, flows, loads, q, qd, times)
+        loads = np.r_[rng.normal(size=n) * 0.3, system.of_bodies.weight + 0.1 * rng.normal(size=b)]
+        flows = add_flow(empty_flows(system), system, key)
+        expected_q, expected_qd, expected_force = by_exponential(system, closed, loads, q, qd, times)
+        coordinates, displacement, force = by_flow(system, closed, flows, loads, q, qd, times)
         size = np.abs(np.hstack([expected_q, expected_qd])).max()
         # closed rows that are nearly parallel have large forces, whose round-off the exponential carries along
-        tolerance = 2e-13 * np.linalg.cond(rows.delassus[np.ix_(closed, closed)]) if len(closed) else 2e-13
+        tolerance = 2e-13 * np.linalg.cond(system.delassus[np.ix_(closed, closed)]) if len(closed) else 2e-13
         assert np.abs(coordinates[:, :n] - expected_q[:, :n]).max() < tolerance * size
         assert np.abs(coordinates[:, n:] - expected_qd[:, :n]).max() < tolerance * size
         assert np.abs(displacement - (expected_q - q) @ jacobian.T).max() < tolerance * size
@@ -142,27 +134,27 @@ def check(rows, rng):
 @pytest.mark.parametrize(("modes", "bodies"), [(1, 1), (2, 1), (1, 2), (3, 2), (4, 3), (6, 3)])
 def test_flow_equals_the_matrix_exponential(modes, bodies, labels):
     """Every subsystem of bodies that stick, rest at walls and push each other, under non-proportional damping."""
-    checked = sum(check(*system(seed, modes, bodies, labels)) for seed in range(3))
+    checked = sum(check(*random_system(seed, modes, bodies, labels)) for seed in range(3))
     assert checked >= 3 * 2**bodies
 
 
 def test_flow_of_a_proportionally_damped_structure():
-    assert check(*system(0, 5, 2, "three", proportional=True)) >= 4
+    assert check(*random_system(0, 5, 2, "three", proportional=True)) >= 4
 
 
 def test_steps_compose():
     """Two steps are one: the flow of a subsystem forgets nothing (a semigroup)."""
-    rows, rng = system(7, 4, 3, "three")
-    n = len(rows.stiffness)
-    key, closed = next((key, closed) for key, closed in keys(rows) if len(closed) == 2)
-    q = rng.normal(size=n + len(rows.mass))
-    qd = null_space(np.hstack([rows.structure, rows.bodies])[closed]) @ rng.normal(size=len(q) - 2)
-    loads = np.r_[np.zeros(n), rows.weight]
-    flows = add_flow(empty_flows(rows), rows, key)
+    system, rng = random_system(7, 4, 3, "three")
+    n = system.modes
+    key, closed = next((key, closed) for key, closed in keys(system) if len(closed) == 2)
+    q = rng.normal(size=n + system.bodies)
+    qd = null_space(system.J[closed]) @ rng.normal(size=len(q) - 2)
+    loads = np.r_[np.zeros(n), system.of_bodies.weight]
+    flows = add_flow(empty_flows(system), system, key)
     m, period = flows.modes[0], 2 * np.pi / OMEGA
-    at_once, _, _ = by_flow(rows, closed, flows, loads, q, qd, np.array([3 * period]))
+    at_once, _, _ = by_flow(system, closed, flows, loads, q, qd, np.array([3 * period]))
     for _ in range(3):
-        step, _, _ = by_flow(rows, closed, flows, loads, q, qd, np.array([period]))
+        step, _, _ = by_flow(system, closed, flows, loads, q, qd, np.array([period]))
         q, qd = np.r_[step[0, :n], q[n:]], np.r_[step[0, n:], qd[n:]]
     assert m > n
     assert np.r_[q[:n], qd[:n]] == pytest.approx(at_once[0], abs=1e-13 * np.abs(at_once).max())

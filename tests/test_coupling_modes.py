@@ -15,8 +15,8 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes, real_modes
 from vanedamp.coupling.exact.subsystem_assembly import _about_centre, add_flow, empty_flows
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.system.constraints import rows_of
-from vanedamp.coupling.system.modal_structure import LinearStructure, linear_structure
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.modal_basis import ModalBasis
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import ReducedModel
 
@@ -47,32 +47,30 @@ def bar(modes, hanger, masses, restitution, damping, stiffness=1e7):
         matrix = matrix + half @ half.T
     case = struck(1.0, restitution, excitation={"frequency": 50.0}).replace({"contact.stiffness": stiffness})
     bodies = [{"cavity": "c", "mass": mass, "restitution": restitution} for mass in masses]
-    structure = LinearStructure(
-        omega=100 * np.pi, stiffness=omegas**2, damping=matrix, response=shapes, floor=shapes[None], left=shapes[None],
-        right=shapes[None], casing=np.zeros((0, modes)), force=-1j * shapes, base_acceleration=np.zeros(1, complex),
-        gravity=np.zeros((1, 2)), displacement=np.zeros(modes), velocity=np.zeros(modes),
-    )  # fmt: skip
-    return rows_of(case.replace({"damper": bodies}), structure)[0]
+    basis = ModalBasis(
+        omegas**2, matrix, np.zeros((modes, 3)), {"structure": shapes}, {"structure": np.array([1.0, 0.0, 0.0])}, {}, {}
+    )
+    return assemble(case.replace({"damper": bodies, "excitation.force": 1.0}), basis)
 
 
-def error_of_flow(rows, contacts, time):
+def error_of_flow(system, contacts, time):
     """Largest error of the propagator on (p, slip, p', slip') after `time`, and what round-off of its input explains.
 
     Coordinates count by what the rows feel of them, rates by the excitation's frequency. A relative error of 1e-16 in
     stiffnesses turns the phase of the quickest mode by that share of its turns.
     """
-    closed = rows.friction_rows + np.array(contacts)
-    flows = add_flow(empty_flows(rows), rows, np.isin(np.arange(len(rows.delassus)), closed))
-    n, b, m = len(rows.stiffness), len(rows.mass), flows.modes[0]
+    closed = system.friction_rows + np.array(contacts)
+    flows = add_flow(empty_flows(system), system, np.isin(np.arange(len(system.delassus)), closed))
+    n, b, m = system.modes, system.bodies, flows.modes[0]
     rate, shape = flows.eigenvalue[0, 1:m], flows.shape[0, :, 1:m]
     slips = flows.motion[0, :b, 1:m]
     shape = np.vstack([shape[:n], slips, shape[n:], slips * rate])
     on_structure, on_slips = flows.project[0, 1:m], flows.project_slip[0, 1:m]
     project = np.hstack([on_structure[:, :n], on_slips[:, :b], on_structure[:, n:], on_slips[:, b:]])
     found = ((shape * np.exp(rate * time)) @ project).real
-    exact = propagator(rows, closed, time)
-    size = np.r_[1 / np.abs(rows.structure).max(axis=0), np.ones(b)]
-    size = np.r_[size, size * rows.omega]
+    exact = propagator(system, closed, time)
+    size = np.r_[1 / np.abs(system.of_structure.J).max(axis=0), np.ones(b)]
+    size = np.r_[size, size * system.omega]
     error = np.array((found - exact).tolist(), float) * size / size[:, None]
     largest = np.abs(np.array(exact.tolist(), float) * size / size[:, None]).max()
     return np.abs(error).max(), EPS * (len(size) + np.abs(rate.imag).max() * time) * largest
@@ -83,7 +81,7 @@ def error_of_flow(rows, contacts, time):
 @pytest.mark.parametrize("stiffness", [10.0, 1e5])
 def test_one_mode_and_a_body(mass, restitution, stiffness):
     case = struck(mass, restitution).replace({"contact.stiffness": stiffness})
-    error, bound = error_of_flow(rows_of(case, linear_structure(case))[0], [0], 0.04)
+    error, bound = error_of_flow(assemble(case), [0], 0.04)
     assert error < 8 * bound
 
 
@@ -99,8 +97,8 @@ def test_one_mode_and_a_body(mass, restitution, stiffness):
     ],
 )
 def test_a_bar_on_a_soft_hanger(hanger, masses, restitution, damping):
-    rows = bar(6, hanger, masses, restitution, damping)
-    error, bound = error_of_flow(rows, np.arange(1, len(masses) + 1), 0.006)
+    system = bar(6, hanger, masses, restitution, damping)
+    error, bound = error_of_flow(system, np.arange(1, len(masses) + 1), 0.006)
     # a relative error of 1e-16 in a quick mode's strain moves the hanger's mode by the ratio of their frequencies
     assert error < 8 * bound * 3750.0 / hanger
 

@@ -14,7 +14,7 @@ from tests.tools.laws_by_event import check_events
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact import subsystem_assembly as flow
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 
@@ -137,11 +137,11 @@ def test_first_impact(damping_ratio):
 
 def _first_impact(mpmath, case, near):
     """Root near a time of |x| = half the gap: p'' + c p' + k p = F sin(w t) from rest, in the model's doubles."""
-    structure = linear_structure(case)
+    structure = assemble(case)
     k, c, omega, force, row = (
         mpmath.mpf(float(value))
         for value in (
-            structure.stiffness[0], structure.damping[0, 0], structure.omega, -structure.force[0].imag,
+            structure.stiffness[0], structure.damping[0, 0], structure.omega, -structure.load[0].imag,
             structure.floor[0, 0],
         )
     )  # fmt: skip

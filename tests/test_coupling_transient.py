@@ -9,7 +9,6 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import settle
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
-from vanedamp.coupling.system.modal_structure import linear_structure
 from vanedamp.coupling.system.transient import LIMIT, left_over, outlasted
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
@@ -32,12 +31,11 @@ def scene(zeta, frequency=FIRST, gap=OUT_OF_REACH, **changes):
 @pytest.mark.parametrize("zeta", [1e-4, 1e-3, 0.02])
 @pytest.mark.parametrize("periods", [0, 10, 1000])
 def test_one_mode_at_resonance(zeta, periods):
-    structure = linear_structure(scene(zeta))
-    assert left_over(structure, periods) == pytest.approx(math.exp(-2 * math.pi * zeta * periods), rel=1e-9)
+    assert left_over(scene(zeta), periods) == pytest.approx(math.exp(-2 * math.pi * zeta * periods), rel=1e-9)
 
 
 def test_overdamped_mode_goes_by_its_slower_part():
-    structure = linear_structure(scene(2.0))
+    structure = scene(2.0)
     slower = 2 * math.pi * (2.0 - math.sqrt(3.0))
     assert left_over(structure, 3) / left_over(structure, 2) == pytest.approx(math.exp(-slower), rel=1e-9)
 
@@ -54,12 +52,12 @@ def test_modes_count_as_they_are_excited(tmp_path):
         "excitation": {"frequency": FIRST, "force": 1.0, "at": "tip"},
         "cavity": [], "damper": [],
     }  # fmt: skip
-    structure = linear_structure(validate(Scene, data, "x"))
+    structure = validate(Scene, data, "x")
     assert left_over(structure, 100) == pytest.approx(math.exp(-0.5 * 100 / FIRST), rel=1e-9)
 
 
 def test_nothing_excited_has_no_transient():
-    assert left_over(linear_structure(scene(0.0, excitation={"frequency": FIRST})), 1) == 0.0
+    assert left_over(scene(0.0, excitation={"frequency": FIRST}), 1) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -76,7 +74,7 @@ def test_default_suits_the_damping(zeta, transient):
 def test_default_where_no_length_would_do():
     """With next to no damping the default stays; the run tells that it was too short."""
     assert settle(scene(1e-6)).scene.time == scene(1e-6).time
-    assert left_over(linear_structure(scene(1e-6)), LIMIT) > 0.01
+    assert left_over(scene(1e-6), LIMIT) > 0.01
     response = simulate(scene(1e-6))
     assert (response.periods, response.transient, response.status) == (1500, 1000, "not_steady")
 
@@ -113,7 +111,7 @@ def test_bodies_may_end_the_transient_sooner():
     long = simulate(scene(2e-4, gap=BETWEEN, time={"periods": 9000, "transient": 6000}))
     assert long.status == "ok" and long.impacts_per_period > 0.5
     short = simulate(scene(2e-4, gap=BETWEEN, time={"periods": 3500, "transient": 2000}))
-    assert left_over(linear_structure(scene(2e-4)), 2000) > 0.05
+    assert left_over(scene(2e-4), 2000) > 0.05
     assert short.status == "ok"
     # confidence intervals are 2 % wide each
     assert short.amplitude_mean == pytest.approx(long.amplitude_mean, rel=0.05)

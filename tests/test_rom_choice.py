@@ -12,8 +12,7 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import settle, settle_all
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
-from vanedamp.coupling.system.constraints import rows_of
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel
@@ -53,8 +52,8 @@ def scene(file, **changes):
 
 def springs(made):
     """(contacts,) stiffness of a scene's contacts, N/m."""
-    rows, *_ = rows_of(made, linear_structure(made))
-    return rows.spring[rows.friction_rows :]
+    system = assemble(made)
+    return system.spring[system.friction_rows :]
 
 
 def test_each_wall_yields_by_its_own_flexibility(tmp_path):

@@ -27,7 +27,7 @@ from vanedamp.coupling.exact.gap_kinematics import (
 )
 from vanedamp.coupling.exact.impacts import all_move, bounce, collide
 from vanedamp.coupling.exact.root_search import POSITION, VELOCITY
-from vanedamp.coupling.exact.section import _coordinates, record_section
+from vanedamp.coupling.exact.section import _coordinates, record_start
 from vanedamp.coupling.exact.state import (
     AWAKE,
     CLOSED,
@@ -55,6 +55,9 @@ from vanedamp.coupling.response.records import FRICTION
 # what advance() returns, and ILL_CONDITIONED: the flow that it needs cannot be had
 DONE, NEEDS_FLOW, LOG_FULL, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED, ILL_CONDITIONED = range(7)
 
+# what an event leads to: the same contact states go on, they must be decided, or its impact has no solution
+_STAYS, _DECIDE, _FAILED = range(3)
+
 #: differences below this share of their terms are round-off
 _EQUAL = 1e-14
 #: modes whose acceleration is below this share of the largest sleep until the next impact
@@ -62,97 +65,106 @@ _ASLEEP = 1e-14
 
 
 @entry
-def advance(rows, flows, st, ch, rec, work, periods, max_events):
+def advance(system, flows, st, ch, rec, work, periods, max_events):
     """Run until all periods are done or something is needed. Returns one of the codes above."""
+    deciding = False
     while True:
+        if deciding:
+            # decided at one place only: that much code is compiled into the loop, as a call costs more than it does
+            if not settle(system, st, rec, work):
+                return UNDECIDED
+            if not _within_walls(system, st):
+                return ACCURACY_LOST
+            deciding = False
         if st.counters[SEARCHING] == 1:
             s = _find_flow(flows, st.key)
             if s < 0:
                 return NEEDS_FLOW
-            _enter(rows, flows, st, work, s)
-            if stop_riders(rows, flows, st):
+            _enter(system, flows, st, work, s)
+            if stop_riders(system, flows, st):
                 keep_released(st, work)
-                if not settle(rows, st, rec, work):
-                    return UNDECIDED
+                deciding = True
                 continue
             if st.counters[EVENTS] == 0 and st.counters[PERIOD] == 0:
-                record_section(rows, flows, st, rec, work)
+                record_start(system, flows, st, rec, work)
         if st.counters[PERIOD] >= periods:
             return DONE
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
-        if st.counters[LOGGED] + 2 * len(rows.delassus) >= len(rec.log):
+        if st.counters[LOGGED] + 2 * len(system.delassus) >= len(rec.log):
             return LOG_FULL
-        tau, who = next_event(rows, flows, st, ch)
+        tau, who = next_event(system, flows, st, ch)
         _amplitudes(flows, st, work, tau)
-        account(rows, flows, st, rec, work, tau)
-        _move(rows, flows, st, work, tau)
+        account(system, flows, st, rec, work, tau)
+        _move(system, flows, st, work, tau)
         if who < 0:
             carry(st, ch, tau)
             st.counters[PERIOD] += 1
             st.time[0] = 0.0
             for r in range(len(st.last_impact)):
-                st.last_impact[r] -= rows.period
-            _phase(rows, st)
+                st.last_impact[r] -= system.period
+            _phase(system, st)
             _wake(flows, st)
-            record_section(rows, flows, st, rec, work)
-            align_gaps(rows, st, work.coordinates)
+            record_start(system, flows, st, rec, work)
+            align_gaps(system, st, work.coordinates)
             continue
         st.counters[EVENTS] += 1
         st.time[0] += tau
-        _phase(rows, st)
-        if not _happen(rows, flows, st, rec, work, ch.row[who], ch.order[who], ch.side[who]):
+        _phase(system, st)
+        outcome = _happen(system, flows, st, rec, work, ch.row[who], ch.order[who], ch.side[who])
+        if outcome == _FAILED:
             return UNDECIDED
-        if not _within_walls(rows, st):
+        deciding = outcome == _DECIDE
+        if not deciding and not _within_walls(system, st):
             return ACCURACY_LOST
 
 
 @entry
-def begin(rows, st, rec, work):
+def begin(system, st, rec, work):
     """Decide the contact states of the initial state. Returns False if that fails."""
     n, hit = len(st.constant), False
-    for r in range(rows.friction_rows):
-        if not rigid(rows, r) and rows.limit[r] > 0.0:
-            st.state[r] = _stretched(rows, st, r)
+    for r in range(system.friction_rows):
+        if not rigid(system, r) and system.limit[r] > 0.0:
+            st.state[r] = _stretched(system, st, r)
     for r in range(len(st.state)):
         work.forced[r] = 0
-        if r >= rows.friction_rows and st.displacement[r] <= SIMULTANEOUS * rows.gap[r - rows.friction_rows]:
-            if not rigid(rows, r) and st.displacement[r] < -SIMULTANEOUS * rows.gap[r - rows.friction_rows]:
+        if r >= system.friction_rows and st.displacement[r] <= SIMULTANEOUS * system.free_travel[r]:
+            if not rigid(system, r) and st.displacement[r] < -SIMULTANEOUS * system.free_travel[r]:
                 # pressed already: its impact belongs to the run before
-                st.state[r] = SPRUNG if spring_force(rows, st, r) > 0.0 else LEAVING
+                st.state[r] = SPRUNG if spring_force(system, st, r) > 0.0 else LEAVING
                 continue
-            _touch(rows, st, work, r)
-            if st.velocity[r] < 0.0 and rigid(rows, r):
+            _touch(system, st, work, r)
+            if st.velocity[r] < 0.0 and rigid(system, r):
                 hit = True
             elif st.velocity[r] < 0.0:
-                begin_push(rows, st, rec, r)
+                begin_push(system, st, rec, r)
     if hit:
-        if not collide(rows, st, rec, work):
+        if not collide(system, st, rec, work):
             return False
-        _structure_jump(rows, work)
+        _structure_jump(system, work)
         for i in range(n):
             st.coordinates[n + i] += work.jump[i]
-    return settle(rows, st, rec, work)
+    return settle(system, st, rec, work)
 
 
 @inlined
-def _stretched(rows, st, r):
+def _stretched(system, st, r):
     """State of a Jenkins element with a given elongation: its spring holds, or it slides on at its bound."""
-    at_bound = abs(rows.spring[r] * st.displacement[r]) >= (1.0 - SIMULTANEOUS) * rows.limit[r]
+    at_bound = abs(system.spring[r] * st.displacement[r]) >= (1.0 - SIMULTANEOUS) * system.limit[r]
     if at_bound and st.displacement[r] * st.velocity[r] > 0.0:
         return SLIP_RIGHT if st.velocity[r] > 0.0 else SLIP_LEFT
     return SPRUNG
 
 
 @inlined
-def _touch(rows, st, work, r):
+def _touch(system, st, work, r):
     """The gap of row r is zero, exactly, and so are those that close with it."""
     only(work, r)
-    join(rows, st, work)
+    join(system, st, work)
     st.displacement[r] = 0.0
-    measure_gaps(rows, st)
-    if rigid(rows, r):
-        close(rows, st, work)
+    measure_gaps(system, st)
+    if rigid(system, r):
+        close(system, st, work)
 
 
 @kernel
@@ -169,35 +181,35 @@ def _find_flow(flows, key):
 
 
 @inlined
-def _phase(rows, st):
-    angle = rows.omega * st.time[0]
+def _phase(system, st):
+    angle = system.omega * st.time[0]
     st.amplitude[0] = complex(math.cos(angle), math.sin(angle))
 
 
-@kernel
-def _enter(rows, flows, st, work, s):
+@inlined
+def _enter(system, flows, st, work, s):
     """Begin subsystem s with the structure at st.coordinates and the row states as they are."""
-    n, b, y = len(st.constant), len(rows.mass), st.coordinates
+    n, b, y = len(st.constant), system.bodies, st.coordinates
     st.counters[FLOW], st.counters[SEARCHING] = s, 0
     sprung = flows.sprung[s]
-    constant_loads(rows, st, work)
+    constant_loads(system, st, work)
     if sprung:
-        _preload(rows, flows, st, work, s, y)
+        _preload(system, flows, st, work, s, y)
     for i in range(n + b if sprung else n):
         total = 0.0
+        for k in range(n + b):
+            total += flows.static[s, i, k] * work.loads[k]
         for k in range(n):
-            total += flows.static[s, i, k] * work.on_structure[k] + flows.held[s, i, k] * y[k]
-        for k in range(b):
-            total += flows.static[s, i, n + k] * work.on_bodies[k]
+            total += flows.held[s, i, k] * y[k]
         if i < n:
             st.constant[i] = total
         else:
             st.slip_constant[i - n] = total
     for i in range(b):
-        st.body_drift[i] = 0.0
+        st.drifts[n + i] = 0.0
         for k in range(b):
-            st.body_drift[i] += flows.body_acceleration[s, i, k] * work.on_bodies[k]
-    _phase(rows, st)
+            st.drifts[n + i] += flows.body_acceleration[s, i, k] * work.loads[n + k]
+    _phase(system, st)
     for i in range(2 * n):
         work.coordinates[i] = y[i] - (flows.shape[s, i, 0] * st.amplitude[0]).real
         if i < n:
@@ -215,63 +227,62 @@ def _enter(rows, flows, st, work, s):
             for i in range(2 * b):
                 total += flows.project_slip[s, j, i] * work.slips[i]
         st.amplitude[j] = total
-    _constant_forces(rows, flows, st, work, s)
+    _constant_forces(system, flows, st, work, s)
     _wake(flows, st)
 
 
 @kernel
-def _preload(rows, flows, st, work, s, y):
+def _preload(system, flows, st, work, s, y):
     """Add the forces that closed springs have at p = 0 and xi = 0: of a wall's gap, an anchor, bodies that stick."""
     for r in range(len(st.state)):
         if st.state[r] == SPRUNG:
             offset = 0.0
-            if r < rows.friction_rows:
+            if r < system.friction_rows:
                 offset = st.displacement[r]
                 for i in range(len(st.constant)):
-                    offset -= rows.structure[r, i] * y[i]
+                    offset -= system.J[r, i] * y[i]
             else:
-                if rows.before[r] < 0 or rows.after[r] < 0:
-                    offset = 0.5 * rows.gap[r - rows.friction_rows]
-                for b in range(len(rows.mass)):
+                offset = system.rest[r]
+                for b in range(system.bodies):
                     if flows.attached[s, b]:
-                        offset += rows.bodies[r, b] * st.displacement[b]
-            add_force(rows, work, r, -rows.spring[r] * offset)
+                        offset += system.J[r, system.modes + b] * st.displacement[b]
+            add_force(system, work, r, -system.spring[r] * offset)
 
 
 @kernel
-def _constant_forces(rows, flows, st, work, s):
+def _constant_forces(system, flows, st, work, s):
     """Constant parts of the rows' accelerations and of the closed rows' forces."""
-    n, b, r_count = len(st.constant), len(rows.mass), len(st.state)
+    n, b, r_count = len(st.constant), system.bodies, len(st.state)
     sprung = flows.sprung[s]
     if sprung:
-        constant_loads(rows, st, work)  # without the preload: springs are in the levels
+        constant_loads(system, st, work)  # without the preload: springs are in the levels
     for r in range(r_count):
         st.drift[r], st.level[r] = 0.0, 0.0
         if sprung and st.state[r] == SPRUNG:
-            st.level[r] = spring_force(rows, st, r)
+            st.level[r] = spring_force(system, st, r)
             for j in range(flows.modes[s]):
                 st.level[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
         size = 0.0
-        for k in range(b):
-            part = rows.bodies[r, k] * st.body_drift[k]
+        for i in range(n + b):
+            part = system.J[r, i] * st.drifts[i]
             st.drift[r] += part
             size += abs(part)
         if abs(st.drift[r]) <= _EQUAL * size:
             st.drift[r] = 0.0  # bodies that fall together
+    for i in range(n):
+        work.loads[i] -= system.stiffness[i] * st.constant[i]
+    for i in range(n, n + b):
+        work.loads[i] /= system.mass[i]
     for r in range(r_count):
         work.acceleration[r], work.jerk[r] = 0.0, 0.0
-        for k in range(b):
-            part = rows.bodies[r, k] * work.on_bodies[k] / rows.mass[k]
-            work.acceleration[r] += part
-            work.jerk[r] += abs(part)
-        for k in range(n):
-            part = rows.structure[r, k] * (work.on_structure[k] - rows.stiffness[k] * st.constant[k])
+        for i in range(n + b):
+            part = system.J[r, i] * work.loads[i]
             work.acceleration[r] += part
             work.jerk[r] += abs(part)
         if sprung:
             for k in range(r_count):
-                work.acceleration[r] += rows.delassus[r, k] * st.level[k]
-                work.jerk[r] += abs(rows.delassus[r, k] * st.level[k])
+                work.acceleration[r] += system.delassus[r, k] * st.level[k]
+                work.jerk[r] += abs(system.delassus[r, k] * st.level[k])
     for r in range(r_count):
         if flows.closed_inverse[s, r, r] == 0.0:
             continue
@@ -329,12 +340,12 @@ def _grow(eigenvalue, load, phase, gain, bend, tau):
 
 
 @inlined
-def _move(rows, flows, st, work, tau):
+def _move(system, flows, st, work, tau):
     """Carry rows and amplitudes over tau."""
-    s, count, friction = st.counters[FLOW], st.counters[AWAKE], rows.friction_rows
+    s, count, friction = st.counters[FLOW], st.counters[AWAKE], system.friction_rows
     for r in range(len(st.state)):
         state = st.state[r]
-        if (r >= friction and (rows.rides[r] or state == CLOSED or state == TOUCHING)) or (
+        if (r >= friction and (system.moves_with_floor[r] or state == CLOSED or state == TOUCHING)) or (
             r < friction and (state == STICK or state == HELD)
         ):
             continue
@@ -346,13 +357,13 @@ def _move(rows, flows, st, work, tau):
         st.velocity[r] += speed
         if r < friction:
             st.ledger[FRICTION] -= st.held[r] * shift
-        if r >= friction or rigid(rows, r) or state == SPRUNG:  # a Jenkins element slides with its spring as it is
+        if r >= friction or rigid(system, r) or state == SPRUNG:  # a Jenkins element slides with its spring as it is
             shift_slip(st, r, shift)
     if flows.sprung[s]:
-        _push(rows, flows, st, work, tau)
+        _push(system, flows, st, work, tau)
     if st.counters[CLOSED_ROWS] > 0:
-        _stay_together(rows, st, work)
-    measure_gaps(rows, st)
+        _stay_together(system, st, work)
+    measure_gaps(system, st)
     for a in range(count):
         st.amplitude[st.awake[a]] += work.gain[a]
     if tau > 0.0:
@@ -361,22 +372,22 @@ def _move(rows, flows, st, work, tau):
 
 
 @inlined
-def _stay_together(rows, st, work):
+def _stay_together(system, st, work):
     """Bodies that move as one keep to each other exactly."""
     closed = False
-    for r in range(rows.friction_rows, len(st.state)):
-        work.shut[r] = rigid(rows, r) and st.state[r] != OPEN
+    for r in range(system.friction_rows, len(st.state)):
+        work.shut[r] = rigid(system, r) and st.state[r] != OPEN
         closed = closed or work.shut[r]
     if closed:
-        join(rows, st, work)
-        join_speeds(rows, st, work)
+        join(system, st, work)
+        join_speeds(system, st, work)
 
 
 @kernel
-def _push(rows, flows, st, work, tau):
+def _push(system, flows, st, work, tau):
     """Add up the impulses of compliant contacts."""
     s = st.counters[FLOW]
-    for r in range(rows.friction_rows, len(st.state)):
+    for r in range(system.friction_rows, len(st.state)):
         if st.state[r] == SPRUNG:
             st.push[r] += st.level[r] * tau
             for a in range(st.counters[AWAKE]):
@@ -384,59 +395,59 @@ def _push(rows, flows, st, work, tau):
 
 
 @inlined
-def _within_walls(rows, st):
+def _within_walls(system, st):
     """Whether round-off has kept every body inside its cavity."""
-    friction = rows.friction_rows
+    friction = system.friction_rows
     for r in range(friction, len(st.state)):
         pressed = st.state[r] == SPRUNG or st.state[r] == LEAVING
-        if not pressed and not st.displacement[r] >= -1e-9 * rows.gap[r - friction]:
+        if not pressed and not st.displacement[r] >= -1e-9 * system.free_travel[r]:
             return False
     return True
 
 
 @inlined
-def _happen(rows, flows, st, rec, work, r, order, side):
-    """The event of row r: jump of velocities, new states. Returns False if it cannot be decided."""
+def _happen(system, flows, st, rec, work, r, order, side):
+    """The event of row r: jump of velocities. Returns whether contact states must be decided anew, or _FAILED."""
     n = len(st.constant)
-    if order == POSITION and side == CLOSES and bounce(rows, st, rec, work, r):
+    if order == POSITION and side == CLOSES and bounce(system, st, rec, work, r):
         _kick(flows, st, work)
-        return True
+        return _STAYS
     keep_released(st, work)
     if order == POSITION and side != RECLOSES:
         # a gap that closes while it still widens, to round-off, is a touch without speed
         if side == CLOSES and st.velocity[r] > 0.0:
             st.velocity[r] = 0.0
             only(work, r)
-            join_speeds(rows, st, work)
-        _touch(rows, st, work, r)
-    if order == POSITION and side == CLOSES and rigid(rows, r):
-        for i in range(rows.friction_rows, len(st.state)):
+            join_speeds(system, st, work)
+        _touch(system, st, work, r)
+    if order == POSITION and side == CLOSES and rigid(system, r):
+        for i in range(system.friction_rows, len(st.state)):
             if st.state[i] == CLOSED:
-                st.settling[i] = longest_hop(rows, flows, st, i)
+                st.settling[i] = longest_hop(system, flows, st, i)
             elif st.state[i] == TOUCHING:
                 st.settling[i] = 0.0
-        if not collide(rows, st, rec, work):
-            return False
-        if all_move(rows, st):
+        if not collide(system, st, rec, work):
+            return _FAILED
+        if all_move(system, st):
             _kick(flows, st, work)
-            return True
+            return _STAYS
         _coordinates(flows, st, st.coordinates)
-        _structure_jump(rows, work)
+        _structure_jump(system, work)
         for i in range(n):
             st.coordinates[n + i] += work.jump[i]
-        return settle(rows, st, rec, work)
+        return _DECIDE
     if order == VELOCITY:
         st.velocity[r] = 0.0
-    elif r < rows.friction_rows or rigid(rows, r):
+    elif r < system.friction_rows or rigid(system, r):
         work.forced[r] = side
     elif side != CLOSES:
-        change_push(rows, st, rec, work, r, side)
+        change_push(system, st, rec, work, r, side)
     elif st.velocity[r] < 0.0:
-        begin_push(rows, st, rec, r)
+        begin_push(system, st, rec, r)
     _coordinates(flows, st, st.coordinates)
     if side == CLOSES:
-        align_gaps(rows, st, st.coordinates)  # a motion in step with the excitation may touch at every period's start
-    return settle(rows, st, rec, work)
+        align_gaps(system, st, st.coordinates)  # a motion in step with the excitation may touch at every period's start
+    return _DECIDE
 
 
 @inlined
@@ -450,10 +461,10 @@ def _kick(flows, st, work):
     _wake(flows, st)
 
 
-@kernel
-def _structure_jump(rows, work):
+@inlined
+def _structure_jump(system, work):
     """Jump of the structure's modal velocities under the impulses."""
     for i in range(len(work.jump)):
         work.jump[i] = 0.0
         for r in range(len(work.impulse)):
-            work.jump[i] += rows.structure[r, i] * work.impulse[r]
+            work.jump[i] += system.J[r, i] * work.impulse[r]

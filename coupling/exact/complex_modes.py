@@ -186,8 +186,8 @@ def _polish(
     slope = 2 * values[:, None] * shapes + shapes @ damping
     better = _inverse_step(values, scale, w, damping, scale * slope)
     # the largest part is real: a slow mode's small imaginary ones are not to be drowned in its round-off
-    rows = np.arange(len(values))
-    better = scale * better / better[rows, np.abs(better).argmax(axis=1)][:, None]
+    system = np.arange(len(values))
+    better = scale * better / better[system, np.abs(better).argmax(axis=1)][:, None]
     force = (values[:, None] - 1j * w) * (values[:, None] + 1j * w) * better + values[:, None] * (better @ damping)
     slope = 2 * values[:, None] * better + better @ damping
     form, size = (better * slope).sum(axis=1), (np.abs(better) * np.abs(slope)).sum(axis=1)

@@ -26,7 +26,7 @@ from vanedamp.coupling.exact.state import (
     TOUCHING,
 )
 from vanedamp.coupling.numerics.complementarity import AT_HIGH, AT_LOW, DEPENDENT, FREE, solve_box
-from vanedamp.coupling.numerics.jit import ZERO, kernel
+from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
 
 #: forces and accelerations below this share of the terms that they are sums of are round-off
 ROUND_OFF = 1e-12
@@ -34,47 +34,47 @@ ROUND_OFF = 1e-12
 TRAVEL = 1e-2
 
 
-@kernel
-def settle(rows, st, rec, work):
+@inlined
+def settle(system, st, rec, work):
     """Decide the state of every row from displacements, velocities and st.coordinates; name the subsystem.
 
     work.forced marks rows whose force has just reached a bound. Returns False if the problem cannot be solved.
     """
-    friction, k = rows.friction_rows, ZERO
-    _halt(rows, st, work)
+    friction, k = system.friction_rows, ZERO
+    _halt(system, st, work)
     for r in range(friction, len(st.state)):
-        if rigid(rows, r):
+        if rigid(system, r):
             k = _stand_by(st, work, r, OPEN, st.displacement[r] == 0.0 and st.velocity[r] == 0.0, k)
         else:
             work.before[r] = SPRUNG
     for r in range(friction):
-        if not rigid(rows, r):
+        if not rigid(system, r):
             work.before[r], st.released[r], st.held[r] = st.state[r], 0, 0.0
-            slide_or_hold(rows, st, work, r)
+            slide_or_hold(system, st, work, r)
             continue
-        k = _stand_by(st, work, r, COAST, rows.limit[r] > 0.0 and st.velocity[r] == 0.0, k)
-        if rows.limit[r] > 0.0 and st.velocity[r] != 0.0:
+        k = _stand_by(st, work, r, COAST, system.limit[r] > 0.0 and st.velocity[r] == 0.0, k)
+        if system.limit[r] > 0.0 and st.velocity[r] != 0.0:
             st.state[r] = SLIP_RIGHT if st.velocity[r] > 0.0 else SLIP_LEFT
-            st.held[r] = -st.state[r] * rows.limit[r]
-    if not _decide(rows, st, rec, work, k):
+            st.held[r] = -st.state[r] * system.limit[r]
+    if not _decide(system, st, rec, work, k):
         return False
     st.counters[CLOSED_ROWS] = 0
     for r in range(len(st.state)):
         st.key[r] = st.state[r] == SPRUNG or st.state[r] == (STICK if r < friction else CLOSED)
         st.counters[CLOSED_ROWS] += st.key[r]
-    log_changes(rows, st, rec, work)
+    log_changes(system, st, rec, work)
     st.counters[SEARCHING] = 1
     return True
 
 
 @kernel
-def stop_riders(rows, flows, st):
+def stop_riders(system, flows, st):
     """Bodies that ride on the structure do not slip: true to round-off after an impact, made exact here.
 
     Returns whether a slip was stopped: its friction is then open again.
     """
     s, stopped = st.counters[FLOW], False
-    for r in range(rows.friction_rows):
+    for r in range(system.friction_rows):
         if (st.state[r] == SLIP_LEFT or st.state[r] == SLIP_RIGHT) and st.drift[r] == 0.0:
             still = True
             for j in range(flows.modes[s]):
@@ -93,15 +93,15 @@ def keep_released(st, work):
 
 
 @kernel
-def _halt(rows, st, work):
+def _halt(system, st, work):
     """Bodies whose contacts touch without speed, to round-off, rest against each other exactly."""
-    tiny = slowest(rows, st)
-    for r in range(rows.friction_rows, len(st.state)):
-        work.shut[r] = rigid(rows, r) and st.displacement[r] == 0.0 and abs(st.velocity[r]) <= tiny
-        if work.shut[r] and not rows.rides[r]:
+    tiny = slowest(system, st)
+    for r in range(system.friction_rows, len(st.state)):
+        work.shut[r] = rigid(system, r) and st.displacement[r] == 0.0 and abs(st.velocity[r]) <= tiny
+        if work.shut[r] and not system.moves_with_floor[r]:
             st.velocity[r] = 0.0
-    join_speeds(rows, st, work)
-    measure_gaps(rows, st)
+    join_speeds(system, st, work)
+    measure_gaps(system, st)
 
 
 @kernel
@@ -110,34 +110,34 @@ def _stand_by(st, work, r, moving, rests, k):
     work.before[r] = st.state[r]
     st.released[r], st.held[r], st.state[r] = 0, 0.0, moving
     if rests:
-        work.rows[k] = r
+        work.listed[k] = r
         k += 1
     return k
 
 
-@kernel
-def _decide(rows, st, rec, work, k):
+@inlined
+def _decide(system, st, rec, work, k):
     """Solve for the k listed rows at rest: which are closed, stick, slip or open."""
-    friction, problem = rows.friction_rows, work.problem
-    scale = _free_acceleration(rows, st, work)
+    friction, problem = system.friction_rows, work.problem
+    scale = _free_acceleration(system, st, work)
     for p in range(k):
-        r = work.rows[p]
+        r = work.listed[p]
         problem.b[p] = work.acceleration[r]
-        problem.low[p], problem.high[p] = (-rows.limit[r], rows.limit[r]) if r < friction else (0.0, np.inf)
+        problem.low[p], problem.high[p] = (-system.limit[r], system.limit[r]) if r < friction else (0.0, np.inf)
         problem.forced[p] = work.forced[r]
         for q in range(k):
-            problem.matrix[p, q] = rows.delassus[r, work.rows[q]]
+            problem.matrix[p, q] = system.delassus[r, work.listed[q]]
     if not solve_box(problem, k, scale):
         return False
     for p in range(k):
         work.verdict[p], work.reaction[p] = problem.state[p], problem.force[p]
         for r in range(len(st.state)):
-            work.acceleration[r] += rows.delassus[r, work.rows[p]] * problem.force[p]
-    members = _undecided(rows, work, k, ROUND_OFF * scale)
-    if members > 0 and not _decide_by_rates(rows, st, work, k, members):
+            work.acceleration[r] += system.delassus[r, work.listed[p]] * problem.force[p]
+    members = _undecided(system, work, k, ROUND_OFF * scale)
+    if members > 0 and not _decide_by_rates(system, st, work, k, members):
         return False
     for p in range(k):
-        r, state = work.rows[p], work.verdict[p]
+        r, state = work.listed[p], work.verdict[p]
         if state == FREE:
             st.state[r] = STICK if r < friction else CLOSED
             continue
@@ -146,12 +146,12 @@ def _decide(rows, st, rec, work, k):
             st.state[r] = HELD if r < friction else TOUCHING
         elif r < friction:
             st.state[r] = SLIP_RIGHT if state == AT_LOW else SLIP_LEFT
-    press(rows, st, rec, work, ROUND_OFF * scale)
+    press(system, st, rec, work, ROUND_OFF * scale)
     return True
 
 
-@kernel
-def _undecided(rows, work, k, tolerance):
+@inlined
+def _undecided(system, work, k, tolerance):
     """List the rows that rest; returns how many, or 0 if no force is at a bound without acceleration.
 
     work.side: bound at which a row's force is, 0 if between its bounds.
@@ -173,142 +173,135 @@ def _undecided(rows, work, k, tolerance):
     return count if undecided else 0
 
 
-@kernel
-def _decide_by_rates(rows, st, work, k, members):
+@inlined
+def _decide_by_rates(system, st, work, k, members):
     """Complementarity of the rates: a force at its bound may come in, at rest, or stay there and let its row go."""
     problem = work.problem
-    scale = _free_jerk(rows, st, work, k)
+    scale = _free_jerk(system, st, work, k)
     for u in range(members):
         p = work.members[u]
-        r, side = work.rows[p], work.side[p]
+        r, side = work.listed[p], work.side[p]
         problem.b[u] = work.jerk[r]
         problem.low[u] = 0.0 if side == AT_LOW else -np.inf
         problem.high[u] = 0.0 if side == AT_HIGH else np.inf
         problem.forced[u] = work.forced[r] if side != 0 else 0
         for v in range(members):
-            problem.matrix[u, v] = rows.delassus[r, work.rows[work.members[v]]]
+            problem.matrix[u, v] = system.delassus[r, work.listed[work.members[v]]]
     if not solve_box(problem, members, scale):
         return False
     for u in range(members):
         p = work.members[u]
         work.verdict[p] = problem.state[u]
         if problem.state[u] == AT_LOW or problem.state[u] == AT_HIGH:
-            r = work.rows[p]
+            r = work.listed[p]
             st.released[r] = problem.state[u]
-            if r < rows.friction_rows:
-                work.reaction[p] = -rows.limit[r] if problem.state[u] == AT_LOW else rows.limit[r]
+            if r < system.friction_rows:
+                work.reaction[p] = -system.limit[r] if problem.state[u] == AT_LOW else system.limit[r]
             else:
                 work.reaction[p] = 0.0
     return True
 
 
-@kernel
-def constant_loads(rows, st, work):
-    """Constant loads on structure and bodies: weight, sliding friction, forces of rows that others hold."""
-    n, b = len(st.constant), len(rows.mass)
-    for i in range(n):
-        work.on_structure[i] = 0.0
-    for i in range(b):
-        work.on_bodies[i] = rows.weight[i]
+@inlined
+def constant_loads(system, st, work):
+    """Constant loads (work.loads): weight, sliding friction, forces of rows that others hold."""
+    for i in range(len(work.loads)):
+        work.loads[i] = system.weight[i]
     for r in range(len(st.state)):
         if st.held[r] != 0.0:
-            add_force(rows, work, r, st.held[r])
+            add_force(system, work, r, st.held[r])
 
 
 @kernel
-def add_force(rows, work, r, force):
-    """Add the force of row r (N) to the loads."""
-    for i in range(len(work.on_structure)):
-        work.on_structure[i] += rows.structure[r, i] * force
-    for i in range(len(rows.mass)):
-        work.on_bodies[i] += rows.bodies[r, i] * force
+def add_force(system, work, r, force):
+    """Add the force of row r (N) to work.loads."""
+    for i in range(len(work.loads)):
+        work.loads[i] += system.J[r, i] * force
 
 
-@kernel
-def _free_acceleration(rows, st, work):
+@inlined
+def _free_acceleration(system, st, work):
     """Acceleration of each row under the known forces, with no rigid row closed, at st.coordinates.
 
-    Returns the size of the terms that the accelerations are sums of. Leaves the accelerations of the structure's modes
-    in work.on_structure, the forces on the bodies in work.on_bodies.
+    Returns the size of the terms that the accelerations are sums of. Leaves the accelerations of the coordinates in
+    work.loads.
     """
-    n, b, largest = len(st.constant), len(rows.mass), 0.0
-    constant_loads(rows, st, work)
+    n, size, largest = len(st.constant), len(work.loads), 0.0
+    constant_loads(system, st, work)
     for r in range(len(st.state)):
         if st.state[r] == SPRUNG:
-            add_force(rows, work, r, spring_force(rows, st, r))
+            add_force(system, work, r, spring_force(system, st, r))
     phase = st.amplitude[0]
     for i in range(n):
         p, speed = st.coordinates[i], st.coordinates[n + i]
-        damper = _damping_force(rows, st.coordinates[n:], i)
+        damper = _damping_force(system, st.coordinates[n:], i)
         # sizes by amplitude: what passes through zero has the round-off of its peak
-        work.jump[i] = (
-            abs(work.on_structure[i]) + abs(rows.force[i]) + abs(damper)
-            + rows.stiffness[i] * abs(p) + np.sqrt(rows.stiffness[i]) * abs(speed)
+        work.sizes[i] = (
+            abs(work.loads[i]) + abs(system.load[i]) + abs(damper)
+            + system.stiffness[i] * abs(p) + np.sqrt(system.stiffness[i]) * abs(speed)
         )  # fmt: skip
-        work.on_structure[i] += (rows.force[i] * phase).real - rows.stiffness[i] * p - damper
-    for i in range(b):
-        work.on_bodies[i] += (rows.inertia[i] * phase).real
+        work.loads[i] += (system.load[i] * phase).real - system.stiffness[i] * p - damper
+    for i in range(n, size):
+        work.loads[i] += (system.load[i] * phase).real
+        work.sizes[i] = (abs(work.loads[i]) + abs(system.load[i])) / system.mass[i]
+        work.loads[i] /= system.mass[i]
     for r in range(len(st.state)):
-        total, size = 0.0, 0.0
-        for i in range(n):
-            total += rows.structure[r, i] * work.on_structure[i]
-            size += abs(rows.structure[r, i]) * work.jump[i]
-        for i in range(b):
-            total += rows.bodies[r, i] * work.on_bodies[i] / rows.mass[i]
-            size += abs(rows.bodies[r, i]) * (abs(work.on_bodies[i]) + abs(rows.inertia[i])) / rows.mass[i]
-        if r >= rows.friction_rows and st.state[r] == SPRUNG:
-            size += TRAVEL * rows.spring[r] * rows.gap[r - rows.friction_rows] * rows.delassus[r, r]
+        total, terms = 0.0, 0.0
+        for i in range(size):
+            total += system.J[r, i] * work.loads[i]
+            terms += abs(system.J[r, i]) * work.sizes[i]
+        if r >= system.friction_rows and st.state[r] == SPRUNG:
+            terms += TRAVEL * system.spring[r] * system.free_travel[r] * system.delassus[r, r]
         work.acceleration[r] = total
-        largest = max(largest, size)
+        largest = max(largest, terms)
     return largest
 
 
 @kernel
-def _damping_force(rows, speed, i):
-    if rows.proportional:
-        return rows.damping[i, i] * speed[i]
+def _damping_force(system, speed, i):
+    if system.proportional:
+        return system.damping[i, i] * speed[i]
     total = 0.0
-    for k in range(len(rows.stiffness)):
-        total += rows.damping[i, k] * speed[k]
+    for k in range(system.modes):
+        total += system.damping[i, k] * speed[k]
     return total
 
 
-@kernel
-def _free_jerk(rows, st, work, k):
+@inlined
+def _free_jerk(system, st, work, k):
     """Rate of each row's acceleration with the forces of the k listed rows held as they are (after _free_acceleration).
 
     Returns the size of the terms that it is a sum of.
     """
-    n, b, largest = len(st.constant), len(rows.mass), 0.0
+    n, size, largest = len(st.constant), len(work.loads), 0.0
     for p in range(k):
-        add_force(rows, work, work.rows[p], work.reaction[p])
-    turn = 1j * rows.omega * st.amplitude[0]
+        add_force(system, work, work.listed[p], work.reaction[p])
+    turn = 1j * system.omega * st.amplitude[0]
+    for i in range(size):
+        work.rates[i] = (system.load[i] * turn).real
+        work.sizes[i] = system.omega * abs(system.load[i])
     for i in range(n):
         speed = st.coordinates[n + i]
-        damper = _damping_force(rows, work.on_structure, i)
-        work.jump[i] = (rows.force[i] * turn).real - rows.stiffness[i] * speed - damper
-        work.sizes[i] = (
-            rows.omega * abs(rows.force[i]) + abs(damper) + rows.stiffness[i] * abs(speed)
-            + rows.stiffness[i] * np.sqrt(rows.stiffness[i]) * abs(st.coordinates[i])
+        damper = _damping_force(system, work.loads, i)
+        work.rates[i] -= system.stiffness[i] * speed + damper
+        work.sizes[i] += (
+            abs(damper) + system.stiffness[i] * abs(speed)
+            + system.stiffness[i] * np.sqrt(system.stiffness[i]) * abs(st.coordinates[i])
         )  # fmt: skip
-    for i in range(b):
-        work.slips[i] = (rows.inertia[i] * turn).real
     for r in range(len(st.state)):
         if st.state[r] == SPRUNG:
-            rate = -(rows.spring[r] * st.velocity[r] + rows.dashpot[r] * work.acceleration[r])
-            for i in range(n):
-                work.jump[i] += rows.structure[r, i] * rate
-                work.sizes[i] += abs(rows.structure[r, i] * rate)
-            for i in range(b):
-                work.slips[i] += rows.bodies[r, i] * rate
+            rate = -(system.spring[r] * st.velocity[r] + system.dashpot[r] * work.acceleration[r])
+            for i in range(size):
+                work.rates[i] += system.J[r, i] * rate
+                work.sizes[i] += abs(system.J[r, i] * rate)
+    for i in range(n, size):
+        work.rates[i] /= system.mass[i]
+        work.sizes[i] /= system.mass[i]
     for r in range(len(st.state)):
-        total, size = 0.0, 0.0
-        for i in range(n):
-            total += rows.structure[r, i] * work.jump[i]
-            size += abs(rows.structure[r, i]) * work.sizes[i]
-        for i in range(b):
-            total += rows.bodies[r, i] * work.slips[i] / rows.mass[i]
-            size += abs(rows.bodies[r, i]) * (abs(work.slips[i]) + rows.omega * abs(rows.inertia[i])) / rows.mass[i]
+        total, terms = 0.0, 0.0
+        for i in range(size):
+            total += system.J[r, i] * work.rates[i]
+            terms += abs(system.J[r, i]) * work.sizes[i]
         work.jerk[r] = total
-        largest = max(largest, size)
+        largest = max(largest, terms)
     return largest

@@ -18,25 +18,25 @@ _NEGLIGIBLE = 1e-9
 
 
 @inlined
-def account(rows, flows, st, rec, work, tau):
+def account(system, flows, st, rec, work, tau):
     """Energy, harmonic, mean square, momentum and peak of the segment [0, tau], by closed-form integrals."""
     s, period = st.counters[FLOW], st.counters[PERIOD]
     constant = 0.0
     for i in range(len(st.constant)):
-        constant += rows.response[i] * st.constant[i]
+        constant += system.response[i] * st.constant[i]
     felt = _gather(flows, st, work, s)
     _pairs(flows, st, rec, work, s, period, felt)
     if flows.damped[s]:
         _dashpots(flows, st, work, s)
-    _with_excitation(rows, flows, st, rec, work, s, period, tau, constant)
+    _with_excitation(system, flows, st, rec, work, s, period, tau, constant)
     for i in range(flows.slow_count[s]):
         if flows.slow[s, i, 2] == CALM:
             rec.square[period] += _calm_square(flows, st, s, i, tau, constant)
             break
         _slow_pair(flows, st, rec, s, period, i, tau, constant)
-    rec.peak[period] = highest(rows, flows, st, work, s, tau, constant, rec.peak[period])
+    rec.peak[period] = highest(system, flows, st, work, s, tau, constant, rec.peak[period])
     if rec.samples.shape[0] > 0:
-        _sample(rows, flows, st, rec, s, tau, constant)
+        _sample(system, flows, st, rec, s, tau, constant)
 
 
 @inlined
@@ -111,7 +111,7 @@ def _dashpots(flows, st, work, s):
 
 
 @inlined
-def _with_excitation(rows, flows, st, rec, work, s, period, tau, constant):
+def _with_excitation(system, flows, st, rec, work, s, period, tau, constant):
     """What is linear in the modes: work of the loads, harmonic, momentum and mean, by their linear maps."""
     work_r, work_i, harm_r, harm_i, mom_r, mom_i, mean, free = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     old_work_r, old_work_i, old_harm_r, old_harm_i, old_mom_r, old_mom_i = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -139,50 +139,50 @@ def _with_excitation(rows, flows, st, rec, work, s, period, tau, constant):
     harmonic = total.conjugate() * complex(harm_r, harm_i) + change.conjugate() * complex(old_harm_r, old_harm_i)
     momentum = total.conjugate() * complex(mom_r, mom_i) + change.conjugate() * complex(old_mom_r, old_mom_i)
     # integral of exp(-i omega t)
-    flat = complex(0.0, 1.0 / rows.omega) * change.conjugate()
+    flat = complex(0.0, 1.0 / system.omega) * change.conjugate()
     st.ledger[EXCITATION] += 0.5 * loads
     rec.harmonic[period] += 0.5 * harmonic + constant * flat
     rec.momentum[period] += 0.5 * momentum
     rec.square[period] += constant * (mean + constant * tau)
-    if len(rows.mass) > 0:
-        _free_bodies(rows, flows, st, rec, work, s, period, tau, free, flat)
+    if system.bodies > 0:
+        _free_bodies(system, flows, st, rec, work, s, period, tau, free, flat)
 
 
 @inlined
-def _free_bodies(rows, flows, st, rec, work, s, period, tau, waves, flat):
+def _free_bodies(system, flows, st, rec, work, s, period, tau, waves, flat):
     """Momentum and work of the polynomial part of the bodies' motion."""
-    speed, drift = -waves, 0.0
-    for b in range(len(rows.mass)):
-        drift += rows.mass[b] * st.body_drift[b]
+    n, speed, drift = system.modes, -waves, 0.0
+    for b in range(system.bodies):
+        drift += system.mass[n + b] * st.drifts[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
-            speed += rows.mass[b] * st.velocity[b]
+            speed += system.mass[n + b] * st.velocity[b]
     momentum = speed * flat
     if drift != 0.0:
         # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
-        slope = work.bend[0].conjugate() + complex(0.0, rows.omega * tau) * work.gain[0].conjugate()
-        momentum += drift / (rows.omega * rows.omega) * slope
+        slope = work.bend[0].conjugate() + complex(0.0, system.omega * tau) * work.gain[0].conjugate()
+        momentum += drift / (system.omega * system.omega) * slope
     rec.momentum[period] += momentum
-    if rows.alike:
-        st.ledger[EXCITATION] += rows.inertia[0].imag / rows.mass[0] * momentum.imag
+    if system.alike:
+        st.ledger[EXCITATION] += system.load[n].imag / system.mass[n] * momentum.imag
     else:
-        st.ledger[EXCITATION] += _push(rows, flows, st, work, s, tau, flat)
+        st.ledger[EXCITATION] += _push(system, flows, st, work, s, tau, flat)
 
 
 @kernel
-def _push(rows, flows, st, work, s, tau, flat):
+def _push(system, flows, st, work, s, tau, flat):
     """Work of the base on the polynomial part of the bodies' motion, in cavities of several directions."""
-    speed, drift = 0.0, 0.0
-    for b in range(len(rows.mass)):
-        drift += rows.inertia[b].imag * st.body_drift[b]
+    n, speed, drift = system.modes, 0.0, 0.0
+    for b in range(system.bodies):
+        drift += system.load[n + b].imag * st.drifts[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
             own = st.velocity[b]
             for a in range(st.counters[AWAKE]):
                 j = st.awake[a]
                 own -= (flows.velocity[s, b, j] * st.amplitude[j]).real
-            speed += rows.inertia[b].imag * own
+            speed += system.load[n + b].imag * own
     # integral of t exp(-i omega t), as in _free_bodies
-    slope = work.bend[0].conjugate() + complex(0.0, rows.omega * tau) * work.gain[0].conjugate()
-    return speed * flat.imag + drift / (rows.omega * rows.omega) * slope.imag
+    slope = work.bend[0].conjugate() + complex(0.0, system.omega * tau) * work.gain[0].conjugate()
+    return speed * flat.imag + drift / (system.omega * system.omega) * slope.imag
 
 
 @inlined
@@ -275,19 +275,19 @@ def _driven_integral(c, delay, push, other, other_delay, other_push):
 
 
 @kernel
-def _sample(rows, flows, st, rec, s, tau, constant):
+def _sample(system, flows, st, rec, s, tau, constant):
     """Response and slips at the equidistant sampling times within [time, time + tau)."""
     each = len(rec.samples) // (len(rec.section) - 1)
     start = st.time[0]
-    begin = math.ceil(start / rows.period * each - 1e-12)
+    begin = math.ceil(start / system.period * each - 1e-12)
     for i in range(max(begin, 0), each):
-        t = i * rows.period / each - start
+        t = i * system.period / each - start
         if t >= tau:
             break
         t = max(t, 0.0)
         entry = rec.samples[st.counters[PERIOD] * each + i]
         entry[0] = constant
-        for r in range(len(rows.mass)):
+        for r in range(system.bodies):
             entry[1 + r] = st.displacement[r] + t * (st.velocity[r] + 0.5 * st.drift[r] * t)
         for a in range(st.counters[AWAKE]):
             j = st.awake[a]
@@ -295,11 +295,11 @@ def _sample(rows, flows, st, rec, s, tau, constant):
             first = exp_minus_one(z)
             line = exp_minus_line(z, first)
             entry[0] += (flows.response[s, j] * st.amplitude[j] * (1.0 + first)).real
-            for r in range(len(rows.mass)):
+            for r in range(system.bodies):
                 entry[1 + r] += (flows.motion[s, r, j] * st.amplitude[j] * line).real
         for j in range(1, flows.driven[s] + 1):
             growth, beyond = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, 0], t)
             drive = flows.load[s, j] * st.amplitude[0]
             entry[0] += (flows.response[s, j] * drive * growth).real
-            for r in range(len(rows.mass)):
+            for r in range(system.bodies):
                 entry[1 + r] += (flows.motion[s, r, j] * drive * beyond).real

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import Handover
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.constraints import rows_of
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
 from vanedamp.files.toml_input import InputError
 
 _STATUS = {
@@ -54,35 +53,31 @@ class EngineRun:
         functional: np.ndarray | None = None,
         start: Handover | None = None,
     ) -> None:
-        structure = linear_structure(scene)
+        self.system = assemble(scene)
         if functional is not None:
-            structure = replace(structure, response=functional)
+            self.system = self.system._replace(response=np.r_[functional, np.zeros(self.system.bodies)])
         self.max_events, self.begun, self.ended = scene.solver.max_events, False, False
-        self.structure = structure
-        self.rows, displacement, velocity = rows_of(scene, structure)
-        coordinates = np.r_[structure.displacement, structure.velocity]
-        if start is not None:
-            coordinates, displacement, velocity = given(structure, self.rows, start)
-        self.flows = empty_flows(self.rows)
+        self.scale = physical_scale(scene, self.system)
+        initial = initial_motion(scene, self.system) if start is None else given(self.system, self.scale, start)
+        self.flows = empty_flows(self.system)
         self.log = _Log(events, [])
         modes = self.flows.eigenvalue.shape[1]
-        self.state = st.new_state(self.rows, modes, displacement, velocity)
-        self.state.coordinates[:] = coordinates
-        self.channels = st.new_channels(self.rows, modes)
-        self.records = recs.new_records(self.rows, scene.time.simulated, samples_per_period)
-        self.scratch = st.new_scratch(self.rows, modes)
+        self.state = st.new_state(self.system, modes, initial)
+        self.channels = st.new_channels(self.system, modes)
+        self.records = recs.new_records(self.system, scene.time.simulated, samples_per_period)
+        self.scratch = st.new_scratch(self.system, modes)
 
     def begin(self, max_events: int) -> int:
         """Decide the initial state and record it. Returns the automaton's code.
 
         Raises InputError for a structure that is critically damped without any contact.
         """
-        self.begun = True
+        self.begun, modes = True, self.system.of_structure
         try:
-            complex_modes(np.sqrt(self.rows.stiffness), self.rows.damping)
+            complex_modes(np.sqrt(modes.stiffness), modes.damping)
         except IllConditioned as error:
             raise InputError(f"structure: {error}; change its damping slightly") from None
-        if not auto.begin(self.rows, self.state, self.records, self.scratch):
+        if not auto.begin(self.system, self.state, self.records, self.scratch):
             return auto.UNDECIDED
         return self.advance(0, max_events)
 
@@ -90,7 +85,7 @@ class EngineRun:
         """Advance to the end of `periods`. Returns the automaton's code."""
         while True:
             code = auto.advance(
-                self.rows, self.flows, self.state, self.channels, self.records, self.scratch, periods, max_events
+                self.system, self.flows, self.state, self.channels, self.records, self.scratch, periods, max_events
             )
             if code == auto.NEEDS_FLOW:
                 code = self._add_flow()
@@ -104,7 +99,7 @@ class EngineRun:
     def _add_flow(self) -> int:
         """Add the subsystem that the state calls for. Returns DONE or ILL_CONDITIONED."""
         try:
-            self.flows = add_flow(self.flows, self.rows, self.state.key)
+            self.flows = add_flow(self.flows, self.system, self.state.key)
         except IllConditioned:
             return int(auto.ILL_CONDITIONED)
         return int(auto.DONE)
@@ -124,13 +119,13 @@ class EngineRun:
         awake = state.awake[: state.counters[st.AWAKE]]
         y = (self.flows.shape[s][:, awake] @ state.amplitude[awake]).real
         y[: len(state.constant)] += state.constant
-        return taken(self.structure, self.rows, state.displacement, state.velocity, y)
+        return taken(self.system, self.scale, state.displacement, state.velocity, y)
 
     def outcome(self) -> Outcome:
         """What the run leaves behind."""
         counters = self.state.counters
         return Outcome(
-            self.rows, self.records, int(counters[st.PERIOD]), int(counters[st.EVENTS]), _OPEN_LEDGER,
+            self.system, self.records, int(counters[st.PERIOD]), int(counters[st.EVENTS]), _OPEN_LEDGER,
             {
                 "impacts": int(counters[st.IMPACTS]),
                 "segments": int(counters[st.SEGMENTS]),

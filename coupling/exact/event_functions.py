@@ -48,17 +48,17 @@ CHATTER = 3e-7
 
 
 @inlined
-def next_event(rows, flows, st, ch):
+def next_event(system, flows, st, ch):
     """Time to the next event and its channel, or to the period's end and -1.
 
     What is known beyond the period's end stays known in the next segment (`carry`).
     """
     s = st.counters[FLOW]
     driven = flows.driven[s]
-    left = max(rows.period - st.time[0], 0.0)
-    shortest = RESOLUTION * rows.period
+    left = max(system.period - st.time[0], 0.0)
+    shortest = RESOLUTION * system.period
     eigenvalue, awake = flows.eigenvalue[s], st.awake[: st.counters[AWAKE]]
-    count = _watch(rows, flows, st, ch, s)
+    count = _watch(system, flows, st, ch, s)
     st.counters[SEGMENTS] += 1
     while True:
         k, tau = -1, left
@@ -81,10 +81,10 @@ def next_event(rows, flows, st, ch):
         )
         if driven > 0:
             drive = ch.drive[k, : driven + 1]
-            more, bound = add_secular(ch.order[k], drive, eigenvalue, tau, rows.period, ch.lower)
+            more, bound = add_secular(ch.order[k], drive, eigenvalue, tau, system.period, ch.lower)
             noise, second = noise + more, second + bound
             calm = calm + bound if calm >= 0.0 else calm
-        step, found = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, rows.period, shortest)
+        step, found = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, system.period, shortest)
         ch.known[k] = ROOT if found else EXPANDED
         ch.safe[k] = tau + step if found else max(ch.safe[k], tau + step)
 
@@ -126,40 +126,40 @@ def advance_or_stop(lower, noise, second, calm, longest, shortest):
 
 
 @inlined
-def _watch(rows, flows, st, ch, s):
+def _watch(system, flows, st, ch, s):
     """Set up the event functions of the segment. Returns how many."""
     count = ZERO
-    for r in range(rows.friction_rows):
+    for r in range(system.friction_rows):
         state = st.state[r]
         if state == STICK or state == SPRUNG:
             for side in (AT_LOW, AT_HIGH):
-                count = _watch_force(rows, flows, st, ch, s, r, side, rows.limit[r], count)
+                count = _watch_force(system, flows, st, ch, s, r, side, system.limit[r], count)
         elif state == SLIP_LEFT or state == SLIP_RIGHT:
-            count = _watch_motion(rows, flows, st, ch, s, r, VELOCITY, float(state), 0, count)
-    for r in range(rows.friction_rows, len(st.state)):
+            count = _watch_motion(system, flows, st, ch, s, r, VELOCITY, float(state), 0, count)
+    for r in range(system.friction_rows, len(st.state)):
         state = st.state[r]
         if state == CLOSED or state == SPRUNG:
-            count = _watch_force(rows, flows, st, ch, s, r, AT_LOW, 0.0, count)
-        elif state == OPEN and not _surely_opens(rows, st, r):
-            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, 1.0, CLOSES, count)
+            count = _watch_force(system, flows, st, ch, s, r, AT_LOW, 0.0, count)
+        elif state == OPEN and not _surely_opens(system, st, r):
+            count = _watch_motion(system, flows, st, ch, s, r, POSITION, 1.0, CLOSES, count)
         elif state == LEAVING:
-            count = _watch_motion(rows, flows, st, ch, s, r, POSITION, -1.0, OPENS, count)
-            count = _watch_spring(rows, flows, st, ch, s, r, count)
+            count = _watch_motion(system, flows, st, ch, s, r, POSITION, -1.0, OPENS, count)
+            count = _watch_spring(system, flows, st, ch, s, r, count)
     return count
 
 
 @inlined
-def _surely_opens(rows, st, r):
+def _surely_opens(system, st, r):
     """Whether a gap can only widen in this segment: the body slides away from a wall that rides on its floor."""
-    if not rows.rides[r]:
+    if not system.moves_with_floor[r]:
         return False
-    if rows.before[r] < 0:
-        return st.state[rows.after[r]] == SLIP_RIGHT
-    return rows.after[r] < 0 and st.state[rows.before[r]] == SLIP_LEFT
+    if system.left_body[r] < 0:
+        return st.state[system.right_body[r]] == SLIP_RIGHT
+    return system.right_body[r] < 0 and st.state[system.left_body[r]] == SLIP_LEFT
 
 
 @inlined
-def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
+def _watch_motion(system, flows, st, ch, s, r, order, sign, what, k):
     """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign, for its first root."""
     if order == POSITION:
         value, slope, ch.k2[k] = sign * st.displacement[r], sign * st.velocity[r], sign * st.drift[r]
@@ -181,28 +181,28 @@ def _watch_motion(rows, flows, st, ch, s, r, order, sign, what, k):
         bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
     if flows.driven[s] > 0:
         on_motion, on_velocity = (0.0, sign) if order == VELOCITY else (sign, 0.0)
-        first, second, largest, _ = _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, 0.0, k)
+        first, second, largest, _ = _watch_drive(system, flows, st, ch, s, r, on_motion, on_velocity, 0.0, k)
         if order == VELOCITY:
             slope += first
         curvature += second
         bound += largest
     _know(st, ch, r, order, what, value, slope, bound - ch.k2[k], k)
     if flows.driven[s] > 0:
-        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)  # as far as the bounds hold
+        ch.safe[k] = min(ch.safe[k], 2.0 * system.period)  # as far as the bounds hold
     if what == CLOSES or what == OPENS:
-        st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * rows.period
+        st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * system.period
     if st.released[r] != 0:
-        _leave(rows, flows, st, ch, s, r, order, sign, k)
+        _leave(system, flows, st, ch, s, r, order, sign, k)
     return k + 1
 
 
 @inlined
-def _watch_drive(rows, flows, st, ch, s, r, on_motion, on_velocity, on_force, k):
+def _watch_drive(system, flows, st, ch, s, r, on_motion, on_velocity, on_force, k):
     """Watch what the excitation adds to driven modes (`_watch_growth`)."""
     load = flows.load[s, : flows.driven[s] + 1]
     return _watch_growth(
         flows.eigenvalue[s], flows.motion[s, r], flows.velocity[s, r], flows.force[s, r], on_motion, on_velocity,
-        on_force, load, st.amplitude[0], rows.period, ch.drive[k],
+        on_force, load, st.amplitude[0], system.period, ch.drive[k],
     )  # fmt: skip
 
 
@@ -237,7 +237,7 @@ def _know(st, ch, r, order, what, value, slope, bound, k):
 
 
 @kernel
-def _leave(rows, flows, st, ch, s, r, order, sign, k):
+def _leave(system, flows, st, ch, s, r, order, sign, k):
     """First safe step of a row whose force was at its bound: from rest, no acceleration, and its jerk decides."""
     jerk, snap = 0.0, 0.0
     for a in range(st.counters[AWAKE]):
@@ -251,27 +251,27 @@ def _leave(rows, flows, st, ch, s, r, order, sign, k):
     for j in range(1, flows.driven[s] + 1):
         rate, drive = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * flows.load[s, j] * st.amplitude[0]
         jerk += (drive * (rate * rate + rate * excitation + excitation * excitation)).real
-        snap += secular_bound(drive, rate, excitation, rows.period, 4)
+        snap += secular_bound(drive, rate, excitation, system.period, 4)
     quick = (2.0 if order == POSITION else 1.5) * jerk / snap
-    shortest = 1e3 * RESOLUTION * rows.period
-    ch.safe[k], ch.known[k] = max(quick if quick == quick else rows.period, shortest), EXPANDED
+    shortest = 1e3 * RESOLUTION * system.period
+    ch.safe[k], ch.known[k] = max(quick if quick == quick else system.period, shortest), EXPANDED
 
 
 @kernel
-def longest_hop(rows, flows, st, r):
+def longest_hop(system, flows, st, r):
     """Speed (m/s) with which a contact at rest would leave for a flight of CHATTER, from its force now."""
     s = st.counters[FLOW]
     force = st.level[r]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
         force += (flows.force[s, r, j] * st.amplitude[j]).real
-    return max(0.0, force) * rows.delassus[r, r] * 0.5 * CHATTER * rows.period
+    return max(0.0, force) * system.delassus[r, r] * 0.5 * CHATTER * system.period
 
 
 @kernel
-def _watch_spring(rows, flows, st, ch, s, r, k):
+def _watch_spring(system, flows, st, ch, s, r, k):
     """Watch a compliant contact that has ended for the spring's wish to push again: spring gap + dashpot rate > 0."""
-    spring, dashpot = rows.spring[r], rows.dashpot[r]
+    spring, dashpot = system.spring[r], system.dashpot[r]
     ch.row[k], ch.order[k], ch.side[k], ch.known[k], ch.safe[k] = r, POSITION, RECLOSES, BOUNDED, 0.0
     acceleration = st.drift[r]
     for a in range(st.counters[AWAKE]):
@@ -284,16 +284,16 @@ def _watch_spring(rows, flows, st, ch, s, r, k):
     ch.k2[k] = spring * st.drift[r]
     if flows.driven[s] > 0:
         # the row's velocity has its share of the growth already, its acceleration has not
-        acceleration, _, _, _ = _watch_drive(rows, flows, st, ch, s, r, 0.0, 1.0, 0.0, k)
+        acceleration, _, _, _ = _watch_drive(system, flows, st, ch, s, r, 0.0, 1.0, 0.0, k)
         ch.k1[k] += dashpot * acceleration
-        _watch_drive(rows, flows, st, ch, s, r, spring, dashpot, 0.0, k)
+        _watch_drive(system, flows, st, ch, s, r, spring, dashpot, 0.0, k)
     # the contact ended at zero force
     ch.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
     return k + 1
 
 
 @inlined
-def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
+def _watch_force(system, flows, st, ch, s, r, side, limit, k):
     """Watch the force of a closed row for reaching its low (AT_LOW) or high (AT_HIGH) bound."""
     sign = 1.0 if side == AT_LOW else -1.0
     constant, swing, value, slope, bound = sign * st.level[r] + limit, 0.0, 0.0, 0.0, 0.0
@@ -308,18 +308,18 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
         bound += size * (rate.real * rate.real + rate.imag * rate.imag)
     curvature, third = 0.0, 0.0
     if flows.driven[s] > 0:  # a force that grows is always watched
-        first, curvature, second_bound, third = _watch_drive(rows, flows, st, ch, s, r, 0.0, 0.0, sign, k)
+        first, curvature, second_bound, third = _watch_drive(system, flows, st, ch, s, r, 0.0, 0.0, sign, k)
         slope += first
         bound += second_bound
     elif constant > swing:
         return k  # the force never comes near its bound: nothing to watch
-    if st.state[r] == SPRUNG and r >= rows.friction_rows:
+    if st.state[r] == SPRUNG and r >= system.friction_rows:
         # bodies that touch without force, as in a free flight side by side, are not parted by round-off
-        constant += ADHESION * rows.spring[r] * rows.gap[r - rows.friction_rows]
+        constant += ADHESION * system.spring[r] * system.free_travel[r]
     ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
     _know(st, ch, r, FORCE, side, constant + value, slope, bound, k)
     if flows.driven[s] > 0:
-        ch.safe[k] = min(ch.safe[k], 2.0 * rows.period)  # as far as the bounds hold
+        ch.safe[k] = min(ch.safe[k], 2.0 * system.period)  # as far as the bounds hold
     if st.released[r] == -side:
         for a in range(st.counters[AWAKE]):
             j = st.awake[a]
@@ -327,7 +327,7 @@ def _watch_force(rows, flows, st, ch, s, r, side, limit, k):
             second = ch.g[k, j] * rate * rate
             curvature += second.real
             third += (abs(second.real) + abs(second.imag)) * abs(rate)
-        quick = 2.9 * curvature / third if third > 0.0 else rows.period
-        ch.safe[k] = max(quick, 1e3 * RESOLUTION * rows.period)
+        quick = 2.9 * curvature / third if third > 0.0 else system.period
+        ch.safe[k] = max(quick, 1e3 * RESOLUTION * system.period)
         ch.known[k] = EXPANDED
     return k + 1

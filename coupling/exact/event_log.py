@@ -17,10 +17,10 @@ def log_event(period, counters, time, log, kind, r, before, after, impulse):
 
 
 @inlined
-def log_impact(rows, st, rec, r, before, after, impulse):
+def log_impact(system, st, rec, r, before, after, impulse):
     """Count an impact of row r and log it: relative velocities (m/s), impulse (N s)."""
-    _count(st.counters, rec.impacts, rec.collided, 0.5 * before * before / rows.delassus[r, r])
-    log_event(rows.period, st.counters, st.time, rec.log, IMPACT, r, before, after, impulse)
+    _count(st.counters, rec.impacts, rec.collided, 0.5 * before * before / system.delassus[r, r])
+    log_event(system.period, st.counters, st.time, rec.log, IMPACT, r, before, after, impulse)
 
 
 @kernel
@@ -32,28 +32,30 @@ def _count(counters, impacts, collided, energy):
 
 
 @kernel
-def log_changes(rows, st, rec, work):
+def log_changes(system, st, rec, work):
     """Log what changed. A body that rests at a wall is at rest on the floor too, and only the wall is named."""
     for r in range(len(st.state)):
         was, now = work.before[r], st.state[r]
-        if r < rows.friction_rows:
-            if now >= STICK > was and not _at_wall(rows, st.state, r):
-                log_event(rows.period, st.counters, st.time, rec.log, STICKS, r, 0.0, 0.0, 0.0)
-            elif was >= STICK > now and not _at_wall(rows, work.before, r):
-                log_event(rows.period, st.counters, st.time, rec.log, SLIPS, r, 0.0, st.velocity[r], 0.0)
+        if r < system.friction_rows:
+            if now >= STICK > was and not _at_wall(system, st.state, r):
+                log_event(system.period, st.counters, st.time, rec.log, STICKS, r, 0.0, 0.0, 0.0)
+            elif was >= STICK > now and not _at_wall(system, work.before, r):
+                log_event(system.period, st.counters, st.time, rec.log, SLIPS, r, 0.0, st.velocity[r], 0.0)
         elif now == SPRUNG or was == SPRUNG:
             continue  # logged where a spring begins and ends to push
         elif now != OPEN and was == OPEN:
-            log_event(rows.period, st.counters, st.time, rec.log, RESTS, r, 0.0, 0.0, 0.0)
+            log_event(system.period, st.counters, st.time, rec.log, RESTS, r, 0.0, 0.0, 0.0)
         elif now == OPEN and was != OPEN:
-            log_event(rows.period, st.counters, st.time, rec.log, DETACHES, r, 0.0, st.velocity[r], 0.0)
+            log_event(system.period, st.counters, st.time, rec.log, DETACHES, r, 0.0, st.velocity[r], 0.0)
 
 
 @kernel
-def _at_wall(rows, state, body):
+def _at_wall(system, state, body):
     """Whether a body rests at a wall that moves with its floor."""
-    for r in range(rows.friction_rows, len(state)):
-        at_wall = (rows.before[r] == body and rows.after[r] < 0) or (rows.after[r] == body and rows.before[r] < 0)
-        if at_wall and rows.rides[r] and state[r] != OPEN and state[r] != SPRUNG:
+    for r in range(system.friction_rows, len(state)):
+        at_wall = (system.left_body[r] == body and system.right_body[r] < 0) or (
+            system.right_body[r] == body and system.left_body[r] < 0
+        )
+        if at_wall and system.moves_with_floor[r] and state[r] != OPEN and state[r] != SPRUNG:
             return True
     return False

@@ -19,12 +19,12 @@ _NEAR = 1e-6
 
 
 @inlined
-def measure_gaps(rows, st):
+def measure_gaps(system, st):
     """Displacement and velocity of the gaps that ride, from the slips."""
-    for r in range(rows.friction_rows, len(st.state)):
-        if rows.rides[r]:
-            half = 0.5 * rows.gap[r - rows.friction_rows]
-            before, after = rows.before[r], rows.after[r]
+    for r in range(system.friction_rows, len(st.state)):
+        if system.moves_with_floor[r]:
+            half = system.rest[r]
+            before, after = system.left_body[r], system.right_body[r]
             right, far, faster = half, 0.0, 0.0
             if after >= 0:
                 right, far, faster = st.displacement[after], st.low[after], st.velocity[after]
@@ -35,23 +35,23 @@ def measure_gaps(rows, st):
 
 
 @inlined
-def align_gaps(rows, st, y):
+def align_gaps(system, st, y):
     """Take open gaps to walls that move apart from the floor anew from slips and structure: round-off would add up.
 
     y: (2n,) p and p' of the structure. A gap about to close is left alone: it must not change sides.
     """
     n = len(st.constant)
-    for r in range(rows.friction_rows, len(st.state)):
-        scale = rows.gap[r - rows.friction_rows]
-        if rows.rides[r] or st.state[r] != OPEN or st.displacement[r] < _NEAR * scale:
+    for r in range(system.friction_rows, len(st.state)):
+        scale = system.free_travel[r]
+        if system.moves_with_floor[r] or st.state[r] != OPEN or st.displacement[r] < _NEAR * scale:
             continue
-        k, sign = (rows.before[r], -1.0) if rows.before[r] >= 0 else (rows.after[r], 1.0)
+        k, sign = (system.left_body[r], -1.0) if system.left_body[r] >= 0 else (system.right_body[r], 1.0)
         place, speed = sign * (st.displacement[k] + st.low[k]), sign * st.velocity[k]
         for i in range(n):
-            apart = rows.structure[r, i] + sign * rows.floor[k, i]
+            apart = system.J[r, i] + sign * system.floor[k, i]
             place += apart * y[i]
             speed += apart * y[n + i]
-        st.displacement[r], st.velocity[r] = 0.5 * scale + place, speed
+        st.displacement[r], st.velocity[r] = system.rest[r] + place, speed
 
 
 @inlined
@@ -73,30 +73,30 @@ def only(work, r):
 
 
 @inlined
-def join(rows, st, work):
+def join(system, st, work):
     """Put bodies that touch (work.shut of their contacts) exactly where they touch, from the walls inwards."""
-    slip, low, friction = st.displacement, st.low, rows.friction_rows
+    slip, low, friction = st.displacement, st.low, system.friction_rows
     for r in range(friction, len(st.state)):
-        before, after = rows.before[r], rows.after[r]
-        if work.shut[r] and rows.rides[r] and after >= 0:
-            slip[after] = slip[before] if before >= 0 else -0.5 * rows.gap[r - friction]
+        before, after = system.left_body[r], system.right_body[r]
+        if work.shut[r] and system.moves_with_floor[r] and after >= 0:
+            slip[after] = slip[before] if before >= 0 else -system.rest[r]
             low[after] = low[before] if before >= 0 else 0.0
     anchored = False
     for r in range(len(st.state) - 1, friction - 1, -1):
-        before, after = rows.before[r], rows.after[r]
-        anchored = work.shut[r] and rows.rides[r] and before >= 0 and (anchored or after < 0)
+        before, after = system.left_body[r], system.right_body[r]
+        anchored = work.shut[r] and system.moves_with_floor[r] and before >= 0 and (anchored or after < 0)
         if anchored:
-            slip[before] = slip[after] if after >= 0 else 0.5 * rows.gap[r - friction]
+            slip[before] = slip[after] if after >= 0 else system.rest[r]
             low[before] = low[after] if after >= 0 else 0.0
 
 
 @kernel
-def join_speeds(rows, st, work):
+def join_speeds(system, st, work):
     """Give bodies that rest against each other or at a wall (work.shut of their contacts) exactly the same speed."""
-    speed, friction = st.velocity, rows.friction_rows
+    speed, friction = st.velocity, system.friction_rows
     for r in range(friction, len(st.state)):
-        if work.shut[r] and rows.rides[r]:
-            before, after = rows.before[r], rows.after[r]
+        if work.shut[r] and system.moves_with_floor[r]:
+            before, after = system.left_body[r], system.right_body[r]
             if before < 0 or after < 0 or speed[before] == 0.0 or speed[after] == 0.0:
                 if before >= 0:
                     speed[before] = 0.0
@@ -105,38 +105,38 @@ def join_speeds(rows, st, work):
             else:
                 speed[after] = speed[before]
     for r in range(len(st.state) - 1, friction - 1, -1):
-        before, after = rows.before[r], rows.after[r]
-        if work.shut[r] and rows.rides[r] and before >= 0 and after >= 0:
+        before, after = system.left_body[r], system.right_body[r]
+        if work.shut[r] and system.moves_with_floor[r] and before >= 0 and after >= 0:
             speed[before] = speed[after]
 
 
 @inlined
-def close(rows, st, work):
+def close(system, st, work):
     """Put the bodies of all rigid contacts that touch, to round-off, exactly there. Lists them; returns how many."""
-    count, tiny, friction = 0, slowest(rows, st), rows.friction_rows
+    count, tiny, friction = 0, slowest(system, st), system.friction_rows
     for r in range(friction, len(st.state)):
-        near = st.displacement[r] <= SIMULTANEOUS * rows.gap[r - friction] and st.velocity[r] <= tiny
-        work.shut[r] = rigid(rows, r) and (st.displacement[r] == 0.0 or near)
+        near = st.displacement[r] <= SIMULTANEOUS * system.free_travel[r] and st.velocity[r] <= tiny
+        work.shut[r] = rigid(system, r) and (st.displacement[r] == 0.0 or near)
         if work.shut[r]:
-            work.rows[count] = r
+            work.listed[count] = r
             count += 1
-            if not rows.rides[r]:
+            if not system.moves_with_floor[r]:
                 st.displacement[r] = 0.0
-    join(rows, st, work)
-    measure_gaps(rows, st)
+    join(system, st, work)
+    measure_gaps(system, st)
     return count
 
 
 @inlined
-def slowest(rows, st):
+def slowest(system, st):
     """Speed below which a relative motion is round-off, m/s."""
     fastest = st.fastest[0]
-    for r in range(rows.friction_rows):
+    for r in range(system.friction_rows):
         fastest = max(fastest, abs(st.velocity[r]))
     return ROUND_OFF * fastest
 
 
 @inlined
-def rigid(rows, r):
+def rigid(system, r):
     """Whether row r is a constraint while it is closed, not a spring."""
-    return rows.spring[r] == math.inf
+    return system.spring[r] == math.inf

@@ -20,32 +20,32 @@ COLLAPSE = 1e-13
 
 
 @inlined
-def bounce(rows, st, rec, work, r):
+def bounce(system, st, rec, work, r):
     """The ordinary impact: row r alone, of free flights that go on in their directions, not the last of a chatter.
 
     Returns False, with nothing changed, if it is not that: then `collide` decides.
     """
-    friction, speed = rows.friction_rows, st.velocity[r]
-    restitution = rows.restitution[r - friction]
-    last = st.time[0] - st.last_impact[r] < COLLAPSE * rows.period
-    if not rigid(rows, r) or not rows.rides[r] or last or -speed * restitution <= st.settling[r]:
+    friction, speed = system.friction_rows, st.velocity[r]
+    restitution = system.restitution[r]
+    last = st.time[0] - st.last_impact[r] < COLLAPSE * system.period
+    if not rigid(system, r) or not system.moves_with_floor[r] or last or -speed * restitution <= st.settling[r]:
         return False
-    if -speed <= slowest(rows, st):
+    if -speed <= slowest(system, st):
         return False
     for i in range(friction, len(st.state)):
-        if st.state[i] != OPEN or (i != r and st.displacement[i] <= SIMULTANEOUS * rows.gap[i - friction]):
+        if st.state[i] != OPEN or (i != r and st.displacement[i] <= SIMULTANEOUS * system.free_travel[i]):
             return False
-    impulse = -(1.0 + restitution) * speed / rows.delassus[r, r]
+    impulse = -(1.0 + restitution) * speed / system.delassus[r, r]
     for i in range(friction):
-        turns = st.state[i] * (st.velocity[i] + rows.delassus[i, r] * impulse) <= 0.0
+        turns = st.state[i] * (st.velocity[i] + system.delassus[i, r] * impulse) <= 0.0
         if st.state[i] >= STICK or (st.state[i] != COAST and turns):
             return False
     for i in range(len(st.state)):
         work.impulse[i] = 0.0
-        if i < friction or not rows.rides[i]:
-            st.velocity[i] += rows.delassus[i, r] * impulse
+        if i < friction or not system.moves_with_floor[i]:
+            st.velocity[i] += system.delassus[i, r] * impulse
     # the contact obeys the law to the last bit
-    before, after, half = rows.before[r], rows.after[r], 0.5 * rows.gap[r - friction]
+    before, after, half = system.left_body[r], system.right_body[r], system.rest[r]
     if before < 0:
         st.displacement[after], st.low[after], st.velocity[after] = -half, 0.0, -restitution * speed
     elif after < 0:
@@ -53,22 +53,22 @@ def bounce(rows, st, rec, work, r):
     else:
         st.displacement[after], st.low[after] = st.displacement[before], st.low[before]
         st.velocity[after] = st.velocity[before] - restitution * speed
-    measure_gaps(rows, st)
+    measure_gaps(system, st)
     work.impulse[r] = impulse
     st.ledger[IMPACT_LOSS] -= 0.5 * (1.0 - restitution) * impulse * speed
-    _note(rows, st, rec, r, speed, -restitution * speed, impulse)
+    _note(system, st, rec, r, speed, -restitution * speed, impulse)
     return True
 
 
 @inlined
-def _note(rows, st, rec, r, before, after, impulse):
+def _note(system, st, rec, r, before, after, impulse):
     """Log an impact, and when it was."""
     st.last_impact[r] = st.time[0]
-    log_impact(rows, st, rec, r, before, after, impulse)
+    log_impact(system, st, rec, r, before, after, impulse)
 
 
-@kernel
-def collide(rows, st, rec, work):
+@inlined
+def collide(system, st, rec, work):
     """Newton's law at all touching rigid contacts at once: v+ + k v- >= 0 and P >= 0 complement each other.
 
     Velocities of rows jump; the impulses are left in work.impulse (r,). An impact at the end of a chatter or of an
@@ -76,16 +76,16 @@ def collide(rows, st, rec, work):
     chatter together (`_complete`), so that bodies that chatter on one structure do not wake each other for ever.
     Returns False if the problem cannot be solved.
     """
-    friction, problem = rows.friction_rows, work.problem
-    k = close(rows, st, work)
-    tiny = slowest(rows, st)
+    problem = work.problem
+    k = close(system, st, work)
+    tiny = slowest(system, st)
     for p in range(k):
-        r = work.rows[p]
+        r = work.listed[p]
         speed = st.velocity[r] if abs(st.velocity[r]) > tiny else 0.0
         # kept before the jump, for the ledger and the log
         work.jerk[p], work.acceleration[p] = speed, min(speed, 0.0)
-        restitution = rows.restitution[r - friction]
-        collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * rows.period
+        restitution = system.restitution[r]
+        collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * system.period
         if collapsed or -speed * restitution < _share(restitution) * st.settling[r]:
             restitution = 0.0
         problem.restitution[p] = restitution
@@ -93,21 +93,21 @@ def collide(rows, st, rec, work):
         problem.b[p] = speed + restitution * min(speed, 0.0)
         problem.low[p], problem.high[p], problem.forced[p] = 0.0, np.inf, 0
         for q in range(k):
-            problem.matrix[p, q] = rows.delassus[r, work.rows[q]]
+            problem.matrix[p, q] = system.delassus[r, work.listed[q]]
         work.reaction[p] = 0.0
     if not solve_box(problem, k, 0.0):
         return False
-    if _leave_slowly(rows, st, work, k) and not _complete(rows, st, work, k):
+    if _leave_slowly(system, st, work, k) and not _complete(system, st, work, k):
         return False
-    _jump(rows, st, work, k)
+    _jump(system, st, work, k)
     for p in range(k):
-        r, before, impulse = work.rows[p], work.acceleration[p], problem.force[p]
+        r, before, impulse = work.listed[p], work.acceleration[p], problem.force[p]
         after = st.velocity[r]
         if impulse != 0.0 or problem.state[p] == DEPENDENT:
             after = -problem.restitution[p] * before
         st.ledger[IMPACT_LOSS] -= 0.5 * impulse * (work.jerk[p] + after)
         if before < 0.0:
-            _note(rows, st, rec, r, before, after, max(impulse, work.reaction[p]))
+            _note(system, st, rec, r, before, after, max(impulse, work.reaction[p]))
     return True
 
 
@@ -121,20 +121,20 @@ def _share(restitution):
 
 
 @kernel
-def _leave_slowly(rows, st, work, k):
+def _leave_slowly(system, st, work, k):
     """Mark the contacts (work.side) that rest or would separate too slowly. Returns whether any would separate."""
     problem, found = work.problem, False
     for p in range(k):
-        r = work.rows[p]
+        r = work.listed[p]
         work.side[p] = problem.restitution[p] == 0.0 or work.acceleration[p] == 0.0
         after = problem.acceleration[p] - problem.restitution[p] * work.acceleration[p]
-        if problem.state[p] == AT_LOW and after < _share(rows.restitution[r - rows.friction_rows]) * st.settling[r]:
+        if problem.state[p] == AT_LOW and after < _share(system.restitution[r]) * st.settling[r]:
             work.side[p], found = True, True
     return found
 
 
 @kernel
-def _complete(rows, st, work, k):
+def _complete(system, st, work, k):
     """End the chatter of the marked contacts together, by what their impacts and forces do until it is over.
 
     A chatter that is over within CHATTER leaves its contacts closed without speed. Its impacts and the pressing forces
@@ -148,7 +148,7 @@ def _complete(rows, st, work, k):
         problem.forced[p] = 0  # the solver's own mark
         if work.side[p]:
             problem.restitution[p] = 0.0
-            problem.b[p] = work.jerk[p] + _pressed(rows, st, work, p, k)
+            problem.b[p] = work.jerk[p] + _pressed(system, st, work, p, k)
     if not solve_box(problem, k, 0.0):
         return False
     for p in range(k):
@@ -161,65 +161,65 @@ def _complete(rows, st, work, k):
 
 
 @kernel
-def _pressed(rows, st, work, p, k):
+def _pressed(system, st, work, p, k):
     """Speed (m/s) that touching contact p gains within CHATTER if none of them carries a force."""
-    r = work.rows[p]
+    r = work.listed[p]
     speed = 0.0 if st.state[r] == CLOSED else -2.0 * st.settling[r]
     for q in range(k):
-        other = work.rows[q]
+        other = work.listed[q]
         if st.state[other] == CLOSED:
             # the speed that its own force holds back
-            speed -= 2.0 * st.settling[other] * rows.delassus[r, other] / rows.delassus[other, other]
+            speed -= 2.0 * st.settling[other] * system.delassus[r, other] / system.delassus[other, other]
     return speed
 
 
 @inlined
-def _jump(rows, st, work, k):
+def _jump(system, st, work, k):
     """Apply the impulses to the velocities. Contacts obey the law, or are at rest, to the last bit."""
-    friction, problem, speed = rows.friction_rows, work.problem, st.velocity
+    friction, problem, speed = system.friction_rows, work.problem, st.velocity
     for r in range(len(st.state)):
         work.impulse[r], work.shut[r] = 0.0, False
     for p in range(k):
-        work.impulse[work.rows[p]] = problem.force[p]
+        work.impulse[work.listed[p]] = problem.force[p]
     for r in range(len(st.state)):
-        if r >= friction and rows.rides[r]:
+        if r >= friction and system.moves_with_floor[r]:
             continue
         change, size = 0.0, 0.0
         for p in range(k):
-            part = rows.delassus[r, work.rows[p]] * problem.force[p]
+            part = system.delassus[r, work.listed[p]] * problem.force[p]
             change += part
             size += abs(part)
         if abs(change) > 1e-13 * size:
             speed[r] += change
-    measure_gaps(rows, st)
-    tiny = slowest(rows, st)
+    measure_gaps(system, st)
+    tiny = slowest(system, st)
     for p in range(k):
-        r = work.rows[p]
+        r = work.listed[p]
         if problem.force[p] != 0.0 or problem.state[p] == DEPENDENT:
             after = -problem.restitution[p] * work.acceleration[p]
             work.shut[r] = after == 0.0
-            if not rows.rides[r]:
+            if not system.moves_with_floor[r]:
                 speed[r] = after
-            elif rows.before[r] < 0:
-                speed[rows.after[r]] = after
-            elif rows.after[r] < 0:
-                speed[rows.before[r]] = -after
+            elif system.left_body[r] < 0:
+                speed[system.right_body[r]] = after
+            elif system.right_body[r] < 0:
+                speed[system.left_body[r]] = -after
         else:
             work.shut[r] = abs(speed[r]) <= tiny
-        if work.shut[r] and not rows.rides[r]:
+        if work.shut[r] and not system.moves_with_floor[r]:
             speed[r] = 0.0
-    join_speeds(rows, st, work)
-    measure_gaps(rows, st)
+    join_speeds(system, st, work)
+    measure_gaps(system, st)
 
 
 @inlined
-def all_move(rows, st):
+def all_move(system, st):
     """Whether no row is or was at rest and no slip has changed its direction: an impact between free flights."""
     for r in range(len(st.state)):
         state = st.state[r]
         if state == SPRUNG:
             continue  # a spring's force does not jump
-        if r >= rows.friction_rows:
+        if r >= system.friction_rows:
             if state != OPEN or (st.displacement[r] == 0.0 and st.velocity[r] == 0.0):
                 return False
         elif state != COAST and (state >= STICK or state * st.velocity[r] <= 0.0):

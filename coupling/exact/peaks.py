@@ -10,7 +10,7 @@ from vanedamp.coupling.numerics.jit import inlined, kernel
 
 
 @inlined
-def highest(rows, flows, st, work, s, tau, constant, peak):
+def highest(system, flows, st, work, s, tau, constant, peak):
     """Largest |response| on [0, tau] and before.
 
     Between points of a grid the response differs from its cubic Hermite interpolant by at most (bound of the fourth
@@ -38,7 +38,7 @@ def highest(rows, flows, st, work, s, tau, constant, peak):
     if driven > 0:
         load = flows.load[s, : driven + 1]
         more = _drive(
-            flows.eigenvalue[s], flows.response[s], load, st.amplitude[0], work.gain[0], rows.period, work.drive
+            flows.eigenvalue[s], flows.response[s], load, st.amplitude[0], work.gain[0], system.period, work.drive
         )
         v0, v1, size, fourth = v0 + more[0], v1 + more[1], size + more[2] * tau, fourth + more[3]
     if size <= peak or tau <= 0.0:
@@ -46,7 +46,7 @@ def highest(rows, flows, st, work, s, tau, constant, peak):
     peak = max(peak, abs(x0), abs(x1))
     if not _may_exceed(peak, x0, v0, x1, v1, tau, fourth):
         return peak
-    h = 0.125 * rows.period
+    h = 0.125 * system.period
     if fourth * min(h, tau) ** 4 <= 0.384 * size:
         pieces = math.ceil(tau / h)
         for a in range(count):

@@ -7,56 +7,57 @@ from dataclasses import astuple
 import numpy as np
 
 from vanedamp.coupling.response.restart_state import Handover
-from vanedamp.coupling.system.constraints import Rows, row_motion
-from vanedamp.coupling.system.modal_structure import LinearStructure
+from vanedamp.coupling.system.assembly import InitialMotion, row_motion
+from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 
-def taken(structure: LinearStructure, rows: Rows, slip: np.ndarray, speed: np.ndarray, y: np.ndarray) -> Handover:
-    """The handover of a run: slips (r,) and their speeds of all rows, and y (2n,) = (p, p') of the structure."""
-    b, n, scale = len(rows.mass), structure.modes, structure.physical
+def taken(system: System, scale: float, slip: np.ndarray, speed: np.ndarray, y: np.ndarray) -> Handover:
+    """The handover of a run: slips (r,) and their speeds of all rows, and y (2n,) = (p, p') of the structure.
+
+    scale: displacement per modal coordinate (system.assembly.physical_scale).
+    """
+    b, n, friction = system.bodies, system.modes, system.friction_rows
     return Handover(
         frozen(scale * y[:n]), frozen(scale * y[n:]), frozen(slip[:b]), frozen(speed[:b]),
-        frozen(np.where(np.isfinite(rows.spring), slip, 0.0)[b : rows.friction_rows]), frozen(rows.gap),
+        frozen(np.where(np.isfinite(system.spring), slip, 0.0)[b:friction]), frozen(system.free_travel[friction:]),
     )  # fmt: skip
 
 
-def given(structure: LinearStructure, rows: Rows, start: Handover) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(y, displacement, velocity): structure (2n,) and rows (r,) at the start of a run of another scene.
+def given(system: System, scale: float, start: Handover) -> InitialMotion:
+    """The motion at the start of a run of another scene.
 
     Bodies that would stand in a wall or in each other, because the gap is smaller now, are moved to where they touch;
     springs of friction dampers are unloaded to what their sliders hold. Raises InputError for a scene of another size.
     """
-    sizes = (structure.modes, structure.modes, len(rows.mass), len(rows.mass), _dampers(rows), len(rows.gap))
+    b, friction = system.bodies, system.friction_rows
+    sizes = (system.modes, system.modes, b, b, friction - b, len(system.J) - friction)
     found = tuple(len(array) for array in astuple(start))
     if found != sizes:
         raise InputError(
             f"continuation: a state of {found[0]} modes, {found[2]} bodies and {found[4]} friction dampers does not "
             f"fit a scene of {sizes[0]}, {sizes[2]} and {sizes[4]}"
         )
-    p, rate = (array / structure.physical for array in (start.displacement, start.velocity))
-    limit, spring = rows.limit[len(rows.mass) :], rows.spring[len(rows.mass) : rows.friction_rows]
+    p, rate = (array / scale for array in (start.displacement, start.velocity))
+    limit, spring = system.limit[b:friction], system.spring[b:friction]
     elongation = np.where(np.isfinite(spring), np.clip(start.elongation, -limit / spring, limit / spring), 0.0)
-    slip = _inside(rows, start, p)
-    return np.r_[p, rate], *row_motion(rows, slip, start.slip_velocity, p, rate, elongation)
+    slip = _inside(system, start, p)
+    return InitialMotion(p, rate, *row_motion(system, slip, start.slip_velocity, p, rate, elongation))
 
 
-def _dampers(rows: Rows) -> int:
-    return rows.friction_rows - len(rows.mass)
-
-
-def _inside(rows: Rows, start: Handover, p: np.ndarray) -> np.ndarray:
+def _inside(system: System, start: Handover, p: np.ndarray) -> np.ndarray:
     """Slips (b,) of bodies inside their cavities: pushed in from the left walls, then from the right ones.
 
     A compliant wall stays pressed as it was if its gap is what it was.
     """
-    slip, still, unloaded = np.array(start.slip), np.zeros(len(rows.mass)), np.zeros(_dampers(rows))
-    pressed = np.isfinite(rows.spring[rows.friction_rows :]) & (rows.gap == start.gap)
-    contacts = rows.friction_rows + np.flatnonzero(~pressed)
-    for order, body, sign in ((contacts, rows.after, 1.0), (contacts[::-1], rows.before, -1.0)):
+    friction = system.friction_rows
+    slip, still, unloaded = np.array(start.slip), np.zeros(system.bodies), np.zeros(friction - system.bodies)
+    pressed = np.isfinite(system.spring[friction:]) & (system.free_travel[friction:] == start.gap)
+    contacts = friction + np.flatnonzero(~pressed)
+    for order, body, sign in ((contacts, system.right_body, 1.0), (contacts[::-1], system.left_body, -1.0)):
         for r in order:
-            gap = row_motion(rows, slip, still, p, 0.0 * p, unloaded)[0][r]
+            gap = row_motion(system, slip, still, p, 0.0 * p, unloaded)[0][r]
             if gap < 0.0 and body[r] >= 0:
                 slip[body[r]] -= sign * gap
     return slip

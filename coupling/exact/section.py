@@ -6,42 +6,21 @@ from vanedamp.coupling.exact.compliant_contacts import spring_energy
 from vanedamp.coupling.exact.gap_kinematics import rigid
 from vanedamp.coupling.exact.state import AWAKE, FLOW, PERIOD, SPRUNG
 from vanedamp.coupling.numerics.jit import inlined
-from vanedamp.coupling.response.records import STORED
+from vanedamp.coupling.response.recorder import put_section
 
 
 @inlined
-def record_section(rows, flows, st, rec, work):
-    """Section and ledger at the start of a period."""
-    n, b = len(st.constant), len(rows.mass)
-    entry, y = rec.section[st.counters[PERIOD]], work.coordinates
+def record_start(system, flows, st, rec, work):
+    """Record section and ledger at the start of a period."""
+    n, b, y, springs = len(st.constant), system.bodies, work.coordinates, 0.0
     _coordinates(flows, st, y)
-    entry[0] = (rows.table * st.amplitude[0]).real
-    entry[1] = (1j * rows.omega * rows.table * st.amplitude[0]).real
-    for i in range(n):
-        entry[0] += rows.response[i] * y[i]
-        entry[1] += rows.response[i] * y[n + i]
-    momentum, energy, part = 0.0, 0.0, rec.parts[st.counters[PERIOD]]
-    for i in range(n):
-        energy += 0.5 * (y[n + i] * y[n + i] + rows.stiffness[i] * y[i] * y[i])
-    for k in range(b):
-        velocity, height = st.velocity[k], st.displacement[k]
-        for i in range(n):
-            velocity += rows.floor[k, i] * y[n + i]
-            height += rows.floor[k, i] * y[i]
-        momentum += rows.mass[k] * velocity
-        part[1 + k] = 0.5 * rows.mass[k] * velocity * velocity - rows.weight[k] * height
-        entry[3 + k], entry[3 + b + k] = st.displacement[k], st.velocity[k]
-    entry[2] = momentum
     for r in range(len(st.state)):
         # a Jenkins element keeps its spring's energy while it slides
-        if st.state[r] == SPRUNG or (r < rows.friction_rows and not rigid(rows, r) and rows.limit[r] > 0.0):
-            energy += spring_energy(rows, st, r)
-    part[0] = energy
-    for k in range(b):
-        energy += part[1 + k]
-    st.ledger[STORED] = energy
-    for i in range(len(st.ledger)):
-        rec.ledger[st.counters[PERIOD], i] = st.ledger[i]
+        if st.state[r] == SPRUNG or (r < system.friction_rows and not rigid(system, r) and system.limit[r] > 0.0):
+            springs += spring_energy(system, st, r)
+    put_section(
+        system, rec, st.counters[PERIOD], y[:n], y[n:], st.displacement[:b], st.velocity[:b], springs, st.ledger
+    )
 
 
 @inlined

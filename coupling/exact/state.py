@@ -12,7 +12,8 @@ import numpy as np
 from vanedamp.coupling.exact.root_search import DEGREE
 from vanedamp.coupling.numerics.complementarity import Problem, new_problem
 from vanedamp.coupling.response.records import ENERGIES
-from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.system import System
 
 # names that functions are called with are numbers of numpy: numba would compile once for every literal
 
@@ -60,7 +61,7 @@ class State(NamedTuple):
     low: np.ndarray  # (r,) of slips: what is beyond the last digit of `displacement`, m
     velocity: np.ndarray  # (r,)
     drift: np.ndarray  # (r,) constant acceleration of each row's free bodies
-    body_drift: np.ndarray  # (b,)
+    drifts: np.ndarray  # (N,) constant acceleration of the free bodies, 0 for modes
     held: np.ndarray  # (r,) constant force of rows that are not closed, N
     level: np.ndarray  # (r,) constant part of a closed row's force, N
     state: np.ndarray  # (r,) int
@@ -98,10 +99,10 @@ class Scratch(NamedTuple):
     drive: np.ndarray  # (m,) share of the response in the growth of driven modes, 1/s
     coordinates: np.ndarray  # (2n,)
     slips: np.ndarray  # (2b,)
-    on_structure: np.ndarray  # (n,)
-    on_bodies: np.ndarray  # (b,)
-    jump: np.ndarray  # (n,)
-    sizes: np.ndarray  # (n,)
+    loads: np.ndarray  # (N,) on the coordinates, or their accelerations
+    rates: np.ndarray  # (N,) of these
+    sizes: np.ndarray  # (N,) of the terms that they are sums of
+    jump: np.ndarray  # (n,) of the modal velocities
     acceleration: np.ndarray  # (r,)
     jerk: np.ndarray  # (r,)
     impulse: np.ndarray  # (r,)
@@ -109,7 +110,7 @@ class Scratch(NamedTuple):
     before: np.ndarray  # (r,) int, row states
     forced: np.ndarray  # (r,) int: the bound that a row's force has just reached
     shut: np.ndarray  # (r,) int: contacts whose bodies are together
-    rows: np.ndarray  # (r,) int: the listed rows
+    listed: np.ndarray  # (r,) int: the listed rows
     verdict: np.ndarray  # (r,) int, of the listed rows
     side: np.ndarray  # (r,) int, of the listed rows
     members: np.ndarray  # (r,) int: places in that list
@@ -123,15 +124,15 @@ class Scratch(NamedTuple):
     growth: np.ndarray  # (m,) of driven modes over that step
 
 
-def new_state(rows: Rows, modes: int, displacement: np.ndarray, velocity: np.ndarray) -> State:
-    """The state at time zero with the rows as given; `modes` is the room for complex modes."""
-    r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
+def new_state(system: System, modes: int, initial: InitialMotion) -> State:
+    """The state at time zero; `modes` is the room for complex modes."""
+    r, n, b = len(system.delassus), system.modes, system.bodies
     state = State(
         counters=np.zeros(len(COUNTERS), np.int64), time=np.zeros(1), key=np.zeros(r, np.bool_),
-        amplitude=np.zeros(modes, complex), awake=np.zeros(modes, np.int64), coordinates=np.zeros(2 * n),
-        constant=np.zeros(n), slip_constant=np.zeros(b), displacement=np.array(displacement), low=np.zeros(r),
-        velocity=np.array(velocity), drift=np.zeros(r),
-        body_drift=np.zeros(b), held=np.zeros(r), level=np.zeros(r), state=np.zeros(r, np.int64),
+        amplitude=np.zeros(modes, complex), awake=np.zeros(modes, np.int64),
+        coordinates=np.r_[initial.p, initial.p_rate], constant=np.zeros(n), slip_constant=np.zeros(b),
+        displacement=np.array(initial.displacement), low=np.zeros(r), velocity=np.array(initial.velocity),
+        drift=np.zeros(r), drifts=np.zeros(n + b), held=np.zeros(r), level=np.zeros(r), state=np.zeros(r, np.int64),
         released=np.zeros(r, np.int64), settling=np.zeros(r), last_impact=np.full(r, -np.inf), push=np.zeros(r),
         fastest=np.zeros(1), ledger=np.zeros(len(ENERGIES)),
     )  # fmt: skip
@@ -139,18 +140,18 @@ def new_state(rows: Rows, modes: int, displacement: np.ndarray, velocity: np.nda
     return state
 
 
-def new_channels(rows: Rows, modes: int) -> Channels:
+def new_channels(system: System, modes: int) -> Channels:
     """Room for two event functions a row."""
-    k = 2 * len(rows.delassus)
+    k = 2 * len(system.delassus)
     integers, reals = np.zeros((4, k), np.int64), np.zeros((5, k))
     return Channels._make([*integers, *reals, *np.zeros((2, k, modes), complex), np.zeros((2, DEGREE + 1))])
 
 
-def new_scratch(rows: Rows, modes: int) -> Scratch:
+def new_scratch(system: System, modes: int) -> Scratch:
     """Scratch space for a scene."""
-    r, n, b = len(rows.delassus), len(rows.stiffness), len(rows.mass)
+    r, n, b = len(system.delassus), system.modes, system.bodies
     complexes, reals, integers = np.zeros((9, modes), complex), np.zeros((4, r)), np.zeros((7, r), np.int64)
-    sizes = (2 * n, 2 * b, n, b, n, n)
+    sizes = (2 * n, 2 * b, n + b, n + b, n + b, n)
     return Scratch._make(
         [*complexes[:3], *(np.zeros(size) for size in sizes), *reals, *integers, new_problem(r),
          np.zeros(modes, np.int64), *complexes[3:]]

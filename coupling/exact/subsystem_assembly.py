@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.exact.complex_modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
 from vanedamp.coupling.exact.state import ALONE, CALM, DIFFERENCE, SUM
-from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.system import System
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
@@ -93,10 +93,10 @@ class Flows(NamedTuple):
     slow_count: np.ndarray  # (s,)
 
 
-def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
+def empty_flows(system: System, capacity: int = 4) -> Flows:
     """Room for `capacity` subsystems, none of them filled (modes 0)."""
-    n, b, r = len(rows.stiffness), len(rows.mass), len(rows.delassus)
-    m = 2 * n + 1 + 2 * b * bool(np.isfinite(rows.spring[rows.friction_rows :]).any())
+    n, b, r = system.modes, system.bodies, len(system.delassus)
+    m = 2 * n + 1 + 2 * b * bool(np.isfinite(system.spring[system.friction_rows :]).any())
     pairs = m * (m + 3)
     z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
@@ -111,7 +111,7 @@ def empty_flows(rows: Rows, capacity: int = 4) -> Flows:
     )  # fmt: skip
 
 
-def add_flow(flows: Flows, rows: Rows, closed: np.ndarray) -> Flows:
+def add_flow(flows: Flows, system: System, closed: np.ndarray) -> Flows:
     """The stack with the subsystem of the closed rows (r,) in its first free place.
 
     Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
@@ -121,72 +121,81 @@ def add_flow(flows: Flows, rows: Rows, closed: np.ndarray) -> Flows:
     if len(free) == 0:
         size, room = len(flows.modes), sum(part.nbytes for part in flows)
         if 2 * room > ROOM:
-            flows = empty_flows(rows, size)
+            flows = empty_flows(system, size)
         else:
-            more = empty_flows(rows, size)
+            more = empty_flows(system, size)
             flows = Flows(*(np.concatenate([old, new]) for old, new in zip(flows, more, strict=True)))
         free = np.flatnonzero(flows.modes == 0)
     place = free[0]
-    _fill(flows, rows, place, np.flatnonzero(closed))
+    _fill(flows, system, place, np.flatnonzero(closed))
     flows.key[place] = closed
     return flows
 
 
-def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
-    n, b = len(rows.stiffness), len(rows.mass)
-    rigid, sprung = closed[np.isinf(rows.spring[closed])], closed[np.isfinite(rows.spring[closed])]
-    carrier, cluster, inner = _attachment(rows, rigid)
-    springs = _sprung_bodies(rows, cluster, sprung)
-    carrier[springs.anchored] = rows.floor[springs.anchored]
+def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
+    n, b = system.modes, system.bodies
+    rigid, sprung = closed[np.isinf(system.spring[closed])], closed[np.isfinite(system.spring[closed])]
+    carrier, cluster, inner = _attachment(system, rigid)
+    springs = _sprung_bodies(system, cluster, sprung)
+    carrier[springs.anchored] = system.floor[springs.anchored]
     free = (cluster >= 0) & ~springs.anchored
     # coordinates z = (p, xi): bodies are at x = carrier p + xi, besides the parabolas of free ones; z = lift eta
     basis = null_space(inner) if len(inner) else np.eye(n)
     lift, drop = block_diag(basis, springs.lift), block_diag(basis.T, springs.drop)
     spread = np.vstack([np.hstack([np.eye(n), carrier.T]), np.hstack([np.zeros((b, n)), np.eye(b)])])
     loads = lift.T @ spread  # loads on (p, x) become loads on eta
-    functional = _functional(rows, carrier)
-    law = np.hstack([functional[sprung], rows.bodies[sprung]])
-    elastic = np.vstack([np.eye(n, n + b), law]) * np.sqrt(np.r_[rows.stiffness, rows.spring[sprung]])[:, None]
-    if rows.proportional and lift.shape[1] == n and not len(sprung) and not np.any(cluster < 0):
-        real = RealModes(np.sqrt(rows.stiffness), np.eye(n), np.eye(n), rows.damping)
+    functional = _functional(system, carrier)
+    law = np.hstack([functional[sprung], system.of_bodies.J[sprung]])
+    elastic = (
+        np.vstack([np.eye(n, n + b), law])
+        * np.sqrt(np.r_[system.of_structure.stiffness, system.spring[sprung]])[:, None]
+    )
+    if system.proportional and lift.shape[1] == n and not len(sprung) and not np.any(cluster < 0):
+        real = RealModes(np.sqrt(system.of_structure.stiffness), np.eye(n), np.eye(n), system.of_structure.damping)
     else:
-        root = np.sqrt(rows.stiffness)
-        loss = block_diag(rows.damping / root / root[:, None], np.diag(rows.dashpot[sprung] / rows.spring[sprung]))
-        real = real_modes(np.sqrt(np.r_[np.ones(n), rows.mass])[:, None] * loads.T, elastic @ lift, loss)
+        root = np.sqrt(system.of_structure.stiffness)
+        loss = block_diag(
+            system.of_structure.damping / root / root[:, None], np.diag(system.dashpot[sprung] / system.spring[sprung])
+        )
+        real = real_modes(np.sqrt(np.r_[np.ones(n), system.of_bodies.mass])[:, None] * loads.T, elastic @ lift, loss)
     # from here on eta are the amplitudes of the real modes
     lift, drop, loads = lift @ real.shape, real.project @ drop, real.shape.T @ loads
     damping, stiffness = real.damping, np.diag(real.frequency**2)
     modes, harmonic, growth = _excite(
-        rows, damping, stiffness, loads @ np.r_[rows.force, rows.inertia], complex_modes(real.frequency, damping)
+        system,
+        damping,
+        stiffness,
+        loads @ np.r_[system.of_structure.load, system.of_bodies.load],
+        complex_modes(real.frequency, damping),
     )
     eigenvalue, shape, project = _one_of_each_pair(*modes)
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
-    felt = np.abs(np.vstack([functional, rows.response]))
-    _check_split(rows, felt.max(axis=0), law, sprung, shape, project)
+    felt = np.abs(np.vstack([functional, system.of_structure.response]))
+    _check_split(system, felt.max(axis=0), law, sprung, shape, project)
     flexibility = lift / real.frequency**2
-    _check_rest(rows, felt, flexibility @ loads)
+    _check_rest(system, felt, flexibility @ loads)
     m = len(eigenvalue) + 1
     flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, cluster < 0
-    flows.eigenvalue[s, :m] = np.r_[1j * rows.omega, eigenvalue]
+    flows.eigenvalue[s, :m] = np.r_[1j * system.omega, eigenvalue]
     driven = len(growth)
     flows.driven[s], flows.load[s, 1 : driven + 1] = driven, growth
     harmonic = lift @ harmonic
-    in_step = np.r_[harmonic, 1j * rows.omega * harmonic + shape[: n + b, :driven] @ growth]
+    in_step = np.r_[harmonic, 1j * system.omega * harmonic + shape[: n + b, :driven] @ growth]
     full = np.hstack([in_step[:, None], shape])
     structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
     flows.shape[s, :, :m] = full[structure]
     flows.excited[s] = full[xi, 0]
     flows.project[s, 1:m], flows.project_slip[s, 1:m] = project[:, structure], project[:, xi]
-    flows.kick[s, :, 1:m] = rows.structure @ project[:, n + b : 2 * n + b].T
+    flows.kick[s, :, 1:m] = system.of_structure.J @ project[:, n + b : 2 * n + b].T
     own = full[n : n + b].copy()
-    own[free, 0] -= (rows.inertia / rows.mass)[free] / rows.omega**2
+    own[free, 0] -= (system.of_bodies.load / system.of_bodies.mass)[free] / system.omega**2
     body = carrier @ full[:n] + own
     for c in np.unique(springs.cluster[free]):
         members = free & (springs.cluster == c)
-        flows.body_acceleration[s][np.ix_(members, members)] = 1 / rows.mass[members].sum()
+        flows.body_acceleration[s][np.ix_(members, members)] = 1 / system.of_bodies.mass[members].sum()
     flows.body[s, :, :m] = body
-    motion = functional @ full[:n] + rows.bodies @ own
-    terms = np.abs(functional) @ np.abs(full[:n]) + np.abs(rows.bodies) @ np.abs(own)
+    motion = functional @ full[:n] + system.of_bodies.J @ own
+    terms = np.abs(functional) @ np.abs(full[:n]) + np.abs(system.of_bodies.J) @ np.abs(own)
     # a row that others hold is at rest: round-off would make a Jenkins element there stick and slip without end
     flows.motion[s, :, :m] = np.where(np.abs(motion) <= HELD_STILL * terms, 0, motion)
     flows.velocity[s, :, :m] = _rate(flows, s, flows.motion[s, :, :m])
@@ -194,30 +203,32 @@ def _fill(flows: Flows, rows: Rows, s: int, closed: np.ndarray) -> None:
     if len(inner):
         kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
         flows.held[s] = kept - flexibility @ (elastic @ lift).T @ elastic @ kept
-    flows.response[s, :m] = rows.response @ full[:n]
-    flows.response[s, 0] += rows.table
+    flows.response[s, :m] = system.of_structure.response @ full[:n]
+    flows.response[s, 0] += system.table
     rate = np.abs(flows.eigenvalue[s, :m])
     size = np.abs(np.vstack([flows.motion[s, :, :m], flows.response[s, :m]])).max(axis=0)
     # terms by their sizes: a mode may be where no row feels it as long as others are closed
-    held = np.vstack([np.abs(functional) @ np.abs(full[:n]), np.abs(rows.response) @ np.abs(full[:n])]).max(axis=0)
+    held = np.vstack(
+        [np.abs(functional) @ np.abs(full[:n]), np.abs(system.of_structure.response) @ np.abs(full[:n])]
+    ).max(axis=0)
     flows.speed[s, :m], flows.acceleration[s, :m] = size * rate, np.maximum(size, held) * rate**2
-    flows.turn[s, :m] = np.exp(flows.eigenvalue[s, :m] * rows.period / 8)
-    _fill_forces(flows, rows, s, full[structure], rigid, sprung)
-    _fill_energy(flows, rows, s, full[structure], body)
+    flows.turn[s, :m] = np.exp(flows.eigenvalue[s, :m] * system.period / 8)
+    _fill_forces(flows, system, s, full[structure], rigid, sprung)
+    _fill_energy(flows, system, s, full[structure], body)
 
 
 def _check_split(
-    rows: Rows, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, shape: np.ndarray, project: np.ndarray
+    system: System, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, shape: np.ndarray, project: np.ndarray
 ) -> None:
     """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
 
     Each coordinate counts by what the rows and the response feel of it (felt (n,)), its rate by its own frequency or
     that of the excitation.
     """
-    n, b = len(rows.stiffness), len(rows.mass)
+    n, b = system.modes, system.bodies
     size = np.r_[1 / np.maximum(felt, _UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]
-    stiffness = np.r_[rows.stiffness, np.zeros(b)] + rows.spring[sprung] @ law**2
-    rate = np.maximum(rows.omega, np.sqrt(stiffness / np.r_[np.ones(n), rows.mass]))
+    stiffness = np.r_[system.of_structure.stiffness, np.zeros(b)] + system.spring[sprung] @ law**2
+    rate = np.maximum(system.omega, np.sqrt(stiffness / np.r_[np.ones(n), system.of_bodies.mass]))
     size = np.r_[size, size * rate]
     grows = np.finfo(float).eps * size / size[:, None]
     parts = sum(np.abs(part(shape)) @ np.abs(part(project)) for part in (np.real, np.imag))
@@ -227,29 +238,31 @@ def _check_split(
         raise IllConditioned("its modes cancel")
 
 
-def _check_rest(rows: Rows, felt: np.ndarray, static: np.ndarray) -> None:
+def _check_rest(system: System, felt: np.ndarray, static: np.ndarray) -> None:
     """Refuse a subsystem that weight would carry so far that its round-off there is more than FAR of a gap."""
-    n, eps = len(rows.stiffness), np.finfo(float).eps
-    far = felt @ np.abs(static[:n, n:] @ rows.weight)
-    if len(rows.gap) and not eps * far.max(initial=0.0) <= FAR * rows.gap.min():
+    n, eps = system.modes, np.finfo(float).eps
+    far = felt @ np.abs(static[:n, n:] @ system.of_bodies.weight)
+    if not eps * far.max(initial=0.0) <= FAR * system.free_travel.min(initial=np.inf):
         raise IllConditioned("at rest under its weight the structure is too far away")
 
 
-def _fill_forces(flows: Flows, rows: Rows, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
+def _fill_forces(flows: Flows, system: System, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
     m = flows.modes[s]
     rate, load = flows.eigenvalue[s, :m], flows.load[s, :m]
-    spring, dashpot = rows.spring[sprung, None], rows.dashpot[sprung, None]
+    spring, dashpot = system.spring[sprung, None], system.dashpot[sprung, None]
     push = -spring * flows.motion[s, sprung, :m] - dashpot * flows.velocity[s, sprung, :m]
     flows.force[s, sprung, :m], flows.impulse[s, sprung, :m] = push, _antiderivative(push, 1 / rate, load)
     if not len(rigid):
         return
-    pull = rows.structure @ np.hstack([-np.diag(rows.stiffness), -rows.damping])
+    pull = system.of_structure.J @ np.hstack([-np.diag(system.of_structure.stiffness), -system.of_structure.damping])
     acceleration, size = pull @ full, np.abs(pull) @ np.abs(full)
-    excited = rows.structure @ rows.force + rows.bodies @ (rows.inertia / rows.mass)
+    excited = system.of_structure.J @ system.of_structure.load + system.of_bodies.J @ (
+        system.of_bodies.load / system.of_bodies.mass
+    )
     acceleration[:, 0] += excited
     size[:, 0] += np.abs(excited)
-    acceleration += rows.delassus[:, sprung] @ flows.force[s, sprung, :m]
-    inverse = np.linalg.inv(rows.delassus[np.ix_(rigid, rigid)])
+    acceleration += system.delassus[:, sprung] @ flows.force[s, sprung, :m]
+    inverse = np.linalg.inv(system.delassus[np.ix_(rigid, rigid)])
     flows.closed_inverse[s][np.ix_(rigid, rigid)] = inverse
     force = -inverse @ acceleration[rigid]
     # a contact without force has none, not round-off, or it would open and close at every tick of the clock
@@ -258,16 +271,16 @@ def _fill_forces(flows: Flows, rows: Rows, s: int, full: np.ndarray, rigid: np.n
 
 
 def _excite(
-    rows: Rows, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
+    system: System, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
 ) -> tuple[_Modes, np.ndarray, np.ndarray]:
     """The modes, driven ones first; eta (k,) in step with a harmonic load, without their share; their growth."""
     eigenvalue, shape, project = modes
     if not load.any():  # free decay, at any frequency
         return modes, np.zeros_like(load), np.zeros(0)
-    k, apart = len(load), 1j * rows.omega - eigenvalue
-    driven = np.abs(apart) * rows.period < NEAR
+    k, apart = len(load), 1j * system.omega - eigenvalue
+    driven = np.abs(apart) * system.period < NEAR
     if not driven.any():
-        dynamic = stiffness + 1j * rows.omega * damping - rows.omega**2 * np.eye(k)
+        dynamic = stiffness + 1j * system.omega * damping - system.omega**2 * np.eye(k)
         return modes, np.linalg.solve(dynamic, load), np.zeros(0)
     growth = project[:, k:] @ load
     harmonic = shape[:k] @ np.where(driven, 0, growth / np.where(driven, 1, apart))
@@ -284,20 +297,20 @@ def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
     return rate
 
 
-def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.ndarray) -> None:
-    n, m = len(rows.stiffness), flows.modes[s]
+def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: np.ndarray) -> None:
+    n, m = system.modes, flows.modes[s]
     velocity, rate, load = full[n:], flows.eigenvalue[s, :m], flows.load[s, :m]
     body_rate = _rate(flows, s, body)
-    response, momentum = flows.response[s, :m], rows.mass @ body_rate
+    response, momentum = flows.response[s, :m], system.of_bodies.mass @ body_rate
     # all harmonic loads are in phase with the sine: real amplitudes
-    work = -rows.force.imag @ velocity - rows.inertia.imag @ body_rate
-    free = rows.mass * (np.diagonal(flows.body_acceleration[s]) != 0)
+    work = -system.of_structure.load.imag @ velocity - system.of_bodies.load.imag @ body_rate
+    free = system.of_bodies.mass * (np.diagonal(flows.body_acceleration[s]) != 0)
     # the excitation and the modes that it drives turn together: a product of one with a conjugate one is slow
     together = np.arange(m) <= flows.driven[s]
-    along, _ = _reciprocal(rate + rate[0], rows.period)
-    against, _ = _reciprocal(rate - rate[0], rows.period, together)
-    back, _ = _reciprocal(rate.conj() - rate[0], rows.period)
-    alone, slow_alone = _reciprocal(rate, rows.period)
+    along, _ = _reciprocal(rate + rate[0], system.period)
+    against, _ = _reciprocal(rate - rate[0], system.period, together)
+    back, _ = _reciprocal(rate.conj() - rate[0], system.period)
+    alone, slow_alone = _reciprocal(rate, system.period)
     mean = 2 * _antiderivative(response, alone, load)
     free_momentum = free @ flows.velocity[s, : len(free), :m]
     work_along, work_against = _antiderivative(work, along, load), work * against
@@ -311,28 +324,28 @@ def _fill_energy(flows: Flows, rows: Rows, s: int, full: np.ndarray, body: np.nd
         _real_map(0.5 * momentum * against, 0.5 * momentum_back),
         np.column_stack([mean.real, -mean.imag, free_momentum.real, -free_momentum.imag]),
     ])  # fmt: skip
-    sprung = np.isfinite(rows.spring) & flows.force[s].any(axis=1)
-    push, damper = flows.velocity[s, sprung, :m], np.diag(rows.dashpot[sprung])
+    sprung = np.isfinite(system.spring) & flows.force[s].any(axis=1)
+    push, damper = flows.velocity[s, sprung, :m], np.diag(system.dashpot[sprung])
     reciprocal, slow = zip(
-        _reciprocal(rate[:, None] + rate, rows.period),
-        _reciprocal(rate[:, None] + rate.conj(), rows.period, np.outer(together, together)),
+        _reciprocal(rate[:, None] + rate, system.period),
+        _reciprocal(rate[:, None] + rate.conj(), system.period, np.outer(together, together)),
         strict=True,
     )
     forms = (flows.loss, flows.dashpot, flows.square), (flows.slow_loss, flows.slow_dashpot, flows.slow_square)
     products = [
         [left.T @ middle @ right for right in (left, left.conj())]
-        for left, middle in ((velocity, rows.damping), (push, damper), (response[None], np.eye(1)))
+        for left, middle in ((velocity, system.of_structure.damping), (push, damper), (response[None], np.eye(1)))
     ]
     integral: list[np.ndarray] = [np.zeros(0)] * 2
     for form, product in zip(forms[0], products, strict=True):
         for kind, other in ((SUM, load), (DIFFERENCE, load.conj())):
             product[kind], integral[kind] = _antiderivatives(product[kind], reciprocal[kind], load, other)
         form[s, :m, :m] = _real_form(*integral)
-    flows.damped[s] = rows.dashpot[sprung].any()
-    flows.uncoupled[s] = rows.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + 1
+    flows.damped[s] = system.dashpot[sprung].any()
+    flows.uncoupled[s] = system.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + 1
     # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
     # is taken at once (exact.energy_balance)
-    calm = np.abs(rate) * rows.period < SLOW / 2
+    calm = np.abs(rate) * system.period < SLOW / 2
     products[2] = [np.where(np.outer(calm, calm), 0, product) for product in products[2]]
     listed = [(j, k, kind) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
     count = len(listed)
@@ -386,28 +399,28 @@ def _real_form(both: np.ndarray, mixed: np.ndarray) -> np.ndarray:
     return 0.5 * _real_map(both, mixed) * [1, 1, -1, -1]
 
 
-def _attachment(rows: Rows, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _attachment(system: System, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Who moves with whom: (functional each body rides on, its free cluster or -1 if it rides, inner constraints).
 
     An inner constraint is a combination of closed rows that ties two functionals of the structure to each other.
     """
-    n, b = rows.structure.shape[1], len(rows.mass)
+    n, b = system.of_structure.J.shape[1], system.bodies
     carrier, known = np.zeros((b, n)), np.zeros(b, bool)
     remaining, inner = [int(r) for r in closed], []
     while True:
-        ready = [r for r in remaining if _decided(rows, r, known)]
+        ready = [r for r in remaining if _decided(system, r, known)]
         if not ready:
             break
         r = ready[0]
         remaining.remove(r)
-        functional = rows.bodies[r] @ carrier + rows.structure[r]
-        unknown = np.flatnonzero((rows.bodies[r] != 0) & ~known)
+        functional = system.of_bodies.J[r] @ carrier + system.of_structure.J[r]
+        unknown = np.flatnonzero((system.of_bodies.J[r] != 0) & ~known)
         if len(unknown):
-            carrier[unknown[0]] = -functional / rows.bodies[r, unknown[0]]
+            carrier[unknown[0]] = -functional / system.of_bodies.J[r, unknown[0]]
             known[unknown[0]] = True
-        elif np.linalg.norm(functional) > 1e-12 * np.linalg.norm(rows.structure[r]):
+        elif np.linalg.norm(functional) > 1e-12 * np.linalg.norm(system.of_structure.J[r]):
             inner.append(functional)
-    cluster = _connected([np.flatnonzero(rows.bodies[r]) for r in remaining], b)
+    cluster = _connected([np.flatnonzero(system.of_bodies.J[r]) for r in remaining], b)
     numbers = np.unique(cluster[~known])
     cluster = np.where(known, -1, np.searchsorted(numbers, cluster))
     return carrier, cluster, np.array(inner)
@@ -421,17 +434,17 @@ def _connected(links: list[np.ndarray], count: int) -> np.ndarray:
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def _decided(rows: Rows, r: int, known: np.ndarray) -> bool:
+def _decided(system: System, r: int, known: np.ndarray) -> bool:
     """Whether all but one of the bodies of a closed row are known to ride on the structure."""
-    bodies = rows.bodies[r] != 0
+    bodies = system.of_bodies.J[r] != 0
     free = np.count_nonzero(bodies & ~known)
     return free == 0 or (free == 1 and (np.count_nonzero(bodies) == 1 or bool(known[bodies].any())))
 
 
-def _functional(rows: Rows, carrier: np.ndarray) -> np.ndarray:
+def _functional(system: System, carrier: np.ndarray) -> np.ndarray:
     """Functional of p in each row (r, n); exactly zero where the row's two sides ride on one functional."""
-    functional: np.ndarray = rows.structure + rows.bodies @ carrier
-    scale = (np.abs(rows.structure) + np.abs(rows.bodies) @ np.abs(carrier)).max(axis=1, initial=0)
+    functional: np.ndarray = system.of_structure.J + system.of_bodies.J @ carrier
+    scale = (np.abs(system.of_structure.J) + np.abs(system.of_bodies.J) @ np.abs(carrier)).max(axis=1, initial=0)
     functional[np.abs(functional).max(axis=1, initial=0) <= 1e-12 * scale] = 0
     return functional
 
@@ -445,13 +458,13 @@ class _SprungBodies(NamedTuple):
     cluster: np.ndarray  # (b,) number of the bodies that move freely together
 
 
-def _sprung_bodies(rows: Rows, cluster: np.ndarray, sprung: np.ndarray) -> _SprungBodies:
+def _sprung_bodies(system: System, cluster: np.ndarray, sprung: np.ndarray) -> _SprungBodies:
     """Bodies that springs tie to the structure move with it; others vibrate about their common centre of mass."""
     b, groups = len(cluster), cluster.max(initial=-1) + 1
     if not len(sprung):
         return _SprungBodies(np.zeros((b, 0)), np.zeros((0, b)), np.zeros(b, bool), cluster)
     member = (cluster == np.arange(groups)[:, None]).astype(float)
-    links = rows.bodies[sprung] @ member.T
+    links = system.of_bodies.J[sprung] @ member.T
     # the last node is the structure
     ends = [np.r_[np.flatnonzero(link), groups][:2] for link in links if link.any()]
     part = _connected(ends, groups + 1)
@@ -463,7 +476,7 @@ def _sprung_bodies(rows: Rows, cluster: np.ndarray, sprung: np.ndarray) -> _Spru
             columns.append(member[inside].T)
             rests.append(first[inside])
         elif len(inside) > 1:
-            spread, gather = _about_centre(member[inside] @ rows.mass)
+            spread, gather = _about_centre(member[inside] @ system.of_bodies.mass)
             columns.append(member[inside].T @ spread)
             rests.append(gather @ first[inside])
     anchored = (cluster >= 0) & (part[cluster] == part[groups])

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, System
-from vanedamp.coupling.methods.newmark import first_forces, net_load, row_force
+from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, TimeGrid
+from vanedamp.coupling.methods.penalty import first_forces, net_load, row_force
 from vanedamp.coupling.methods.step_records import (
     close_step,
     copy,
@@ -23,28 +23,31 @@ from vanedamp.coupling.methods.step_records import (
     solve_inverse,
 )
 from vanedamp.coupling.numerics.jit import entry
+from vanedamp.coupling.system.system import System
 
 
-def explicit_matrix(system: System) -> np.ndarray:
+def explicit_matrix(system: System, times: TimeGrid) -> np.ndarray:
     """Inverse (N, N) of the mass with half a step of damping."""
-    inverse: np.ndarray = np.linalg.inv(np.diag(system.mass) + 0.5 * system.step * system.damping)
+    inverse: np.ndarray = np.linalg.inv(np.diag(system.mass) + 0.5 * times.step * system.damping)
     return inverse
 
 
 @entry
-def march_explicit(system, motion, records, log, inverse, slow, periods, budget, deepest):
+def march_explicit(system, times, motion, records, log, inverse, slow, periods, budget, deepest):
     """Step to the end of `periods`. slow: (friction rows,) speed below which friction is viscous, m/s."""
-    size, rows, h, steps = len(motion.q), len(system.J), system.step, len(system.phase) - 1
+    size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
     q, v, rhs, change = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
     impulse, speed, before, old = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows], motion.rows[3]
     if motion.counters[PERIOD] == 0:
         record_start(system, motion, records)
-        first_forces(system, motion, slow)
+        first_forces(system, times, motion, slow)
         for i in range(size):
-            motion.half[i] = motion.v[i] + 0.5 * h * net_load(system, motion, motion.q, motion.v, 0, i) / system.mass[i]
+            motion.half[i] = (
+                motion.v[i] + 0.5 * h * net_load(system, times, motion, motion.q, motion.v, 0, i) / system.mass[i]
+            )
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
-            open_step(system, motion, records, k, q, v, before)
+            open_step(system, times, motion, records, k, q, v, before)
             copy(motion.force, old)
             for i in range(size):
                 motion.q[i] += h * motion.half[i]
@@ -53,7 +56,7 @@ def march_explicit(system, motion, records, log, inverse, slow, periods, budget,
                 row_force(system, motion, r, row_speed(system, r, motion.q), speed[r], slow, h * speed[r])
                 impulse[r] = 0.5 * h * (old[r] + motion.force[r])
             for i in range(size):
-                rhs[i] = load_at(system, k + 1, i) - damped(system, motion.half, i)
+                rhs[i] = load_at(system, times, k + 1, i) - damped(system, motion.half, i)
                 rhs[i] -= system.stiffness[i] * motion.q[i]
             for r in range(rows):
                 if motion.force[r] != 0.0:
@@ -63,10 +66,10 @@ def march_explicit(system, motion, records, log, inverse, slow, periods, budget,
             for i in range(size):
                 motion.v[i] = motion.half[i] + 0.5 * h * change[i]
                 motion.half[i] += h * change[i]
-            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
+            code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
             if code != DONE:
                 return code
-        code = end_period(system, motion, records, budget)
+        code = end_period(system, times, motion, records, budget)
         if code != DONE:
             return code
     return DONE

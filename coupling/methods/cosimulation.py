@@ -14,52 +14,53 @@ import math
 import numpy as np
 from scipy.linalg import expm
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, STEPS, System
-from vanedamp.coupling.methods.newmark import first_forces, net_load, row_force
+from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, STEPS, TimeGrid
+from vanedamp.coupling.methods.penalty import first_forces, net_load, row_force
 from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
 from vanedamp.coupling.numerics.jit import entry, kernel
+from vanedamp.coupling.system.system import System
 
 
-def cosimulation_matrices(system: System) -> np.ndarray:
+def cosimulation_matrices(system: System, times: TimeGrid) -> np.ndarray:
     """Exact step of the structure: (2n, 4n + 2) on p, p', cos and sin of omega t, constant and linear modal loads."""
     n = system.modes
     rate = np.zeros((4 * n + 2, 4 * n + 2))
     rate[:n, n : 2 * n] = np.eye(n)
     rate[n : 2 * n, :n] = -np.diag(system.stiffness[:n])
     rate[n : 2 * n, n : 2 * n] = -system.damping[:n, :n]
-    rate[n : 2 * n, 2 * n] = system.load[:n, 0]
-    rate[n : 2 * n, 2 * n + 1] = -system.load[:n, 1]
+    rate[n : 2 * n, 2 * n] = system.load[:n].real
+    rate[n : 2 * n, 2 * n + 1] = -system.load[:n].imag
     rate[2 * n, 2 * n + 1], rate[2 * n + 1, 2 * n] = -system.omega, system.omega
     rate[n : 2 * n, 2 * n + 2 : 3 * n + 2] = np.eye(n)
     rate[2 * n + 2 : 3 * n + 2, 3 * n + 2 :] = np.eye(n)
-    exact: np.ndarray = expm(rate * system.step)[: 2 * n]
+    exact: np.ndarray = expm(rate * times.step)[: 2 * n]
     return np.ascontiguousarray(exact)
 
 
 @entry
 def march_cosimulation(
-    system, motion, records, log, matrix, memory, slow, gauss_seidel, hold, substeps, periods, budget, deepest
+    system, times, motion, records, log, matrix, memory, slow, gauss_seidel, hold, substeps, periods, budget, deepest
 ):
     """Step to the end of `periods`. memory (3, 4n + 2 + r): last velocities and mean forces; those before; scratch."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
-    h, steps = system.step, len(system.phase) - 1
+    h, steps = times.step, len(times.phase) - 1
     q, v, known = motion.coordinates[0], motion.coordinates[1], memory[2]
     place, rate, bend, mean = motion.rows[4], motion.rows[5], motion.rows[6], motion.rows[7]
     impulse, speed, before = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows]
     last_speed, last_force, older_force = memory[0, :n], memory[0, n : n + rows], memory[1, :rows]
     if motion.counters[PERIOD] == 0:
         record_start(system, motion, records)
-        first_forces(system, motion, slow)
+        first_forces(system, times, motion, slow)
         for i in range(n, size):
-            start = net_load(system, motion, motion.q, motion.v, 0, i) / system.mass[i]
+            start = net_load(system, times, motion, motion.q, motion.v, 0, i) / system.mass[i]
             motion.half[i] = motion.v[i] + 0.5 * h / substeps * start
         copy(motion.v, last_speed)
         copy(motion.force, last_force)
         copy(motion.force, older_force)
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
-            open_step(system, motion, records, k, q, v, before)
-            _structure(system, motion, matrix, known, last_force, older_force, hold, k, q, v)
+            open_step(system, times, motion, records, k, q, v, before)
+            _structure(system, times, motion, matrix, known, last_force, older_force, hold, k, q, v)
             for r in range(rows):
                 place[r], rate[r], bend[r] = 0.0, 0.0, 0.0
                 speed[r], mean[r] = row_speed(system, r, v), 0.0
@@ -73,24 +74,24 @@ def march_cosimulation(
                         change = motion.v[i] - v[i] if gauss_seidel else v[i] - last_speed[i]
                         bend[r] += system.J[r, i] * change / h
             copy(v, last_speed)
-            _bodies(system, motion, slow, substeps, k, place, rate, bend, mean)
+            _bodies(system, times, motion, slow, substeps, k, place, rate, bend, mean)
             copy(last_force, older_force)
             copy(mean, last_force)
             for r in range(rows):
                 impulse[r] = h * mean[r]
-            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
+            code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
             if code != DONE:
                 return code
-        code = end_period(system, motion, records, budget)
+        code = end_period(system, times, motion, records, budget)
         if code != DONE:
             return code
     return DONE
 
 
 @kernel
-def _structure(system, motion, matrix, known, force, older, hold, k, q, v):
+def _structure(system, times, motion, matrix, known, force, older, hold, k, q, v):
     """The structure's macro-step under the forces that it was given."""
-    n, h = system.modes, system.step
+    n, h = system.modes, times.step
     for i in range(n):
         known[i], known[n + i] = q[i], v[i]
         constant, slope = 0.0, 0.0
@@ -100,7 +101,7 @@ def _structure(system, motion, matrix, known, force, older, hold, k, q, v):
                 slope += system.J[r, i] * (force[r] - older[r]) / h
         # the mean belongs to the middle of the last macro-step
         known[2 * n + 2 + i], known[3 * n + 2 + i] = constant + 0.5 * h * slope, slope
-    known[2 * n], known[2 * n + 1] = system.phase[k, 0], system.phase[k, 1]
+    known[2 * n], known[2 * n + 1] = times.phase[k, 0], times.phase[k, 1]
     for i in range(n):
         p, rate = 0.0, 0.0
         for j in range(4 * n + 2):
@@ -110,13 +111,13 @@ def _structure(system, motion, matrix, known, force, older, hold, k, q, v):
 
 
 @kernel
-def _bodies(system, motion, slow, substeps, k, place, rate, bend, mean):
+def _bodies(system, times, motion, slow, substeps, k, place, rate, bend, mean):
     """The bodies' macro-step on walls that move as they were told; adds up the mean forces of the rows."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
-    small = system.step / substeps
+    small = times.step / substeps
     for j in range(substeps):
         t = (j + 1) * small
-        angle = system.omega * (k * system.step + t)
+        angle = system.omega * (k * times.step + t)
         cosine, sine = math.cos(angle), math.sin(angle)
         for i in range(n, size):
             motion.q[i] += small * motion.half[i]
@@ -129,7 +130,7 @@ def _bodies(system, motion, slow, substeps, k, place, rate, bend, mean):
             row_force(system, motion, r, displacement, speed, slow, small * speed)
             mean[r] += 0.5 * motion.force[r] / substeps
         for i in range(n, size):
-            force = system.weight[i] + system.load[i, 0] * cosine - system.load[i, 1] * sine
+            force = system.weight[i] + system.load[i].real * cosine - system.load[i].imag * sine
             for r in range(rows):
                 force += system.J[r, i] * motion.force[r]
             change = small * force / system.mass[i]

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, System
+from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, TimeGrid
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
     close_step,
@@ -25,14 +25,15 @@ from vanedamp.coupling.methods.step_records import (
     solve_inverse,
 )
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.system.system import System
 
 #: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
 _TURNS, _ROUND_OFF = 20, 1e-12
 
 
-def moreau_matrices(system: System, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Inverse of the iteration matrix (N, N), its product with J^T (N, r), and the rows' mobility (r, r)."""
-    h = system.step
+    h = times.step
     matrix = np.diag(system.mass + (h * theta) ** 2 * system.stiffness) + h * theta * system.damping
     inverse = np.linalg.inv(matrix)
     turned = inverse @ system.J.T
@@ -40,25 +41,27 @@ def moreau_matrices(system: System, theta: float) -> tuple[np.ndarray, np.ndarra
 
 
 @entry
-def march_moreau(system, motion, records, log, problem, inverse, turned, mobility, theta, periods, budget, deepest):
+def march_moreau(
+    system, times, motion, records, log, problem, inverse, turned, mobility, theta, periods, budget, deepest
+):
     """Step to the end of `periods`. Returns one of the codes of methods.equations_of_motion."""
-    size, rows, h, steps = len(motion.q), len(system.J), system.step, len(system.phase) - 1
+    size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
     q, v, rhs, free = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
     impulse, speed, before = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows]
     if motion.counters[PERIOD] == 0:
         record_start(system, motion, records)
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
-            open_step(system, motion, records, k, q, v, before)
+            open_step(system, times, motion, records, k, q, v, before)
             for i in range(size):
-                load = theta * load_at(system, k + 1, i) + (1.0 - theta) * load_at(system, k, i)
+                load = theta * load_at(system, times, k + 1, i) + (1.0 - theta) * load_at(system, times, k, i)
                 rhs[i] = h * (load - damped(system, v, i) - system.stiffness[i] * (q[i] + h * theta * v[i]))
             solve_inverse(inverse, system.proportional, rhs, free)
             for i in range(size):
                 free[i] += v[i]
             for r in range(rows):
                 speed[r], impulse[r] = row_speed(system, r, v), 0.0
-            if not _impulses(system, motion, problem, mobility, turned, free, speed, impulse, theta):
+            if not _impulses(system, times, motion, problem, mobility, turned, free, speed, impulse, theta):
                 return UNDECIDED
             for i in range(size):
                 motion.v[i] = free[i]
@@ -66,17 +69,17 @@ def march_moreau(system, motion, records, log, problem, inverse, turned, mobilit
             for r in range(system.friction_rows):
                 if system.spring[r] != math.inf and system.limit[r] > 0.0:
                     motion.elongation[r] = -impulse[r] / (h * system.spring[r])
-            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
+            code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
             if code != DONE:
                 return code
-        code = end_period(system, motion, records, budget)
+        code = end_period(system, times, motion, records, budget)
         if code != DONE:
             return code
     return DONE
 
 
 @inlined
-def _impulses(system, motion, problem, mobility, turned, free, speed, impulse, theta):
+def _impulses(system, times, motion, problem, mobility, turned, free, speed, impulse, theta):
     """Set the impulses (r,) of a step; `free` (N,) becomes the velocity at its end. Returns False if undecided.
 
     A contact that parts as the step begins waits. Where impulses of others drive it together, it meets a second impact
@@ -88,7 +91,7 @@ def _impulses(system, motion, problem, mobility, turned, free, speed, impulse, t
         slowest = max(slowest, _ROUND_OFF * abs(speed[r]))
     for turn in range(_TURNS):
         last = turn == _TURNS - 1
-        count = _list_rows(system, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last)
+        count = _list_rows(system, times, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last)
         if count == 0:
             return True
         motion.counters[SOLVES] += 1
@@ -114,9 +117,9 @@ def _approaching(system, motion, free, slowest):
 
 
 @kernel
-def _list_rows(system, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last):
+def _list_rows(system, times, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last):
     """Set up the problem of the rows that take part in a turn. Returns how many they are."""
-    h, count, closed = system.step, 0, motion.rows[4]
+    h, count, closed = times.step, 0, motion.rows[4]
     for r in range(len(system.J)):
         low, high, shift, soft = 0.0, np.inf, 0.0, 0.0
         now = row_speed(system, r, free)
@@ -129,7 +132,7 @@ def _list_rows(system, motion, problem, mobility, free, speed, impulse, theta, t
             if system.spring[r] != math.inf:
                 shift, soft = motion.elongation[r] / h, 1.0 / (h * h * system.spring[r])
         else:
-            gap = system.offset[r] + row_speed(system, r, motion.q)
+            gap = system.rest[r] + row_speed(system, r, motion.q)
             if system.spring[r] == math.inf:
                 if gap + 0.5 * h * speed[r] > 0.0:
                     continue

@@ -12,7 +12,8 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, System
+from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, TimeGrid
+from vanedamp.coupling.methods.penalty import first_forces, net_load
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
     close_step,
@@ -25,12 +26,15 @@ from vanedamp.coupling.methods.step_records import (
     row_speed,
     solve_inverse,
 )
-from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.numerics.jit import entry, kernel
+from vanedamp.coupling.system.system import System
 
 
-def newmark_matrices(system: System, alpha: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def newmark_matrices(
+    system: System, times: TimeGrid, alpha: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Parameters alpha, beta, gamma; inverse iteration matrix, (1 + alpha) times its product with J^T, mobility."""
-    h, beta, gamma = system.step, (1 - alpha) ** 2 / 4, 0.5 - alpha
+    h, beta, gamma = times.step, (1 - alpha) ** 2 / 4, 0.5 - alpha
     matrix = np.diag(system.mass + (1 + alpha) * beta * h**2 * system.stiffness)
     inverse = np.linalg.inv(matrix + (1 + alpha) * gamma * h * system.damping)
     turned = (1 + alpha) * inverse @ system.J.T
@@ -39,37 +43,37 @@ def newmark_matrices(system: System, alpha: float) -> tuple[np.ndarray, np.ndarr
 
 @entry
 def march_newmark(
-    system, motion, records, log, problem, parameters, inverse, turned, mobility, slow, periods, budget, deepest
+    system, times, motion, records, log, problem, parameters, inverse, turned, mobility, slow, periods, budget, deepest
 ):
     """Step to the end of `periods`. slow: (friction rows,) speed below which friction is viscous, 0 for Coulomb's."""
     alpha, beta, gamma = parameters[0], parameters[1], parameters[2]
-    size, rows, h, steps = len(motion.q), len(system.J), system.step, len(system.phase) - 1
+    size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
     q, v, rhs, accel = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
     ahead, fast, listed = motion.coordinates[4], motion.coordinates[5], motion.listed
     impulse, speed, before, old = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows], motion.rows[3]
     if motion.counters[PERIOD] == 0:
         record_start(system, motion, records)
-        first_forces(system, motion, slow)
+        first_forces(system, times, motion, slow)
         for i in range(size):
-            motion.half[i] = net_load(system, motion, motion.q, motion.v, 0, i) / system.mass[i]
+            motion.half[i] = net_load(system, times, motion, motion.q, motion.v, 0, i) / system.mass[i]
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
-            open_step(system, motion, records, k, q, v, before)
+            open_step(system, times, motion, records, k, q, v, before)
             copy(motion.force, old)
             for i in range(size):
                 a = motion.half[i]
                 ahead[i] = q[i] + h * v[i] + h * h * (0.5 - beta) * a
                 fast[i] = v[i] + h * (1.0 - gamma) * a
             for i in range(size):
-                new = load_at(system, k + 1, i) - damped(system, fast, i) - system.stiffness[i] * ahead[i]
+                new = load_at(system, times, k + 1, i) - damped(system, fast, i) - system.stiffness[i] * ahead[i]
                 rhs[i] = (1.0 + alpha) * new
                 if alpha != 0.0:
-                    rhs[i] -= alpha * net_load(system, motion, q, v, k, i)
+                    rhs[i] -= alpha * net_load(system, times, motion, q, v, k, i)
             solve_inverse(inverse, system.proportional, rhs, accel)
             for i in range(size):
                 ahead[i] += beta * h * h * accel[i]
                 fast[i] += gamma * h * accel[i]
-            count = _list_rows(system, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma)
+            count = _list_rows(system, times, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma)
             if count > 0:
                 motion.counters[SOLVES] += 1
                 if not solve_rows(problem, count):
@@ -90,55 +94,19 @@ def march_newmark(
                 impulse[r] = 0.5 * h * (old[r] + motion.force[r])
                 if r < system.friction_rows and system.spring[r] != math.inf and system.limit[r] > 0.0:
                     motion.elongation[r] = -motion.force[r] / system.spring[r]
-            code = close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest)
+            code = close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest)
             if code != DONE:
                 return code
-        code = end_period(system, motion, records, budget)
+        code = end_period(system, times, motion, records, budget)
         if code != DONE:
             return code
     return DONE
 
 
 @kernel
-def first_forces(system, motion, slow):
-    """Forces of the rows by their laws (penalty contacts, regularised friction) at motion.q, motion.v."""
-    for r in range(len(system.J)):
-        row_force(system, motion, r, row_speed(system, r, motion.q), row_speed(system, r, motion.v), slow, 0.0)
-
-
-@inlined
-def row_force(system, motion, r, displacement, speed, slow, moved):
-    """Set the force of row r by its law. moved: displacement of a Jenkins element since its last force."""
-    if r >= system.friction_rows:
-        gap = system.offset[r] + displacement
-        push = -system.spring[r] * gap - system.dashpot[r] * speed
-        motion.force[r] = max(push, 0.0) if gap < 0.0 else 0.0
-    elif system.limit[r] == 0.0:
-        motion.force[r] = 0.0
-    elif system.spring[r] != math.inf:
-        push = -system.spring[r] * (motion.elongation[r] + moved)
-        motion.force[r] = min(max(push, -system.limit[r]), system.limit[r])
-        motion.elongation[r] = -motion.force[r] / system.spring[r]
-    elif slow[r] > 0.0:
-        motion.force[r] = -system.limit[r] * min(max(speed / slow[r], -1.0), 1.0)
-    else:
-        motion.force[r] = -system.limit[r] * np.sign(speed)
-
-
-@inlined
-def net_load(system, motion, q, v, k, i):
-    """Sum of the forces on coordinate i at step k of the period."""
-    force = load_at(system, k, i) - damped(system, v, i) - system.stiffness[i] * q[i]
-    for r in range(len(system.J)):
-        if motion.force[r] != 0.0:
-            force += system.J[r, i] * motion.force[r]
-    return force
-
-
-@kernel
-def _list_rows(system, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma):
+def _list_rows(system, times, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma):
     """Set up the problem of the rows that may carry force. Returns how many they are."""
-    h, count = system.step, 0
+    h, count = times.step, 0
     for r in range(len(system.J)):
         speed, displacement = row_speed(system, r, fast), row_speed(system, r, ahead)
         if r < system.friction_rows:
@@ -151,7 +119,7 @@ def _list_rows(system, motion, problem, listed, mobility, ahead, fast, q, slow, 
             else:
                 shift, soft = speed / (gamma * h), slow[r] / (system.limit[r] * gamma * h)
         else:
-            gap = system.offset[r] + displacement
+            gap = system.rest[r] + displacement
             if gap > 0.0:
                 continue
             low, high = 0.0, np.inf

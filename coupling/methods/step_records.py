@@ -15,7 +15,8 @@ from vanedamp.coupling.methods.equations_of_motion import (
     STEPS,
 )
 from vanedamp.coupling.numerics.jit import inlined, kernel
-from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, STORED, VISCOUS
+from vanedamp.coupling.response.recorder import cubic_peak, put_section
+from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 
 #: a motion above this, in m or m/s, has no physical meaning
 _BOUND = 1e30
@@ -24,7 +25,7 @@ _BOUND = 1e30
 @inlined
 def response_of(system, q, cosine, sine):
     """Displacement at the response."""
-    x = system.table[0] * cosine - system.table[1] * sine
+    x = system.table.real * cosine - system.table.imag * sine
     for i in range(system.modes):
         x += system.response[i] * q[i]
     return x
@@ -33,7 +34,7 @@ def response_of(system, q, cosine, sine):
 @inlined
 def rate_of(system, v, cosine, sine):
     """Velocity at the response."""
-    rate = -system.omega * (system.table[0] * sine + system.table[1] * cosine)
+    rate = -system.omega * (system.table.real * sine + system.table.imag * cosine)
     for i in range(system.modes):
         rate += system.response[i] * v[i]
     return rate
@@ -50,75 +51,68 @@ def row_speed(system, r, v):
 
 @kernel
 def record_start(system, motion, records):
-    """Section and ledger at the start of a period."""
-    n, b, p = system.modes, len(system.mass) - system.modes, motion.counters[PERIOD]
-    entry = records.section[p]
-    entry[0], entry[1] = response_of(system, motion.q, 1.0, 0.0), rate_of(system, motion.v, 1.0, 0.0)
-    momentum, part = 0.0, records.parts[p]
-    part[0] = 0.0
-    for i in range(n + b):
-        energy = 0.5 * (system.mass[i] * motion.v[i] ** 2 + system.stiffness[i] * motion.q[i] ** 2)
-        energy -= system.weight[i] * motion.q[i]
-        if i < n:
-            part[0] += energy
-        else:
-            part[1 + i - n] = energy
+    """Record section and ledger at the start of a period."""
+    n, b, springs, slip, speed = system.modes, system.bodies, 0.0, motion.rows[0], motion.rows[1]
     for k in range(b):
-        momentum += system.mass[n + k] * motion.v[n + k]
-        entry[3 + k], entry[3 + b + k] = row_speed(system, k, motion.q), row_speed(system, k, motion.v)
-    entry[2] = momentum
+        slip[k], speed[k] = row_speed(system, k, motion.q), row_speed(system, k, motion.v)
     for r in range(len(system.J)):
-        if r >= system.friction_rows and system.spring[r] != math.inf:
-            part[0] += 0.5 * system.spring[r] * min(row_speed(system, r, motion.q) + system.offset[r], 0.0) ** 2
-        elif r < system.friction_rows and system.spring[r] != math.inf:
-            part[0] += 0.5 * system.spring[r] * motion.elongation[r] ** 2
-    motion.losses[STORED] = part.sum()
-    for i in range(len(motion.losses)):
-        records.ledger[p, i] = motion.losses[i]
+        if system.spring[r] != math.inf:
+            pressed = motion.elongation[r] if r < system.friction_rows else min(row_gap(system, r, motion.q), 0.0)
+            springs += 0.5 * system.spring[r] * pressed * pressed
+    put_section(
+        system, records, motion.counters[PERIOD], motion.q[:n], motion.v[:n], slip[:b], speed[:b], springs,
+        motion.losses,
+    )  # fmt: skip
 
 
 @inlined
-def open_step(system, motion, records, k, q, v, before):
+def row_gap(system, r, q):
+    """Displacement of row r."""
+    return system.rest[r] + row_speed(system, r, q)
+
+
+@inlined
+def open_step(system, times, motion, records, k, q, v, before):
     """Keep the state that step k of the period begins with in q, v (N,) and before (friction rows,); take a sample."""
     copy(motion.q, q)
     copy(motion.v, v)
     copy(motion.elongation, before)
-    sample(system, motion, records, k, q)
+    sample(system, times, motion, records, k, q)
 
 
 @inlined
-def close_step(system, motion, records, log, k, q, v, speed, impulse, before, deepest):
+def close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest):
     """Follow contacts and account for step k from what `open_step` kept; speed (r,) of the rows at its start.
 
     Returns DONE, DIVERGED or PENETRATION.
     """
-    follow_contacts(system, motion, records, log, k, speed, impulse)
-    return tally(system, motion, records, k, q, v, impulse, before, deepest)
+    follow_contacts(system, times, motion, records, log, k, speed, impulse)
+    return tally(system, times, motion, records, k, q, v, impulse, before, deepest)
 
 
 @inlined
-def tally(system, motion, records, k, q, v, impulse, before, deepest):
+def tally(system, times, motion, records, k, q, v, impulse, before, deepest):
     """Account for step k of the period, from q, v to motion.q, motion.v, with the impulses (r,) of the rows.
 
     before: (friction rows,) elongations of Jenkins springs. Returns DONE, DIVERGED or PENETRATION.
     """
-    h, n, p = system.step, system.modes, motion.counters[PERIOD]
-    c0, s0, c1, s1 = system.phase[k, 0], system.phase[k, 1], system.phase[k + 1, 0], system.phase[k + 1, 1]
+    h, n, p = times.step, system.modes, motion.counters[PERIOD]
+    c0, s0, c1, s1 = times.phase[k, 0], times.phase[k, 1], times.phase[k + 1, 0], times.phase[k + 1, 1]
     x0, x1 = response_of(system, q, c0, s0), response_of(system, motion.q, c1, s1)
     rate0, rate1 = rate_of(system, v, c0, s0), rate_of(system, motion.v, c1, s1)
-    _waves(system, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, motion.v)
+    _waves(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, motion.v)
     size = abs(x1)
     for i in range(len(q)):
         moved = motion.q[i] - q[i]
         size = max(size, abs(motion.v[i]))
-        load0 = system.load[i, 0] * c0 - system.load[i, 1] * s0
-        motion.losses[EXCITATION] += 0.5 * (load0 + system.load[i, 0] * c1 - system.load[i, 1] * s1) * moved
+        load = system.load[i]
+        motion.losses[EXCITATION] += 0.5 * (load.real * (c0 + c1) - load.imag * (s0 + s1)) * moved
         for j in range(n if i < n else 0):
             if system.damping[i, j] != 0.0:
                 motion.losses[VISCOUS] += 0.5 * system.damping[i, j] * (v[j] + motion.v[j]) * moved
     deep = 0.0
     for r in range(len(system.J)):
-        moved, now = 0.0, system.offset[r]
+        moved, now = 0.0, system.rest[r]
         contact = r >= system.friction_rows
         if impulse[r] == 0.0 and not contact:
             continue
@@ -127,7 +121,7 @@ def tally(system, motion, records, k, q, v, impulse, before, deepest):
             now += system.J[r, i] * motion.q[i]
         loss = -impulse[r] / h * moved
         if contact:
-            deep = max(deep, -now / system.gap[r])
+            deep = max(deep, -now / times.travel[r])
             if system.spring[r] == math.inf:
                 motion.losses[IMPACT_LOSS] += loss
             else:
@@ -146,15 +140,9 @@ def tally(system, motion, records, k, q, v, impulse, before, deepest):
 
 
 @inlined
-def _waves(system, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after):
+def _waves(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after):
     """Peak, mean square, harmonic and momentum of a step."""
-    largest = abs(x1)
-    if rate0 * rate1 < 0.0:  # a peak in between: that of the cubic through both ends
-        t = rate0 / (rate0 - rate1)
-        u = 1.0 - t
-        inside = x0 * u * u * (1.0 + 2.0 * t) + x1 * t * t * (3.0 - 2.0 * t) + h * t * u * (u * rate0 - t * rate1)
-        largest = max(largest, abs(inside))
-    records.peak[p] = max(records.peak[p], largest)
+    records.peak[p] = max(records.peak[p], abs(x1), cubic_peak(h, x0, x1, rate0, rate1))
     records.square[p] += h * (x0 * x0 + x1 * x1) / 2.0
     records.harmonic[p] += h / 2.0 * complex(x0 * c0 + x1 * c1, -x0 * s0 - x1 * s1)
     m0, m1 = 0.0, 0.0
@@ -165,12 +153,12 @@ def _waves(system, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after
 
 
 @inlined
-def follow_contacts(system, motion, records, log, k, speed, impulse):
+def follow_contacts(system, times, motion, records, log, k, speed, impulse):
     """Count and log impacts: contacts that have begun to carry force, with the speeds (r,) at the step's start.
 
     An impact ends when its contact carries no force any more, which completes its entry in the log.
     """
-    h, p = system.step, motion.counters[PERIOD]
+    h, p = times.step, motion.counters[PERIOD]
     for r in range(system.friction_rows, len(system.J)):
         pushed = impulse[r] > 0.0
         if pushed and motion.active[r] == 0 and speed[r] < 0.0:
@@ -181,7 +169,7 @@ def follow_contacts(system, motion, records, log, k, speed, impulse):
                 mobility += system.J[r, i] ** 2 / system.mass[i]
             records.collided[p] += 0.5 * speed[r] ** 2 / mobility
             motion.speed[r], motion.impulse[r] = speed[r], 0.0
-            motion.begun[r] = (p * (len(system.phase) - 1) + k) * h
+            motion.begun[r] = (p * (len(times.phase) - 1) + k) * h
         if pushed:
             motion.impulse[r] += impulse[r]
         elif motion.active[r] == 1 and motion.counters[LOGGED] < len(log):
@@ -193,16 +181,16 @@ def follow_contacts(system, motion, records, log, k, speed, impulse):
 
 
 @inlined
-def sample(system, motion, records, k, q):
+def sample(system, times, motion, records, k, q):
     """Keep a sample if step k of the period begins at one."""
-    steps, b = len(system.phase) - 1, len(system.mass) - system.modes
+    steps, b = len(times.phase) - 1, system.bodies
     each = len(records.samples) // max(len(records.peak) - 1, 1)
     if each == 0:
         return
     stride = steps // each
     if k % stride == 0 and k // stride < each:
         entry = records.samples[motion.counters[PERIOD] * each + k // stride]
-        entry[0] = response_of(system, q, system.phase[k, 0], system.phase[k, 1])
+        entry[0] = response_of(system, q, times.phase[k, 0], times.phase[k, 1])
         for i in range(b):
             entry[1 + i] = row_speed(system, i, q)
 
@@ -231,9 +219,9 @@ def damped(system, v, i):
 
 
 @inlined
-def load_at(system, k, i):
+def load_at(system, times, k, i):
     """Load on coordinate i at step k of the period, weight included, N."""
-    return system.load[i, 0] * system.phase[k, 0] - system.load[i, 1] * system.phase[k, 1] + system.weight[i]
+    return system.load[i].real * times.phase[k, 0] - system.load[i].imag * times.phase[k, 1] + system.weight[i]
 
 
 @inlined
@@ -244,7 +232,7 @@ def copy(source, target):
 
 
 @inlined
-def end_period(system, motion, records, budget):
+def end_period(system, times, motion, records, budget):
     """Close a period. Returns DONE, DIVERGED or EVENT_BUDGET."""
     total = 0.0
     for i in range(len(motion.losses)):

@@ -15,13 +15,13 @@ from vanedamp.coupling.methods.central_difference import explicit_matrix, march_
 from vanedamp.coupling.methods.cosimulation import cosimulation_matrices, march_cosimulation
 from vanedamp.coupling.methods.moreau import march_moreau, moreau_matrices
 from vanedamp.coupling.methods.newmark import march_newmark, newmark_matrices
+from vanedamp.coupling.methods.penalty import with_penalty
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.response.evaluation import Outcome, Run
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.constraints import rows_of
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble, initial_motion
 from vanedamp.files.toml_input import InputError
 
 _STATUS = {
@@ -45,13 +45,10 @@ class SteppedRun:
     """A run of a stepping method: matrices, motion and records."""
 
     def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
-        structure = linear_structure(scene)
-        self.rows, displacement, velocity = rows_of(scene, structure)
-        system = sy.system_of(scene, self.rows)
-        self.system, self.motion = sy.start(
-            system, self.rows, displacement, velocity, structure.displacement, structure.velocity
-        )
-        self.records = new_records(self.rows, scene.time.simulated, samples_per_period)
+        self.system = assemble(scene)
+        self.times = sy.time_grid(self.system, scene.solver.steps)
+        self.motion = sy.start(self.system, initial_motion(scene, self.system))
+        self.records = new_records(self.system, scene.time.simulated, samples_per_period)
         self.log = np.zeros((_LOG if events else 0, 6))
         self.chunks: list[np.ndarray] = []
         self.march = _march(scene, self)
@@ -78,7 +75,7 @@ class SteppedRun:
             "impacts": int(counters[sy.IMPACTS]), "steps": int(counters[sy.STEPS]), "solves": int(counters[sy.SOLVES])
         }  # fmt: skip
         return Outcome(
-            self.rows, self.records, int(counters[sy.PERIOD]), numbers["impacts"], _OPEN_LEDGER, numbers,
+            self.system, self.records, int(counters[sy.PERIOD]), numbers["impacts"], _OPEN_LEDGER, numbers,
             [chunk for chunk in self.chunks if len(chunk)], float(self.motion.deepest[0]),
         )  # fmt: skip
 
@@ -101,36 +98,36 @@ def begin_run(scene: Scene, events: bool, samples_per_period: int) -> Run:
 
 def _march(scene: Scene, run: SteppedRun) -> March:
     solver, motion, records = scene.solver, run.motion, run.records
-    deepest, budget, problem = solver.deepest, solver.max_events, new_problem(len(run.rows.delassus))
+    deepest, budget, problem = solver.deepest, solver.max_events, new_problem(len(run.system.J))
     if solver.method == "moreau":
         theta = 0.5 if solver.theta is None else solver.theta
-        matrices = moreau_matrices(run.system, theta)
+        matrices = moreau_matrices(run.system, run.times, theta)
         return lambda log, periods: march_moreau(
-            run.system, motion, records, log, problem, *matrices, theta, periods, budget, deepest
+            run.system, run.times, motion, records, log, problem, *matrices, theta, periods, budget, deepest
         )
-    run.system, slow = sy.with_penalty(run.system, run.rows, scene)
+    run.system, slow = with_penalty(run.system, run.times, solver)
     if solver.method == "cosim":
         return _cosimulation(scene, run, slow)
     if solver.scheme in ("newmark", "hht"):
         alpha = (-0.1 if solver.alpha is None else solver.alpha) if solver.scheme == "hht" else 0.0
-        implicit = newmark_matrices(run.system, alpha)
+        implicit = newmark_matrices(run.system, run.times, alpha)
         if solver.slip_velocity is None:
             slow = np.zeros_like(slow)  # implicit: Coulomb's law as it is
         return lambda log, periods: march_newmark(
-            run.system, motion, records, log, problem, *implicit, slow, periods, budget, deepest
+            run.system, run.times, motion, records, log, problem, *implicit, slow, periods, budget, deepest
         )
-    inverse = explicit_matrix(run.system)
+    inverse = explicit_matrix(run.system, run.times)
     return lambda log, periods: march_explicit(
-        run.system, motion, records, log, inverse, slow, periods, budget, deepest
+        run.system, run.times, motion, records, log, inverse, slow, periods, budget, deepest
     )
 
 
 def _cosimulation(scene: Scene, run: SteppedRun, slow: np.ndarray) -> March:
     solver = scene.solver
-    matrices = cosimulation_matrices(run.system)
-    memory = np.zeros((3, 4 * run.system.modes + 2 + len(run.rows.delassus)))
+    matrices = cosimulation_matrices(run.system, run.times)
+    memory = np.zeros((3, 4 * run.system.modes + 2 + len(run.system.J)))
     gauss_seidel, hold = solver.exchange != "jacobi", 1 if solver.hold is None else solver.hold
     return lambda log, periods: march_cosimulation(
-        run.system, run.motion, run.records, log, matrices, memory, slow, gauss_seidel, hold, solver.substeps or 10,
-        periods, solver.max_events, solver.deepest,
+        run.system, run.times, run.motion, run.records, log, matrices, memory, slow, gauss_seidel, hold,
+        solver.substeps or 10, periods, solver.max_events, solver.deepest,
     )  # fmt: skip

@@ -22,8 +22,8 @@ from vanedamp.files.errors import VanedampError
 #: start of a counter: a literal 0 has a type of its own, for which numba would compile all that it is handed to again
 ZERO = np.int64(0)
 
-# what a file of compiled functions holds
-_MARKS = ("@entry", "@kernel", "@inlined")
+# what a file holds that enters compiled code: functions, and records, whose fields have their places there
+_MARKS = ("@entry", "@kernel", "@inlined", "(NamedTuple)")
 _PACKAGE = Path(__file__).parents[2]
 
 
@@ -63,16 +63,30 @@ def _compile(function: Callable[..., Any], **options: bool) -> Any:
         ) from error
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
         return compiled
+    kept = compiled._cache._cache_file
     # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls
-    compiled._cache._cache_file._source_stamp = _sources(Path(function.__code__.co_filename))
+    kept._source_stamp = _sources(Path(function.__code__.co_filename))
+    kept._load_index = _forgiving(kept._load_index)
     return compiled
+
+
+def _forgiving(load: Callable[[], dict[Any, Any]]) -> Callable[[], dict[Any, Any]]:
+    """Load the index of a cache, or an empty one where it names records that another version of this package had."""
+
+    def index() -> dict[Any, Any]:
+        try:
+            return load()
+        except (AttributeError, ImportError):
+            return {}
+
+    return index
 
 
 @cache
 def _sources(file: Path) -> str:
-    """Digest of a file of compiled functions and of those that it imports, through files with such functions alone.
+    """Digest of a file of compiled functions and of those that it imports, through files of functions and records only.
 
-    What the others import (scenes, rows) is data: it does not enter the code.
+    What the others import is data: it does not enter the code.
     """
     texts: dict[Path, str] = {}
     waiting = [file]

@@ -17,7 +17,7 @@ from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Event, Response, Status, classify
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import outlasted
 
 #: periods between two looks at whether the response is steady
@@ -44,7 +44,7 @@ class Outcome:
     free travel.
     """
 
-    rows: Rows
+    system: System
     records: Records
     periods: int
     events: int
@@ -88,17 +88,17 @@ def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | Non
 
 def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started: float) -> Response:
     """The response of a run that began at `started` (time.perf_counter) and dropped `transient` periods."""
-    rows, records, done = run.rows, run.records, run.periods
+    system, records, done = run.system, run.records, run.periods
     first = min(transient, max(done - 1, 0))
     window = slice(first, done)
-    span = max(done - first, 1) * rows.period
+    span = max(done - first, 1) * system.period
     ledger = records.ledger[: done + 1] - records.ledger[first]
-    b = len(rows.mass)
+    b = system.bodies
     section = records.section[: done + 1]
     harmonic = 2 / span * records.harmonic[window].sum()
     evaluated = {name: float(value) for name, value in zip(recs.ENERGIES, ledger[-1], strict=True)}
     peaks = records.peak[window]
-    balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(rows, records))
+    balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(system, records))
     if not balance <= run.open_ledger and status in (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN):
         status = Status.ENERGY
     samples = len(records.samples) // scene.time.simulated
@@ -115,13 +115,13 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         events=run.events,
         classification=classify(
             section[first:],
-            _state_scale(rows, section[first:]),
+            _state_scale(system, section[first:]),
             records.impacts[window],
             evaluated["friction"],
         ),
         energy=evaluated,
         energy_residual=balance,
-        attached_mass_fraction=_attached(rows, section, records.momentum[window].sum(), harmonic, first, span),
+        attached_mass_fraction=_attached(system, section, records.momentum[window].sum(), harmonic, first, span),
         wall_time_s=time.perf_counter() - started,
         periods=done,
         transient=first,
@@ -130,8 +130,8 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         section=section[:, :2].copy(),
         slip=section[:, 3 : 3 + b].copy(),
         slip_velocity=section[:, 3 + b :].copy(),
-        event_list=events_of(rows, run.log),
-        time=np.arange(done * samples) * (rows.period / max(samples, 1)),
+        event_list=events_of(system, run.log),
+        time=np.arange(done * samples) * (system.period / max(samples, 1)),
         displacement=records.samples[: done * samples, 0].copy(),
         body_displacement=records.samples[: done * samples, 1:].copy(),
         penetration=run.penetration,
@@ -152,14 +152,14 @@ def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> f
     return 0.0 if flowed == 0.0 else float(abs(imbalance) / flowed)
 
 
-def _exchanged(rows: Rows, records: Records) -> float:
+def _exchanged(system: System, records: Records) -> float:
     """Energy that comes and goes within a period, J: in collisions, and what the loads lend to each mode and body."""
-    modes = np.abs(rows.force) ** 2 / np.maximum(rows.stiffness, rows.omega**2)
-    bodies = np.abs(rows.inertia) ** 2 / (rows.mass * rows.omega**2)
+    modes = np.abs(system.of_structure.load) ** 2 / np.maximum(system.of_structure.stiffness, system.omega**2)
+    bodies = np.abs(system.of_bodies.load) ** 2 / (system.of_bodies.mass * system.omega**2)
     return float(max(records.collided.max(), (modes.sum() + bodies.sum()) / 2))
 
 
-def _state_scale(rows: Rows, section: np.ndarray) -> np.ndarray:
+def _state_scale(system: System, section: np.ndarray) -> np.ndarray:
     """(states,) what each state of the section is to be measured by.
 
     A displacement and its velocity have one scale, because either may vanish at the period's start. The bodies'
@@ -167,33 +167,33 @@ def _state_scale(rows: Rows, section: np.ndarray) -> np.ndarray:
     small difference of the slip's speed and the structure's, and its slow drift is nothing that the motion in the
     cavity feels.
     """
-    largest, b = np.abs(section).max(axis=0), len(rows.mass)
-    x = max(largest[0], largest[1] / rows.omega)
-    slips = np.maximum(largest[3 : 3 + b], largest[3 + b :] / rows.omega)
-    momentum = rows.mass.sum() * rows.omega * max(x, slips.max(initial=0.0))
-    return np.array([x, rows.omega * x, momentum, *slips, *(rows.omega * slips)]) + np.finfo(float).tiny
+    largest, b = np.abs(section).max(axis=0), system.bodies
+    x = max(largest[0], largest[1] / system.omega)
+    slips = np.maximum(largest[3 : 3 + b], largest[3 + b :] / system.omega)
+    momentum = system.of_bodies.mass.sum() * system.omega * max(x, slips.max(initial=0.0))
+    return np.array([x, system.omega * x, momentum, *slips, *(system.omega * slips)]) + np.finfo(float).tiny
 
 
 def _attached(
-    rows: Rows, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
+    system: System, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
 ) -> float | None:
     """Share of the bodies' mass that the structure feels: Re(F / (omega^2 X)) / sum m, F all contact forces on it."""
     # a structure that does not move feels no mass: its harmonic is 0, or what damping has left of the start
-    if not len(rows.mass) or abs(harmonic) <= np.sqrt(np.finfo(float).tiny) or len(section) <= first + 1:
+    if not system.bodies or abs(harmonic) <= np.sqrt(np.finfo(float).tiny) or len(section) <= first + 1:
         return None
     change = section[-1, 2] - section[first, 2]
-    on_bodies = 2 / span * (change + 1j * rows.omega * momentum) - rows.inertia.sum()
-    return float((-on_bodies / (rows.omega**2 * harmonic)).real / rows.mass.sum())
+    on_bodies = 2 / span * (change + 1j * system.omega * momentum) - system.of_bodies.load.sum()
+    return float((-on_bodies / (system.omega**2 * harmonic)).real / system.of_bodies.mass.sum())
 
 
-def events_of(rows: Rows, chunks: Sequence[np.ndarray]) -> list[Event]:
+def events_of(system: System, chunks: Sequence[np.ndarray]) -> list[Event]:
     """The events of a compiled log: chunks of entries time, kind, row, velocity before and after, impulse."""
     events = []
     entries = np.concatenate(chunks) if chunks else np.zeros((0, 6))
-    _complete(rows, entries)
+    _complete(system, entries)
     for entry in entries:
         row = int(entry[2])
-        body, side = _place(rows, row)
+        body, side = _place(system, row)
         # speeds of the gap, turned into speeds of the body relative to what it meets
         sign = -1.0 if side in ("right", "body") else 1.0
         before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
@@ -201,12 +201,12 @@ def events_of(rows: Rows, chunks: Sequence[np.ndarray]) -> list[Event]:
     return events
 
 
-def _complete(rows: Rows, entries: np.ndarray) -> None:
+def _complete(system: System, entries: np.ndarray) -> None:
     """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end brought."""
     begun: dict[int, np.ndarray] = {}
     for entry in entries:
         kind, row = int(entry[1]), int(entry[2])
-        if not np.isfinite(rows.spring[row]):
+        if not np.isfinite(system.spring[row]):
             continue
         if kind == recs.IMPACT:
             begun[row] = entry
@@ -214,13 +214,13 @@ def _complete(rows: Rows, entries: np.ndarray) -> None:
             begun[row][4:6] = entry[4:6]
 
 
-def _place(rows: Rows, row: int) -> tuple[int, str]:
+def _place(system: System, row: int) -> tuple[int, str]:
     """Number of the body (or of the friction damper, side "casing") and the side on which a row acts."""
-    if len(rows.mass) <= row < rows.friction_rows:
-        return row - len(rows.mass), "casing"
-    bodies = np.flatnonzero(rows.bodies[row])
-    if row < rows.friction_rows:
+    if system.bodies <= row < system.friction_rows:
+        return row - system.bodies, "casing"
+    bodies = np.flatnonzero(system.of_bodies.J[row])
+    if row < system.friction_rows:
         return int(bodies[0]), "floor"
     if len(bodies) == 2:
         return int(bodies[0]), "body"
-    return int(bodies[0]), "left" if rows.bodies[row, bodies[0]] > 0 else "right"
+    return int(bodies[0]), "left" if system.of_bodies.J[row, bodies[0]] > 0 else "right"

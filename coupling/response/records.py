@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.system import System
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")
 IMPACT, STICKS, SLIPS, DETACHES, RESTS = np.arange(len(KINDS))
@@ -31,13 +31,13 @@ class Records(NamedTuple):
     log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
 
 
-def new_records(rows: Rows, periods: int, samples: int) -> Records:
+def new_records(system: System, periods: int, samples: int) -> Records:
     """Room for `periods` periods with `samples` samples each."""
-    b = len(rows.mass)
+    b = system.bodies
     return Records(
         peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
         momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),
         section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
         parts=np.zeros((periods + 1, 1 + b)), collided=np.zeros(periods + 1),
-        samples=np.zeros((periods * samples, 1 + b)), log=np.zeros((4096 + 4 * len(rows.delassus), 6)),
+        samples=np.zeros((periods * samples, 1 + b)), log=np.zeros((4096 + 4 * len(system.delassus), 6)),
     )  # fmt: skip

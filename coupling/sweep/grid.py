@@ -14,7 +14,7 @@ from vanedamp.coupling.model_order.selection import Choices, choices_of, is_open
 from vanedamp.coupling.scene.paths import assign, axis_values
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import InputError, nearest, validate
 
 FREQUENCY = "excitation.frequency"
@@ -140,7 +140,7 @@ def grid(scene: Scene) -> Grid:
     points = Points(base, {})
     choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if leaves_open else {}
     start = settled(first, choices)
-    linear_structure(start.scene)
+    assemble(start.scene)
     return Grid(scene, axes, base, choices, start.estimate, along, warnings_of(start.scene))
 
 

@@ -12,12 +12,30 @@ import numpy as np
 
 from vanedamp.coupling.scene.bodies import Cavity
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.modal_basis import ModalBasis
 from vanedamp.files.toml_input import InputError
 
 #: degrees between the directions of one cavity's surfaces, for walls that open like a wedge, and off a wall's normal
 _PARALLEL, _ALONG = 5.0, 45.0
 
 Vectors = Mapping[str, np.ndarray]
+
+
+def check_directions(scene: Scene, basis: ModalBasis) -> None:
+    """Raise InputError where a reduced model lacks a direction that the scene needs, or where directions do not fit."""
+    if not isinstance(scene.structure, Rom):
+        return
+    if scene.excitation.base_acceleration and not basis.base.any():
+        raise InputError(
+            "excitation.base_acceleration: the reduced model does not say how a base loads it (its base_load is zero); "
+            "give it one, or excite by a force"
+        )
+    labels = [label for cavity in scene.cavity for label in cavity.labels()]
+    if not {str(label) for label in [scene.excitation.at, *labels]} <= set(basis.rows):
+        return  # an unknown label is refused where its row is wanted
+    check_known(scene, basis.directions)
+    check_surfaces(scene.cavity, basis.directions, basis.normals)
 
 
 def check_known(scene: Scene, directions: Vectors) -> None:

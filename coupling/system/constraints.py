@@ -1,193 +1,173 @@
-"""The scene as rows: everything unilateral or frictional is a row of one matrix J over the coordinates (p, x).
+"""Constraint rows of a scene: everything unilateral or frictional is a row of one matrix J over the coordinates (p, x).
 
 p are the modal coordinates of the structure, x the positions of the bodies. Friction rows come first (one a body: its
 slip on the floor; one a friction damper: the structure's motion against the casing), then contact rows (one a gap: left
 wall to first body, body to body, last body to right wall).
 
-A gap between a body and a wall that moves with the floor, and every gap between two bodies, rides: it is the difference
-of slips, which alone are the state, so that slips and gaps can never disagree.
+A gap between a body and a wall that moves with the floor, and every gap between two bodies, is the difference of slips,
+which are the state, so that slips and gaps can never disagree.
 """
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.scene.contact_laws import Element
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.modal_structure import LinearStructure
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
 
 #: coefficients of friction below this are none
 _SMOOTH = 1e-9
 
 
-class Rows(NamedTuple):
-    """What the compiled engine needs to know besides the subsystems. n modes, b bodies, r rows."""
+class Constraints(NamedTuple):
+    """Rows of a scene, with the meaning of the fields of the same name of system.system.System.
+
+    floors: labels of the floors under the bodies.
+    """
 
     friction_rows: int
-    structure: np.ndarray  # (r, n) J on the modal coordinates
-    bodies: np.ndarray  # (r, b) J on the bodies
-    delassus: np.ndarray  # (r, r) J M^-1 J^T with no constraint closed
-    limit: np.ndarray  # (friction rows,) friction force at slip, N
-    spring: np.ndarray  # (r,) stiffness of a row while it is closed, N/m; inf: rigid
-    dashpot: np.ndarray  # (r,) N s/m
-    restitution: np.ndarray  # (contacts,)
-    gap: np.ndarray  # (contacts,) free travel of the contact's cavity, m: the scale of its gap
-    before: np.ndarray  # (r,) body to the left of a contact, -1: the wall
-    after: np.ndarray  # (r,) body to the right of a contact, -1: the wall
-    rides: np.ndarray  # (r,) whether a contact's gap is a difference of slips: no wall that moves apart from the floor
-    floor: np.ndarray  # (b, n) floor functional under each body
-    mass: np.ndarray  # (b,) kg
-    weight: np.ndarray  # (b,) gravity force along the body's cavity, N
-    stiffness: np.ndarray  # (n,)
-    damping: np.ndarray  # (n, n)
-    proportional: bool
-    response: np.ndarray  # (n,)
-    force: np.ndarray  # (n,) complex harmonic load on the modes
-    alike: bool  # whether the base accelerates all bodies alike: their cavities have one angle to its motion
-    inertia: np.ndarray  # (b,) complex harmonic load on the bodies: the base's acceleration along their cavities
-    table: complex
-    omega: float
-    period: float
+    floor: np.ndarray
+    floors: list[str]
+    J: np.ndarray
+    rest: np.ndarray
+    limit: np.ndarray
+    spring: np.ndarray
+    dashpot: np.ndarray
+    restitution: np.ndarray
+    free_travel: np.ndarray
+    left_body: np.ndarray
+    right_body: np.ndarray
+    moves_with_floor: np.ndarray
 
 
-class _Contact(NamedTuple):
-    """One gap before it becomes a row."""
+#: of rows that do not rebound
+_RIGID = Element(0.0)
 
-    before: int
-    after: int
+
+@dataclass(frozen=True)
+class _Row:
+    """One constraint: its functional of the modal coordinates (n,), the bodies left and right of it (-1: none).
+
+    A friction row has a limit, a contact an element and a free travel; rest: gap with the bodies at mid-travel, m.
+    """
+
     structure: np.ndarray
-    gap: float
-    element: Element
+    left: int = -1
+    right: int = -1
+    limit: float = 0.0
+    element: Element = _RIGID
+    rest: float = 0.0
+    free_travel: float = np.inf
 
 
-def rows_of(scene: Scene, structure: LinearStructure) -> tuple[Rows, np.ndarray, np.ndarray]:
-    """Rows of a scene, with the initial displacement and velocity of each row, shapes (r,)."""
-    bodies, n = len(scene.damper), structure.modes
-    contacts, owner = _contacts(scene, structure)
-    casing = structure.casing
-    floor = structure.floor[owner].reshape(bodies, n)
-    friction_rows = bodies + len(casing)
-    j_structure = np.vstack(
-        [-floor, casing, np.reshape([contact.structure for contact in contacts], (len(contacts), n))]
+def constraints_of(scene: Scene, basis: ModalBasis, at: str) -> Constraints:
+    """Form the rows of a scene; `at`: interface label of the excitation, where friction dampers act by default.
+
+    Raises InputError for an unknown label.
+    """
+    cavities = [_surfaces(scene, basis, index) for index in range(len(scene.cavity))]
+    names = [cavity.name for cavity in scene.cavity]
+    owner = [names.index(damper.cavity) for damper in scene.damper]
+    n, bodies = len(basis.stiffness), len(owner)
+    floor = np.reshape([cavities[index].floor for index in owner], (bodies, n))
+    floors = [cavities[index].labels[2] for index in owner]
+    friction = [*_slips(scene, basis, floor, floors), *_friction_dampers(scene, basis, at)]
+    rows = [*friction, *_gaps(scene, cavities, owner)]
+    structure = np.reshape([row.structure for row in rows], (len(rows), n))
+    left, right = (np.array([getattr(row, side) for row in rows], np.int64) for side in ("left", "right"))
+    numbers = np.arange(bodies)
+    on_bodies = (right[:, None] == numbers).astype(float) - (left[:, None] == numbers)
+    # a gap that only bodies and walls that move with their floors bound is a difference of slips
+    on_floors, slips = on_bodies @ -floor, len(friction)
+    moves = [
+        r >= slips and bool(on_bodies[r].any()) and np.allclose(structure[r], on_floors[r], rtol=1e-14, atol=0)
+        for r in range(len(rows))
+    ]
+    contact = np.arange(len(rows)) >= slips
+    return Constraints(
+        friction_rows=slips, floor=floor, floors=floors, J=np.hstack([structure, on_bodies]),
+        rest=np.array([float(row.rest) for row in rows]), limit=np.array([float(row.limit) for row in rows]),
+        spring=np.array([float(row.element.stiffness) for row in rows]),
+        dashpot=np.array([float(row.element.dashpot) for row in rows]),
+        restitution=np.array([float(row.element.restitution) for row in rows]),
+        free_travel=np.array([float(row.free_travel) for row in rows]), left_body=np.where(contact, left, -1),
+        right_body=np.where(contact, right, -1), moves_with_floor=np.array(moves, np.bool_),
+    )  # fmt: skip
+
+
+class _Surfaces(NamedTuple):
+    """Labels of left wall, right wall and floor of a cavity, their functionals (n,), and what its walls yield, m/N."""
+
+    labels: tuple[str, str, str]
+    left: np.ndarray
+    right: np.ndarray
+    floor: np.ndarray
+    flexibility: tuple[float, float]
+
+
+def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> _Surfaces:
+    labels = surface_labels(scene, index)
+    left, right, floor = (
+        interface_row(basis, label, f"cavity[{index}].{side}")
+        for label, side in zip(labels, ("left", "right", "floor"), strict=True)
     )
-    before, after = (
-        np.r_[np.full(friction_rows, -1), [contact[side] for contact in contacts]].astype(np.int64) for side in (0, 1)
-    )
-    j_bodies = np.vstack([np.eye(bodies), np.zeros((len(casing) + len(contacts), bodies))])
-    for r in range(friction_rows, len(j_bodies)):
-        if before[r] >= 0:
-            j_bodies[r, before[r]] = -1.0
-        if after[r] >= 0:
-            j_bodies[r, after[r]] = 1.0
-    mass = np.array([damper.mass for damper in scene.damper])
-    along, across = structure.gravity[owner].T
-    base = structure.base_acceleration[owner]
-    elements = [contact.element for contact in contacts]
-    rows = Rows(
-        friction_rows=friction_rows,
-        structure=j_structure,
-        bodies=j_bodies,
-        delassus=j_structure @ j_structure.T + (j_bodies / mass) @ j_bodies.T,
-        limit=np.array(
-            [_friction_force(scene, i, across[i]) for i in range(bodies)]
-            + [_coefficient(damper.friction) * damper.normal_force for damper in scene.friction_damper]
-        ),
-        spring=np.array(
-            [np.inf] * bodies
-            + [np.inf if damper.stiffness is None else damper.stiffness for damper in scene.friction_damper]
-            + [element.stiffness for element in elements]
-        ),
-        dashpot=np.array([0.0] * friction_rows + [element.dashpot for element in elements]),
-        restitution=np.array([element.restitution for element in elements]),
-        gap=np.array([contact.gap for contact in contacts]),
-        before=before,
-        after=after,
-        rides=np.array([_rides(j_structure, j_bodies, friction_rows, r) for r in range(len(j_bodies))], np.bool_),
-        floor=floor,
-        mass=mass,
-        weight=mass * along,
-        stiffness=np.array(structure.stiffness),
-        damping=np.array(structure.damping),
-        proportional=bool(np.count_nonzero(structure.damping - np.diag(np.diag(structure.damping))) == 0),
-        response=np.array(structure.response),
-        force=np.array(structure.force, complex),
-        alike=bool(np.all(base == base[:1])),
-        inertia=-mass * base + 0j,
-        table=complex(structure.table),
-        omega=structure.omega,
-        period=2 * np.pi / structure.omega,
-    )
-    return rows, *_initial_rows(scene, structure, rows)
+    yields = basis.flexibility.get(labels[0], 0.0), basis.flexibility.get(labels[1], 0.0)
+    return _Surfaces(labels, left, right, floor, yields)
 
 
-def _contacts(scene: Scene, structure: LinearStructure) -> tuple[list[_Contact], np.ndarray]:
-    """All gaps, cavity by cavity from left to right, and the cavity of each body (b,)."""
-    owner = np.zeros(len(scene.damper), int)
-    contacts = []
-    for index, cavity in enumerate(scene.cavity):
-        row = [i for i, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
-        owner[row] = index
-        for before, after in itertools.pairwise([-1, *row, -1]) if row else ():
-            wall = (after < 0) * structure.right[index] - (before < 0) * structure.left[index]
-            pair = [scene.damper[i] for i in (before, after) if i >= 0]
+def surface_labels(scene: Scene, index: int) -> tuple[str, str, str]:
+    """Interface labels of left wall, right wall and floor of a cavity."""
+    if not isinstance(scene.structure, Rom):
+        return ("structure",) * 3
+    left, right, floor = scene.cavity[index].labels()
+    return str(left), str(right), str(floor)
+
+
+def _slips(scene: Scene, basis: ModalBasis, floor: np.ndarray, floors: list[str]) -> list[_Row]:
+    """The slip of each body on its floor."""
+    rows = []
+    for i, damper in enumerate(scene.damper):
+        _, across = scene.gravity.components(basis.directions[floors[i]])
+        normal = damper.mass * across if damper.normal_load is None else damper.normal_load
+        rows.append(_Row(-floor[i], right=i, limit=_coefficient(damper.friction) * max(normal, 0.0)))
+    return rows
+
+
+def _friction_dampers(scene: Scene, basis: ModalBasis, at: str) -> list[_Row]:
+    """The structure's motion against the casing at each friction damper."""
+    rows = []
+    for i, damper in enumerate(scene.friction_damper):
+        structure = interface_row(basis, damper.at or at, f"friction_damper[{i}].at")
+        element = _RIGID if damper.stiffness is None else Element(0.0, damper.stiffness)
+        rows.append(_Row(structure, limit=_coefficient(damper.friction) * damper.normal_force, element=element))
+    return rows
+
+
+def _gaps(scene: Scene, cavities: list[_Surfaces], owner: list[int]) -> list[_Row]:
+    """All gaps, cavity by cavity from left to right."""
+    rows = []
+    for index, (cavity, surfaces) in enumerate(zip(scene.cavity, cavities, strict=True)):
+        inside = [i for i, where in enumerate(owner) if where == index]
+        for left, right in itertools.pairwise([-1, *inside, -1]) if inside else ():
+            wall: np.ndarray = (right < 0) * surfaces.right - (left < 0) * surfaces.left
+            pair = [scene.damper[i] for i in (left, right) if i >= 0]
             # two bodies of different restitution meet with the geometric mean
             restitution = float(np.prod([damper.restitution for damper in pair]) ** (1 / len(pair)))
             # the wall's mass is that of the structure's first mode, the same for every number of modes
             mobility = float(sum(1 / damper.mass for damper in pair) + (wall[:1] ** 2).sum())
-            element = scene.contact.element(restitution, 1 / mobility, _yielding(structure, index, before, after))
-            contacts.append(_Contact(before, after, wall, cavity.gap, element))
-    return contacts, owner
-
-
-def _yielding(structure: LinearStructure, cavity: int, before: int, after: int) -> float:
-    """What the wall of a contact yields besides its modes, m/N; between two bodies the mean of the cavity's walls."""
-    if structure.wall_flexibility is None:
-        return 0.0
-    left, right = structure.wall_flexibility[cavity]
-    return float(left if before < 0 else right if after < 0 else 0.5 * (left + right))
-
-
-def _initial_rows(scene: Scene, structure: LinearStructure, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
-    position = np.array([damper.position for damper in scene.damper])
-    velocity = np.array([damper.velocity for damper in scene.damper])
-    unloaded = np.zeros(rows.friction_rows - len(rows.mass))
-    return row_motion(rows, position, velocity, structure.displacement, structure.velocity, unloaded)
-
-
-def row_motion(
-    rows: Rows, slip: np.ndarray, slip_velocity: np.ndarray, p: np.ndarray, rate: np.ndarray, elongation: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement and velocity (r,) of every row, from slips (b,), modal coordinates (n,) and their rates.
-
-    elongation: (friction dampers,) of the springs before the sliders, m.
-    """
-    # slips are relative to the floor; walls on other functionals start at their rest distance
-    displacement = rows.bodies @ slip
-    ends = np.count_nonzero(rows.bodies[rows.friction_rows :], axis=1) == 1
-    displacement[rows.friction_rows :][ends] += rows.gap[ends] / 2
-    absolute = slip_velocity + rows.floor @ rate
-    speed = rows.structure @ rate + rows.bodies @ absolute
-    moved = rows.structure @ p + rows.bodies @ (rows.floor @ p)
-    speed[: len(slip)] = slip_velocity  # exact, so that a body at relative rest is known to be so
-    moved[: len(slip)] = 0.0
-    displacement += moved
-    springs = np.isfinite(rows.spring[: rows.friction_rows])
-    displacement[: rows.friction_rows][springs] = np.r_[np.zeros(len(slip)), elongation][springs]
-    return displacement, speed
-
-
-def _rides(structure: np.ndarray, bodies: np.ndarray, friction_rows: int, r: int) -> bool:
-    slips = structure[: bodies.shape[1]]
-    return r >= friction_rows and np.allclose(structure[r], bodies[r] @ slips, rtol=1e-14, atol=0)
-
-
-def _friction_force(scene: Scene, index: int, gravity: float) -> float:
-    damper = scene.damper[index]
-    normal = damper.mass * gravity if damper.normal_load is None else damper.normal_load
-    return _coefficient(damper.friction) * max(normal, 0.0)
+            # between two bodies, the mean of what the cavity's walls yield
+            yields = surfaces.flexibility[0] if left < 0 else surfaces.flexibility[1]
+            yields = yields if len(pair) == 1 else 0.5 * sum(surfaces.flexibility)
+            element = scene.contact.element(restitution, 1 / mobility, yields)
+            rest = 0.5 * cavity.gap if len(pair) == 1 else 0.0
+            rows.append(_Row(wall, left, right, element=element, rest=rest, free_travel=cavity.gap))
+    return rows
 
 
 def _coefficient(friction: float) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,12 +10,10 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
-from vanedamp.coupling.scene.bodies import Damper
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.modal_basis import _basis, _row, _surfaces
-from vanedamp.coupling.system.modal_structure import LinearStructure, linear_structure
-from vanedamp.coupling.system.resonance import _receptance
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.resonance import receptance_of
+from vanedamp.coupling.system.system import System
 
 #: frequencies over a range, and around each resonance in half-power widths: between two of them no maximum hides
 _EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
@@ -93,19 +90,20 @@ class LinearResponse:
 
 def linear_responses(scene: Scene) -> tuple[LinearResponse, LinearResponse]:
     """Without bodies, and with every body glued to its cavity's floor. Raises InputError."""
-    structure = linear_structure(scene)
-    return _glued(structure, scene, ()), _glued(structure, scene, scene.damper)
+    system = assemble(scene)
+    modes, bodies = system.of_structure, system.of_bodies
+    glued_load = modes.load + system.floor.T @ bodies.load
+    free, glued = (
+        LinearResponse(modes.stiffness, modes.damping, mass, load, modes.response, system.table)
+        for mass, load in ((np.diag(modes.mass), modes.load), (glued_mass(system), glued_load))
+    )
+    return free, glued
 
 
-def _glued(structure: LinearStructure, scene: Scene, dampers: Sequence[Damper]) -> LinearResponse:
-    names = [cavity.name for cavity in scene.cavity]
-    mass, load = np.eye(structure.modes), structure.force.copy()
-    for damper in dampers:
-        cavity = names.index(damper.cavity)
-        floor = structure.floor[cavity]
-        mass += damper.mass * np.outer(floor, floor)
-        load -= damper.mass * floor * structure.base_acceleration[cavity]
-    return LinearResponse(structure.stiffness, structure.damping, mass, load, structure.response, structure.table)
+def glued_mass(system: System) -> np.ndarray:
+    """Modal mass matrix (n, n) of the structure with every body glued to its floor."""
+    mass: np.ndarray = np.diag(system.of_structure.mass) + (system.floor.T * system.of_bodies.mass) @ system.floor
+    return mass
 
 
 def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np.ndarray:
@@ -113,13 +111,6 @@ def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np
 
     Without bodies, or (`fixed`) with every body glued to its cavity's floor.
     """
-    basis = _basis(scene)
-    at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
-    response = _row(basis, at, "excitation.at")
-    mass = np.eye(len(response))
-    if fixed:
-        names = [cavity.name for cavity in scene.cavity]
-        for damper in scene.damper:
-            _, _, floor = _surfaces(basis, scene, names.index(damper.cavity))
-            mass += damper.mass * np.outer(floor, floor)
-    return _receptance(basis.stiffness, basis.damping, mass, response, 2 * np.pi * np.asarray(frequencies))
+    system = assemble(scene)
+    modes, mass = system.of_structure, glued_mass(system) if fixed else np.eye(system.modes)
+    return receptance_of(modes.stiffness, modes.damping, mass, modes.response, 2 * np.pi * np.asarray(frequencies))

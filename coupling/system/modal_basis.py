@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Rigid, Rom
+from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
 from vanedamp.coupling.system.reduced_model_file import file_stamp, reduced_model
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -20,10 +20,12 @@ _FREQUENCY_ERROR = 1e-3
 
 
 @dataclass(frozen=True)
-class _ModalBasis:
-    """Modes of a structure without bodies: squared frequencies, damping; load (n, 3) of a base acceleration.
+class ModalBasis:
+    """Modes of a structure without bodies.
 
-    By label: functionals, directions and normals (zeros: unknown), residual flexibility.
+    stiffness: (n,) squared undamped angular frequencies; damping: (n, n); base: (n, 3) load of an acceleration of the
+    base. By interface label: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), and residual
+    flexibility, m/N, which the modes lack.
     """
 
     stiffness: np.ndarray
@@ -35,47 +37,44 @@ class _ModalBasis:
     flexibility: dict[str, float]
 
 
-def _row(basis: _ModalBasis, label: str | None, key: str) -> np.ndarray:
+#: direction of the one axis that a structure without an interface has
+_AXIS = frozen([1.0, 0.0, 0.0])
+
+
+def forced_label(scene: Scene) -> str:
+    """Interface label of force and response; a structure without an interface has only one, "structure"."""
+    return str(scene.excitation.at) if isinstance(scene.structure, Rom) else "structure"
+
+
+def interface_row(basis: ModalBasis, label: str, key: str) -> np.ndarray:
+    """The functional (n,) of an interface label, named in a scene under `key`. Raises InputError for an unknown one."""
     try:
-        return basis.rows[str(label)]
+        return basis.rows[label]
     except KeyError:
         raise InputError(f"{key}: no interface label '{label}'; it has {', '.join(basis.rows)}") from None
 
 
-def _surfaces(basis: _ModalBasis, scene: Scene, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    if isinstance(scene.structure, Rigid):
-        return (basis.rows["structure"],) * 3
-    left, right, floor = scene.cavity[index].labels()
-    key = f"cavity[{index}]"
-    return _row(basis, left, f"{key}.left"), _row(basis, right, f"{key}.right"), _row(basis, floor, f"{key}.floor")
-
-
-def _wall_flexibility(basis: _ModalBasis, scene: Scene) -> np.ndarray:
-    if isinstance(scene.structure, Rigid):
-        return np.zeros((len(scene.cavity), 2))
-    walls = [basis.flexibility[str(label)] for cavity in scene.cavity for label in cavity.labels()[:2]]
-    return np.reshape(walls, (-1, 2))
-
-
-def _basis(scene: Scene) -> _ModalBasis:
+def basis_of(scene: Scene) -> ModalBasis:
+    """The modes of a scene's structure. Raises InputError for an unusable model."""
     structure = scene.structure
     if isinstance(structure, Rigid):
-        # its one axis is that of the base's motion and of all cavities
-        root, axis = np.sqrt(structure.mass), frozen([1.0, 0.0, 0.0])
-        return _ModalBasis(
+        root = np.sqrt(structure.mass)
+        return ModalBasis(
             frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
-            frozen([root * axis]), {"structure": frozen([1 / root])}, {"structure": axis}, {}, {},
+            frozen([root * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {}, {},
         )  # fmt: skip
-    assert isinstance(structure, Rom)
+    if isinstance(structure, Prescribed):
+        none = np.zeros(0)
+        return ModalBasis(none, np.zeros((0, 0)), np.zeros((0, 3)), {"structure": none}, {"structure": _AXIS}, {}, {})
     return _rom_basis(structure, file_stamp(structure.file))
 
 
 @lru_cache(maxsize=8)
-def _rom_basis(structure: Rom, _stamp: int) -> _ModalBasis:
+def _rom_basis(structure: Rom, _stamp: int) -> ModalBasis:
     return modal_basis(reduced_model(structure))
 
 
-def modal_basis(model: ReducedModel) -> _ModalBasis:
+def modal_basis(model: ReducedModel) -> ModalBasis:
     """Real modes of a reduced model.
 
     Raises InputError if the structure can move freely (no support), or if round-off of its stiffness alone moves the
@@ -106,4 +105,4 @@ def modal_basis(model: ReducedModel) -> _ModalBasis:
     own = np.zeros(len(model.interface)) if residual is None else np.diag(residual)
     flexibility = dict(zip(model.interface, own.tolist(), strict=True))
     base = frozen(shapes.T @ model.base_load)
-    return _ModalBasis(frozen(squares), frozen(damping), base, rows, directions, normals, flexibility)
+    return ModalBasis(frozen(squares), frozen(damping), base, rows, directions, normals, flexibility)

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Prescribed, Rom
-from vanedamp.coupling.system.modal_basis import _basis, _ModalBasis, _row
+from vanedamp.coupling.scene.structures import Prescribed
+from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
 from vanedamp.files.toml_input import InputError
 
 
@@ -18,9 +18,8 @@ def excitation_force(scene: Scene) -> float:
     """Amplitude of the exciting force, N (resonance_amplitude resolved)."""
     if isinstance(scene.structure, Prescribed):
         return 0.0
-    basis = _basis(scene)
-    at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
-    return _force_amplitude(scene, basis, _row(basis, at, "excitation.at"))
+    basis = basis_of(scene)
+    return force_amplitude(scene, basis, interface_row(basis, forced_label(scene), "excitation.at"))
 
 
 class Resonance(NamedTuple):
@@ -39,12 +38,11 @@ def chosen_resonance(scene: Scene) -> Resonance:
 
     Raises InputError for a structure without damping.
     """
-    basis = _basis(scene)
-    at = scene.excitation.at if isinstance(scene.structure, Rom) else "structure"
-    return _chosen(scene, basis, _row(basis, at, "excitation.at"))
+    basis = basis_of(scene)
+    return _chosen(scene, basis, interface_row(basis, forced_label(scene), "excitation.at"))
 
 
-def _receptance(
+def receptance_of(
     stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, response: np.ndarray, omega: np.ndarray
 ) -> np.ndarray:
     dynamic = np.diag(stiffness) + 1j * omega[:, None, None] * damping - omega[:, None, None] ** 2 * mass
@@ -52,14 +50,15 @@ def _receptance(
     return np.linalg.solve(dynamic, loads)[:, :, 0] @ response
 
 
-def _force_amplitude(scene: Scene, basis: _ModalBasis, response: np.ndarray) -> float:
+def force_amplitude(scene: Scene, basis: ModalBasis, response: np.ndarray) -> float:
+    """Amplitude of the exciting force at the functional `response` (n,) of the basis, N."""
     excitation = scene.excitation
     if excitation.resonance_amplitude is None:
         return excitation.force or 0.0
     return excitation.resonance_amplitude / _chosen(scene, basis, response).flexibility
 
 
-def _chosen(scene: Scene, basis: _ModalBasis, response: np.ndarray) -> Resonance:
+def _chosen(scene: Scene, basis: ModalBasis, response: np.ndarray) -> Resonance:
     if np.any(np.diag(basis.damping) <= 0):
         raise InputError(
             "excitation.resonance_amplitude: an undamped resonance has no amplitude; give damping or force"
@@ -81,7 +80,7 @@ def _resonance(stiffness_: bytes, damping_: bytes, response_: bytes, mode: int) 
     resonance = np.sqrt(stiffness[mode])
 
     def negative(omega: float) -> float:
-        return -float(abs(_receptance(stiffness, damping, np.eye(len(response)), response, np.array([omega]))[0]))
+        return -float(abs(receptance_of(stiffness, damping, np.eye(len(response)), response, np.array([omega]))[0]))
 
     width = min(1.5 * damping[mode, mode] / resonance, 0.5)
     bounds = (resonance * (1 - width), resonance * (1 + width))

@@ -13,7 +13,7 @@ import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
-from vanedamp.coupling.system.modal_structure import LinearStructure, linear_structure
+from vanedamp.coupling.system.assembly import assemble, initial_motion
 
 #: longest transient that is taken without being asked for, in periods
 LIMIT = 10_000
@@ -22,25 +22,38 @@ LIMIT = 10_000
 _BATCHES, _SHORTEST, _CERTAIN = 10, 25, 5.0
 
 
-def left_over(structure: LinearStructure, periods: float) -> float:
-    """Share of the steady response that the transient of the excited modes still has after so many periods, at most.
+def left_over(scene: Scene, periods: float) -> float:
+    """Share of the steady response that the transient of the excited modes still has after `periods` periods, at most.
 
     0 for a structure that nothing excites.
     """
-    if not structure.force.any():
-        return 0.0
-    own, dashpot = np.sqrt(structure.stiffness), np.diag(structure.damping)
-    dynamic = structure.stiffness - structure.omega**2 + 1j * structure.omega * dashpot
-    with np.errstate(divide="ignore", invalid="ignore"):
-        steady = structure.response * structure.force / dynamic
-        # displacement or velocity to make up for, and the initial state
-        begun = np.abs(steady) * np.maximum(1.0, structure.omega / own)
-        begun += np.abs(structure.response) * (np.abs(structure.displacement) + np.abs(structure.velocity) / own)
-        # the slower one of an overdamped mode's two
-        rates = dashpot / 2 - np.sqrt(np.maximum(dashpot**2 / 4 - structure.stiffness, 0.0))
-        decay = np.exp(-rates * 2 * np.pi / structure.omega * periods)
-        share = np.nansum(begun * decay) / abs(np.nansum(steady))
-    return float(share) if np.isfinite(share) else np.inf
+    return _Transient(scene).left_over(periods)
+
+
+class _Transient:
+    """What each mode of a scene's structure begins with beside its steady response, and how fast it loses it."""
+
+    def __init__(self, scene: Scene) -> None:
+        system = assemble(scene)
+        start, modes = initial_motion(scene, system), system.of_structure
+        own, dashpot = np.sqrt(modes.stiffness), np.diag(modes.damping)
+        dynamic = modes.stiffness - system.omega**2 + 1j * system.omega * dashpot
+        self.excited, self.omega, self.damping = bool(modes.load.any()), system.omega, dashpot
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.steady = modes.response * modes.load / dynamic
+            # displacement or velocity to make up for, and the initial state
+            self.begun = np.abs(self.steady) * np.maximum(1.0, system.omega / own)
+            self.begun += np.abs(modes.response) * (np.abs(start.p) + np.abs(start.p_rate) / own)
+            # the slower one of an overdamped mode's two
+            self.rates = dashpot / 2 - np.sqrt(np.maximum(dashpot**2 / 4 - modes.stiffness, 0.0))
+
+    def left_over(self, periods: float) -> float:
+        if not self.excited:
+            return 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            decay = np.exp(-self.rates * 2 * np.pi / self.omega * periods)
+            share = np.nansum(self.begun * decay) / abs(np.nansum(self.steady))
+        return float(share) if np.isfinite(share) else np.inf
 
 
 def timed(scene: Scene) -> Scene:
@@ -51,11 +64,11 @@ def timed(scene: Scene) -> Scene:
     """
     if scene.time.periods is not None or scene.time.transient is not None or isinstance(scene.structure, Prescribed):
         return scene
-    structure, default = linear_structure(scene), scene.time
+    transient, default = _Transient(scene), scene.time
     lengths = range(default.dropped, LIMIT + 1)
-    if left_over(structure, lengths[0]) <= default.tolerance or left_over(structure, lengths[-1]) > default.tolerance:
+    if transient.left_over(lengths[0]) <= default.tolerance or transient.left_over(lengths[-1]) > default.tolerance:
         return scene
-    enough = lengths[bisect_left(lengths, True, key=lambda n: left_over(structure, n) <= default.tolerance)]
+    enough = lengths[bisect_left(lengths, True, key=lambda n: transient.left_over(n) <= default.tolerance)]
     periods = enough + default.simulated - default.dropped
     chosen = replace(default, periods=periods, transient=None if default.steady else enough)
     return replace(scene, time=chosen)
@@ -69,14 +82,14 @@ def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray) -> bool:
     slowest decay, are off by more than the tolerance belong to a transient. With impacts peaks spread anyway: from 500
     periods on, the means of both halves must agree within the tolerance or the scatter.
     """
-    structure, tolerance = linear_structure(scene), scene.time.tolerance
-    if left_over(structure, scene.time.dropped) <= tolerance or not peaks.any():
+    transient, tolerance = _Transient(scene), scene.time.tolerance
+    if transient.left_over(scene.time.dropped) <= tolerance or not peaks.any():
         return True
     if impacts.any():
         return not _drifts(peaks, tolerance)
     if len(peaks) < 2:
         return False
-    rate = float(np.diag(structure.damping).min()) * np.pi / structure.omega
+    rate = float(transient.damping.min()) * np.pi / transient.omega
     remaining = abs(peaks[-1] - peaks[0]) / max(-np.expm1(-rate * (len(peaks) - 1)), tolerance)
     return bool(max(np.ptp(peaks), remaining) <= tolerance * peaks.mean())
 

@@ -17,8 +17,8 @@ from vanedamp.coupling.scene.paths import Range, axis_values
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom
 from vanedamp.coupling.sweep.grid import Points
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import LinearResponse, linear_responses
-from vanedamp.coupling.system.modal_structure import linear_structure
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml, validate
 
@@ -182,7 +182,7 @@ class Study(NamedTuple):
             scene = Points(self.with_bodies(design.bodies), {}).scene(
                 self.point(design, deviation, float(self.table.frequencies[0]))
             )
-            linear_structure(scene)
+            assemble(scene)
 
     def with_bodies(self, count: int) -> Scene:
         """The scene with so many bodies like its first one, put into its cavities in turn."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
-from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.system import System
 
 
 def exponential(generator: mp.matrix, time: float) -> mp.matrix:
@@ -24,17 +24,15 @@ def exponential(generator: mp.matrix, time: float) -> mp.matrix:
     return total
 
 
-def propagator(rows: Rows, closed: np.ndarray, time: float) -> np.ndarray:
+def propagator(system: System, closed: np.ndarray, time: float) -> np.ndarray:
     """(2(n + b), 2(n + b)) of mpmath numbers on (p, slip, p', slip') for the closed springs `closed`, without loads."""
     with mp.workdps(50):
-        n, b = len(rows.stiffness), len(rows.mass)
+        n, b = system.modes, system.bodies
         d, exact = n + b, np.vectorize(mp.mpf, otypes=[object])
-        law = exact(np.hstack([rows.structure, rows.bodies])[closed])
-        mass = exact(np.r_[np.ones(n), rows.mass])
-        stiffness, damping = exact(np.diag(np.r_[rows.stiffness, np.zeros(b)])), exact(np.zeros((d, d)))
-        damping[:n, :n] = exact(rows.damping)
-        stiffness = stiffness + (law.T * exact(rows.spring[closed])) @ law
-        damping = damping + (law.T * exact(rows.dashpot[closed])) @ law
+        law = exact(system.J[closed])
+        mass, stiffness, damping = exact(system.mass), exact(np.diag(system.stiffness)), exact(system.damping)
+        stiffness = stiffness + (law.T * exact(system.spring[closed])) @ law
+        damping = damping + (law.T * exact(system.dashpot[closed])) @ law
         generator = mp.zeros(2 * d)
         generator[:d, d:] = mp.eye(d)
         generator[d:, :d] = mp.matrix((-stiffness / mass[:, None]).tolist())
@@ -43,7 +41,7 @@ def propagator(rows: Rows, closed: np.ndarray, time: float) -> np.ndarray:
         # x = slip + floor p
         to, back = exact(np.eye(2 * d)), exact(np.eye(2 * d))
         for first in (0, d):
-            to[first + n : first + d, first : first + n] = exact(-rows.floor)
-            back[first + n : first + d, first : first + n] = exact(rows.floor)
+            to[first + n : first + d, first : first + n] = exact(-system.floor)
+            back[first + n : first + d, first : first + n] = exact(system.floor)
         propagated: np.ndarray = to @ moved @ back
         return propagated

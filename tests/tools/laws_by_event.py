@@ -57,8 +57,9 @@ class Worst:
 def check_events(scene: Scene, longest: int | None = None) -> Worst:
     """Step through a run, or its first `longest` steps. Raises AssertionError at the first law that is broken."""
     worst, stepper = Worst(scenes=1), Stepper(scene)
-    rows = stepper.run.rows
-    fastest, last = SLOW * rows.omega * rows.gap.max(), np.full(len(rows.delassus), -np.inf)
+    system = stepper.run.system
+    widest = system.free_travel[_contacts(system)].max()
+    fastest, last = SLOW * system.omega * widest, np.full(len(system.delassus), -np.inf)
     if stepper.code == auto.DONE:
         first = stepper.segment()
         _check_state(worst, first, first.at(0.0), None)
@@ -76,16 +77,16 @@ def check_events(scene: Scene, longest: int | None = None) -> Worst:
     return worst
 
 
-def _contacts(rows) -> np.ndarray:
-    return np.arange(len(rows.delassus)) >= rows.friction_rows
+def _contacts(system) -> np.ndarray:
+    return np.arange(len(system.delassus)) >= system.friction_rows
 
 
 def _check_between(worst: Worst, step: Step) -> Moment:
     """Walls and bounds of forces on the way to the next event. Returns the motion at its end."""
-    segment, rows = step.before, step.before.rows
+    segment, system = step.before, step.before.system
     path = segment.at(step.span * np.linspace(0.0, 1.0, POINTS))
-    solid = _contacts(rows) & np.isinf(rows.spring)
-    depth = -path.gap[:, solid].min(axis=0, initial=0.0) / rows.gap[np.isinf(rows.spring[rows.friction_rows :])]
+    solid = _contacts(system) & np.isinf(system.spring)
+    depth = -path.gap[:, solid].min(axis=0, initial=0.0) / system.free_travel[solid]
     worst.note("penetration", depth.max(initial=0.0), PENETRATION, step)
     _check_bounds(worst, segment, path, step)
     return path.take(-1)
@@ -93,44 +94,45 @@ def _check_between(worst: Worst, step: Step) -> Moment:
 
 def _check_bounds(worst: Worst, segment: Segment, path: Moment, step: Step | None) -> None:
     """Forces within their bounds, no pull at walls, friction against its slip; springs that left do not push."""
-    rows, k = segment.rows, segment.rows.friction_rows
+    system, k = segment.system, segment.system.friction_rows
     force, speed = np.atleast_2d(path.force), np.atleast_2d(path.speed)
     size = _force_sizes(segment)
-    friction = np.abs(force[:, :k]) - rows.limit
+    friction = np.abs(force[:, :k]) - system.limit[:k]
     # a compliant contact ends when its spring is pulled by ADHESION of the free travel, not before
-    springs = np.where(np.isfinite(rows.spring[k:]), rows.spring[k:], 0.0)
-    pull = -force[:, k:] - 2 * ADHESION * springs * rows.gap
+    springs = np.where(np.isfinite(system.spring[k:]), system.spring[k:], 0.0)
+    pull = -force[:, k:] - 2 * ADHESION * springs * system.free_travel[k:]
     for excess in (friction.max(axis=0) / size[:k], pull.max(axis=0, initial=0.0) / size[k:]):
         worst.note("bound", excess.max(initial=0.0), BALANCE, step)
     slides = np.isin(segment.state[:k], SLIDES)
     against = (speed[:, :k] * -segment.state[:k])[:, slides]
     # a slip ends where its speed vanishes, which is known to the resolution of the time
-    tick = RESOLUTION * rows.period * np.abs(segment.kinematic()).max() / SPEED
+    tick = RESOLUTION * system.period * np.abs(segment.kinematic()).max() / SPEED
     worst.note("bound", against.max(initial=0.0) / (segment.speed_size() + tick + 1e-300), SPEED, step)
-    assert np.array_equal(segment.held[:k][slides], -segment.state[:k][slides] * rows.limit[slides])
+    assert np.array_equal(segment.held[:k][slides], -segment.state[:k][slides] * system.limit[:k][slides])
 
 
 def _force_sizes(segment: Segment) -> np.ndarray:
     """(r,) size of the terms that the force of each row is a sum of."""
-    rows = segment.rows
-    loads = np.abs(rows.weight).max() + np.abs(rows.inertia).max() + np.abs(rows.limit).max(initial=0.0)
+    system = segment.system
+    bodies = system.of_bodies
+    loads = np.abs(bodies.weight).max() + np.abs(bodies.load).max() + np.abs(system.limit).max(initial=0.0)
     return np.maximum(segment.force_size(), loads + 1e-300)
 
 
 def _check_state(worst: Worst, segment: Segment, now: Moment, step: Step | None) -> None:
     """Newton's second law, and complementarity of gap, speed, acceleration and force, right after an event."""
-    rows, acceleration = segment.rows, segment.dynamic(now)
+    system, acceleration = segment.system, segment.dynamic(now)
     scale = segment.dynamic_size().max(initial=1e-300)
     error = np.abs(acceleration - segment.kinematic())[segment.moves]
     worst.note("balance", error.max(initial=0.0) / scale, BALANCE, step)
-    friction = ~_contacts(rows)
-    solid, state = np.isinf(rows.spring), segment.state
+    friction = ~_contacts(system)
+    solid, state = np.isinf(system.spring), segment.state
     still = solid & np.where(friction, state >= st.STICK, (state == st.CLOSED) | (state == st.TOUCHING))
     worst.note("balance", np.abs(acceleration[still]).max(initial=0.0) / scale, BALANCE, step)
-    assert np.all(segment.velocity[still & (friction | rows.rides)] == 0.0), "a row at rest moves"
+    assert np.all(segment.velocity[still & (friction | system.moves_with_floor)] == 0.0), "a row at rest moves"
     assert np.all(segment.displacement[still & ~friction] == 0.0), "a closed contact is open"
     open_ = ~friction & (state == st.OPEN)
-    gap = rows.gap[open_[rows.friction_rows :]]
+    gap = system.free_travel[open_]
     if np.any(open_ & solid):
         assert np.all(now.force[open_] == 0.0), "an open contact pushes"
     worst.note("penetration", (-segment.displacement[open_] / gap).max(initial=0.0), PENETRATION, step)
@@ -139,32 +141,33 @@ def _check_state(worst: Worst, segment: Segment, now: Moment, step: Step | None)
     starts = solid & friction & np.isin(state, SLIDES) & (segment.velocity == 0.0)
     worst.note("balance", (-state * acceleration)[starts].max(initial=0.0) / scale, BALANCE, step)
     left = ~friction & (state == st.LEAVING)
-    travel = rows.spring[left] * rows.gap[left[rows.friction_rows :]]
-    pushes = -(rows.spring[left] * segment.displacement[left] + rows.dashpot[left] * segment.velocity[left])
+    travel = system.spring[left] * system.free_travel[left]
+    pushes = -(system.spring[left] * segment.displacement[left] + system.dashpot[left] * segment.velocity[left])
     worst.note("bound", (pushes / travel).max(initial=0.0), BALANCE, step)
 
 
 def _check_event(worst: Worst, step: Step, end: Moment, now: Moment, fastest: float, last: np.ndarray) -> np.ndarray:
     """Impulses at closed contacts explain every jump and obey Newton's law. Returns the contacts that were hit."""
-    after, rows = step.after, step.before.rows
-    contacts = _contacts(rows)
-    scale = np.r_[np.full(rows.friction_rows, max(np.abs(end.gap).max(), 1e-300)), rows.gap]
+    after, system = step.after, step.before.system
+    contacts = _contacts(system)
+    scale = np.where(contacts, system.free_travel, max(np.abs(end.gap).max(), 1e-300))
     # speeds that differ by ROUND_OFF of the fastest are equal: slip and gap at a wall apart from the floor may have
     # drifted apart at that speed for a period when they are joined again
-    scale = scale + ROUND_OFF * fastest * rows.period / SIMULTANEOUS
-    jumps = np.isfinite(rows.spring) & ~contacts  # a spring's elongation is set to its bound
+    scale = scale + ROUND_OFF * fastest * system.period / SIMULTANEOUS
+    jumps = np.isfinite(system.spring) & ~contacts  # a spring's elongation is set to its bound
     worst.note("jump", (np.abs(now.gap - end.gap) / scale)[~jumps].max(initial=0.0), 2 * SIMULTANEOUS, step)
-    touching = contacts & np.isinf(rows.spring) & (after.displacement == 0.0)
+    touching = contacts & np.isinf(system.spring) & (after.displacement == 0.0)
     rates, bodies = now.p_rate - end.p_rate, now.body - end.body
-    root = np.sqrt(rows.mass)
-    spread = np.hstack([rows.structure[touching], rows.bodies[touching] / root])
+    mass, on_bodies, on_modes = system.of_bodies.mass, system.of_bodies.J[touching], system.of_structure.J[touching]
+    root = np.sqrt(mass)
+    spread = np.hstack([on_modes, on_bodies / root])
     impulse = np.linalg.lstsq(spread.T, np.r_[rates, bodies * root], rcond=None)[0]
-    left = np.r_[rates - impulse @ rows.structure[touching], bodies - impulse @ rows.bodies[touching] / rows.mass]
+    left = np.r_[rates - impulse @ on_modes, bodies - impulse @ on_bodies / mass]
     worst.note("momentum", np.abs(left).max(initial=0.0) / fastest, SPEED, step)
     if step.impacts == 0:
         worst.note("jump", np.abs(np.r_[rates, bodies]).max() / fastest, SPEED, step)
         return np.zeros(len(touching), bool)
-    if np.isinf(rows.spring[contacts]).any():
+    if np.isinf(system.spring[contacts]).any():
         assert touching.any(), "an impact without a contact"
         _check_newton(worst, step, end, now, touching, impulse, fastest, last)
     else:
@@ -174,17 +177,17 @@ def _check_event(worst: Worst, step: Step, end: Moment, now: Moment, fastest: fl
 
 def _check_newton(worst, step, end, now, touching, impulse, fastest, last) -> None:
     """v+ >= -k v-, with equality under an impulse; below the tolerance of a chatter the impact may be plastic."""
-    rows = step.before.rows
-    limit = 0.5 * CHATTER * rows.period * _accelerations(step, end)[touching]
+    system = step.before.system
+    limit = 0.5 * CHATTER * system.period * _accelerations(step, end)[touching]
     before, after = end.speed[touching], now.speed[touching]
-    restitution = rows.restitution[touching[rows.friction_rows :]]
-    restitution = np.where(step.after.begun - last[touching] < 2 * COLLAPSE * rows.period, 0.0, restitution)
+    restitution = system.restitution[touching]
+    restitution = np.where(step.after.begun - last[touching] < 2 * COLLAPSE * system.period, 0.0, restitution)
     approach = np.maximum(-before, 0.0)
     completed = restitution * approach <= np.maximum(1 - restitution, 0.1) * limit + SPEED * fastest
     short = restitution * approach - after
     worst.note("restitution", (short[~completed] / fastest).max(initial=0.0), SPEED, step)
     worst.note("restitution", (-after / fastest).max(initial=0.0), SPEED, step)
-    small = (SPEED * fastest + 4 * limit.max()) / np.diag(rows.delassus)[touching].min()
+    small = (SPEED * fastest + 4 * limit.max()) / np.diag(system.delassus)[touching].min()
     worst.note("restitution", max(-impulse.min() / small, 0.0) * SPEED, SPEED, step)
     pressed = (impulse > small) & ~completed
     worst.note("restitution", (-short[pressed] / fastest).max(initial=0.0), SPEED, step)
@@ -195,7 +198,7 @@ def _accelerations(step: Step, end: Moment) -> np.ndarray:
     start = np.abs(step.before.kinematic())
     until = np.abs(step.before.dynamic(end))
     pressed = np.abs(step.before.at(0.0).force).max() + np.abs(end.force).max()
-    return np.maximum(start, until) + pressed * np.diag(step.before.rows.delassus)
+    return np.maximum(start, until) + pressed * np.diag(step.before.system.delassus)
 
 
 assert SIMULTANEOUS <= PENETRATION

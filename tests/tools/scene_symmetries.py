@@ -16,7 +16,7 @@ from tests.tools.scene_strategies import scene_of
 from tests.tools.segment_stepper import Segment, Stepper
 from vanedamp.coupling.exact import state as st
 from vanedamp.coupling.response.evaluation import events_of
-from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.system import System
 
 #: perturbation of the runs that measure chaos, as a share of lengths and masses
 PERTURBATION = 1e-11
@@ -55,9 +55,9 @@ def record(data: dict, change=None) -> Record:
     cavities = [damper["cavity"] for damper in data["damper"]]
     hits: dict = defaultdict(list)
     before, together = {}, np.inf
-    for event in events_of(run.rows, run.log.chunks):
+    for event in events_of(run.system, run.log.chunks):
         if event.kind == "impact":
-            time, contact = event.time / run.rows.period, (event.damper, event.side)
+            time, contact = event.time / run.system.period, (event.damper, event.side)
             hits[contact].append((time, event.relative_velocity_before))
             last, other = before.get(cavities[event.damper], (-np.inf, contact))
             if contact != other and time - last < AT_ONCE:
@@ -136,9 +136,9 @@ def perturbed(data: dict) -> list[dict]:
     return near
 
 
-def turned(angle: complex) -> Callable[[Rows], Rows]:
-    """Rows whose excitation is turned by a complex phase."""
-    return lambda rows: rows._replace(force=rows.force * angle, inertia=rows.inertia * angle, table=rows.table * angle)
+def turned(angle: complex) -> Callable[[System], System]:
+    """System whose excitation is turned by a complex phase."""
+    return lambda system: system._replace(load=system.load * angle, table=system.table * angle)
 
 
 def mirrored(data: dict) -> tuple[dict, Callable]:
@@ -155,7 +155,7 @@ def mirrored(data: dict) -> tuple[dict, Callable]:
     }
 
     def change(run):
-        run.rows = turned(-1.0)(run.rows)
+        run.system = turned(-1.0)(run.system)
 
     return image, change
 
@@ -196,7 +196,7 @@ def later(data: dict) -> tuple[float, Callable] | None:
     """
     stepper, best = Stepper(scene_of(data)), None
     for count, step in enumerate(stepper.steps()):
-        pressed = np.any(np.isfinite(stepper.run.rows.spring) & _pressed(step.before))
+        pressed = np.any(np.isfinite(stepper.run.system.spring) & _pressed(step.before))
         if not pressed and (best is None or step.span > best.span):
             best = step
         if count > 60:
@@ -205,16 +205,16 @@ def later(data: dict) -> tuple[float, Callable] | None:
         return None
     tau = 0.37 * best.span
     moment, time = best.before.at(tau), best.before.begun + tau
-    rows = stepper.run.rows
+    system = stepper.run.system
 
     def change(run):
-        run.rows = turned(np.exp(1j * rows.omega * time))(run.rows)
+        run.system = turned(np.exp(1j * system.omega * time))(run.system)
         run.state.displacement[:], run.state.velocity[:] = moment.gap, moment.speed
         run.state.coordinates[:] = np.r_[moment.p, moment.p_rate]
 
-    return time / rows.period, change
+    return time / system.period, change
 
 
 def _pressed(segment: Segment) -> np.ndarray:
-    contacts = np.arange(len(segment.state)) >= segment.rows.friction_rows
+    contacts = np.arange(len(segment.state)) >= segment.system.friction_rows
     return contacts & (segment.state != st.OPEN)

@@ -15,7 +15,7 @@ from vanedamp.coupling.exact import automaton as auto
 from vanedamp.coupling.exact import state as st
 from vanedamp.coupling.exact.event_driven import EngineRun
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.system import System
 
 SLIDES = (st.SLIP_LEFT, st.SLIP_RIGHT)
 
@@ -45,7 +45,7 @@ class Moment:
 class Segment:
     """What holds from one event to the next: state of the rows and all that the motion depends on."""
 
-    rows: Rows
+    system: System
     begun: float  # s
     state: np.ndarray  # (r,)
     displacement: np.ndarray
@@ -65,7 +65,7 @@ class Segment:
     def at(self, tau: float | np.ndarray) -> Moment:
         """The motion at times after the segment's beginning."""
         single, tau = np.ndim(tau) == 0, np.atleast_1d(tau)
-        rows, n = self.rows, len(self.constant)
+        system, n = self.system, len(self.constant)
         z = self.eigenvalue[:, None] * tau
         # of driven modes: D(t) = t exp(i omega t) (1 + w), where 1 + w = (exp(d) - 1)/d
         d = np.where(self.load[:, None] == 0.0, 0.0, z - z[0])
@@ -81,25 +81,25 @@ class Segment:
             self.velocity[moves, None] * tau + 0.5 * self.drift[moves, None] * tau**2 + (self.motion[moves] @ line).real
         )
         speed[moves] += self.drift[moves, None] * tau + (self.velocity_row[moves] @ first).real
-        springs = np.isfinite(rows.spring) & (np.arange(len(gap)) < rows.friction_rows) & (self.state != st.SPRUNG)
+        springs = np.isfinite(system.spring) & (np.arange(len(gap)) < system.friction_rows) & (self.state != st.SPRUNG)
         gap[springs] = self.displacement[springs, None]  # a Jenkins element slides with its spring as it is
-        _ride(rows, gap, speed)
+        _ride(system, gap, speed)
         y = (self.shape @ now).real
         y[:n] += self.constant[:, None]
-        parts = (gap, speed, self._forces(now), y[:n], y[n:], speed[: len(rows.mass)] + rows.floor @ y[n:], now[0])
+        parts = (gap, speed, self._forces(now), y[:n], y[n:], speed[: system.bodies] + system.floor @ y[n:], now[0])
         return Moment(*(part.T[0] if single else part.T for part in parts))
 
     @property
     def moves(self) -> np.ndarray:
         """(r,) rows with a motion of their own."""
-        friction = np.arange(len(self.state)) < self.rows.friction_rows
+        friction = np.arange(len(self.state)) < self.system.friction_rows
         held = np.where(friction, self.state >= st.STICK, (self.state == st.CLOSED) | (self.state == st.TOUCHING))
-        return ~(held & (self.state != st.SPRUNG)) & ~self.rows.rides
+        return ~(held & (self.state != st.SPRUNG)) & ~self.system.moves_with_floor
 
     @property
     def closed(self) -> np.ndarray:
         """(r,) rows whose force belongs to the linear subsystem."""
-        friction = np.arange(len(self.state)) < self.rows.friction_rows
+        friction = np.arange(len(self.state)) < self.system.friction_rows
         return np.where(friction, self.state == st.STICK, self.state == st.CLOSED) | (self.state == st.SPRUNG)
 
     def _forces(self, now: np.ndarray) -> np.ndarray:
@@ -113,19 +113,20 @@ class Segment:
 
     def dynamic(self, moment: Moment) -> np.ndarray:
         """(r,) accelerations by Newton's second law under the forces of a moment."""
-        rows = self.rows
-        on_structure = (rows.force * moment.phase).real + moment.force @ rows.structure
-        on_structure = on_structure - rows.stiffness * moment.p - rows.damping @ moment.p_rate
-        on_bodies = rows.weight + (rows.inertia * moment.phase).real + moment.force @ rows.bodies
-        return rows.structure @ on_structure + rows.bodies @ (on_bodies / rows.mass)
+        system = self.system
+        modes, bodies = system.of_structure, system.of_bodies
+        on_structure = (modes.load * moment.phase).real + moment.force @ modes.J
+        on_structure = on_structure - modes.stiffness * moment.p - modes.damping @ moment.p_rate
+        on_bodies = bodies.weight + (bodies.load * moment.phase).real + moment.force @ bodies.J
+        return modes.J @ on_structure + bodies.J @ (on_bodies / bodies.mass)
 
     def speed_size(self) -> float:
         """Amplitude of the fastest motion, m/s."""
-        rows, n = self.rows, len(self.constant)
+        system, n = self.system, len(self.constant)
         modal = np.abs(self.shape[n:]) @ np.abs(self.amplitude)
         moving = np.abs(self.velocity).max()
         moving += np.abs(self.velocity_row).max(axis=0, initial=0.0) @ np.abs(self.amplitude)
-        return float(max(moving, modal.max(initial=0.0), np.abs(rows.table) * rows.omega))
+        return float(max(moving, modal.max(initial=0.0), np.abs(system.table) * system.omega))
 
     def force_size(self) -> np.ndarray:
         """(r,) amplitudes of the terms that the force of each row is a sum of."""
@@ -133,12 +134,13 @@ class Segment:
 
     def dynamic_size(self) -> np.ndarray:
         """(r,) amplitudes of the terms that the acceleration of each row is a sum of."""
-        rows, n, force = self.rows, len(self.constant), self.force_size()
+        system, n, force = self.system, len(self.constant), self.force_size()
         y = np.abs(self.shape) @ np.abs(self.amplitude)
-        on_structure = np.abs(rows.force) + force @ np.abs(rows.structure) + np.abs(rows.damping) @ y[n:]
-        on_structure = on_structure + rows.stiffness * (np.abs(self.constant) + y[:n])
-        on_bodies = np.abs(rows.weight) + np.abs(rows.inertia) + force @ np.abs(rows.bodies)
-        return np.abs(rows.structure) @ on_structure + np.abs(rows.bodies) @ (on_bodies / rows.mass)
+        modes, bodies = system.of_structure, system.of_bodies
+        on_structure = np.abs(modes.load) + force @ np.abs(modes.J) + np.abs(modes.damping) @ y[n:]
+        on_structure = on_structure + modes.stiffness * (np.abs(self.constant) + y[:n])
+        on_bodies = np.abs(bodies.weight) + np.abs(bodies.load) + force @ np.abs(bodies.J)
+        return np.abs(modes.J) @ on_structure + np.abs(bodies.J) @ (on_bodies / bodies.mass)
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,7 @@ class Stepper:
             impacts, period, time = counters[st.IMPACTS], counters[st.PERIOD], state.time[0]
             self.code = self.run.advance(int(period) + 1, int(counters[st.EVENTS]) + 1)
             after = self.segment()
-            span = (counters[st.PERIOD] - period) * self.run.rows.period + state.time[0] - time
+            span = (counters[st.PERIOD] - period) * self.run.system.period + state.time[0] - time
             yield Step(before, float(span), after, int(counters[st.IMPACTS] - impacts))
             before = after
             if counters[st.EVENTS] >= self.budget:
@@ -183,7 +185,7 @@ class Stepper:
         s, awake = state.counters[st.FLOW], state.awake[: state.counters[st.AWAKE]]
         flows, n = run.flows, len(state.constant)
         return Segment(
-            rows=run.rows, begun=float(state.counters[st.PERIOD] * run.rows.period + state.time[0]),
+            system=run.system, begun=float(state.counters[st.PERIOD] * run.system.period + state.time[0]),
             state=state.state.copy(), displacement=state.displacement.copy(), velocity=state.velocity.copy(),
             drift=state.drift.copy(), held=state.held.copy(), level=state.level.copy(),
             constant=state.constant.copy(), amplitude=state.amplitude[awake], eigenvalue=flows.eigenvalue[s, awake],
@@ -203,10 +205,10 @@ def _exp_minus_line(z: np.ndarray) -> np.ndarray:
     return np.where(small, series * w, np.expm1(z) - z)
 
 
-def _ride(rows: Rows, gap: np.ndarray, speed: np.ndarray) -> None:
+def _ride(system: System, gap: np.ndarray, speed: np.ndarray) -> None:
     """Gaps that ride are differences of slips, in place."""
-    for r in np.flatnonzero(rows.rides):
-        half = rows.gap[r - rows.friction_rows] / 2
-        before, after = rows.before[r], rows.after[r]
+    for r in np.flatnonzero(system.moves_with_floor):
+        half = system.rest[r]
+        before, after = system.left_body[r], system.right_body[r]
         gap[r] = (gap[after] if after >= 0 else half) - (gap[before] if before >= 0 else -half)
         speed[r] = (speed[after] if after >= 0 else 0.0) - (speed[before] if before >= 0 else 0.0)

@@ -13,7 +13,7 @@ from tests.validation.page import Figure, case
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import Handover
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.rom.reduced import ReducedModel
 
 STIFFNESS = np.array([[1.0, -1.0], [-1.0, 2.0]])
@@ -42,8 +42,8 @@ class Chain:
             contact={"law": "compliant", "stiffness": SPRING},
             time={"periods": 1, "transient": 0},
         )
-        structure = linear_structure(data)
-        rows = np.array([structure.floor[0], structure.response])
+        system = assemble(data)
+        rows = np.array([system.floor[0], system.of_structure.response])
         modal = np.linalg.solve(rows, state.reshape(2, 2).T)
         slip, speed = np.array([GAP - _HALF_GAP - state[0]]), np.array([-state[2]])
         start = Handover(modal[:, 0], modal[:, 1], slip, speed, np.zeros(0), np.full(2, 2 * _HALF_GAP))

@@ -46,10 +46,10 @@ class _Decision:
 
     def __init__(self, unforced: Unforced, t: float, z: np.ndarray) -> None:
         u = self.unforced = unforced
-        rows = u.rows
+        system = u.system
         self.p, self.d = [z[u.p], z[u.p_rate]], [z[u.d], z[u.s]]
         self.force: list[np.ndarray] = []
-        self.turn = np.exp(1j * rows.omega * t)
+        self.turn = np.exp(1j * system.omega * t)
         self.state, self.side = np.full(u.r, UNFORCED), np.full(u.r, -1)
         self.order, self.held = np.zeros(u.r, int), np.zeros(u.r)
         self.bound, self.moving = np.full(u.r, -1), np.zeros(u.r, bool)
@@ -89,7 +89,7 @@ class _Decision:
 
     def _classify_slider(self, r: int) -> None:
         u, (d, s) = self.unforced, self.d
-        pull = u.rows.spring[r] * d[r]
+        pull = u.system.spring[r] * d[r]
         self.state[r] = SPRUNG
         if abs(pull) < (1 - _ROUND_OFF) * u.limit[r]:
             return
@@ -103,7 +103,7 @@ class _Decision:
 
     def _classify_soft(self, r: int) -> None:
         u, (d, s) = self.unforced, self.d
-        terms = np.array([-u.rows.spring[r] * d[r], -u.rows.dashpot[r] * s[r]])
+        terms = np.array([-u.system.spring[r] * d[r], -u.system.dashpot[r] * s[r]])
         if d[r] == 0:
             if s[r] == 0:
                 self.open_springs.add(r)
@@ -122,7 +122,7 @@ class _Decision:
     def _settle_gap(self, r: int, order: int, value: float) -> None:
         """A soft contact at zero gap, whose first derivative that is not zero has this order and value."""
         self.open_springs.discard(r)
-        dashpot = self.unforced.rows.dashpot[r] > 0
+        dashpot = self.unforced.system.dashpot[r] > 0
         self.state[r] = SPRUNG if value < 0 else UNFORCED
         self.side[r] = LOW
         self.order[r] = order - (1 if dashpot and value < 0 else 0)
@@ -131,12 +131,13 @@ class _Decision:
 
     def _level(self, k: int) -> bool:
         """Forces and accelerations, k times derived. Returns False if the problem has no solution."""
-        u, rows = self.unforced, self.unforced.rows
+        u, system = self.unforced, self.unforced.system
         known = self._known(k)
-        turn = (1j * rows.omega) ** k * self.turn
-        structure = (rows.force * turn).real - rows.stiffness * self.p[k] - rows.damping @ self.p[k + 1]
-        bodies = u.by_mass @ (rows.inertia * turn).real + (u.by_mass @ rows.weight if k == 0 else 0.0)
-        free = rows.structure @ structure + bodies + rows.delassus @ known
+        turn = (1j * system.omega) ** k * self.turn
+        modes, loose = system.of_structure, system.of_bodies
+        structure = (modes.load * turn).real - modes.stiffness * self.p[k] - modes.damping @ self.p[k + 1]
+        bodies = u.by_mass @ (loose.load * turn).real + (u.by_mass @ loose.weight if k == 0 else 0.0)
+        free = modes.J @ structure + bodies + system.delassus @ known
         scale = float(self._sizes(k, known).max(initial=0.0))
         members = np.flatnonzero(self.resting)
         members = np.concatenate([members[self.side[members] < 0], members[self.side[members] >= 0]])
@@ -145,12 +146,12 @@ class _Decision:
             if not self._solve(k, members, free, scale):
                 return False
             force[members] = self.problem.force[: len(members)]
-        acceleration = rows.delassus @ (force - known) + free
+        acceleration = system.delassus @ (force - known) + free
         left = self._leave(k, members, scale)
         acceleration[members] = 0.0
         acceleration[left] = self.left
         self.force.append(force)
-        self.p.append(structure + rows.structure.T @ force)
+        self.p.append(structure + modes.J.T @ force)
         self.d.append(acceleration)
         self._decide_springs(k, _ROUND_OFF * scale)
         return True
@@ -160,26 +161,27 @@ class _Decision:
         u = self.unforced
         known = np.where(self.state == SLIDE, self.held, 0.0) if k == 0 else np.zeros(u.r)
         for r in np.flatnonzero(self.state == SPRUNG):
-            known[r] = -u.rows.spring[r] * self.d[k][r] - u.rows.dashpot[r] * self.d[k + 1][r]
+            known[r] = -u.system.spring[r] * self.d[k][r] - u.system.dashpot[r] * self.d[k + 1][r]
         return known
 
     def _sizes(self, k: int, known: np.ndarray) -> np.ndarray:
         """Sizes of the terms that accelerations are sums of: by amplitude, as zero has its round-off."""
-        rows, u = self.unforced.rows, self.unforced
-        own = np.sqrt(rows.stiffness)
+        system, u = self.unforced.system, self.unforced
+        modes, loose = system.of_structure, system.of_bodies
+        own = np.sqrt(modes.stiffness)
         rate = np.abs(self.p[k + 1]) + own * np.abs(self.p[k])
-        modal = own * rate + np.abs(rows.damping) @ rate + rows.omega**k * np.abs(rows.force)
-        bodies = rows.omega**k * np.abs(rows.inertia) + (np.abs(rows.weight) if k == 0 else 0.0)
-        return np.abs(rows.structure) @ modal + np.abs(u.by_mass) @ bodies + np.abs(rows.delassus) @ np.abs(known)
+        modal = own * rate + np.abs(modes.damping) @ rate + system.omega**k * np.abs(modes.load)
+        bodies = system.omega**k * np.abs(loose.load) + (np.abs(loose.weight) if k == 0 else 0.0)
+        return np.abs(modes.J) @ modal + np.abs(u.by_mass) @ bodies + np.abs(system.delassus) @ np.abs(known)
 
     def _solve(self, k: int, members: np.ndarray, free: np.ndarray, scale: float) -> bool:
         problem, count, side = self.problem, len(members), self.side[members]
-        contact = members >= self.unforced.rows.friction_rows
+        contact = members >= self.unforced.system.friction_rows
         limit = self.unforced.limit[members]
         low, high = np.where(contact, 0.0, -limit), np.where(contact, np.inf, limit)
         if k > 0:
             low, high = np.where(side == LOW, 0.0, -np.inf), np.where(side == HIGH, 0.0, np.inf)
-        problem.matrix[:count, :count] = self.unforced.rows.delassus[np.ix_(members, members)]
+        problem.matrix[:count, :count] = self.unforced.system.delassus[np.ix_(members, members)]
         problem.b[:count], problem.low[:count], problem.high[:count] = free[members], low, high
         problem.forced[:count] = 0
         return bool(solve_box(problem, count, scale))
@@ -198,7 +200,7 @@ class _Decision:
                 continue
             if k == 0:
                 self.held[r] = force
-                contact = r >= u.rows.friction_rows
+                contact = r >= u.system.friction_rows
                 low, high = (0.0, np.inf) if contact else (-u.limit[r], u.limit[r])
                 self.side[r] = LOW if force - low <= near else HIGH if high - force <= near else -1
             elif self.side[r] >= 0 and abs(force) > near:
@@ -226,7 +228,7 @@ class _Decision:
         return at_bound
 
     def _independent(self, r: int, chosen: list[int]) -> bool:
-        mobility = self.unforced.rows.delassus
+        mobility = self.unforced.system.delassus
         rest = mobility[r, r]
         if chosen:
             across = mobility[chosen, r]
@@ -235,7 +237,7 @@ class _Decision:
 
     def _release(self, r: int, k: int, sign: float) -> None:
         self.resting[r] = False
-        if r < self.unforced.rows.friction_rows:
+        if r < self.unforced.system.friction_rows:
             self._slide(r, sign, k + 1)
         else:
             self.state[r], self.held[r], self.order[r] = UNFORCED, 0.0, k + 2
@@ -259,8 +261,8 @@ class _Decision:
                 if abs(a) > tolerance:
                     self._settle_gap(r, k + 2, a)
             else:
-                push = -u.rows.spring[r] * self.d[k + 1][r] - u.rows.dashpot[r] * a
-                if abs(push) > tolerance * u.rows.dashpot[r]:
+                push = -u.system.spring[r] * self.d[k + 1][r] - u.system.dashpot[r] * a
+                if abs(push) > tolerance * u.system.dashpot[r]:
                     self.open_springs.discard(r)
                     self.state[r] = SPRUNG if push > 0 else LOOSE
                     self.side[r], self.order[r] = LOW, k + 1

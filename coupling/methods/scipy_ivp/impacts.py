@@ -12,7 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.motion import Unforced
 from vanedamp.coupling.numerics.complementarity import AT_LOW, DEPENDENT, Problem, solve_box
-from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.system import System
 
 #: a flight shorter than this share of a period, and all that follow it, are the end of a chatter
 CHATTER = 3e-7
@@ -43,17 +43,17 @@ def collide(
     CHATTER does not take place (0: all rebounds do). resting: (r,) contacts closed so far, which do not leave for less.
     collapsed: (r,) contacts that have collided at this very instant.
     """
-    rows = u.rows
+    system = u.system
     touching = np.flatnonzero(u.rigid_contact & (z[u.d] == 0))
     before = z[u.s][touching]
-    restitution = rows.restitution[touching - rows.friction_rows]
+    restitution = system.restitution[touching]
     share = np.maximum(1 - restitution, 0.1)
-    slow = share * 0.5 * CHATTER * rows.period * np.maximum(pressing[touching], 0.0)
+    slow = share * 0.5 * CHATTER * system.period * np.maximum(pressing[touching], 0.0)
     restitution = np.where(collapsed[touching] | (-restitution * before < slow), 0.0, restitution)
     target = -restitution * np.minimum(before, 0.0)
     tied = np.zeros(len(touching), bool)
     while True:
-        if not _solve(rows, touching, before - target, tied, problem):
+        if not _solve(system, touching, before - target, tied, problem):
             return None
         k = len(touching)
         impulse, state = problem.force[:k].copy(), problem.state[:k].copy()
@@ -63,17 +63,17 @@ def collide(
             break
         tied |= hold
         target = np.where(hold, 0.0, target)
-    z[u.s] += rows.delassus[:, touching] @ impulse
-    z[u.p_rate] += rows.structure[touching].T @ impulse
+    z[u.s] += system.delassus[:, touching] @ impulse
+    z[u.p_rate] += system.of_structure.J[touching].T @ impulse
     struck = (impulse != 0) | (state == DEPENDENT)
     after = np.where(struck, target, z[u.s][touching])
     z[u.s.start + touching] = after
     return Impact(touching, before, after, impulse, -0.5 * float(impulse @ (before + after)))
 
 
-def _solve(rows: Rows, touching: np.ndarray, excess: np.ndarray, tied: np.ndarray, problem: Problem) -> bool:
+def _solve(system: System, touching: np.ndarray, excess: np.ndarray, tied: np.ndarray, problem: Problem) -> bool:
     k = len(touching)
-    problem.matrix[:k, :k] = rows.delassus[np.ix_(touching, touching)]
+    problem.matrix[:k, :k] = system.delassus[np.ix_(touching, touching)]
     problem.b[:k], problem.high[:k], problem.forced[:k] = excess, np.inf, 0
     problem.low[:k] = np.where(tied, -np.inf, 0.0)
     return bool(solve_box(problem, k, 0.0))

@@ -7,6 +7,7 @@ import numpy as np
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
 from vanedamp.coupling.methods.scipy_ivp.motion import LOOSE, SLIDE, SPRUNG, Unforced
 from vanedamp.coupling.response import records as recs
+from vanedamp.coupling.response.recorder import cubic_peak, record_section
 from vanedamp.coupling.scene.scene import Scene
 
 #: the integrals; behind them the impulses of all rows
@@ -21,12 +22,12 @@ class Recorder:
     """
 
     def __init__(self, scene: Scene, unforced: Unforced, events: bool, samples: int) -> None:
-        u, rows = unforced, unforced.rows
-        self.unforced, self.rows, self.keep = u, rows, events
-        self.records = recs.new_records(rows, scene.time.simulated, samples)
+        u, system = unforced, unforced.system
+        self.unforced, self.system, self.keep = u, system, events
+        self.records = recs.new_records(system, scene.time.simulated, samples)
         self.each, self.steps = samples, scene.solver.steps
         self.count = _PUSH + u.r
-        self.functionals = _functionals(u)
+        self.functionals, self.damping = _functionals(u), system.of_structure.damping
         self.states = np.zeros(u.r, int)
         self.period, self.impacts, self.deep = 0, 0, 0.0
         self.impact_loss, self.spring_loss = 0.0, 0.0
@@ -37,37 +38,37 @@ class Recorder:
 
     def sizes(self, reach: float) -> np.ndarray:
         """Typical sizes of state and integrals (size + count,), for a displacement `reach` (m)."""
-        u, rows = self.unforced, self.rows
-        largest = np.abs(rows.structure).max(axis=0, initial=0.0)
-        largest = np.where(largest > 0, largest, np.abs(rows.response))
+        u, system = self.unforced, self.system
+        largest = np.abs(system.of_structure.J).max(axis=0, initial=0.0)
+        largest = np.where(largest > 0, largest, np.abs(system.of_structure.response))
         place = np.concatenate([reach / np.maximum(largest, 1e-300), np.full(u.r, reach)])
-        mass = float(rows.mass.sum())
-        momentum = max(mass * rows.omega * reach, 1e-300)
-        energy = max(mass * (rows.omega * reach) ** 2, 1e-300)
+        mass = float(system.of_bodies.mass.sum())
+        momentum = max(mass * system.omega * reach, 1e-300)
+        energy = max(mass * (system.omega * reach) ** 2, 1e-300)
         integrals = np.full(self.count, momentum)
-        integrals[:_SQUARE], integrals[_SQUARE] = energy, reach**2 / rows.omega
-        integrals[_COS : _SIN + 1], integrals[_MOMENTUM_COS:_PUSH] = reach / rows.omega, momentum / rows.omega
-        return np.concatenate([place, rows.omega * place, integrals])
+        integrals[:_SQUARE], integrals[_SQUARE] = energy, reach**2 / system.omega
+        integrals[_COS : _SIN + 1], integrals[_MOMENTUM_COS:_PUSH] = reach / system.omega, momentum / system.omega
+        return np.concatenate([place, system.omega * place, integrals])
 
     def rates(self, extended: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Rates of the integrals; found: the forces of the rows and the functionals on the extended state."""
-        u, rows = self.unforced, self.rows
+        u, system = self.unforced, self.system
         force, (loads, speeds, (x, _, momentum)) = found[: u.r], self._parts(found[u.r :])
-        s, friction = extended[u.s], rows.friction_rows
+        s, friction = extended[u.s], system.friction_rows
         slide = self.states[:friction] == SLIDE
         sprung = (self.states == SPRUNG)[friction:]
         cosine, sine = extended[u.cosine], extended[u.sine]
         rates = np.empty(self.count)
         rates[:_PUSH] = (
-            loads @ speeds, speeds[: u.n] @ rows.damping @ speeds[: u.n], -(force[:friction] * slide) @ s[:friction],
-            rows.dashpot[friction:] * sprung @ s[friction:] ** 2, x * x, x * cosine, x * sine, momentum * cosine,
+            loads @ speeds, speeds[: u.n] @ self.damping @ speeds[: u.n], -(force[:friction] * slide) @ s[:friction],
+            system.dashpot[friction:] * sprung @ s[friction:] ** 2, x * x, x * cosine, x * sine, momentum * cosine,
             momentum * sine,
         )  # fmt: skip
         rates[_PUSH:] = force
         return rates
 
     def _parts(self, found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        size = self.unforced.n + len(self.rows.mass)
+        size = self.unforced.n + self.system.bodies
         return found[:size], found[size : 2 * size], found[2 * size :]
 
     def start(self, y: np.ndarray) -> None:
@@ -78,12 +79,12 @@ class Recorder:
 
     def points(self, times: np.ndarray, y: np.ndarray) -> None:
         """Peaks, samples and penetration at points of the grid."""
-        u, rows, friction = self.unforced, self.rows, self.rows.friction_rows
-        gaps = y[u.d][friction:] / rows.gap[:, None]
+        u, system, friction = self.unforced, self.system, self.system.friction_rows
+        gaps = y[u.d][friction:] / system.free_travel[friction:, None]
         self.deep = max(self.deep, float((-gaps[u.rigid_contact[friction:]]).max(initial=0.0)))
         for t, state in zip(times, y.T, strict=True):
             self._peak(t, state)
-            index = round(t / rows.period * self.steps)
+            index = round(t / system.period * self.steps)
             if self.each and index % (self.steps // self.each) == 0:
                 self._sample(self.period * self.each + index // (self.steps // self.each), state)
 
@@ -96,15 +97,15 @@ class Recorder:
         u = self.unforced
         x, rate, _ = self._parts(self.functionals @ u.extended(t, y[: u.size]))[2]
         last, before, rate_before = self.last
-        largest = max(abs(x), _cubic_peak(t - last, before, x, rate_before, rate))
+        largest = max(abs(x), cubic_peak(t - last, before, x, rate_before, rate))
         self.records.peak[self.period] = max(self.records.peak[self.period], largest)
         self.last = (t, x, rate)
 
     def _sample(self, index: int, y: np.ndarray) -> None:
         if index < len(self.records.samples):
             u = self.unforced
-            slips = y[u.d][: len(self.rows.mass)]
-            phase = (index % self.each) * self.rows.period / self.each
+            slips = y[u.d][: self.system.bodies]
+            phase = (index % self.each) * self.system.period / self.each
             self.records.samples[index] = [self._parts(self.functionals @ u.extended(phase, y[: u.size]))[2][0], *slips]
 
     def impact(self, t: float, impact: Impact) -> None:
@@ -117,18 +118,18 @@ class Recorder:
     def _count(self, t: float, r: int, before: float, after: float, impulse: float) -> list[float]:
         self.impacts += 1
         self.records.impacts[self.period] += 1
-        self.records.collided[self.period] += 0.5 * before**2 / self.rows.delassus[r, r]
-        entry = [self.period * self.rows.period + t, recs.IMPACT, r, before, after, impulse]
+        self.records.collided[self.period] += 0.5 * before**2 / self.system.delassus[r, r]
+        entry = [self.period * self.system.period + t, recs.IMPACT, r, before, after, impulse]
         if self.keep:
             self.log.append(entry)
         return entry
 
     def springs(self, t: float, y: np.ndarray, old: np.ndarray, new: np.ndarray) -> None:
         """Soft contacts that begin or end to push: impacts, and the energy that a wall keeps which is left pressed."""
-        u, rows = self.unforced, self.rows
+        u, system = self.unforced, self.system
         for r in np.flatnonzero(u.soft_contact & ((old == SPRUNG) != (new == SPRUNG))):
             d, s = y[u.d.start + r], y[u.s.start + r]
-            energy, push = 0.5 * rows.spring[r] * d * d, y[u.size + _PUSH + r]
+            energy, push = 0.5 * system.spring[r] * d * d, y[u.size + _PUSH + r]
             if new[r] == SPRUNG:
                 if old[r] == LOOSE:
                     self.spring_loss -= energy
@@ -152,43 +153,28 @@ class Recorder:
 
     def _section(self, y: np.ndarray) -> None:
         """Section and ledger at the start of a period."""
-        u, rows, p, b = self.unforced, self.rows, self.period, len(self.rows.mass)
+        u, system, b = self.unforced, self.system, self.system.bodies
         z, integrals = y[: u.size], y[u.size :]
-        _, speeds, (x, rate, momentum) = self._parts(self.functionals @ u.extended(0.0, z))
-        self.records.section[p] = [x, rate, momentum, *z[u.d][:b], *z[u.s][:b]]
-        self.last = (0.0, float(x), float(rate))
         holds = (self.states == SPRUNG) | (u.slider & (u.limit > 0))
-        spring = 0.5 * float(rows.spring[holds] @ z[u.d][holds] ** 2)
-        height = z[u.d][:b] + rows.floor @ z[u.p]
-        structure = 0.5 * float((speeds[: u.n] ** 2).sum() + rows.stiffness @ z[u.p] ** 2) + spring
-        parts = self.records.parts[p]
-        parts[:] = [structure, *(0.5 * rows.mass * speeds[u.n :] ** 2 - rows.weight * height)]
-        ledger = self.records.ledger[p]
+        springs = 0.5 * float(system.spring[holds] @ z[u.d][holds] ** 2)
+        ledger = np.zeros(len(recs.ENERGIES))
         ledger[[recs.EXCITATION, recs.VISCOUS, recs.FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
-        ledger[recs.CONTACT] = integrals[_CONTACT] + self.spring_loss
-        ledger[recs.IMPACT_LOSS], ledger[recs.STORED] = self.impact_loss, parts.sum()
+        ledger[recs.CONTACT], ledger[recs.IMPACT_LOSS] = integrals[_CONTACT] + self.spring_loss, self.impact_loss
+        record_section(system, self.records, self.period, z[u.p], z[u.p_rate], z[u.d][:b], z[u.s][:b], springs, ledger)
+        x, rate, _ = self.records.section[self.period, :3]
+        self.last = (0.0, float(x), float(rate))
         self.before = integrals.copy()
 
 
 def _functionals(u: Unforced) -> np.ndarray:
-    rows, b = u.rows, len(u.rows.mass)
+    system, b = u.system, u.system.bodies
     loads, speeds = np.zeros((2, u.n + b, u.size + 3))
-    load = np.concatenate([rows.force, rows.inertia])
-    loads[:, u.cosine], loads[:, u.sine] = load.real, -load.imag
+    loads[:, u.cosine], loads[:, u.sine] = system.load.real, -system.load.imag
     speeds[: u.n, u.p_rate] = np.eye(u.n)
-    speeds[u.n :, u.p_rate] = rows.floor
+    speeds[u.n :, u.p_rate] = system.floor
     speeds[u.n :, u.s.start : u.s.start + b] = np.eye(b)
     response = np.zeros((2, u.size + 3))
-    response[0, u.p] = response[1, u.p_rate] = rows.response
-    response[0, u.cosine], response[0, u.sine] = rows.table.real, -rows.table.imag
-    response[1, u.cosine], response[1, u.sine] = -rows.omega * rows.table.imag, -rows.omega * rows.table.real
-    return np.vstack([loads, speeds, response, rows.mass @ speeds[u.n :]])
-
-
-def _cubic_peak(h: float, x0: float, x1: float, rate0: float, rate1: float) -> float:
-    """|x| where the straight line through two velocities is zero, on the cubic through both ends; 0 if nowhere."""
-    if not rate0 * rate1 < 0:
-        return 0.0
-    t = rate0 / (rate0 - rate1)
-    u = 1 - t
-    return abs(x0 * u * u * (1 + 2 * t) + x1 * t * t * (3 - 2 * t) + h * t * u * (u * rate0 - t * rate1))
+    response[0, u.p] = response[1, u.p_rate] = system.of_structure.response
+    response[0, u.cosine], response[0, u.sine] = system.table.real, -system.table.imag
+    response[1, u.cosine], response[1, u.sine] = -system.omega * system.table.imag, -system.omega * system.table.real
+    return np.vstack([loads, speeds, response, system.of_bodies.mass @ speeds[u.n :]])

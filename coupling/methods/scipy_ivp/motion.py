@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.constraints import Rows
+from vanedamp.coupling.system.system import System
 
 # states of a row: no force; at rest by an unknown force; at rest while other rows carry its force, which is constant;
 # sliding; a spring that holds or presses; a soft contact that has ended at zero force, before its gap is open
@@ -48,37 +48,38 @@ class Guards(NamedTuple):
 
 
 class Unforced:
-    """Scene in rows without any force of rows: sizes, places in the state, and accelerations."""
+    """The system without any force of rows: sizes, places in the state, and accelerations."""
 
-    def __init__(self, rows: Rows) -> None:
-        n, r = len(rows.stiffness), len(rows.delassus)
-        self.rows, self.n, self.r, self.size = rows, n, r, 2 * (n + r)
+    def __init__(self, system: System) -> None:
+        n, r = system.modes, len(system.delassus)
+        self.system, self.n, self.r, self.size = system, n, r, 2 * (n + r)
         self.p, self.d = slice(0, n), slice(n, n + r)
         self.p_rate, self.s = slice(n + r, 2 * n + r), slice(2 * n + r, 2 * (n + r))
         self.one, self.cosine, self.sine = self.size, self.size + 1, self.size + 2
-        self.soft = np.isfinite(rows.spring)
-        contacts = np.arange(r) >= rows.friction_rows
+        self.soft = np.isfinite(system.spring)
+        contacts = np.arange(r) >= system.friction_rows
         self.rigid_contact, self.soft_contact = contacts & ~self.soft, contacts & self.soft
         self.slider = ~contacts & self.soft
         self.friction = ~contacts & ~self.soft
-        self.limit = np.concatenate([rows.limit, np.zeros(r - rows.friction_rows)])
-        self.by_mass = rows.bodies / rows.mass
+        self.limit = system.limit
+        modes, bodies = system.of_structure, system.of_bodies
+        self.by_mass = bodies.J / bodies.mass
         self.structure = np.zeros((n, self.size + 3))
-        self.structure[:, self.p], self.structure[:, self.p_rate] = -np.diag(rows.stiffness), -rows.damping
-        self.structure[:, self.cosine], self.structure[:, self.sine] = rows.force.real, -rows.force.imag
-        self.accelerations = rows.structure @ self.structure
-        self.accelerations[:, self.one] += self.by_mass @ rows.weight
-        self.accelerations[:, self.cosine] += self.by_mass @ rows.inertia.real
-        self.accelerations[:, self.sine] -= self.by_mass @ rows.inertia.imag
+        self.structure[:, self.p], self.structure[:, self.p_rate] = -np.diag(modes.stiffness), -modes.damping
+        self.structure[:, self.cosine], self.structure[:, self.sine] = modes.load.real, -modes.load.imag
+        self.accelerations = modes.J @ self.structure
+        self.accelerations[:, self.one] += self.by_mass @ bodies.weight
+        self.accelerations[:, self.cosine] += self.by_mass @ bodies.load.real
+        self.accelerations[:, self.sine] -= self.by_mass @ bodies.load.imag
 
     def extended(self, t: float | np.ndarray, z: np.ndarray) -> np.ndarray:
         """The states (size, ...) at times t (...) with 1, cos and sin below them."""
-        phase = self.rows.omega * np.asarray(t, float)
+        phase = self.system.omega * np.asarray(t, float)
         return np.concatenate([z, [np.ones_like(phase), np.cos(phase), np.sin(phase)]])
 
     def rates(self, motion: Motion, extended: np.ndarray) -> np.ndarray:
         """The rates (size + 3,) of an extended state, or of its rates."""
-        omega = self.rows.omega
+        omega = self.system.omega
         turn = [0.0, -omega * extended[self.sine], omega * extended[self.cosine]]
         return np.concatenate([motion.rate @ extended, turn])
 
@@ -90,13 +91,13 @@ class Motion:
     """
 
     def __init__(self, unforced: Unforced, contacts: Contacts) -> None:
-        u, rows = unforced, unforced.rows
+        u, system = unforced, unforced.system
         self.unforced, self.contacts = u, contacts
-        state, mobility = contacts.state, rows.delassus
+        state, mobility = contacts.state, system.delassus
         self.force = np.zeros((u.r, u.size + 3))
         self.force[:, u.one] = contacts.held
         for r in np.flatnonzero(state == SPRUNG):
-            self.force[r, u.d.start + r], self.force[r, u.s.start + r] = -rows.spring[r], -rows.dashpot[r]
+            self.force[r, u.d.start + r], self.force[r, u.s.start + r] = -system.spring[r], -system.dashpot[r]
         closed = np.flatnonzero(state == REST)
         if len(closed):
             free = (u.accelerations + mobility @ self.force)[closed]
@@ -106,7 +107,7 @@ class Motion:
         self.rate = np.zeros((u.size, u.size + 3))
         self.rate[u.p, u.p_rate] = np.eye(u.n)
         self.rate[u.d, u.s] = np.diag(~(u.slider & (state == SLIDE)))
-        self.rate[u.p_rate] = u.structure + rows.structure.T @ self.force
+        self.rate[u.p_rate] = u.structure + system.of_structure.J.T @ self.force
         self.rate[u.s] = accelerations
 
     def guards(self) -> Guards:
@@ -123,13 +124,13 @@ class Motion:
         state, order, side = contacts.state[r], int(contacts.order[r]), contacts.side[r]
         place, speed = np.zeros((2, u.size + 3))
         place[u.d.start + r] = speed[u.s.start + r] = 1.0
-        contact = r >= u.rows.friction_rows
+        contact = r >= u.system.friction_rows
         if state == SLIDE:
             return [] if order == NEVER else [(-np.sign(contacts.held[r]) * speed, r, SLIP, order)]
         if state == UNFORCED:
             return [(place, r, GAP, order)] if contact and order != NEVER else []
         if state == LOOSE:
-            push = u.rows.spring[r] * place + u.rows.dashpot[r] * speed
+            push = u.system.spring[r] * place + u.system.dashpot[r] * speed
             return [(-place, r, OPENS, 0)] + ([] if order == NEVER else [(push, r, PUSHES, order)])
         if state == HELD:
             return []

@@ -34,8 +34,7 @@ from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.constraints import rows_of
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble, initial_motion
 
 #: the shortest first step, as a share of a period
 _SHORTEST = 1e-26
@@ -67,14 +66,14 @@ class IvpRun:
 
     def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
         self.solver, self.steps = scene.solver, scene.solver.steps
-        structure = linear_structure(scene)
-        self.rows, displacement, velocity = rows_of(scene, structure)
-        self.unforced = u = Unforced(self.rows)
+        self.system = assemble(scene)
+        initial = initial_motion(scene, self.system)
+        self.unforced = u = Unforced(self.system)
         self.record = Recorder(scene, u, events, samples_per_period)
         self.y = np.zeros(u.size + self.record.count)
-        self.y[u.p], self.y[u.d] = structure.displacement, displacement
-        self.y[u.p_rate], self.y[u.s] = structure.velocity, velocity
-        self.time, self.step = 0.0, self.rows.period / self.steps
+        self.y[u.p], self.y[u.d] = initial.p, initial.displacement
+        self.y[u.p_rate], self.y[u.s] = initial.p_rate, initial.velocity
+        self.time, self.step = 0.0, self.system.period / self.steps
         self.problem = new_problem(u.r)
         self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
         self.since = np.full(u.r, np.inf)  # s, since each contact's last impact
@@ -104,13 +103,14 @@ class IvpRun:
         log = [np.array(record.log)] if record.log else []
         open_ledger = _OPEN_LEDGER * max(self.solver.rtol or 0.0, _LEAST)
         return Outcome(
-            self.rows, record.records, record.period, self.events, open_ledger, numbers, log, max(record.deep, 0.0)
+            self.system, record.records, record.period, self.events, open_ledger, numbers, log, max(record.deep, 0.0)
         )
 
     def _begin(self) -> bool:
         self.begun, place = True, self.y[self.unforced.d]
-        gap = np.concatenate([np.zeros(self.rows.friction_rows), self.rows.gap])
-        place[np.abs(place) <= _TOUCHING * gap] = 0.0
+        contacts = slice(self.system.friction_rows, None)
+        gap = place[contacts]
+        gap[np.abs(gap) <= _TOUCHING * self.system.free_travel[contacts]] = 0.0
         decided = self._decide(-1, -1)
         self.record.start(self.y)
         return decided
@@ -136,7 +136,7 @@ class IvpRun:
             self.guards.order[:] = 0
             return self._end_period()
         self.events += 1
-        self.standing = self.standing + 1 if arc.duration < COLLAPSE * self.rows.period else 0
+        self.standing = self.standing + 1 if arc.duration < COLLAPSE * self.system.period else 0
         if self.standing > _STANDING:
             return Status.UNDECIDED
         decided = self._decide(int(self.guards.row[arc.event]), int(self.guards.kind[arc.event]))
@@ -183,11 +183,11 @@ class IvpRun:
             root = np.sqrt(slope**2 - 2 * curvature * value)
             times = np.where(slope > 0, -(slope + root) / curvature, 2 * value / (root - slope))
         times = times[np.isfinite(times) & (times > 0)]
-        return float(np.clip(2 * times.min(initial=np.inf), _SHORTEST * self.rows.period, self.step))
+        return float(np.clip(2 * times.min(initial=np.inf), _SHORTEST * self.system.period, self.step))
 
     def rate(self, t: float, y: np.ndarray) -> np.ndarray:
         """Rates of the state and of the integrals."""
-        u, phase = self.unforced, self.rows.omega * t
+        u, phase = self.unforced, self.system.omega * t
         self._extended[: u.size] = y[: u.size]
         self._extended[u.cosine], self._extended[u.sine] = np.cos(phase), np.sin(phase)
         found = self._linear @ self._extended
@@ -228,30 +228,30 @@ class IvpRun:
 
     def _arrive(self, row: int, kind: int, z: np.ndarray) -> None:
         """What the event has brought to zero, or to its bound, is there exactly."""
-        u, rows = self.unforced, self.rows
-        if kind in (GAP, OPENS) or (kind == LOW and u.soft_contact[row] and rows.dashpot[row] == 0):
+        u, system = self.unforced, self.system
+        if kind in (GAP, OPENS) or (kind == LOW and u.soft_contact[row] and system.dashpot[row] == 0):
             z[u.d.start + row] = 0.0
         elif kind == SLIP:
             z[u.s.start + row] = 0.0
         elif kind in (LOW, HIGH) and u.slider[row]:
-            z[u.d.start + row] = (1 if kind == LOW else -1) * u.limit[row] / rows.spring[row]
+            z[u.d.start + row] = (1 if kind == LOW else -1) * u.limit[row] / system.spring[row]
 
     def _calm(self, z: np.ndarray) -> None:
         """Zero to the round-off of the run's largest speed is zero: two slips may come to rest together."""
         self.fastest = max(self.fastest, float(np.abs(z[self.unforced.s]).max(initial=0.0)))
         # gaps of contacts that have just collided are known beyond the round-off of places
-        touch = np.where(self.since > FRESH * self.rows.period, TOUCH * self.rows.period, 0.0)
+        touch = np.where(self.since > FRESH * self.system.period, TOUCH * self.system.period, 0.0)
         calm(self.unforced, z, self.fastest, touch)
 
     def _impact(self, z: np.ndarray) -> bool:
-        u, rows, complete = self.unforced, self.rows, self.solver.complete_chatter is not False
+        u, system, complete = self.unforced, self.system, self.solver.complete_chatter is not False
         pressing, resting, collapsed = np.zeros(u.r), np.zeros(u.r, bool), np.zeros(u.r, bool)
         if complete:
             extended = u.extended(self.time, z)
             resting = self.motion.contacts.state == REST
-            push = np.diag(rows.delassus) * (self.motion.force @ extended)
+            push = np.diag(system.delassus) * (self.motion.force @ extended)
             pressing = np.where(resting, push, -(self.motion.rate[u.s] @ extended))
-            collapsed = self.since < COLLAPSE * rows.period
+            collapsed = self.since < COLLAPSE * system.period
         impact = collide(u, z, pressing, resting, collapsed, self.problem)
         if impact is None:
             return False
@@ -262,8 +262,9 @@ class IvpRun:
 
 def _reach(scene: Scene, u: Unforced) -> float:
     """A typical displacement, m: the narrowest gap, the least elongation at which a spring slides, the static one."""
-    rows = u.rows
-    lengths = [cavity.gap for cavity in scene.cavity] + list(u.limit[u.slider] / rows.spring[u.slider])
+    system = u.system
+    lengths = [cavity.gap for cavity in scene.cavity] + list(u.limit[u.slider] / system.spring[u.slider])
     lengths = [length for length in lengths if length > 0]
-    static = np.abs(rows.structure) @ (np.abs(rows.force) / rows.stiffness)
+    modes = system.of_structure
+    static = np.abs(modes.J) @ (np.abs(modes.load) / modes.stiffness)
     return float(min(lengths, default=static.max(initial=1e-12)))

@@ -48,11 +48,11 @@ def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
     code = run.advance(period, scene.solver.max_events)
     search, accounting = np.zeros(rounds), np.zeros(rounds)
     while True:
-        tau = _search(run.rows, run.flows, run.state, run.channels, 1)
+        tau = _search(run.system, run.flows, run.state, run.channels, 1)
         _amplitudes(run.flows, run.state, run.scratch, tau)
         for turn in range(-1, rounds):  # the first compiles
-            one = seconds(_search, run.rows, run.flows, run.state, run.channels, _REPEATS)
-            two = seconds(_account, run.rows, run.flows, run.state, run.records, run.scratch, tau, _REPEATS)
+            one = seconds(_search, run.system, run.flows, run.state, run.channels, _REPEATS)
+            two = seconds(_account, run.system, run.flows, run.state, run.records, run.scratch, tau, _REPEATS)
             if turn >= 0:
                 search[turn] += one / _REPEATS
                 accounting[turn] += two / _REPEATS

@@ -16,8 +16,7 @@ from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.constraints import rows_of
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.resonance import excitation_force
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.matrices import SystemMatrices
@@ -55,18 +54,18 @@ def explicit_run(
     """
     if len(scene.damper) != 1 or scene.damper[0].friction > 0 or scene.contact.law != "compliant":
         raise InputError("scene: the whole mesh takes one body without friction and a compliant contact")
-    rows, _, _ = rows_of(scene, linear_structure(scene))
+    system = assemble(scene)
     free = matrices.free
     stiffness = sparse.csr_matrix(matrices.stiffness)[free][:, free]
     mass = _row_sums(matrices)[free]
     response = _functional(interface, free, str(scene.excitation.at))
     wall = _functional(interface, free, str(scene.cavity[0].labels()[2]))
     highest = _highest(stiffness, mass)
-    omega, damping = rows.omega, 2 * matrices.damping_ratio * first
+    omega, damping = system.omega, 2 * matrices.damping_ratio * first
     steps = math.ceil(2 * math.pi / omega * highest / (2 * share))
     h, load, half = 2 * math.pi / omega / steps, excitation_force(scene), scene.cavity[0].gap / 2
     start, peak = np.array([scene.damper[0].position, scene.damper[0].velocity]), np.zeros(periods)
-    contact = np.array([half, rows.spring[-1], rows.dashpot[-1], scene.damper[0].mass])
+    contact = np.array([half, system.spring[-1], system.dashpot[-1], scene.damper[0].mass])
     arrays = (stiffness.indptr, stiffness.indices, stiffness.data, mass, *_sparse(response), *_sparse(wall))
     phase = load * np.sin(2 * np.pi * np.arange(steps) / steps)
     impacts = np.zeros(periods, np.int64)

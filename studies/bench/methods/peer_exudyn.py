@@ -34,7 +34,7 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     node, kept = _model(world, equations, turn, units)
     sensor = world.AddSensor(_sensor(node))
     world.Assemble()
-    settings = _settings(periods, len(equations.system.phase) - 1)
+    settings = _settings(periods, len(equations.times.phase) - 1)
     started = time.thread_time()
     try:
         world.SolveDynamic(settings, solverType=exudyn.DynamicSolverType.GeneralizedAlpha, showHints=False)
@@ -53,8 +53,12 @@ class _Units:
     """Scales of length (m), time (s), mass (kg) and force (N)."""
 
     def __init__(self, equations: Coupled) -> None:
-        gaps = equations.rows.gap[np.isfinite(equations.rows.gap)]
-        self.length, self.time, self.mass = float(gaps.min()), equations.rows.period, float(equations.rows.mass.min())
+        gaps = equations.times.travel[np.isfinite(equations.times.travel)]
+        self.length, self.time, self.mass = (
+            float(gaps.min()),
+            equations.system.period,
+            float(equations.system.of_bodies.mass.min()),
+        )
         self.force = self.mass * self.length / self.time**2
 
 
@@ -103,10 +107,10 @@ def _model(world: Any, equations: Coupled, turn: np.ndarray, units: _Units) -> t
     ground = world.AddMarker(MarkerNodeCoordinate(nodeNumber=world.AddNode(NodePointGround()), coordinate=0))
     markers = [world.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=i)) for i in range(size)]
     kept = []
-    for marker, (cosine, sine) in zip(markers, turn.T @ system.load / units.force, strict=True):
-        if cosine or sine:
+    for marker, load in zip(markers, turn.T @ system.load / units.force, strict=True):
+        if load:
             item = world.AddLoad(LoadCoordinate(markerNumber=marker, load=0.0))
-            kept.append(CreateSymbolicUserFunction(world, _load(cosine, sine), "loadUserFunction", item))
+            kept.append(CreateSymbolicUserFunction(world, _load(load), "loadUserFunction", item))
             world.SetLoadParameter(item, "loadUserFunction", kept[-1])
     for r, row in enumerate(system.J @ turn):
         ends = [next((markers[i] for i in range(size) if sign * row[i] > 0.5), ground) for sign in (-1, 1)]
@@ -117,13 +121,15 @@ def _model(world: Any, equations: Coupled, turn: np.ndarray, units: _Units) -> t
     return node, kept
 
 
-def _load(cosine: float, sine: float) -> Any:
+def _load(load: complex) -> Any:
     """A harmonic load, as source that Exudyn turns into an expression of its own."""
     import exudyn
 
     names: dict[str, Any] = {"exudyn": exudyn}
     angle = f"{2 * np.pi!r} * t"
-    text = f"{float(cosine)!r} * exudyn.symbolic.cos({angle}) - ({float(sine)!r}) * exudyn.symbolic.sin({angle})"
+    text = (
+        f"{float(load.real)!r} * exudyn.symbolic.cos({angle}) - ({float(load.imag)!r}) * exudyn.symbolic.sin({angle})"
+    )
     exec(f"def load(mbs, t, load):\n    return {text}", names)
     return names["load"]
 
@@ -131,11 +137,11 @@ def _load(cosine: float, sine: float) -> Any:
 def _contact(world: Any, ends: list[Any], equations: Coupled, r: int, units: _Units) -> Any:
     from exudyn.itemInterface import NodeGenericData, ObjectContactCoordinate
 
-    system, steps = equations.system, len(equations.system.phase) - 1
+    system, steps = equations.system, len(equations.times.phase) - 1
     rigid = np.isinf(system.spring[r])
     if rigid:  # as long a contact as that of our penalty methods
         duration = 2 * steps ** (1 / 3) / steps
-        stiffness = (np.pi / duration) ** 2 / (equations.rows.delassus[r, r] * units.mass)
+        stiffness = (np.pi / duration) ** 2 / (equations.system.delassus[r, r] * units.mass)
         law = {
             "impactModel": 2, "restitutionCoefficient": float(system.restitution[r]), "minimumImpactVelocity": 1e-3
         }  # fmt: skip
@@ -147,7 +153,7 @@ def _contact(world: Any, ends: list[Any], equations: Coupled, r: int, units: _Un
     ))  # fmt: skip
     return ObjectContactCoordinate(
         markerNumbers=ends, nodeNumber=data, contactStiffness=stiffness,
-        offset=-float(system.offset[r]) / units.length, **law,
+        offset=-float(system.rest[r]) / units.length, **law,
     )  # fmt: skip
 
 
@@ -156,7 +162,7 @@ def _friction(ends: list[Any], equations: Coupled, r: int, units: _Units) -> Any
 
     force = float(equations.system.limit[r]) / units.force
     # as for our explicit penalty method
-    slow = 2 * force * equations.rows.delassus[r, r] * units.mass / (len(equations.system.phase) - 1)
+    slow = 2 * force * equations.system.delassus[r, r] * units.mass / (len(equations.times.phase) - 1)
     return ObjectConnectorCoordinateSpringDamperExt(
         markerNumbers=ends, dynamicFrictionForce=force, frictionProportionalZone=float(slow)
     )

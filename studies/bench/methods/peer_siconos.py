@@ -23,9 +23,9 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     steps = round(setting)
     equations = coupled(scene, steps)
     simulation, structure, kept = _model(equations, periods)
-    system, h = equations.system, equations.system.step
+    system, h = equations.system, equations.times.step
     angle = system.omega * h * (np.arange(steps) + 0.5)
-    loads = np.outer(np.cos(angle), system.load[:, 0]) - np.outer(np.sin(angle), system.load[:, 1]) + system.weight
+    loads = np.outer(np.cos(angle), system.load.real) - np.outer(np.sin(angle), system.load.imag) + system.weight
     # views of its own memory, taken once: each call would leave one behind
     force, place = structure.fExt(), structure.q()
     q = np.zeros((periods * steps + 1, len(system.mass)))
@@ -46,12 +46,12 @@ def _model(equations: Coupled, periods: int) -> tuple[Any, Any, list[Any]]:
     import siconos.kernel as kernel
 
     system, motion = equations.system, equations.motion
-    h = system.step
+    h = equations.times.step
     structure = kernel.LagrangianLinearTIDS(
         motion.q.copy(), motion.v.copy(), np.diag(system.mass), np.diag(system.stiffness), system.damping.copy()
     )
     structure.setFExtPtr(np.zeros(len(motion.q)))
-    world = kernel.NonSmoothDynamicalSystem(0.0, (periods + 1) * equations.rows.period)
+    world = kernel.NonSmoothDynamicalSystem(0.0, (periods + 1) * equations.system.period)
     world.insertDynamicalSystem(structure)
     kept: list[Any] = [world]
     friction = False
@@ -63,7 +63,7 @@ def _model(equations: Coupled, periods: int) -> tuple[Any, Any, list[Any]]:
             law, relation = kernel.RelayNSL(1, -bound, bound), kernel.LagrangianLinearTIR(row[None].copy())
         else:
             law = kernel.NewtonImpactNSL(float(system.restitution[r]))
-            relation = kernel.LagrangianLinearTIR(row[None].copy(), np.array([system.offset[r]]))
+            relation = kernel.LagrangianLinearTIR(row[None].copy(), np.array([system.rest[r]]))
         interaction = kernel.Interaction(law, relation)
         world.link(interaction, structure)
         kept += [law, relation, interaction]

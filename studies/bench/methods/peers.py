@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.methods import equations_of_motion as sy
+from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.constraints import Rows, rows_of
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
 #: share of the free travel by which a body may overlap a wall, as for our methods
@@ -73,35 +73,30 @@ def run_peer(name: str, scene: Scene, periods: int, setting: float, samples: int
 
 
 class Coupled(NamedTuple):
-    """A scene as M q'' + C q' + K q = loads + J^T lambda, and its state at time zero."""
+    """A scene as M q'' + C q' + K q = loads + J^T lambda, the steps of a period, and its state at time zero."""
 
-    system: sy.System
-    rows: Rows
-    motion: sy.Motion
+    system: System
+    times: TimeGrid
+    motion: Motion
 
 
 def coupled(scene: Scene, steps: int) -> Coupled:
     """The matrices that our own stepping methods use, with so many steps a period."""
-    structure = linear_structure(scene)
-    rows, displacement, velocity = rows_of(scene, structure)
-    stepped = scene.replace({"solver.method": "moreau", "solver.steps_per_period": steps})
-    system, motion = sy.start(
-        sy.system_of(stepped, rows), rows, displacement, velocity, structure.displacement, structure.velocity
-    )
-    return Coupled(system, rows, motion)
+    system = assemble(scene)
+    return Coupled(system, time_grid(system, steps), start(system, initial_motion(scene, system)))
 
 
 def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:
     """Return the result of a run of equal steps. q: (periods * steps + 1, N) coordinates at the steps."""
-    system, steps = equations.system, len(equations.system.phase) - 1
+    system, times, steps = equations.system, equations.times, len(equations.times.phase) - 1
     periods = (len(q) - 1) // steps
-    phase = np.tile(system.phase[:-1], (periods, 1))
-    x = q[:-1] @ system.response + system.table[0] * phase[:, 0] - system.table[1] * phase[:, 1]
+    phase = np.tile(times.phase[:-1], (periods, 1))
+    x = q[:-1] @ system.response + system.table.real * phase[:, 0] - system.table.imag * phase[:, 1]
     every = np.arange(0, periods * steps, steps // samples) if samples else np.zeros(0, int)
-    slips = q[every] @ system.J[: len(equations.rows.mass)].T
-    gaps = system.J @ q.T + system.offset[:, None]
+    slips = q[every] @ system.J[: system.bodies].T
+    gaps = system.J @ q.T + system.rest[:, None]
     # no number is deeper than any
-    deep = float(np.nan_to_num((-gaps / system.gap[:, None]).max(initial=0.0), nan=np.inf))
+    deep = float(np.nan_to_num((-gaps / times.travel[:, None]).max(initial=0.0), nan=np.inf))
     status = Status.OK if deep <= _DEEPEST else Status.PENETRATION
     if not np.isfinite(q).all():
         status = Status.DIVERGED

@@ -11,8 +11,7 @@ import numpy as np
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.constraints import rows_of
-from vanedamp.coupling.system.modal_structure import linear_structure
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import validate
 
 #: one oscillation in a unit of time
@@ -62,8 +61,7 @@ def coupled_pair(mass: float) -> tuple[dict[str, Any], float, float]:
     tables = pressed(mass, stiffness, restitution=0.7)
     tables["structure"] = STRUCTURE | {"damping": DAMPING}
     pair = scene(tables, {})
-    rows, _, _ = rows_of(pair, linear_structure(pair))
-    return tables, stiffness, float(rows.dashpot[-2])
+    return tables, stiffness, float(assemble(pair).dashpot[-2])
 
 
 def restless(tables: Mapping[str, Any], solver: Mapping[str, Any], static: float, steps: int) -> bool:

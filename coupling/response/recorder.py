@@ -1,0 +1,52 @@
+"""The recorder of all methods: section and ledger of a period, and the peak within a step."""
+
+from __future__ import annotations
+
+from vanedamp.coupling.numerics.jit import entry, inlined
+from vanedamp.coupling.response.records import STORED
+
+
+@entry
+def record_section(system, records, period, p, p_rate, slip, slip_velocity, springs, ledger):
+    """Record section and ledger at the start of a period, for every method: what Python calls."""
+    put_section(system, records, period, p, p_rate, slip, slip_velocity, springs, ledger)
+
+
+@inlined
+def put_section(system, records, period, p, p_rate, slip, slip_velocity, springs, ledger):
+    """Record section and ledger at the start of a period, in compiled functions.
+
+    p, p_rate: (n,) modal coordinates and their rates; slip, slip_velocity: (b,) of the bodies; springs: energy in all
+    springs of rows, J; ledger: (6,) J, whose stored energy is set.
+    """
+    n, b, entry, part = system.modes, system.bodies, records.section[period], records.parts[period]
+    x, rate = system.table.real, -system.omega * system.table.imag
+    energy, momentum = springs, 0.0
+    for i in range(n):
+        x += system.response[i] * p[i]
+        rate += system.response[i] * p_rate[i]
+        energy += 0.5 * (p_rate[i] * p_rate[i] + system.stiffness[i] * p[i] * p[i])
+    part[0] = energy
+    for k in range(b):
+        velocity, height = slip_velocity[k], slip[k]
+        for i in range(n):
+            velocity += system.floor[k, i] * p_rate[i]
+            height += system.floor[k, i] * p[i]
+        momentum += system.mass[n + k] * velocity
+        part[1 + k] = 0.5 * system.mass[n + k] * velocity * velocity - system.weight[n + k] * height
+        energy += part[1 + k]
+        entry[3 + k], entry[3 + b + k] = slip[k], slip_velocity[k]
+    entry[0], entry[1], entry[2] = x, rate, momentum
+    ledger[STORED] = energy
+    for i in range(len(ledger)):
+        records.ledger[period, i] = ledger[i]
+
+
+@entry
+def cubic_peak(h, x0, x1, rate0, rate1):
+    """|x| where the straight line through two velocities is zero, on the cubic through both ends; 0 if nowhere."""
+    if not rate0 * rate1 < 0.0:
+        return 0.0
+    t = rate0 / (rate0 - rate1)
+    u = 1.0 - t
+    return abs(x0 * u * u * (1.0 + 2.0 * t) + x1 * t * t * (3.0 - 2.0 * t) + h * t * u * (u * rate0 - t * rate1))

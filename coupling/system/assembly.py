@@ -1,0 +1,99 @@
+"""From a scene to its system, and to the motion that it begins with."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Prescribed, Rigid
+from vanedamp.coupling.system.cavities import check_directions
+from vanedamp.coupling.system.constraints import constraints_of
+from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
+from vanedamp.coupling.system.resonance import force_amplitude
+from vanedamp.coupling.system.system import System
+
+
+class InitialMotion(NamedTuple):
+    """Motion at time zero: modal coordinates (n,) and their rates, displacements (r,) and velocities of the rows."""
+
+    p: np.ndarray
+    p_rate: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+
+
+def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
+    """Assemble the system of a scene. basis: modes of its structure, if not those that the scene names.
+
+    Raises InputError for an unknown label or an unusable model.
+    """
+    basis = basis or basis_of(scene)
+    omega, n = 2 * np.pi * scene.excitation.frequency, len(basis.stiffness)
+    check_directions(scene, basis)
+    at = forced_label(scene)
+    response = interface_row(basis, at, "excitation.at")
+    base, table = (scene.excitation.base_acceleration or 0.0) * -1j * basis.directions[at], 0.0j
+    if isinstance(scene.structure, Prescribed):
+        table = -1j * scene.structure.displacement_amplitude
+        base = -(omega**2) * table * basis.directions[at]
+    force = -1j * response * force_amplitude(scene, basis, response) - basis.base @ base
+    made = constraints_of(scene, basis, at)
+    on_structure, on_bodies = made.J[:, :n], made.J[:, n:]
+    mass = np.array([damper.mass for damper in scene.damper])
+    along = np.reshape([basis.directions[label] for label in made.floors], (-1, 3))
+    gravity = np.reshape([scene.gravity.components(direction) for direction in along], (-1, 2))[:, 0]
+    accelerated = along @ base
+    bodies = len(mass)
+    damping = np.zeros((n + bodies, n + bodies))
+    damping[:n, :n] = basis.damping
+    return System(
+        modes=n, bodies=bodies, friction_rows=made.friction_rows, mass=np.concatenate([np.ones(n), mass]),
+        stiffness=np.concatenate([basis.stiffness, np.zeros(bodies)]), damping=damping,
+        proportional=bool(np.count_nonzero(basis.damping - np.diag(np.diag(basis.damping))) == 0),
+        load=np.concatenate([force, -mass * accelerated]) + 0j,
+        weight=np.concatenate([np.zeros(n), mass * gravity]), alike=bool(np.all(accelerated == accelerated[:1])),
+        response=np.concatenate([response, np.zeros(bodies)]), table=complex(table), omega=omega,
+        period=2 * np.pi / omega, floor=made.floor, J=made.J, rest=made.rest,
+        delassus=on_structure @ on_structure.T + (on_bodies / mass) @ on_bodies.T, limit=made.limit,
+        spring=made.spring, dashpot=made.dashpot, restitution=made.restitution, free_travel=made.free_travel,
+        left_body=made.left_body, right_body=made.right_body, moves_with_floor=made.moves_with_floor,
+    )  # fmt: skip
+
+
+def initial_motion(scene: Scene, system: System) -> InitialMotion:
+    """The motion that a scene begins with."""
+    n = system.modes
+    scale = physical_scale(scene, system)  # an initial state is that of a rigid structure: others have none
+    p, p_rate = np.full(n, scene.initial.displacement / scale), np.full(n, scene.initial.velocity / scale)
+    slip = np.array([damper.position for damper in scene.damper])
+    speed = np.array([damper.velocity for damper in scene.damper])
+    unloaded = np.zeros(system.friction_rows - system.bodies)
+    return InitialMotion(p, p_rate, *row_motion(system, slip, speed, p, p_rate, unloaded))
+
+
+def physical_scale(scene: Scene, system: System) -> float:
+    """Displacement per modal coordinate of a rigid structure, which has only one, whatever its mass; 1 for others."""
+    return float(system.response[0]) if isinstance(scene.structure, Rigid) else 1.0
+
+
+def row_motion(
+    system: System, slip: np.ndarray, slip_velocity: np.ndarray, p: np.ndarray, p_rate: np.ndarray,
+    elongation: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Displacement and velocity (r,) of every row, from slips (b,), modal coordinates (n,) and their rates.
+
+    elongation: (friction dampers,) of the springs before the sliders, m.
+    """
+    b, friction = system.bodies, system.friction_rows
+    # slips are relative to the floor, so that a body at relative rest is known to be so
+    on_structure, on_bodies = system.of_structure.J, system.of_bodies.J
+    displacement = on_bodies @ slip + system.rest
+    speed = on_structure @ p_rate + on_bodies @ (slip_velocity + system.floor @ p_rate)
+    moved = on_structure @ p + on_bodies @ (system.floor @ p)
+    speed[:b], moved[:b] = slip_velocity, 0.0
+    displacement += moved
+    springs = np.isfinite(system.spring[b:friction])
+    displacement[b:friction][springs] = elongation[springs]
+    return displacement, speed

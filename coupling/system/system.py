@@ -1,0 +1,74 @@
+"""The record of a scene as matrices, the same for every method: M q'' + C q' + K q = loads + J^T lambda.
+
+q = (p, x) are the real modal coordinates of the structure, mass-normalised, and the positions of the bodies. All motion
+is relative to the base: a prescribed motion is a structure without modes on a moving base. Everything unilateral or
+frictional is a row of J (system.constraints), whose displacement is J q + rest.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Part(NamedTuple):
+    """The part of a system that belongs to k of its coordinates: as in System, and J (r, k) on them."""
+
+    mass: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    load: np.ndarray
+    weight: np.ndarray
+    response: np.ndarray
+    J: np.ndarray
+
+
+class System(NamedTuple):
+    """Matrices of a scene: n modes, b bodies, N = n + b coordinates, r rows (friction rows first, then contacts).
+
+    Compiled functions take it as it is.
+    """
+
+    modes: int  # n
+    bodies: int  # b
+    friction_rows: int
+    mass: np.ndarray  # (N,) 1 for a mode, kg for a body
+    stiffness: np.ndarray  # (N,) squared undamped angular frequencies; 0 for bodies
+    damping: np.ndarray  # (N, N)
+    proportional: bool  # whether damping couples no two modes
+    load: np.ndarray  # (N,) complex amplitude of the harmonic load exp(i omega t), N
+    weight: np.ndarray  # (N,) gravity along each body's cavity, N
+    alike: bool  # whether the base accelerates all bodies alike: their cavities have one angle to its motion
+    response: np.ndarray  # (N,) functional of the response
+    table: complex  # displacement amplitude of a base whose motion is the response (prescribed), m
+    omega: float  # rad/s
+    period: float  # s
+    floor: np.ndarray  # (b, n) motion of the floor under each body
+    J: np.ndarray  # (r, N)
+    rest: np.ndarray  # (r,) displacement of a row at q = 0, m
+    delassus: np.ndarray  # (r, r) J M^-1 J^T, with no row closed
+    limit: np.ndarray  # (r,) friction force at slip, N; 0 for contacts
+    spring: np.ndarray  # (r,) stiffness of a row while it is closed, N/m; inf: rigid
+    dashpot: np.ndarray  # (r,) N s/m
+    restitution: np.ndarray  # (r,) of rigid contacts
+    free_travel: np.ndarray  # (r,) of the contact's cavity, m: the scale of its gap; inf for friction rows
+    left_body: np.ndarray  # (r,) body to the left of a contact, -1: a wall
+    right_body: np.ndarray  # (r,) body to the right of a contact, -1: a wall
+    moves_with_floor: np.ndarray  # (r,) whether a contact's gap is a difference of slips
+
+    @property
+    def of_structure(self) -> Part:
+        """What belongs to the modal coordinates."""
+        return self._part(slice(0, self.modes))
+
+    @property
+    def of_bodies(self) -> Part:
+        """What belongs to the bodies."""
+        return self._part(slice(self.modes, None))
+
+    def _part(self, at: slice) -> Part:
+        return Part(
+            self.mass[at], self.stiffness[at], self.damping[at, at], self.load[at], self.weight[at], self.response[at],
+            self.J[:, at],
+        )  # fmt: skip
