@@ -129,19 +129,26 @@ def check_symmetries(data):
 
     Returns the number of impacts that were compared.
     """
+    may_hop = hops(scene_of(data))
     one = record(data)
     apart = [record(near) for near in perturbed(data)]
     codes = {run.code for run in (one, *apart)}
-    assume(not (hops(scene_of(data)) and auto.EVENT_BUDGET in codes))
+    assume(not (may_hop and auto.EVENT_BUDGET in codes))
     assert codes == {auto.DONE}
+
+    def compared_with(other, **how):
+        if may_hop and other.code == auto.EVENT_BUDGET:
+            return 0  # round-off decides whether an elastic body rests on its wall or hops
+        return compare(one, other, apart, **how)
+
     image, change = mirrored(data)
-    compared = compare(one, unmirrored(record(image, change)), apart)
+    compared = compared_with(unmirrored(record(image, change)))
     moved, old = reordered(data, list(range(len(data["cavity"])))[::-1])
-    compared += compare(one, renumbered(record(moved), old), apart)
+    compared += compared_with(renumbered(record(moved), old))
     start = later(data)
     if start is not None:
         time, change = start
-        compared += compare(one, record(data, change), apart, shift=time, sections=False)
+        compared += compared_with(record(data, change), shift=time, sections=False)
     return compared
 
 

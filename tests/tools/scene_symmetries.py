@@ -26,6 +26,8 @@ PARTED = 1e-6
 ROUND_OFF = 1e-9
 #: impacts that close on each other are one, in periods
 AT_ONCE = 1e-6
+#: what moves less is at rest: in the units of scene_strategies motion is about 1
+AT_REST = 1e-6
 #: impacts slower than this share of the fastest are the end of a chatter
 FADING = 1e-3
 
@@ -86,7 +88,8 @@ def compare(one: Record, other: Record, apart: list[Record], shift: float = 0.0,
 
 
 def _compare_sections(one: Record, other: Record, apart: list[Record], count: int) -> None:
-    scale = np.abs(one.sections).max(axis=0) + 1e-300
+    # a structure that friction holds moves by round-off only
+    scale = np.maximum(np.abs(one.sections).max(axis=0), AT_REST)
     scale[3:] = scale[3:].max()
     spread, difference = (
         np.max([np.abs((one.sections - run.sections)[:count] / scale).max(axis=1) for run in runs], axis=0)
