@@ -46,9 +46,13 @@ def align_gaps(system, st, y):
         if system.moves_with_floor[r] or st.state[r] != OPEN or st.displacement[r] < _NEAR * scale:
             continue
         k, sign = (system.left_body[r], -1.0) if system.left_body[r] >= 0 else (system.right_body[r], 1.0)
-        place, speed = sign * (st.displacement[k] + st.low[k]), sign * st.velocity[k]
+        place, speed = 0.0, 0.0
+        if k >= 0:  # a stop has no body
+            place, speed = sign * (st.displacement[k] + st.low[k]), sign * st.velocity[k]
         for i in range(n):
-            apart = system.J[r, i] + sign * system.floor[k, i]
+            apart = system.J[r, i]
+            if k >= 0:
+                apart += sign * system.floor[k, i]
             place += apart * y[i]
             speed += apart * y[n + i]
         st.displacement[r], st.velocity[r] = system.rest[r] + place, speed

@@ -28,8 +28,9 @@ def taken(system: System, scale: float, slip: np.ndarray, speed: np.ndarray, y: 
 def given(system: System, scale: float, start: Handover) -> InitialMotion:
     """The motion at the start of a run of another scene.
 
-    Bodies that would stand in a wall or in each other, because the gap is smaller now, are moved to where they touch;
-    springs of friction dampers are unloaded to what their sliders hold. Raises InputError for a scene of another size.
+    Bodies that would stand in a wall or in each other, because the gap is smaller now, are moved to where they touch, and
+    so is the structure beyond a rigid stop, by the least kinetic energy; springs of friction dampers are unloaded to
+    what their sliders hold. Raises InputError for a scene of another size.
     """
     b, friction = system.bodies, system.friction_rows
     sizes = (system.modes, system.modes, b, b, friction - b, len(system.J) - friction)
@@ -42,8 +43,22 @@ def given(system: System, scale: float, start: Handover) -> InitialMotion:
     p, rate = (array / scale for array in (start.displacement, start.velocity))
     limit, spring = system.limit[b:friction], system.spring[b:friction]
     elongation = np.where(np.isfinite(spring), np.clip(start.elongation, -limit / spring, limit / spring), 0.0)
+    p = _before_stops(system, p)
     slip = _inside(system, start, p)
     return InitialMotion(p, rate, *row_motion(system, slip, start.slip_velocity, p, rate, elongation))
+
+
+def _before_stops(system: System, p: np.ndarray) -> np.ndarray:
+    """Modal coordinates (n,) of a structure that no rigid stop is inside of: as many turns as there are stops."""
+    stops = [
+        r for r in range(system.friction_rows, len(system.J))
+        if not system.of_bodies.J[r].any() and np.isinf(system.spring[r])
+    ]  # fmt: skip
+    for _ in stops:
+        for r in stops:
+            row = system.of_structure.J[r]
+            p = p - min(system.rest[r] + row @ p, 0.0) / (row @ row) * row
+    return p
 
 
 def _inside(system: System, start: Handover, p: np.ndarray) -> np.ndarray:

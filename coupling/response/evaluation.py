@@ -215,12 +215,15 @@ def _complete(system: System, entries: np.ndarray) -> None:
 
 
 def _place(system: System, row: int) -> tuple[int, str]:
-    """Number of the body (or of the friction damper, side "casing") and the side on which a row acts."""
+    """Number and side of a row: of a body and where it acts; of a friction damper, "casing"; of a stop, "stop"."""
     if system.bodies <= row < system.friction_rows:
         return row - system.bodies, "casing"
     bodies = np.flatnonzero(system.of_bodies.J[row])
     if row < system.friction_rows:
         return int(bodies[0]), "floor"
+    if not len(bodies):
+        contacts = np.arange(system.friction_rows, len(system.J))
+        return row - int(contacts[~system.of_bodies.J[contacts].any(axis=1)][0]), "stop"
     if len(bodies) == 2:
         return int(bodies[0]), "body"
     return int(bodies[0]), "left" if system.of_bodies.J[row, bodies[0]] > 0 else "right"

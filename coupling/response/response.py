@@ -42,8 +42,8 @@ class Status(StrEnum):
 class Event:
     """One event: time (s), kind, number of the body, side, speeds (m/s) and impulse (N s).
 
-    side: "left", "right" (walls), "body" (the next body to the right), "floor"; "casing" for a friction damper, whose
-    number is then meant. Speeds are the body's relative to what it meets.
+    side: "left", "right" (walls), "body" (the next body to the right), "floor"; "casing" for a friction damper, "stop"
+    for a stop, whose number is then meant. Speeds are the body's relative to what it meets; at a stop, of its gap.
     """
 
     time: float

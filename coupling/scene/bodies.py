@@ -1,8 +1,8 @@
-"""Cavities, the bodies in them, and friction dampers."""
+"""Cavities, the bodies in them, friction dampers, and stops."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
@@ -58,3 +58,21 @@ class FrictionDamper:
     friction: NonNegative
     stiffness: Positive | None = None
     at: str | None = None
+
+
+@dataclass(frozen=True, config=STRICT)
+class Stop:
+    """Contact of the structure with the ground or with itself: a stop on one `side` of it, `gap` (m) away at rest.
+
+    On a reduced model `at` and `to` name interface labels: the stop is at `to`, which moves, or at the ground.
+    """
+
+    side: Literal["left", "right"]
+    gap: NonNegative
+    restitution: Fraction = 1.0
+    at: str | None = None
+    to: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.to is not None and self.to == self.at:
+            raise ValueError(f"to: a point ('{self.to}') does not touch itself; name another, or leave it out")

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper
+from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper, Stop
 from vanedamp.coupling.scene.contact_laws import Compliant, Contact, Massless, Newton
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
@@ -101,6 +101,7 @@ class Scene:
     cavity: tuple[Cavity, ...] = ()
     damper: tuple[Damper, ...] = ()
     friction_damper: tuple[FrictionDamper, ...] = ()
+    stop: tuple[Stop, ...] = ()
     initial: Initial = field(default_factory=Initial)
     gravity: Gravity = field(default_factory=Gravity)
     contact: Contact = field(default_factory=Newton)
@@ -120,13 +121,18 @@ class Scene:
                     f"damper[{index}].cavity: no cavity '{damper.cavity}'; {nearest(damper.cavity, names)}"
                 )
             self._check_load(index, damper)
-            try:
-                self.contact.element(damper.restitution, damper.mass)
-            except InputError as error:
-                raise ValueError(f"damper[{index}].{error}") from None
+            self._check_contact(f"damper[{index}]", damper.restitution, damper.mass)
+        for index, stop in enumerate(self.stop):
+            self._check_contact(f"stop[{index}]", stop.restitution, 1.0)
         for cavity in self.cavity:
             self._check_row(cavity)
         self._check_structure()
+
+    def _check_contact(self, key: str, restitution: float, mass: float) -> None:
+        try:
+            self.contact.element(restitution, mass)
+        except InputError as error:
+            raise ValueError(f"{key}.{error}") from None
 
     def _check_load(self, index: int, damper: Damper) -> None:
         if damper.normal_load is not None or damper.friction == 0 or self.gravity.direction is not None:
@@ -159,6 +165,11 @@ class Scene:
             for index, cavity in enumerate(self.cavity):
                 if cavity.labels()[2] is None:
                     raise ValueError(f"cavity[{index}].floor: name an interface label of the reduced model")
+            for index, stop in enumerate(self.stop):
+                if stop.at is None:
+                    raise ValueError(
+                        f"stop[{index}].at: name the interface label of the reduced model that hits the stop"
+                    )
             if self.initial != Initial():
                 raise ValueError("initial: an initial state is for rigid structures; a reduced model starts at rest")
         elif self.gravity.direction is not None:
@@ -170,12 +181,20 @@ class Scene:
             raise ValueError(
                 'contact: the residual flexibility is that of a reduced model; take structure.model = "rom"'
             )
+        for index, stop in enumerate(self.stop):
+            if not isinstance(self.structure, Rom) and (stop.at, stop.to) != (None, None):
+                key = "at" if stop.to is None else "to"
+                raise ValueError(
+                    f"stop[{index}].{key}: interface labels are a reduced model's; the one mode of this structure has "
+                    "no points: leave it out"
+                )
         if isinstance(self.structure, Prescribed):
             excitation = self.excitation
             if excitation.force or excitation.base_acceleration or excitation.resonance_amplitude:
                 raise ValueError("excitation: a prescribed motion takes frequency alone; structure sets the amplitude")
-            if self.friction_damper:
-                raise ValueError("friction_damper: a prescribed motion feels no force; remove it")
+            for name in ("friction_damper", "stop"):
+                if getattr(self, name):
+                    raise ValueError(f"{name}: a prescribed motion feels no force; remove it")
             if self.initial != Initial():
                 raise ValueError("initial: a prescribed motion has no initial state; remove the table")
 

@@ -13,6 +13,7 @@ from vanedamp.coupling.system.constraints import constraints_of
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
 from vanedamp.coupling.system.resonance import force_amplitude
 from vanedamp.coupling.system.system import System
+from vanedamp.files.toml_input import InputError
 
 
 class InitialMotion(NamedTuple):
@@ -40,6 +41,12 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         base = -(omega**2) * table * basis.directions[at]
     force = -1j * response * force_amplitude(scene, basis, response) - basis.base @ base
     made = constraints_of(scene, basis, at)
+    travel = made.free_travel.copy()
+    if scene.stop:  # whose gap may be none: how far their place moves counts as well
+        stops, begun = slice(len(travel) - len(scene.stop), None), scene.initial
+        reach = np.abs(made.J[stops, :n]) @ (np.abs(force) / basis.stiffness)
+        reach += abs(begun.displacement) + abs(begun.velocity) / np.sqrt(basis.stiffness[0]) + np.finfo(float).tiny
+        travel[stops] = np.maximum(travel[stops], reach)
     on_structure, on_bodies = made.J[:, :n], made.J[:, n:]
     mass = np.array([damper.mass for damper in scene.damper])
     along = np.reshape([basis.directions[label] for label in made.floors], (-1, 3))
@@ -57,7 +64,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         response=np.concatenate([response, np.zeros(bodies)]), table=complex(table), omega=omega,
         period=2 * np.pi / omega, floor=made.floor, J=made.J, rest=made.rest,
         delassus=on_structure @ on_structure.T + (on_bodies / mass) @ on_bodies.T, limit=made.limit,
-        spring=made.spring, dashpot=made.dashpot, restitution=made.restitution, free_travel=made.free_travel,
+        spring=made.spring, dashpot=made.dashpot, restitution=made.restitution, free_travel=travel,
         left_body=made.left_body, right_body=made.right_body, moves_with_floor=made.moves_with_floor,
     )  # fmt: skip
 
@@ -70,7 +77,11 @@ def initial_motion(scene: Scene, system: System) -> InitialMotion:
     slip = np.array([damper.position for damper in scene.damper])
     speed = np.array([damper.velocity for damper in scene.damper])
     unloaded = np.zeros(system.friction_rows - system.bodies)
-    return InitialMotion(p, p_rate, *row_motion(system, slip, speed, p, p_rate, unloaded))
+    motion = InitialMotion(p, p_rate, *row_motion(system, slip, speed, p, p_rate, unloaded))
+    for index, gap in enumerate(motion.displacement[len(system.J) - len(scene.stop) :]):
+        if gap < 0.0:
+            raise InputError(f"initial.displacement: the structure would begin {-gap:g} m beyond stop[{index}]")
+    return motion
 
 
 def physical_scale(scene: Scene, system: System) -> float:

@@ -2,7 +2,7 @@
 
 p are the modal coordinates of the structure, x the positions of the bodies. Friction rows come first (one a body: its
 slip on the floor; one a friction damper: the structure's motion against the casing), then contact rows (one a gap: left
-wall to first body, body to body, last body to right wall).
+wall to first body, body to body, last body to right wall; one a stop).
 
 A gap between a body and a wall that moves with the floor, and every gap between two bodies, is the difference of slips,
 which are the state, so that slips and gaps can never disagree.
@@ -23,6 +23,8 @@ from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
 
 #: coefficients of friction below this are none
 _SMOOTH = 1e-9
+#: mobility (1/kg) of a point that the first mode does not move
+_LIGHT = 1e-30
 
 
 class Constraints(NamedTuple):
@@ -78,7 +80,7 @@ def constraints_of(scene: Scene, basis: ModalBasis, at: str) -> Constraints:
     floor = np.reshape([cavities[index].floor for index in owner], (bodies, n))
     floors = [cavities[index].labels[2] for index in owner]
     friction = [*_slips(scene, basis, floor, floors), *_friction_dampers(scene, basis, at)]
-    rows = [*friction, *_gaps(scene, cavities, owner)]
+    rows = [*friction, *_gaps(scene, cavities, owner), *_stops(scene, basis)]
     structure = np.reshape([row.structure for row in rows], (len(rows), n))
     left, right = (np.array([getattr(row, side) for row in rows], np.int64) for side in ("left", "right"))
     numbers = np.arange(bodies)
@@ -167,6 +169,20 @@ def _gaps(scene: Scene, cavities: list[_Surfaces], owner: list[int]) -> list[_Ro
             element = scene.contact.element(restitution, 1 / mobility, yields)
             rest = 0.5 * cavity.gap if len(pair) == 1 else 0.0
             rows.append(_Row(wall, left, right, element=element, rest=rest, free_travel=cavity.gap))
+    return rows
+
+
+def _stops(scene: Scene, basis: ModalBasis) -> list[_Row]:
+    """The gap of each stop, which closes as the structure moves to that side, against the ground or a second point."""
+    rows = []
+    for i, stop in enumerate(scene.stop):
+        ends = [(stop.at or "structure", "at", 1.0)] + ([(stop.to, "to", -1.0)] if stop.to else [])
+        towards = -1.0 if stop.side == "right" else 1.0
+        gap = np.sum([towards * sign * interface_row(basis, label, f"stop[{i}].{key}") for label, key, sign in ends], 0)
+        yields = sum(basis.flexibility.get(label, 0.0) for label, _, _ in ends)
+        # the mass is that of the first mode, as at the walls of cavities
+        element = scene.contact.element(stop.restitution, 1 / max(float((gap[:1] ** 2).sum()), _LIGHT), yields)
+        rows.append(_Row(gap, element=element, rest=stop.gap, free_travel=stop.gap))
     return rows
 
 

@@ -263,7 +263,8 @@ class IvpRun:
 def _reach(scene: Scene, u: Unforced) -> float:
     """A typical displacement, m: the narrowest gap, the least elongation at which a spring slides, the static one."""
     system = u.system
-    lengths = [cavity.gap for cavity in scene.cavity] + list(u.limit[u.slider] / system.spring[u.slider])
+    gaps = [cavity.gap for cavity in scene.cavity] + [stop.gap for stop in scene.stop]
+    lengths = gaps + list(u.limit[u.slider] / system.spring[u.slider])
     lengths = [length for length in lengths if length > 0]
     modes = system.of_structure
     static = np.abs(modes.J) @ (np.abs(modes.load) / modes.stiffness)
