@@ -23,6 +23,8 @@ from vanedamp.rom.reduced import ReducedModel
 
 #: a few units in the last place
 _ULPS = 2.0**-49
+#: steps after which a run is given up, as one whose events have no end
+_MOST = 20_000
 
 
 class Event(NamedTuple):
@@ -102,6 +104,7 @@ def agreement(one: Reference, other: Reference, tolerance: float) -> float:
     Without bodies, the response. Runs that differ in round-off alone tell how long a chaotic motion can be followed.
     """
     time = np.union1d(one.solution.ts, other.solution.ts) / one.system.omega
+    time = time[time <= min(one.time, other.time)]
     bodies = len(one.system.m) > 0
     first, second = (run.states(time)[1] if bodies else run.x(time)[None] for run in (one, other))
     apart = np.abs(first - second).max(axis=0) > tolerance * one.system.length
@@ -121,6 +124,7 @@ def integrate(
 
     reduced is the ReducedModel of a scene with model = "rom"; rtol and step (radians of the fastest natural frequency)
     bound the steps of DOP853; pressed says what an impact elsewhere does to contacts that are at rest, see `collide`.
+    The motion ends early where events come without end, as chatter does that no law completes here.
     """
     system = System(scene, reduced)
     modes = Modes(system)
@@ -134,7 +138,7 @@ def integrate(
         events += named
         if len(events) > 1000 and events[-1000].time == t / system.omega:
             raise RuntimeError(f"events without end at t = {t / system.omega:g} s")
-        if t >= end:
+        if t >= end or len(pieces) > _MOST:
             break
         for now, state, piece in _march(system, modes.flow(mode), t, y, end, step, rtol):
             t, y = now, state
