@@ -16,6 +16,7 @@ from vanedamp.coupling.scene.structures import Initial
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.report.time_history import History, history_figure
 
 DAMPING, RESTITUTION, GAP = 0.1, 0.8, 1.0
 
@@ -199,6 +200,35 @@ def test_a_sweep_of_the_gap_goes_on_from_its_neighbour():
     ups = sweep(oscillator(1.0, sweep={"stop.0.gap": [1.0, 0.5, 0.25]}))
     assert set(found.status.ravel()) == {"ok"}
     assert found.amplitude_mean == pytest.approx(ups.amplitude_mean, rel=1e-9)
+
+
+def test_modes_are_not_chosen_without_knowing_the_stops(tmp_path):
+    scene = validate(
+        Scene,
+        {
+            "structure": {"model": "rom", "file": chain(tmp_path), "modes": "auto"},
+            "excitation": {"frequency": 0.25, "force": 1.0, "at": "one"},
+            "stop": [{"at": "one", "side": "right", "gap": 0.05}],
+        },
+        "scene",
+    )
+    with pytest.raises(InputError, match="not those of stops"):
+        simulate(scene)
+    with_all = scene.replace({"structure.modes": 2, "time": {"periods": 5, "transient": 0}})
+    assert any(warning.startswith("contact: Newton's law") for warning in simulate(with_all).warnings)
+
+
+def test_the_history_shows_stop_and_impacts(tmp_path):
+    scene = oscillator(1.0, time={"periods": 30, "transient": 0})
+    simulate(scene, events=True, samples_per_period=50).save(tmp_path / "run.h5", {"scene": scene.to_dict()})
+    history = History.load(tmp_path / "run.h5")
+    assert len(history.struck)
+    assert set(history.struck) == {-1}
+    figure = history_figure(history)
+    assert [trace.name for trace in figure.data] == ["structure", "impacts on stops"]
+    assert [line.y0 for line in figure.layout.shapes] == [1e6 * GAP]
+    at = np.interp(history.impacts, history.time, history.displacement)
+    assert np.abs(at[5:] - GAP).max() < 0.1  # between two samples, where the motion turns round
 
 
 @pytest.mark.parametrize(

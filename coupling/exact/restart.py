@@ -28,9 +28,9 @@ def taken(system: System, scale: float, slip: np.ndarray, speed: np.ndarray, y: 
 def given(system: System, scale: float, start: Handover) -> InitialMotion:
     """The motion at the start of a run of another scene.
 
-    Bodies that would stand in a wall or in each other, because the gap is smaller now, are moved to where they touch, and
-    so is the structure beyond a rigid stop, by the least kinetic energy; springs of friction dampers are unloaded to
-    what their sliders hold. Raises InputError for a scene of another size.
+    Bodies that would stand in a wall or in each other, because the gap is smaller now, are moved to where they touch,
+    and so is a structure beyond a rigid stop, by the nearest way; springs of friction dampers are unloaded to what
+    their sliders hold. Raises InputError for a scene of another size.
     """
     b, friction = system.bodies, system.friction_rows
     sizes = (system.modes, system.modes, b, b, friction - b, len(system.J) - friction)

@@ -74,10 +74,17 @@ def settle_all(scenes: Sequence[Scene]) -> list[Settled]:
 
 
 def choices_of(scenes: Iterable[Scene]) -> Choices:
-    """The number of modes that suits all scenes with one model and tolerance, for each of these."""
+    """The number of modes that suits all scenes with one model and tolerance, for each of these.
+
+    Raises InputError for a scene with stops, whose impacts the estimate does not know.
+    """
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
         if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+            if scene.stop:
+                raise InputError(
+                    'structure.modes: "auto" weighs the collisions of bodies, not those of stops; give a number of modes'
+                )
             groups.setdefault(_group(scene), []).append(scene)
     return {key: _choice(members) for key, members in groups.items()}
 
@@ -112,7 +119,7 @@ def settled(scene: Scene, choices: Choices) -> Settled:
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
     """What to know of a scene without open choices: that Newton's law, also the default, is on several modes."""
-    if not (isinstance(scene.structure, Rom) and isinstance(scene.contact, Newton) and scene.damper):
+    if not (isinstance(scene.structure, Rom) and isinstance(scene.contact, Newton) and (scene.damper or scene.stop)):
         return ()
     size = reduced_model(scene.structure).size
     if size == 1:

@@ -27,7 +27,7 @@ class History:
 
     time          (n,) s, as sampled; displacement (n,) m at excitation.at
     bodies        (n, dampers) m, relative to their cavities
-    impacts       (m,) s; struck: (m,) number of the body of each
+    impacts       (m,) s; struck: (m,) number of the body of each, -1: the structure's on a stop
     measures      plain figures and energies of the run, as `vanedamp run --json` tells them
     scene         what was run; None if the file does not say
     """
@@ -47,13 +47,14 @@ class History:
         values, attributes = load(path, "response")
         provenance = json.loads(attributes.pop("provenance", "{}"))
         kinds = values.get("event_kind", np.array([], dtype=object)) == "impact"
+        struck = np.where(values.get("event_side", "") == "stop", -1, values.get("event_damper", -1))
         energy = json.loads(attributes.pop("energy", "{}"))
         return cls(
             time=frozen(values.get("time", [])),
             displacement=frozen(values.get("displacement", [])),
             bodies=frozen(values.get("body_displacement", np.zeros((0, 0)))),
             impacts=frozen(np.asarray(values.get("event_time", []))[kinds]),
-            struck=frozen(np.asarray(values.get("event_damper", []))[kinds], int),
+            struck=frozen(np.atleast_1d(struck)[kinds] if len(kinds) else [], int),
             measures=attributes | {"energy": energy},
             provenance=provenance,
             scene=validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None,
@@ -80,13 +81,22 @@ class History:
 
 def history_figure(history: History) -> go.Figure:
     """Displacement with a mark at every impact, above the bodies' places between the walls."""
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
+    rows = 2 if history.bodies.shape[1] else 1
+    figure = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     milliseconds = 1e3 * history.time
     figure.add_scatter(
         x=milliseconds, y=1e6 * history.displacement, name="structure", line={"color": "#0f172a", "width": 1.4},
         hovertemplate="%{y:.4g} µm", row=1, col=1,
     )  # fmt: skip
     at = np.interp(history.impacts, history.time, history.displacement)
+    on_stops = history.struck < 0
+    if on_stops.any():
+        figure.add_scatter(
+            x=1e3 * history.impacts[on_stops], y=1e6 * at[on_stops], name="impacts on stops", mode="markers",
+            marker={"color": "#7f1d1d", "size": 7, "symbol": "x"}, hovertemplate="%{y:.4g} µm", row=1, col=1,
+        )  # fmt: skip
+    for stop in _stops(history.scene):
+        figure.add_hline(y=1e6 * stop, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
     for body in range(history.bodies.shape[1]):
         colour = COLOURS[body % len(COLOURS)]
         mine = history.struck == body
@@ -98,15 +108,24 @@ def history_figure(history: History) -> go.Figure:
             x=milliseconds, y=1e6 * history.bodies[:, body], name=f"body {body + 1} in its cavity",
             line={"color": colour, "width": 1.2}, hovertemplate="%{y:.4g} µm", row=2, col=1,
         )  # fmt: skip
-    for wall in _walls(history.scene):
+    for wall in _walls(history.scene) if rows == 2 else ():
         figure.add_hline(y=1e6 * wall, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=2, col=1)
     figure.update_yaxes(title_text="displacement, µm", row=1, col=1)
-    figure.update_yaxes(title_text="relative to the cavity, µm", row=2, col=1)
+    if rows == 2:
+        figure.update_yaxes(title_text="relative to the cavity, µm", row=2, col=1)
     end = milliseconds[-1]
     figure.update_xaxes(range=[end - 1e3 * _SHOWN_PERIODS * history.period, end], hoverformat=".6g")
-    figure.update_xaxes(title_text="time, ms", row=2, col=1)
+    figure.update_xaxes(title_text="time, ms", row=rows, col=1)
     figure.update_layout(hovermode="x unified")
-    return dressed(figure, height=560)
+    return dressed(figure, height=280 * rows)
+
+
+def _stops(scene: Scene | None) -> list[float]:
+    """Return where the ground stops the point whose displacement is shown, m."""
+    if scene is None:
+        return []
+    shown = [stop for stop in scene.stop if stop.to is None and stop.at in (None, scene.excitation.at)]
+    return [stop.gap if stop.side == "right" else -stop.gap for stop in shown]
 
 
 def _walls(scene: Scene | None) -> list[float]:
