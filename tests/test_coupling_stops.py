@@ -214,7 +214,7 @@ def test_modes_are_not_chosen_without_knowing_the_stops(tmp_path):
     )
     with pytest.raises(InputError, match="not those of stops"):
         simulate(scene)
-    with_all = scene.replace({"structure.modes": 2, "time": {"periods": 5, "transient": 0}})
+    with_all = scene.replace({"structure.modes": 2, "structure.natural": True, "time": {"periods": 5, "transient": 0}})
     assert any(warning.startswith("contact: Newton's law") for warning in simulate(with_all).warnings)
 
 

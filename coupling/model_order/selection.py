@@ -83,7 +83,7 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
         if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
             if scene.stop:
                 raise InputError(
-                    'structure.modes: "auto" weighs the collisions of bodies, not those of stops; give a number of modes'
+                    'structure.modes: "auto" weighs collisions of bodies, not those of stops; give a number of modes'
                 )
             groups.setdefault(_group(scene), []).append(scene)
     return {key: _choice(members) for key, members in groups.items()}
