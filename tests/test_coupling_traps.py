@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from tests.tools.laws_by_event import check_events
 from tests.tools.random_scenes import random_reduced, random_scene
 from tests.tools.scene_strategies import scene_of
 from tests.tools.segment_stepper import Stepper
@@ -709,3 +710,31 @@ def test_a_body_at_a_wall_of_a_structure_that_friction_holds():
     drawn = scene_of(data)
     for force in np.linspace(0.01, 0.02, 60):
         assert simulate(drawn.replace({"excitation.force": force})).status == Status.OK
+
+
+def test_what_held_a_body_may_go_to_its_bound():
+    """Three bodies pushed together at rest on a structure that friction holds: one of two frictions is at its bound.
+
+    What the other then has to hold was left to nobody, and the bodies drifted by round-off of balanced forces.
+    """
+    data = {
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.009116936737522485},
+        "initial": {"displacement": 0.6301429112925603, "velocity": -0.387646159},
+        "excitation": {"frequency": 0.16950320476095077, "force": 0.023552165907000377},
+        "gravity": {"acceleration": 1.0, "orientation_deg": -2.7678210438287784e-26},
+        "cavity": [{"name": "c0", "gap": 2.2138098257481027}],
+        "damper": [
+            {"cavity": "c0", "mass": 0.06564817683898341, "position": -0.23307261359874717},
+            {"cavity": "c0", "mass": 0.008736948760642396, "friction": 0.3024896094229785,
+             "position": 0.13282858954488616, "velocity": -0.254220839},
+            {"cavity": "c0", "mass": 0.14956861922263506, "friction": 0.5627571346686047,
+             "restitution": 0.10766685875863649, "position": 0.27672622821851284, "normal_load": 0.09071795328941251},
+        ],
+        "friction_damper": [
+            {"normal_force": 0.8763409950793732, "friction": 0.9692854833710918},
+            {"normal_force": 0.027182818284590463, "friction": 0.8206759365907959, "stiffness": 6.6858944422792685},
+        ],
+        "time": {"periods": 6, "transient": 0},
+    }  # fmt: skip
+    worst = check_events(validate(Scene, data, "scene"))
+    assert worst.impacts > 50

@@ -60,6 +60,10 @@ def solve_box(problem, k, scale):
             if not _drive(problem, k, i, tolerance):
                 return False
     for i in range(k):
+        # what held a row may have gone to its bound since
+        if state[i] == DEPENDENT and not _dependent(problem, k, i):
+            state[i] = FREE
+    for i in range(k):
         if state[i] != FREE and abs(a[i]) <= tolerance:
             if _dependent(problem, k, i):
                 state[i] = DEPENDENT
