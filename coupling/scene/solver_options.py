@@ -95,17 +95,18 @@ def options_of(table: Mapping[str, Any]) -> SolverOptions:
     options: type[SolverOptions] = METHODS.part(method).Options
     for key in given:
         if key not in options.model_fields:
-            reason = PydanticCustomError("option", "{reason}", {"reason": _stranger(key, method, options)})
+            reason = PydanticCustomError("option", "{reason}", {"reason": _stranger(key, method)})
             raise _error(InitErrorDetails(type=reason, loc=(key,), input=table))
     return options.model_validate(given)
 
 
-def _stranger(key: str, method: str, options: type[SolverOptions]) -> str:
+def _stranger(key: str, method: str) -> str:
     """Return why a method has no such option: other methods have it, or none has."""
-    users = [name for name, part in METHODS.all().items() if key in part.Options.model_fields]
+    known = {name: part.Options.model_fields for name, part in METHODS.all().items()}
+    users = [name for name, options in known.items() if key in options]
     if users:
         return f"is for method {' or '.join(users)}, not {method}"
-    return f"unknown key; {nearest(key, list(options.model_fields))}"
+    return f"unknown key; {nearest(key, list({option for options in known.values() for option in options}))}"
 
 
 def _error(details: InitErrorDetails) -> ValidationError:
