@@ -268,7 +268,10 @@ class IvpRun:
 def _reach(u: Unforced) -> float:
     """A typical displacement, m: the narrowest gap, the least elongation at which a spring slides, the static one."""
     system = u.system
-    lengths = [*system.free_travel[system.friction_rows :], *(u.limit[u.slider] / system.spring[u.slider])]
+    contacts = slice(system.friction_rows, None)
+    stops = (system.left_body[contacts] < 0) & (system.right_body[contacts] < 0)
+    gaps = np.where(stops, system.rest[contacts], system.free_travel[contacts])
+    lengths = [*gaps, *(u.limit[u.slider] / system.spring[u.slider])]
     lengths = [length for length in lengths if length > 0]
     modes = system.of_structure
     static = np.abs(modes.J) @ (np.abs(modes.load) / modes.stiffness)
