@@ -1,4 +1,4 @@
-"""Parts that are found or named, not imported: files of ours, and what other packages add by entry points.
+"""Parts that are found or named, not imported: modules of ours, and what other packages add by entry points.
 
 An installed package adds a part in its pyproject.toml, without a change here:
 
@@ -29,8 +29,9 @@ class ExtensionError(VanedampError):
 
 
 class ExtensionPoint(NamedTuple):
-    """Where parts of one kind come from: a folder of ours, whose files are all loaded. A part is a module, or any
-    object with the attributes.
+    """Where parts of one kind come from that are loaded all at once.
+
+    A part is a module, or any object with the attributes.
 
     kind        in words, for messages
     package     each module of which is a part; folders: each package of which is one
@@ -61,7 +62,7 @@ class ExtensionPoint(NamedTuple):
 
 
 class Registry(NamedTuple):
-    """Where parts of one kind come from that are loaded one by one, when they are first wanted.
+    """Where parts of one kind come from that are loaded one by one, as they are wanted.
 
     kind        in words, for messages
     modules     ours, by the name of the part
@@ -79,7 +80,7 @@ class Registry(NamedTuple):
         return [*self.modules, *_added(self.kind, self.group, self.modules)]
 
     def part(self, name: str) -> Any:
-        """Return the part of a name. Raises KeyError for an unknown name, ExtensionError for a part without use."""
+        """Return a part. Raises KeyError for an unknown name, ExtensionError for a part that cannot be used."""
         if name in self.modules:
             return import_module(self.modules[name])
         return _load(_added(self.kind, self.group, self.modules)[name], self.kind, self.attributes)
@@ -101,7 +102,7 @@ def _added(kind: str, group: str, own: Mapping[str, Any]) -> dict[str, EntryPoin
 
 @lru_cache(maxsize=32)
 def _entry_points(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """Return the entry points on a path of imports. To read all installed packages takes as long as many a run."""
+    """Return the entry points on a path of imports, kept: to look through all installed packages takes long."""
     # this import takes half as long as all else of `vanedamp --help`
     from importlib.metadata import entry_points
 
