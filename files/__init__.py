@@ -1,1 +1,2 @@
-"""Ground of all parts: `errors` (the base of all), `store` (HDF5 records, whole files), `toml_input`, `provenance`."""
+"""Ground of all parts: `errors` (the base of all), `store` (HDF5 records, whole files), `toml_input`, `provenance`,
+`extensions` (parts that are found by name)."""

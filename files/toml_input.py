@@ -20,7 +20,7 @@ T = TypeVar("T")
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
-_NO_TABLE = ("dataclass_type", "dict_type", "mapping_type", "model_attributes_type")
+_NO_TABLE = ("dataclass_type", "model_type", "dict_type", "mapping_type", "model_attributes_type")
 _NO_LIST = ("tuple_type", "list_type")
 
 #: no quantity is larger, in any units, and none that must not be zero is smaller than its inverse: their products and

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tests.test_coupling_traps import cluster
-from vanedamp.coupling.exact.event_driven import EngineRun
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.evaluation import evaluate, residual
@@ -35,7 +34,7 @@ def test_terms_that_cancel_are_no_flow():
 def test_a_ledger_that_does_not_close_ends_a_run(missing):
     """A millionth of what flowed is not missing without a word, and no figure that is not a number passes."""
     scene = cluster(15e-6).replace({"time.periods": 20})
-    run = EngineRun(scene, False, 0)
+    run = run_of(scene)
     assert run.advance_to(20) is Status.OK
     run.records.ledger[-1, recs.VISCOUS] += missing * np.abs(run.records.ledger).max()
     response = evaluate(scene, run.outcome(), Status.OK, 0, time.perf_counter())
@@ -47,7 +46,7 @@ def test_every_method_is_judged(solver, bound):
     """Time steps may lose a tenth of what flows, an integrator a thousand times its tolerance."""
     scene = cluster(15e-6).replace({"time.periods": 5, "solver": solver})
     for missing, status in ((0.1 * bound, Status.OK), (10 * bound, Status.ENERGY)):
-        run = run_of(scene, False, 0)
+        run = run_of(scene)
         assert run.advance_to(5) is Status.OK
         ledger = run.outcome().records.ledger
         ledger[5, recs.VISCOUS] += missing * np.abs(ledger).max()
@@ -56,7 +55,7 @@ def test_every_method_is_judged(solver, bound):
 
 def test_a_run_that_has_ended_otherwise_keeps_its_status():
     scene = cluster(15e-6).replace({"time.periods": 5})
-    run = EngineRun(scene, False, 0)
+    run = run_of(scene)
     run.advance_to(5)
     outcome = replace(run.outcome(), open_ledger=0.0)
     for status in (Status.EVENT_BUDGET, Status.ACCURACY_LOST, Status.ILL_CONDITIONED):

@@ -9,14 +9,12 @@ import numpy as np
 from vanedamp.coupling.exact import automaton as auto
 from vanedamp.coupling.exact import state as st
 from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes
-from vanedamp.coupling.exact.restart import given, taken
 from vanedamp.coupling.exact.subsystem_assembly import add_flow, empty_flows
 from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart_state import Handover
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
+from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
 _STATUS = {
@@ -46,26 +44,16 @@ class EngineRun:
     """The mutable state of one run and the subsystems it has met."""
 
     def __init__(
-        self,
-        scene: Scene,
-        events: bool,
-        samples_per_period: int,
-        functional: np.ndarray | None = None,
-        start: Handover | None = None,
+        self, system: System, initial: InitialMotion, records: recs.Records, events: bool, max_events: int
     ) -> None:
-        self.system = assemble(scene)
-        if functional is not None:
-            self.system = self.system._replace(response=np.r_[functional, np.zeros(self.system.bodies)])
-        self.max_events, self.begun, self.ended = scene.solver.max_events, False, False
-        self.scale = physical_scale(scene, self.system)
-        initial = initial_motion(scene, self.system) if start is None else given(self.system, self.scale, start)
-        self.flows = empty_flows(self.system)
+        self.system, self.records, self.max_events = system, records, max_events
+        self.begun, self.ended = False, False
+        self.flows = empty_flows(system)
         self.log = _Log(events, [])
         modes = self.flows.eigenvalue.shape[1]
-        self.state = st.new_state(self.system, modes, initial)
-        self.channels = st.new_channels(self.system, modes)
-        self.records = recs.new_records(self.system, scene.time.simulated, samples_per_period)
-        self.scratch = st.new_scratch(self.system, modes)
+        self.state = st.new_state(system, modes, initial)
+        self.channels = st.new_channels(system, modes)
+        self.scratch = st.new_scratch(system, modes)
 
     def begin(self, max_events: int) -> int:
         """Decide the initial state and record it. Returns the automaton's code.
@@ -111,15 +99,15 @@ class EngineRun:
         self.ended = code != auto.DONE
         return _STATUS[code]
 
-    def final(self) -> Handover | None:
-        """The state at the end of the periods done; None for a run that ended within one."""
+    def final(self) -> InitialMotion | None:
+        """The motion at the end of the periods done; None for a run that ended within one."""
         if self.ended:
             return None
-        state, s = self.state, int(self.state.counters[st.FLOW])
+        state, s, n = self.state, int(self.state.counters[st.FLOW]), self.system.modes
         awake = state.awake[: state.counters[st.AWAKE]]
         y = (self.flows.shape[s][:, awake] @ state.amplitude[awake]).real
         y[: len(state.constant)] += state.constant
-        return taken(self.system, self.scale, state.displacement, state.velocity, y)
+        return InitialMotion(y[:n], y[n:], state.displacement, state.velocity)
 
     def outcome(self) -> Outcome:
         """What the run leaves behind."""

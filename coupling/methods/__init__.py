@@ -1,1 +1,50 @@
-"""The values of `solver.method`, each a way to run a scene."""
+"""The values of `solver.method`, each a way to run a scene; coupling.scene.solver_options names their modules.
+
+A method is a module, or any object, with what the protocol `Method` says, and is loaded when a scene asks for it.
+Another package adds one by an entry point, whose name is the value of `solver.method`:
+
+    [project.entry-points."vanedamp.methods"]
+    leapfrog = "acme.leapfrog"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+if TYPE_CHECKING:
+    from vanedamp.coupling.response.evaluation import Run
+    from vanedamp.coupling.response.records import Records
+    from vanedamp.coupling.scene.solver_options import SolverOptions
+    from vanedamp.coupling.system.assembly import InitialMotion
+    from vanedamp.coupling.system.system import System
+
+
+class Variant(NamedTuple):
+    """A method with some of its options, as a line of a chart of methods.
+
+    label, colour, marker: of the line, as matplotlib has them; options: of the [solver] table, without the method;
+    setting: the option that changes along the line, None for a single point; tolerance: whether it is a tolerance, not
+    a number of steps.
+    """
+
+    label: str
+    colour: str
+    marker: str
+    options: Mapping[str, Any] = {}
+    setting: str | None = "steps_per_period"
+    tolerance: bool = False
+
+
+class Method(Protocol):
+    """The contract of a method. It may also have RESTARTS = True: its runs leave a state, and begin with any."""
+
+    Options: type[SolverOptions]
+    VARIANTS: Sequence[Variant]
+
+    def begin(self, system: System, options: Any, initial: InitialMotion, records: Records, events: bool) -> Run:
+        """Return a run of a system at time zero.
+
+        options: an instance of Options; initial: the motion at time zero; records: room for all periods, to be filled
+        (response.recorder); events: whether to keep a log of them. Raises InputError for what the method cannot do.
+        """

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, TimeGrid
-from vanedamp.coupling.methods.penalty import first_forces, net_load, row_force
+from vanedamp.coupling.methods.penalty_forces import first_forces, net_load, row_force
 from vanedamp.coupling.methods.step_records import (
     close_step,
     copy,

@@ -10,15 +10,64 @@ Gomes and others, Co-simulation: a survey (2018).
 from __future__ import annotations
 
 import math
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 from scipy.linalg import expm
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, STEPS, TimeGrid
-from vanedamp.coupling.methods.penalty import first_forces, net_load, row_force
+from vanedamp.coupling.methods import Variant
+from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, STEPS, Motion, TimeGrid, time_grid
+from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, net_load, row_force, with_penalty
 from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
+from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.jit import entry, kernel
+from vanedamp.coupling.response.evaluation import Run
+from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
+from vanedamp.files.toml_input import Whole
+
+VARIANTS = (
+    Variant("co-simulation, Jacobi, hold 0", "#7e22ce", "v", {"exchange": "jacobi", "hold": 0}),
+    Variant("co-simulation, Gauss-Seidel, hold 1", "#be185d", "<", {"exchange": "gauss_seidel", "hold": 1}),
+)
+
+
+class Options(PenaltyOptions):
+    """The steps are macro-steps.
+
+    exchange: whether the bodies know the structure's new motion; hold: order of extrapolation within a macro-step;
+    substeps: of the bodies in it.
+    """
+
+    method: Literal["cosim"] = "cosim"
+    exchange: Literal["jacobi", "gauss_seidel"] = "gauss_seidel"
+    hold: Annotated[Whole, Field(ge=0, le=1)] = 1
+    substeps: Annotated[Whole, Field(gt=0, le=10_000)] = 10
+
+    @property
+    def smallest_steps(self) -> int:
+        """Steps of the bodies in a period."""
+        return self.steps_per_period * self.substeps
+
+
+def begin(system: System, options: Options, initial: InitialMotion, records: Records, events: bool) -> Run:
+    """Return a run. Raises InputError for a rigid contact of restitution 0."""
+    times = time_grid(system, options.steps_per_period)
+    soft, slow = with_penalty(system, times, options)
+    matrix = cosimulation_matrices(soft, times)
+    memory = np.zeros((3, 4 * soft.modes + 2 + len(soft.J)))
+    gauss_seidel, hold, substeps = options.exchange == "gauss_seidel", options.hold, options.substeps
+    budget, deepest = options.max_events, options.penetration
+
+    def march(motion: Motion, log: np.ndarray, periods: int) -> int:
+        return march_cosimulation(
+            soft, times, motion, records, log, matrix, memory, slow, gauss_seidel, hold, substeps, periods, budget,
+            deepest,
+        )  # fmt: skip
+
+    return SteppedRun(soft, march, initial, records, events)
 
 
 def cosimulation_matrices(system: System, times: TimeGrid) -> np.ndarray:

@@ -9,10 +9,13 @@ after theirs. Springs of compliant contacts and Jenkins elements enter the same 
 from __future__ import annotations
 
 import math
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, TimeGrid
+from vanedamp.coupling.methods import Variant
+from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, Motion, TimeGrid, time_grid
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
     close_step,
@@ -24,11 +27,39 @@ from vanedamp.coupling.methods.step_records import (
     row_speed,
     solve_inverse,
 )
+from vanedamp.coupling.methods.time_stepping import SteppedRun
+from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.response.evaluation import Run
+from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.scene.solver_options import SteppingOptions
+from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
+from vanedamp.files.toml_input import Real
+
+VARIANTS = (Variant("Moreau-Jean", "#c2410c", "o"),)
 
 #: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
 _TURNS, _ROUND_OFF = 20, 1e-12
+
+
+class Options(SteppingOptions):
+    """theta: weight of a step's end in the smooth forces; 1/2 is of second order, 1 damps."""
+
+    method: Literal["moreau"] = "moreau"
+    theta: Annotated[Real, Field(ge=0.5, le=1)] = 0.5
+
+
+def begin(system: System, options: Options, initial: InitialMotion, records: Records, events: bool) -> Run:
+    """Return a run."""
+    times, theta, problem = time_grid(system, options.steps_per_period), options.theta, new_problem(len(system.J))
+    matrices = moreau_matrices(system, times, theta)
+    budget, deepest = options.max_events, options.penetration
+
+    def march(motion: Motion, log: np.ndarray, periods: int) -> int:
+        return march_moreau(system, times, motion, records, log, problem, *matrices, theta, periods, budget, deepest)
+
+    return SteppedRun(system, march, initial, records, events)
 
 
 def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

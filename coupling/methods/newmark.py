@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, TimeGrid
-from vanedamp.coupling.methods.penalty import first_forces, net_load
+from vanedamp.coupling.methods.penalty_forces import first_forces, net_load
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
     close_step,

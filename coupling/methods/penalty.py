@@ -1,73 +1,64 @@
-"""Penalties in place of constraints: springs for contacts, viscous friction below a slip speed, and their forces."""
+"""`solver.method = "penalty"`: springs and dashpots for contacts, by central differences, Newmark or HHT."""
 
 from __future__ import annotations
 
-import math
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from vanedamp.coupling.methods.equations_of_motion import TimeGrid
-from vanedamp.coupling.methods.step_records import damped, load_at, row_speed
-from vanedamp.coupling.numerics.jit import inlined, kernel
-from vanedamp.coupling.scene.contact_laws import damping_ratio
-from vanedamp.coupling.scene.solver_options import Solver
+from vanedamp.coupling.methods import Variant
+from vanedamp.coupling.methods.central_difference import explicit_matrix, march_explicit
+from vanedamp.coupling.methods.equations_of_motion import Motion, time_grid
+from vanedamp.coupling.methods.newmark import march_newmark, newmark_matrices
+from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, with_penalty
+from vanedamp.coupling.methods.time_stepping import SteppedRun
+from vanedamp.coupling.numerics.complementarity import new_problem
+from vanedamp.coupling.response.evaluation import Run
+from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
+from vanedamp.files.toml_input import Real
+
+VARIANTS = (
+    Variant("penalty, central differences", "#15803d", "s"),
+    Variant("penalty, Newmark", "#65a30d", "D", {"scheme": "newmark"}),
+    Variant("penalty, HHT", "#0e7490", "^", {"scheme": "hht"}),
+)
 
 
-def with_penalty(system: System, times: TimeGrid, solver: Solver) -> tuple[System, np.ndarray]:
-    """Rigid contacts as springs and dashpots, and the slip speed (friction rows,) below which friction is viscous.
+class Options(PenaltyOptions):
+    """scheme: of the steps; alpha: numerical damping of "hht"."""
 
-    The spring makes a contact last `contact_steps` steps: unless given, 2 steps^(1/3) of them, which makes the error of
-    a contact that is too soft and that of one resolved by too few steps fall alike. The dashpot gives an isolated
-    collision its restitution.
-    Raises InputError for a restitution of 0.
-    """
-    spring, dashpot = system.spring.copy(), system.dashpot.copy()
-    for r in range(system.friction_rows, len(spring)):
-        if np.isinf(spring[r]):
-            reduced = 1 / system.delassus[r, r]
-            duration = (solver.contact_steps or 2 * solver.steps ** (1 / 3)) * times.step
-            spring[r] = solver.contact_stiffness or reduced * (np.pi / duration) ** 2
-            dashpot[r] = 2 * damping_ratio(system.restitution[r]) * np.sqrt(spring[r] * reduced)
-    slips = slice(0, system.friction_rows)
-    # four times the speed at which an explicit step becomes unstable (docs/accuracy.md)
-    slow = 2 * system.limit[slips] * np.diag(system.delassus)[slips] * times.step
-    if solver.slip_velocity is not None:
-        slow = np.full(len(slow), solver.slip_velocity)
-    return system._replace(spring=spring, dashpot=dashpot), slow
+    method: Literal["penalty"] = "penalty"
+    scheme: Literal["central_difference", "newmark", "hht"] = "central_difference"
+    alpha: Annotated[Real, Field(ge=-1 / 3, le=0)] = -0.1
+
+    @model_validator(mode="after")
+    def _check_alpha(self) -> Options:
+        if "alpha" in self.model_fields_set and self.scheme != "hht":
+            raise ValueError('alpha: is for scheme = "hht"')
+        return self
 
 
-@kernel
-def first_forces(system, times, motion, slow):
-    """Forces of the rows by their laws (penalty contacts, regularised friction) at motion.q, motion.v."""
-    for r in range(len(system.J)):
-        row_force(system, motion, r, row_speed(system, r, motion.q), row_speed(system, r, motion.v), slow, 0.0)
+def begin(system: System, options: Options, initial: InitialMotion, records: Records, events: bool) -> Run:
+    """Return a run. Raises InputError for a rigid contact of restitution 0."""
+    times = time_grid(system, options.steps_per_period)
+    soft, slow = with_penalty(system, times, options)
+    budget, deepest = options.max_events, options.penetration
+    if options.scheme == "central_difference":
+        inverse = explicit_matrix(soft, times)
 
+        def march(motion: Motion, log: np.ndarray, periods: int) -> int:
+            return march_explicit(soft, times, motion, records, log, inverse, slow, periods, budget, deepest)
 
-@inlined
-def row_force(system, motion, r, displacement, speed, slow, moved):
-    """Set the force of row r by its law. moved: displacement of a Jenkins element since its last force."""
-    if r >= system.friction_rows:
-        gap = system.rest[r] + displacement
-        push = -system.spring[r] * gap - system.dashpot[r] * speed
-        motion.force[r] = max(push, 0.0) if gap < 0.0 else 0.0
-    elif system.limit[r] == 0.0:
-        motion.force[r] = 0.0
-    elif system.spring[r] != math.inf:
-        push = -system.spring[r] * (motion.elongation[r] + moved)
-        motion.force[r] = min(max(push, -system.limit[r]), system.limit[r])
-        motion.elongation[r] = -motion.force[r] / system.spring[r]
-    elif slow[r] > 0.0:
-        motion.force[r] = -system.limit[r] * min(max(speed / slow[r], -1.0), 1.0)
     else:
-        motion.force[r] = -system.limit[r] * np.sign(speed)
+        problem = new_problem(len(soft.J))
+        matrices = newmark_matrices(soft, times, options.alpha if options.scheme == "hht" else 0.0)
+        if options.slip_velocity is None:
+            slow = np.zeros_like(slow)  # implicit: Coulomb's law as it is
 
+        def march(motion: Motion, log: np.ndarray, periods: int) -> int:
+            return march_newmark(soft, times, motion, records, log, problem, *matrices, slow, periods, budget, deepest)
 
-@inlined
-def net_load(system, times, motion, q, v, k, i):
-    """Sum of the forces on coordinate i at step k of the period."""
-    force = load_at(system, times, k, i) - damped(system, v, i) - system.stiffness[i] * q[i]
-    for r in range(len(system.J)):
-        if motion.force[r] != 0.0:
-            force += system.J[r, i] * motion.force[r]
-    return force
+    return SteppedRun(soft, march, initial, records, events)

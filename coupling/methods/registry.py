@@ -1,7 +1,4 @@
-"""Runs of scenes without open choices: the exact engine's state, records and subsystems, and the response they leave.
-
-Other methods (`solver.method`) are those of methods.time_stepping.
-"""
+"""Runs of scenes without open choices, by the method that `solver.method` names, and the response that they leave."""
 
 from __future__ import annotations
 
@@ -11,11 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.methods import Method, exact
 from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
+from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.response.restart import given, taken
 from vanedamp.coupling.response.restart_state import Handover
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.solver_options import METHODS
+from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
 from vanedamp.files.toml_input import InputError
 
 
@@ -30,27 +31,47 @@ def respond(
     started = time.perf_counter()
     run = run_of(scene, events, samples_per_period, start)
     status, transient = run_scene(run, scene, progress)
-    final = run.final() if isinstance(run, EngineRun) else None
-    return replace(evaluate(scene, run.outcome(), status, transient, started), final=final)
+    outcome, last = run.outcome(), run.final()
+    final = None if last is None else taken(outcome.system, physical_scale(scene, outcome.system), last)
+    return replace(evaluate(scene, outcome, status, transient, started), final=final)
 
 
 def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:
-    """A run whose response is another functional (n,) of the structure's modes; with a fixed number of periods.
+    """A run of the engine whose response is another functional (n,) of the structure's modes; of all periods.
 
     `scene` has no open choices. Raises InputError for a scene that the model does not allow.
     """
     started = time.perf_counter()
-    run = EngineRun(scene, False, samples_per_period, functional)
+    system = assemble(scene)
+    system = system._replace(response=np.r_[functional, np.zeros(system.bodies)])
+    records = new_records(system, scene.time.simulated, samples_per_period)
+    run = exact.begin(system, scene.solver, initial_motion(scene, system), records, False)
     status, transient = run_scene(run, scene)
     return evaluate(scene, run.outcome(), status, transient, started)
 
 
-def run_of(scene: Scene, events: bool, samples_per_period: int, start: Handover | None = None) -> Run:
-    """A run of the scene's method, not yet begun."""
-    if scene.solver.method == "exact":
-        return EngineRun(scene, events, samples_per_period, start=start)
-    if start is not None:
-        raise InputError(f"continuation: is for solver.method exact, not {scene.solver.method}")
-    from vanedamp.coupling.methods.time_stepping import begin_run  # its kernels are loaded when they are wanted
+def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, start: Handover | None = None) -> Run:
+    """A run of the scene's method at time zero.
 
-    return begin_run(scene, events, samples_per_period)
+    Raises InputError for what the method cannot do, such as to begin with the state of another run.
+    """
+    method: Method = METHODS.part(scene.solver.method)
+    if start is not None and (reason := why_no_restart(scene)):
+        raise InputError(f"continuation: {reason}")
+    scene.solver.check_samples(samples_per_period)
+    system = assemble(scene)
+    initial = initial_motion(scene, system) if start is None else given(system, physical_scale(scene, system), start)
+    records = new_records(system, scene.time.simulated, samples_per_period)
+    return method.begin(system, scene.solver, initial, records, events)
+
+
+def why_no_restart(scene: Scene) -> str | None:
+    """Why runs of the scene's method cannot begin with the state of another; None if they can."""
+    if _restarts(METHODS.part(scene.solver.method)):
+        return None
+    able = [name for name, method in METHODS.all().items() if _restarts(method)]
+    return f"is for solver.method {' or '.join(able)}, not {scene.solver.method}"
+
+
+def _restarts(method: Method) -> bool:
+    return getattr(method, "RESTARTS", False)

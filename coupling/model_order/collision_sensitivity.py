@@ -13,7 +13,7 @@ from dataclasses import replace
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.scene.contact_laws import Compliant
 from vanedamp.coupling.scene.scene import Scene, Time
-from vanedamp.coupling.scene.solver_options import Solver
+from vanedamp.coupling.scene.solver_options import options_of
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.rom.contact_pulse import Collision, Pulse
 
@@ -65,7 +65,7 @@ def _amplitude(scene: Scene, modes: int, restitution: float, spring: float) -> f
         contact=Compliant(spring),
         damper=tuple(replace(damper, restitution=restitution) for damper in scene.damper),
         time=Time(_PERIODS, _TRANSIENT),
-        solver=Solver(),
+        solver=options_of({}),
         sweep={},
     )
     return respond(simple).amplitude_mean

@@ -17,6 +17,7 @@ from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Event, Response, Status, classify
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import outlasted
 
@@ -34,6 +35,9 @@ class Run(Protocol):
 
     def outcome(self) -> Outcome:
         """What the run leaves behind."""
+
+    def final(self) -> InitialMotion | None:
+        """The motion that another run can begin with; None for one that ended within a period, or leaves none."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +105,7 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(system, records))
     if not balance <= run.open_ledger and status in (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN):
         status = Status.ENERGY
-    samples = len(records.samples) // scene.time.simulated
+    samples = records.samples_per_period
     return Response(
         status=status,
         frequency=scene.excitation.frequency,

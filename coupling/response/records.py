@@ -30,6 +30,11 @@ class Records(NamedTuple):
     samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples a period
     log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
 
+    @property
+    def samples_per_period(self) -> int:
+        """Samples of each period."""
+        return len(self.samples) // max(len(self.peak) - 1, 1)
+
 
 def new_records(system: System, periods: int, samples: int) -> Records:
     """Room for `periods` periods with `samples` samples each."""

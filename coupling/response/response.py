@@ -68,7 +68,7 @@ class Response:
     and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model
     whose number of modes was chosen automatically (model_order.selection), None otherwise; warnings: what to know of
     the scene before its figures are used; final: the state at its end, with which another run can begin, None for one
-    that ended within a period or by another method than the exact one.
+    that ended within a period, or whose method leaves none.
     """
 
     status: Status

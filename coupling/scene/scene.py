@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import field
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,7 +18,7 @@ from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper, Stop
 from vanedamp.coupling.scene.contact_laws import Compliant, Contact, Massless, Newton
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
-from vanedamp.coupling.scene.solver_options import Solver
+from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
 from vanedamp.files.toml_input import (
     STRICT,
@@ -106,7 +107,7 @@ class Scene:
     gravity: Gravity = field(default_factory=Gravity)
     contact: Contact = field(default_factory=Newton)
     time: Time = field(default_factory=Time)
-    solver: Solver = field(default_factory=Solver)
+    solver: Solver = field(default_factory=partial(options_of, {}))
     continuation: Continuation = field(default_factory=Continuation)
     sweep: dict[str, Axis] = field(default_factory=dict)
 

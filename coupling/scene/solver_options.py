@@ -1,80 +1,126 @@
-"""The [solver] table of a scene: the method and its options."""
+"""The [solver] table of a scene: a method, and its options as the method's own file declares them.
+
+Methods are named here, and loaded when a scene asks for one: a scene of the exact engine needs nobody else's kernels.
+"""
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any
 
-from pydantic import Field
-from pydantic.dataclasses import dataclass
+from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, ValidationError, WrapValidator
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Real, Whole
+from vanedamp.files.extensions import Registry
+from vanedamp.files.toml_input import InputError, Positive, Whole, nearest
 
-_STEPPING = ("moreau", "penalty", "cosim", "solve_ivp")
-#: which methods an option belongs to, besides `method` and `max_events`, which belong to all
-_USERS: dict[str, tuple[str, ...]] = {
-    "steps_per_period": _STEPPING,
-    "penetration": _STEPPING,
-    "theta": ("moreau",),
-    "scheme": ("penalty",),
-    "alpha": ("penalty",),
-    "contact_steps": ("penalty", "cosim"),
-    "contact_stiffness": ("penalty", "cosim"),
-    "slip_velocity": ("penalty", "cosim"),
-    "exchange": ("cosim",),
-    "hold": ("cosim",),
-    "substeps": ("cosim",),
-    "rtol": ("solve_ivp",),
-    "complete_chatter": ("solve_ivp",),
-}
+_METHODS = "vanedamp.coupling.methods"
+#: the values of `solver.method`; coupling.methods.Method is the contract
+METHODS = Registry(
+    "method",
+    {
+        "exact": f"{_METHODS}.exact",
+        "moreau": f"{_METHODS}.moreau",
+        "penalty": f"{_METHODS}.penalty",
+        "cosim": f"{_METHODS}.cosimulation",
+        "solve_ivp": f"{_METHODS}.scipy_ivp",
+    },
+    "vanedamp.methods",
+    ("Options", "begin", "VARIANTS"),
+)
+#: processor time of an excitation period, and of a time step, for one body on a rigid structure, s (docs/accuracy.md)
+PERIOD_SECONDS, STEP_SECONDS = 20e-6, 0.1e-6
 
 
-@dataclass(frozen=True, config=STRICT)
-class Solver:
-    """The method, and the budget of events after which a run ends with status 'event_budget'.
+class SolverOptions(BaseModel):
+    """The options of every method; those of one derive from it, with a Literal for `method` and defaults for all.
 
-    steps_per_period: steps (macro-steps of cosim) in an excitation period, 1000 unless given; for solve_ivp the least
-    number, 32; penetration: share of the free travel by which a body may overlap a rigid wall, 0.1 (solve_ivp: 1e-3).
-    moreau: theta of the one-step scheme (0.5). penalty: scheme; alpha of "hht" (-0.1). penalty and cosim, for rigid
-    contacts: contact_stiffness (N/m), or contact_steps, the duration of a contact in steps (2 steps_per_period^(1/3));
-    slip_velocity below which friction is viscous (m/s; from the stability limit unless given). cosim: exchange
-    ("gauss_seidel"), hold (order of extrapolation within a macro-step, 1), substeps of the bodies (10). solve_ivp:
-    relative tolerance rtol (1e-9), complete_chatter (true).
+    max_events: the budget of events after which a run ends with status 'event_budget'. Unlike the other tables this is
+    a model, which knows what was given (`model_fields_set`): defaults differ from method to method, so that a scene
+    whose method is replaced keeps what was given, and nothing else.
     """
 
-    method: Literal["exact", "moreau", "penalty", "cosim", "solve_ivp"] = "exact"
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+    method: str
     max_events: Annotated[Whole, Field(gt=0)] = 20_000_000
-    steps_per_period: Annotated[Whole, Field(ge=4, le=10_000_000)] | None = None
-    penetration: Positive | None = None
-    theta: Annotated[Real, Field(ge=0.5, le=1)] | None = None
-    scheme: Literal["central_difference", "newmark", "hht"] | None = None
-    alpha: Annotated[Real, Field(ge=-1 / 3, le=0)] | None = None
-    contact_steps: Annotated[Real, Field(ge=4)] | None = None
-    contact_stiffness: Positive | None = None
-    slip_velocity: NonNegative | None = None
-    exchange: Literal["jacobi", "gauss_seidel"] | None = None
-    hold: Annotated[Whole, Field(ge=0, le=1)] | None = None
-    substeps: Annotated[Whole, Field(gt=0, le=10_000)] | None = None
-    rtol: Annotated[Real, Field(ge=3e-14, lt=1)] | None = None
-    complete_chatter: bool | None = None
-
-    def __post_init__(self) -> None:
-        for option in fields(self):
-            users = _USERS.get(option.name)
-            if users is None or getattr(self, option.name) is None or self.method in users:
-                continue
-            raise ValueError(f"{option.name}: is for method {' or '.join(users)}, not {self.method}")
-        if self.alpha is not None and self.scheme != "hht":
-            raise ValueError('alpha: is for scheme = "hht"')
-        if self.contact_steps is not None and self.contact_stiffness is not None:
-            raise ValueError("give one of contact_steps and contact_stiffness")
 
     @property
-    def steps(self) -> int:
-        """Steps in an excitation period."""
-        return self.steps_per_period or (32 if self.method == "solve_ivp" else 1000)
+    def seconds_per_period(self) -> float:
+        """Processor time of an excitation period, s, roughly: to refuse what nobody would wait for."""
+        return PERIOD_SECONDS
+
+    def check_samples(self, samples: int) -> None:
+        """Raise InputError where that many samples of a period cannot be taken."""
+
+
+class SteppingOptions(SolverOptions):
+    """The options of methods with steps of equal size.
+
+    steps_per_period: of the excitation; penetration: share of the free travel by which a body may overlap a rigid wall.
+    """
+
+    steps_per_period: Annotated[Whole, Field(ge=4, le=10_000_000)] = 1000
+    penetration: Positive = 0.1
 
     @property
-    def deepest(self) -> float:
-        """Share of the free travel by which a body may overlap a rigid wall."""
-        return self.penetration or (1e-3 if self.method == "solve_ivp" else 0.1)
+    def smallest_steps(self) -> int:
+        """Steps of the smallest size in a period."""
+        return self.steps_per_period
+
+    @property
+    def seconds_per_period(self) -> float:
+        """Processor time of an excitation period, s."""
+        return PERIOD_SECONDS + STEP_SECONDS * self.smallest_steps
+
+    def check_samples(self, samples: int) -> None:
+        """Raise InputError where samples do not fall on steps."""
+        if samples and self.steps_per_period % samples:
+            raise InputError(
+                f"solver.steps_per_period: {self.steps_per_period} is no multiple of {samples} samples a period"
+            )
+
+
+def options_of(table: Mapping[str, Any]) -> SolverOptions:
+    """Return the options in a [solver] table; None counts as not given.
+
+    Raises pydantic's ValidationError, whose places are those in the table.
+    """
+    given = {key: value for key, value in table.items() if value is not None}
+    method = given.get("method", "exact")
+    if not isinstance(method, str) or not (method in METHODS.modules or method in METHODS.names()):
+        *names, last = map(repr, METHODS.names())
+        expected = {"expected": f"{', '.join(names)} or {last}"}
+        raise _error(InitErrorDetails(type="literal_error", loc=("method",), input=method, ctx=expected))
+    options: type[SolverOptions] = METHODS.part(method).Options
+    for key in given:
+        if key not in options.model_fields:
+            reason = PydanticCustomError("option", "{reason}", {"reason": _stranger(key, method)})
+            raise _error(InitErrorDetails(type=reason, loc=(key,), input=table))
+    return options.model_validate(given)
+
+
+def _stranger(key: str, method: str) -> str:
+    """Return why a method has no such option: other methods have it, or none has."""
+    known = {name: part.Options.model_fields for name, part in METHODS.all().items()}
+    users = [name for name, options in known.items() if key in options]
+    if users:
+        return f"is for method {' or '.join(users)}, not {method}"
+    return f"unknown key; {nearest(key, list({option for options in known.values() for option in options}))}"
+
+
+def _error(details: InitErrorDetails) -> ValidationError:
+    return ValidationError.from_exception_data("solver", [details])
+
+
+def _by_method(value: Any, handler: Any) -> Any:
+    return options_of(value) if isinstance(value, Mapping) else handler(value)
+
+
+def _plain(options: SolverOptions) -> dict[str, Any]:
+    """Return what was given as plain data, with what every method has."""
+    return options.model_dump(mode="json", include=options.model_fields_set | set(SolverOptions.model_fields))
+
+
+#: the [solver] table
+Solver = Annotated[SolverOptions, WrapValidator(_by_method), PlainSerializer(_plain)]

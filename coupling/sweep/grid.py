@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.methods.registry import why_no_restart
 from vanedamp.coupling.model_order.selection import Choices, choices_of, is_open, settled, warnings_of
 from vanedamp.coupling.scene.paths import assign, axis_values
 from vanedamp.coupling.scene.scene import Scene
@@ -163,11 +164,9 @@ def _telling(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
 
 
 def _check_method(scene: Scene) -> None:
-    if scene.continuation.direction != "independent" and scene.solver.method != "exact":
-        raise InputError(
-            f'continuation.direction: "{scene.continuation.direction}" is for solver.method exact, not '
-            f'{scene.solver.method}; take "independent"'
-        )
+    direction = scene.continuation.direction
+    if direction != "independent" and (reason := why_no_restart(scene)):
+        raise InputError(f'continuation.direction: "{direction}" {reason}; take "independent"')
 
 
 def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:

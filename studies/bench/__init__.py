@@ -12,7 +12,7 @@ Import what is heavy inside `run`. What several benchmarks need is in the files 
 
 from __future__ import annotations
 
-from vanedamp.studies.extensions import ExtensionPoint
+from vanedamp.files.extensions import ExtensionPoint
 
 BENCHMARKS = ExtensionPoint(
     "benchmark", "vanedamp.studies.bench", "vanedamp.benchmarks", ("SUMMARY", "run"), folders=True

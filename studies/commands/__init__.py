@@ -16,7 +16,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Protocol
 
-from vanedamp.studies.extensions import ExtensionPoint
+from vanedamp.files.extensions import ExtensionPoint
 
 
 class Command(Protocol):

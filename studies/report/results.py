@@ -9,9 +9,9 @@ from typing import Any, Protocol
 
 import h5py
 
+from vanedamp.files.extensions import ExtensionError, ExtensionPoint
 from vanedamp.files.store import StoreError
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.extensions import ExtensionError, ExtensionPoint
 
 SECTIONS = ExtensionPoint(
     "section of the report", "vanedamp.studies.report.sections", "vanedamp.report_sections",

@@ -13,7 +13,7 @@ import numpy as np
 
 from vanedamp.coupling.exact import automaton as auto
 from vanedamp.coupling.exact import state as st
-from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
@@ -158,7 +158,7 @@ class Stepper:
 
     def __init__(self, scene: Scene, change=None) -> None:
         """change: alters the mutable run before it begins."""
-        self.run = EngineRun(scene, True, 0)
+        self.run = run_of(scene, events=True)
         if change is not None:
             change(self.run)
         self.budget = scene.solver.max_events

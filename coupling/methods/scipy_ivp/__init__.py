@@ -1,1 +1,44 @@
 """`solver.method = "solve_ivp"`: scipy's DOP853, stopped at every event."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from vanedamp.coupling.methods import Variant
+from vanedamp.coupling.response.evaluation import Run
+from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.scene.solver_options import PERIOD_SECONDS, SteppingOptions
+from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.system import System
+from vanedamp.files.toml_input import Positive, Real, Whole
+
+VARIANTS = (Variant("solve_ivp, DOP853 with events", "#a16207", ">", setting="rtol", tolerance=True),)
+#: processor time of a step, s
+_STEP_SECONDS = 1e-3
+
+
+class Options(SteppingOptions):
+    """steps_per_period: the least number; rtol: relative tolerance.
+
+    complete_chatter: whether impacts that follow each other ever faster end at once, in rest.
+    """
+
+    method: Literal["solve_ivp"] = "solve_ivp"
+    steps_per_period: Annotated[Whole, Field(ge=4, le=10_000_000)] = 32
+    penetration: Positive = 1e-3
+    rtol: Annotated[Real, Field(ge=3e-14, lt=1)] = 1e-9
+    complete_chatter: bool = True
+
+    @property
+    def seconds_per_period(self) -> float:
+        """Processor time of an excitation period, s."""
+        return PERIOD_SECONDS + _STEP_SECONDS * self.steps_per_period
+
+
+def begin(system: System, options: Options, initial: InitialMotion, records: Records, events: bool) -> Run:
+    """Return a run."""
+    from vanedamp.coupling.methods.scipy_ivp.run import IvpRun  # its kernels are loaded when they are wanted
+
+    return IvpRun(system, options, initial, records, events)

@@ -8,7 +8,6 @@ from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
 from vanedamp.coupling.methods.scipy_ivp.motion import LOOSE, SLIDE, SPRUNG, Unforced
 from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.recorder import cubic_peak, record_section
-from vanedamp.coupling.scene.scene import Scene
 
 #: the integrals; behind them the impulses of all rows
 _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN, _PUSH = range(10)
@@ -21,11 +20,10 @@ class Recorder:
     bodies' momentum, on the extended state; states: of the rows.
     """
 
-    def __init__(self, scene: Scene, unforced: Unforced, events: bool, samples: int) -> None:
+    def __init__(self, unforced: Unforced, records: recs.Records, steps: int, events: bool) -> None:
         u, system = unforced, unforced.system
-        self.unforced, self.system, self.keep = u, system, events
-        self.records = recs.new_records(system, scene.time.simulated, samples)
-        self.each, self.steps = samples, scene.solver.steps
+        self.unforced, self.system, self.records, self.keep = u, system, records, events
+        self.each, self.steps = records.samples_per_period, steps
         self.count = _PUSH + u.r
         self.functionals, self.damping = _functionals(u), system.of_structure.damping
         self.states = np.zeros(u.r, int)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import DOP853
 
+from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
 from vanedamp.coupling.methods.scipy_ivp.impacts import COLLAPSE, FRESH, TOUCH, calm, collide
 from vanedamp.coupling.methods.scipy_ivp.integrals import Recorder
@@ -32,9 +33,10 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
 from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.response.evaluation import Outcome
+from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.system import System
 
 #: the shortest first step, as a share of a period
 _SHORTEST = 1e-26
@@ -64,24 +66,24 @@ class Arc(NamedTuple):
 class IvpRun:
     """A run by solve_ivp: state y = (z, integrals) and the states of the rows. Times count from the period's start."""
 
-    def __init__(self, scene: Scene, events: bool, samples_per_period: int) -> None:
-        self.solver, self.steps = scene.solver, scene.solver.steps
-        self.system = assemble(scene)
-        initial = initial_motion(scene, self.system)
-        self.unforced = u = Unforced(self.system)
-        self.record = Recorder(scene, u, events, samples_per_period)
+    def __init__(
+        self, system: System, options: Options, initial: InitialMotion, records: Records, events: bool
+    ) -> None:
+        self.system, self.options, self.steps = system, options, options.steps_per_period
+        self.unforced = u = Unforced(system)
+        self.record = Recorder(u, records, self.steps, events)
         self.y = np.zeros(u.size + self.record.count)
         self.y[u.p], self.y[u.d] = initial.p, initial.displacement
         self.y[u.p_rate], self.y[u.s] = initial.p_rate, initial.velocity
-        self.time, self.step = 0.0, self.system.period / self.steps
+        self.time, self.step = 0.0, system.period / self.steps
         self.problem = new_problem(u.r)
         self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
         self.since = np.full(u.r, np.inf)  # s, since each contact's last impact
         self.begun = False
         nothing = np.zeros(u.r, int)
         self._follow(Contacts(nothing + UNFORCED, nothing.astype(float), nothing, nothing))
-        self.tolerance = self.solver.rtol or 1e-9
-        self.absolute = self.tolerance * self.record.sizes(_reach(scene, u))
+        self.tolerance = options.rtol
+        self.absolute = self.tolerance * self.record.sizes(_reach(u))
 
     def advance_to(self, periods: int) -> Status:
         """Continue to the end of `periods`, or to what ends the run."""
@@ -89,7 +91,7 @@ class IvpRun:
             return Status.UNDECIDED
         with np.errstate(all="ignore"):
             while self.record.period < periods:
-                if self.events >= self.solver.max_events:
+                if self.events >= self.options.max_events:
                     return Status.EVENT_BUDGET
                 status = self._segment()
                 if status is not Status.OK:
@@ -101,10 +103,13 @@ class IvpRun:
         record = self.record
         numbers = {"impacts": record.impacts, "evaluations": self.evaluations}
         log = [np.array(record.log)] if record.log else []
-        open_ledger = _OPEN_LEDGER * max(self.solver.rtol or 0.0, _LEAST)
+        open_ledger = _OPEN_LEDGER * max(self.tolerance, _LEAST)
         return Outcome(
             self.system, record.records, record.period, self.events, open_ledger, numbers, log, max(record.deep, 0.0)
         )
+
+    def final(self) -> None:
+        """None: the states of contacts are no part of a motion that another run could begin with."""
 
     def _begin(self) -> bool:
         self.begun, place = True, self.y[self.unforced.d]
@@ -128,7 +133,7 @@ class IvpRun:
         if arc.failed or not np.isfinite(arc.last).all():
             return Status.DIVERGED
         self.record.points(arc.t, arc.y)
-        if self.record.deep > self.solver.deepest:
+        if self.record.deep > self.options.penetration:
             return Status.PENETRATION
         self.time, self.y = self.time + arc.duration, arc.last
         self.since += arc.duration
@@ -244,7 +249,7 @@ class IvpRun:
         calm(self.unforced, z, self.fastest, touch)
 
     def _impact(self, z: np.ndarray) -> bool:
-        u, system, complete = self.unforced, self.system, self.solver.complete_chatter is not False
+        u, system, complete = self.unforced, self.system, self.options.complete_chatter
         pressing, resting, collapsed = np.zeros(u.r), np.zeros(u.r, bool), np.zeros(u.r, bool)
         if complete:
             extended = u.extended(self.time, z)
@@ -260,11 +265,13 @@ class IvpRun:
         return True
 
 
-def _reach(scene: Scene, u: Unforced) -> float:
+def _reach(u: Unforced) -> float:
     """A typical displacement, m: the narrowest gap, the least elongation at which a spring slides, the static one."""
     system = u.system
-    gaps = [cavity.gap for cavity in scene.cavity] + [stop.gap for stop in scene.stop]
-    lengths = gaps + list(u.limit[u.slider] / system.spring[u.slider])
+    contacts = slice(system.friction_rows, None)
+    stops = (system.left_body[contacts] < 0) & (system.right_body[contacts] < 0)
+    gaps = np.where(stops, system.rest[contacts], system.free_travel[contacts])
+    lengths = [*gaps, *(u.limit[u.slider] / system.spring[u.slider])]
     lengths = [length for length in lengths if length > 0]
     modes = system.of_structure
     static = np.abs(modes.J) @ (np.abs(modes.load) / modes.stiffness)

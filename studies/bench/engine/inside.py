@@ -34,7 +34,7 @@ def awake_modes(scene: Scene, first: int, last: int) -> float:
 def time_of_a_period(scene: Scene, lengths: tuple[int, int]) -> float:
     """Mean seconds of the periods from the first to the second of two, in one run of the scene's method."""
     first, last = lengths
-    run = run_of(scene.replace({"time.periods": last, "time.transient": 0}), False, 0)
+    run = run_of(scene.replace({"time.periods": last, "time.transient": 0}))
     run.advance_to(first)
     return seconds(run.advance_to, last) / (last - first)
 
@@ -62,7 +62,8 @@ def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
 
 
 def _begun(scene: Scene, periods: int) -> EngineRun:
-    run = EngineRun(scene.replace({"time.periods": periods}), False, 0)
+    run = run_of(scene.replace({"time.periods": periods}))
+    assert isinstance(run, EngineRun)
     run.begin(scene.solver.max_events)
     return run
 

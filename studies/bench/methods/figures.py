@@ -11,25 +11,20 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
 
 from vanedamp.studies.bench.methods.peers import PEERS
-from vanedamp.studies.bench.methods.scenes import STEPPING
+from vanedamp.studies.bench.methods.scenes import charted
 from vanedamp.studies.figures import GREY, draw_grid, save, subplots
 
-_COLOURS = (
-    "#1d4f91", "#c2410c", "#15803d", "#65a30d", "#0e7490", "#7e22ce", "#be185d", "#a16207", "#111827", "#64748b",
-    "#dc2626",
-)  # fmt: skip
-_MARKERS = "*osD^v<>PXh"
-#: each method keeps its colour and marker in all panels
-_METHODS = ("exact engine", *STEPPING, "solve_ivp, DOP853 with events", *PEERS)
+#: of curves that are no methods
+_COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#65a30d", "#0e7490", "#7e22ce", "#be185d", "#a16207")
 
 
 def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
     """A panel a scene: error against CPU time per period, and the model ladder if there is one."""
-    charts, drawn = result["charts"], []
+    charts, drawn, styles = result["charts"], [], _styles()
     figure, axes = subplots(2, 4, size=(21, 10))
     panels = list(axes.flat)
     for panel, (name, chart) in zip(panels, charts.items(), strict=False):
-        _chart(panel, name, chart)
+        _chart(panel, name, chart, styles)
         drawn.append(panel)
     for part, draw in (("ladder", _ladder), ("curve", _curve)):
         if part in result:
@@ -41,13 +36,19 @@ def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
     for panel in drawn[: len(charts)]:
         handles, labels = panel.get_legend_handles_labels()
         legend = dict(zip(labels, handles, strict=True)) | legend
-    names = [name for name in _METHODS if name in legend]
+    names = [name for name in styles if name in legend]
     figure.legend([legend[name] for name in names], names, loc="outside lower center", ncols=6)
     save(figure, path)
 
 
-def _chart(axes: Axes, name: str, chart: Mapping[str, Any]) -> None:
-    for method, colour, marker in zip(_METHODS, _COLOURS, _MARKERS, strict=True):
+def _styles() -> dict[str, tuple[str, str]]:
+    """Colour and marker of every method and peer, by its label: the same in all panels."""
+    ours = {label: (variant.colour, variant.marker) for label, (_, variant) in charted().items()}
+    return ours | {name: (peer.colour, peer.marker) for name, peer in PEERS.items()}
+
+
+def _chart(axes: Axes, name: str, chart: Mapping[str, Any], styles: Mapping[str, tuple[str, str]]) -> None:
+    for method, (colour, marker) in styles.items():
         points = [point for point in chart["points"] if point["method"] == method and point["time"]]
         times = [1e6 * point["time"]["median"] for point in points]
         errors = [max(point["error"], 1e-14) for point in points]

@@ -22,6 +22,7 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.solver_options import METHODS, SteppingOptions
 from vanedamp.coupling.scene.structures import Rigid
 from vanedamp.files.store import write_csv, write_json
 from vanedamp.files.toml_input import InputError
@@ -39,9 +40,8 @@ _SEED = 20_260_102
 _SAMPLES, _LEAST = 10, 40
 #: error of a state that is as good as zero
 _FLOOR = 1e-13
-#: status of a run that was left out, and the tolerance of solve_ivp for means
+#: status of a run that was left out, and the one tolerance for means
 DEAR, _ONE = "too dear for a mean", 1e-4
-EXACT, IVP = "exact engine", "solve_ivp, DOP853 with events"
 
 
 @dataclass(frozen=True)
@@ -126,15 +126,7 @@ def _chart(scene: Scene, repeats: bool, effort: Effort, rng: np.random.Generator
     """Times and errors of every method on a scene."""
     periods = effort.checked if repeats else effort.reference
     reference = _run(scene, periods, repeats)
-    variants = {(EXACT, 0.0): scene}
-    for name, options in scenes.STEPPING.items():
-        variants |= {
-            (name, float(count)): scenes.by(scene, steps_per_period=count, **options) for count in effort.steps
-        }
-    variants |= {
-        (IVP, rtol): scenes.by(scene, method="solve_ivp", rtol=rtol, steps_per_period=_SAMPLES if repeats else _LEAST)
-        for rtol in effort.tolerances
-    }
+    variants = _variants(scene, repeats, effort)
     points = [_point(key, variant, reference, repeats, effort) for key, variant in variants.items()]
     for point in points:
         # a method may fail later than in the periods that are compared
@@ -166,6 +158,25 @@ def _chart(scene: Scene, repeats: bool, effort: Effort, rng: np.random.Generator
         "impacts_per_period": reference.impacts_per_period, "points": points, "dominated_by": better,
         "absent": absent,
     }  # fmt: skip
+
+
+def _variants(scene: Scene, repeats: bool, effort: Effort) -> dict[tuple[str, float], Scene]:
+    """The scene by every method, under its label and setting; the exact engine is the first."""
+    made = {}
+    for label, (method, variant) in scenes.charted().items():
+        options = dict(variant.options)
+        settings: tuple[float, ...] = effort.tolerances if variant.tolerance else effort.steps
+        if variant.tolerance and issubclass(METHODS.part(method).Options, SteppingOptions):
+            options["steps_per_period"] = _SAMPLES if repeats else _LEAST
+        for setting in settings if variant.setting else (0,):
+            changed = options | ({variant.setting: setting} if variant.setting else {})
+            made[label, float(setting)] = scenes.by(scene, method=method, **changed)
+    return made
+
+
+def _by_tolerance(label: str) -> bool:
+    """Whether the setting of a method or a peer is a tolerance."""
+    return PEERS[label].tolerance if label in PEERS else scenes.charted()[label][1].tolerance
 
 
 def _peers(
@@ -226,9 +237,10 @@ def _new_point(key: tuple[str, float], status: str) -> dict[str, Any]:
 def _point(key: tuple[str, float], scene: Scene, reference: Response, repeats: bool, effort: Effort) -> dict[str, Any]:
     """Status and error of one run."""
     method, setting = key
-    small = 10 if scene.solver.method == "cosim" else 1  # steps of the bodies within a macro-step
-    periods = effort.checked if repeats else (effort.ivp if method == IVP else effort.means)
-    if not repeats and (setting * small * periods > effort.dearest or (method == IVP and setting != _ONE)):
+    by_tolerance = _by_tolerance(method)
+    periods = effort.checked if repeats else (effort.ivp if by_tolerance else effort.means)
+    steps = scene.solver.smallest_steps if isinstance(scene.solver, SteppingOptions) else 0
+    if not repeats and (steps * periods > effort.dearest or (by_tolerance and setting != _ONE)):
         return _new_point(key, DEAR)  # no error, rather than that of a run too short for its transient
     response = _run(scene, periods, repeats)
     point = _new_point(key, response.status.value)
@@ -265,11 +277,10 @@ def _mean_error(mean: float, confidence: float | None, reference: Response) -> d
 
 def _lengths(point: Mapping[str, Any], effort: Effort) -> tuple[int, int]:
     """Two lengths of a run in periods, so that the longer takes some tenths of a second."""
-    peer = PEERS.get(point["method"])
-    if point["method"] == IVP or (peer and peer.tolerance):
+    if _by_tolerance(point["method"]):
         return 1, 3
-    long = effort.timed / (25 if point["method"] == EXACT else point["setting"])
-    if peer:
+    long = effort.timed / (point["setting"] or 25)
+    if point["method"] in PEERS:
         return 0, max(int(long / 10), 2)
     long = int(np.clip(long, 12, 20_000))
     return max(long // 6, 1), long

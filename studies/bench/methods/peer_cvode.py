@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.run import Arc, IvpRun
+from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble, initial_motion
 from vanedamp.studies.bench.methods.peers import PeerRun
-from vanedamp.studies.bench.methods.scenes import by
 
 if TYPE_CHECKING:
     from sksundae.cvode import CVODEResult
@@ -25,8 +27,11 @@ _STEPS = 40
 
 def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     """Run with the relative tolerance `setting`."""
-    ours = by(scene, method="solve_ivp", rtol=setting, steps_per_period=_STEPS)
-    job = CvodeRun(ours.replace({"time.periods": periods, "time.transient": 0}), False, samples)
+    system = assemble(scene)
+    options = Options(rtol=setting, steps_per_period=_STEPS)
+    options.check_samples(samples)
+    records = new_records(system, periods, samples)
+    job = CvodeRun(system, options, initial_motion(scene, system), records, False)
     started = time.thread_time()
     status = job.advance_to(periods)
     seconds = time.thread_time() - started

@@ -41,18 +41,23 @@ class PeerRun:
 
 
 class Peer(NamedTuple):
-    """A program: module of studies, what to import, how to get it, whether its setting is a tolerance (or steps)."""
+    """A program: module of studies, what to import, how to get it, whether its setting is a tolerance (or steps).
+
+    colour, marker: of its line in charts.
+    """
 
     module: str
     needs: str
     remedy: str
     tolerance: bool
+    colour: str
+    marker: str
 
 
 PEERS = {
-    "SUNDIALS CVODE": Peer("peer_cvode", "sksundae", "pip install vanedamp[peers]", True),
-    "Exudyn": Peer("peer_exudyn", "exudyn", "pip install vanedamp[peers]", False),
-    "Siconos": Peer("peer_siconos", "siconos.kernel", "apt install python3-siconos", False),
+    "SUNDIALS CVODE": Peer("peer_cvode", "sksundae", "pip install vanedamp[peers]", True, "#111827", "P"),
+    "Exudyn": Peer("peer_exudyn", "exudyn", "pip install vanedamp[peers]", False, "#64748b", "X"),
+    "Siconos": Peer("peer_siconos", "siconos.kernel", "apt install python3-siconos", False, "#dc2626", "h"),
 }
 
 

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.solver_options import METHODS
+from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.bench.engine import scenes as bench_scenes
 
@@ -16,15 +19,16 @@ if TYPE_CHECKING:
     from vanedamp.modal.matrices import SystemMatrices
     from vanedamp.rom.interface import Interface
 
-#: methods by the name in charts: options of [solver] besides the number of steps
-STEPPING: dict[str, dict[str, Any]] = {
-    "Moreau-Jean": {"method": "moreau"},
-    "penalty, central differences": {"method": "penalty"},
-    "penalty, Newmark": {"method": "penalty", "scheme": "newmark"},
-    "penalty, HHT": {"method": "penalty", "scheme": "hht"},
-    "co-simulation, Jacobi, hold 0": {"method": "cosim", "exchange": "jacobi", "hold": 0},
-    "co-simulation, Gauss-Seidel, hold 1": {"method": "cosim", "exchange": "gauss_seidel", "hold": 1},
-}
+
+def charted() -> dict[str, tuple[str, Variant]]:
+    """Methods by their label in charts: the value of `solver.method`, and how it is drawn. Raises ExtensionError."""
+    found: dict[str, tuple[str, Variant]] = {}
+    for name, method in METHODS.all().items():
+        for variant in method.VARIANTS:
+            if variant.label in found:
+                raise ExtensionError(f"method {name}: another is '{variant.label}' in charts, too; name it otherwise")
+            found[variant.label] = (name, variant)
+    return found
 
 
 def by(scene: Scene, **solver: Any) -> Scene:

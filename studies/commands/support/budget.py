@@ -11,8 +11,8 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.workers import available_cores
 
-#: s of an excitation period; of a step of the methods that step; and of a run besides
-_PERIOD, _STEP, _RUN = 20e-6, 0.1e-6, 2.5e-3
+#: s of a run, beside its periods
+_RUN = 2.5e-3
 #: bytes of a period's record, of a sample of one channel, and of a finished point
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
 #: at most: points of a sweep, bytes of a run, s of a command
@@ -56,9 +56,7 @@ def check_optimise(study: Study, workers: int | None) -> None:
 
 def _seconds(scene: Scene) -> float:
     """Processor time of a run."""
-    solver = scene.solver
-    step = {"exact": 0.0, "solve_ivp": 1e-3}.get(solver.method, _STEP) * (solver.substeps or 1)
-    return _RUN + scene.time.simulated * (_PERIOD + step * solver.steps)
+    return _RUN + scene.time.simulated * scene.solver.seconds_per_period
 
 
 def _check_time(key: str, what: str, seconds: float) -> None:

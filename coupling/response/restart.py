@@ -1,4 +1,4 @@
-"""Restart states from the engine's state, and back."""
+"""Restart states from the motion at the end of a run, and back."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 
-def taken(system: System, scale: float, slip: np.ndarray, speed: np.ndarray, y: np.ndarray) -> Handover:
-    """The handover of a run: slips (r,) and their speeds of all rows, and y (2n,) = (p, p') of the structure.
+def taken(system: System, scale: float, last: InitialMotion) -> Handover:
+    """The handover of a run from its last motion.
 
     scale: displacement per modal coordinate (system.assembly.physical_scale).
     """
-    b, n, friction = system.bodies, system.modes, system.friction_rows
+    b, friction, slip = system.bodies, system.friction_rows, last.displacement
     return Handover(
-        frozen(scale * y[:n]), frozen(scale * y[n:]), frozen(slip[:b]), frozen(speed[:b]),
+        frozen(scale * last.p), frozen(scale * last.p_rate), frozen(slip[:b]), frozen(last.velocity[:b]),
         frozen(np.where(np.isfinite(system.spring), slip, 0.0)[b:friction]), frozen(system.free_travel[friction:]),
     )  # fmt: skip
 

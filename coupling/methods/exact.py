@@ -1,0 +1,28 @@
+"""`solver.method = "exact"`: the event-driven engine (coupling.exact)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from vanedamp.coupling.methods import Variant
+from vanedamp.coupling.response.evaluation import Run
+from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.scene.solver_options import SolverOptions
+from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.system import System
+
+VARIANTS = (Variant("exact engine", "#1d4f91", "*", setting=None),)
+RESTARTS = True
+
+
+class Options(SolverOptions):
+    """No more than every method has."""
+
+    method: Literal["exact"] = "exact"
+
+
+def begin(system: System, options: SolverOptions, initial: InitialMotion, records: Records, events: bool) -> Run:
+    """Return a run by the engine."""
+    from vanedamp.coupling.exact.event_driven import EngineRun  # its kernels are loaded when they are wanted
+
+    return EngineRun(system, initial, records, events, options.max_events)

@@ -1,0 +1,128 @@
+"""Parts that are found or named, not imported: modules of ours, and what other packages add by entry points.
+
+An installed package adds a part in its pyproject.toml, without a change here:
+
+    [project.entry-points."vanedamp.commands"]
+    fatigue = "acme.fatigue_command"
+"""
+
+from __future__ import annotations
+
+import pkgutil
+import sys
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vanedamp.files.errors import VanedampError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+#: place of a part that has no ORDER: after those that have one
+_LAST = 1000
+
+
+class ExtensionError(VanedampError):
+    """A part of another package that cannot be used."""
+
+
+class ExtensionPoint(NamedTuple):
+    """Where parts of one kind come from that are loaded all at once.
+
+    A part is a module, or any object with the attributes.
+
+    kind        in words, for messages
+    package     each module of which is a part; folders: each package of which is one
+    group       of entry points, whose names are those of the parts
+    attributes  that a part must have; it may have a NAME other than its file's, and an ORDER among the others
+    """
+
+    kind: str
+    package: str
+    group: str
+    attributes: tuple[str, ...]
+    folders: bool = False
+
+    def own(self) -> dict[str, Any]:
+        """Return the parts of our own folder by name, in their order."""
+        parts = {}
+        for _, name, is_folder in pkgutil.iter_modules(import_module(self.package).__path__):
+            if is_folder is self.folders:
+                part = import_module(f"{self.package}.{name}")
+                parts[getattr(part, "NAME", name)] = part
+        return _in_order(parts)
+
+    def all(self) -> dict[str, Any]:
+        """Return our own parts and those of other packages. Raises ExtensionError for one that cannot be used."""
+        own = self.own()
+        added = _added(self.kind, self.group, own)
+        return _in_order(own | {name: _load(entry, self.kind, self.attributes) for name, entry in added.items()})
+
+
+class Registry(NamedTuple):
+    """Where parts of one kind come from that are loaded one by one, as they are wanted.
+
+    kind        in words, for messages
+    modules     ours, by the name of the part
+    group       of entry points, whose names are those of the parts
+    attributes  that a part must have
+    """
+
+    kind: str
+    modules: Mapping[str, str]
+    group: str
+    attributes: tuple[str, ...]
+
+    def names(self) -> list[str]:
+        """Return the names of all parts, ours first; loads none. Raises ExtensionError for a name that is taken."""
+        return [*self.modules, *_added(self.kind, self.group, self.modules)]
+
+    def part(self, name: str) -> Any:
+        """Return a part. Raises KeyError for an unknown name, ExtensionError for a part that cannot be used."""
+        if name in self.modules:
+            return import_module(self.modules[name])
+        return _load(_added(self.kind, self.group, self.modules)[name], self.kind, self.attributes)
+
+    def all(self) -> dict[str, Any]:
+        """Return all parts by name. Raises ExtensionError for one that cannot be used."""
+        return {name: self.part(name) for name in self.names()}
+
+
+def _added(kind: str, group: str, own: Mapping[str, Any]) -> dict[str, EntryPoint]:
+    """Return the entry points of a group by name."""
+    entries: dict[str, EntryPoint] = {}
+    for entry in _entry_points(group, tuple(sys.path)):
+        if entry.name in own or entry.name in entries:
+            raise ExtensionError(f"{_source(entry)}: there is a {kind} named {entry.name} already; name it otherwise")
+        entries[entry.name] = entry
+    return entries
+
+
+@lru_cache(maxsize=32)
+def _entry_points(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Return the entry points on a path of imports, kept: to look through all installed packages takes long."""
+    # this import takes half as long as all else of `vanedamp --help`
+    from importlib.metadata import entry_points
+
+    return tuple(entry_points(group=group))
+
+
+def _load(entry: EntryPoint, kind: str, attributes: tuple[str, ...]) -> Any:
+    try:
+        part = entry.load()
+    except Exception as error:  # whatever another package's module does
+        raise ExtensionError(f"{_source(entry)}: cannot be loaded ({type(error).__name__}: {error})") from error
+    missing = [attribute for attribute in attributes if not hasattr(part, attribute)]
+    if missing:
+        raise ExtensionError(f"{_source(entry)}: is no {kind}: lacks {', '.join(missing)}")
+    return part
+
+
+def _source(entry: EntryPoint) -> str:
+    return f"entry point {entry.name} = {entry.value} ({entry.group})"
+
+
+def _in_order(parts: dict[str, Any]) -> dict[str, Any]:
+    return dict(sorted(parts.items(), key=lambda item: (getattr(item[1], "ORDER", _LAST), item[0])))
