@@ -13,14 +13,10 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import Any, NamedTuple
 
-from vanedamp.files.errors import VanedampError
+from vanedamp.files.entry_points import ExtensionError, added_parts
 
 #: place of a part that has no ORDER: after those that have one
 _LAST = 1000
-
-
-class ExtensionError(VanedampError):
-    """A part of another package that cannot be used."""
 
 
 class ExtensionPoint(NamedTuple):
@@ -58,19 +54,11 @@ class ExtensionPoint(NamedTuple):
 
     def _added(self) -> Iterator[tuple[str, str, Any]]:
         """Name, where it comes from, and the part, of every entry point."""
-        # this import takes half as long as all else of `vanedamp --help`
-        from importlib.metadata import entry_points
-
-        for entry in entry_points(group=self.group):
-            source = f"entry point {entry.name} = {entry.value} ({self.group})"
-            try:
-                part = entry.load()
-            except Exception as error:  # whatever another package's module does
-                raise ExtensionError(f"{source}: cannot be loaded ({type(error).__name__}: {error})") from error
+        for name, source, part in added_parts(self.group):
             missing = [attribute for attribute in self.attributes if not hasattr(part, attribute)]
             if missing:
                 raise ExtensionError(f"{source}: is no {self.kind}: lacks {', '.join(missing)}")
-            yield entry.name, source, part
+            yield name, source, part
 
 
 def _in_order(parts: dict[str, Any]) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from vanedamp.coupling.methods.step_records import (
     solve_inverse,
 )
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
 
 #: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
@@ -140,7 +141,7 @@ def _list_rows(system, times, motion, problem, mobility, free, speed, impulse, t
                 before = speed[r] if turn == 0 else now
                 if not last and before > slowest and now > -slowest:
                     continue
-                shift = system.restitution[r] * min(before, 0.0)
+                shift = restitution_at(system, r, -before) * min(before, 0.0)
             else:
                 if gap + h * min(speed[r], row_speed(system, r, free)) > 0.0:
                     continue

@@ -11,7 +11,8 @@ import h5py
 
 from vanedamp.files.store import StoreError
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.extensions import ExtensionError, ExtensionPoint
+from vanedamp.files.entry_points import ExtensionError
+from vanedamp.studies.extensions import ExtensionPoint
 
 SECTIONS = ExtensionPoint(
     "section of the report", "vanedamp.studies.report.sections", "vanedamp.report_sections",
