@@ -1,4 +1,4 @@
-"""A contact law from outside the package, whose restitution falls with the speed: closed forms, other methods, refusals.
+"""A contact law from outside the package, whose restitution falls with the speed: closed forms, methods, refusals.
 
 The law is that of viscoelastic spheres to leading order (Kuwabara and Kono 1987), with a coefficient for each body.
 """
@@ -137,10 +137,15 @@ def test_bounces_of_a_ball(falls):
 
 
 def test_the_ball_comes_to_rest(falls):
-    """In finite time, as the speeds fall like n^-5; the end of the chatter is completed in less than 1e-5 periods."""
-    rest = next(event for event in falls.event_list if event.kind == "rests")
-    times, _, _ = bounces(200_000, C)
-    assert abs(rest.time - times[-1]) < 1e-5
+    """In finite time, as the speeds fall like n^-5, and earlier by what the engine leaves out of the chatter.
+
+    It ends with a flight of less than 3e-8 periods, a fifth of which times v / (v - v') are then to come.
+    """
+    rest = next(event for event in falls.event_list if event.kind == "rest")
+    times, speeds, factors = bounces(200_000, C)
+    last = np.count_nonzero(2 * speeds / G > 3e-8) - 1
+    left_out = 1.3 * 3e-8 / (1 - factors[last])
+    assert times[-1] - left_out < rest.time < times[-1]
 
 
 def test_energy_of_the_bounces(falls):
@@ -173,16 +178,16 @@ def states(response):
 
 
 def test_solve_ivp_finds_the_same():
-    """Errors of the tolerance in each of some 1e3 steps, and impacts that multiply them by less than 1e3."""
+    """Errors of the tolerance in each of some 1e3 steps, which the impacts multiply by 30."""
     scene = two_bodies({"law": "fifth root", "c": C})
     exact, ours = (simulate(by(scene, **options), events=True) for options in (
         {"method": "exact"}, {"method": "solve_ivp", "rtol": RTOL}))  # fmt: skip
     assert exact.energy_residual < 1e-12
     assert ours.energy_residual < 1e4 * RTOL
     assert len(impacts(exact)) == len(impacts(ours)) >= 8
-    np.testing.assert_allclose(states(ours), states(exact), rtol=0, atol=1e6 * RTOL)
+    np.testing.assert_allclose(states(ours), states(exact), rtol=0, atol=3e4 * RTOL)
     losses = [run.energy["impact"] for run in (exact, ours)]
-    assert losses[1] == pytest.approx(losses[0], rel=1e6 * RTOL)
+    assert losses[1] == pytest.approx(losses[0], rel=3e4 * RTOL)
 
 
 def test_moreau_converges_in_first_order():
@@ -198,18 +203,14 @@ def test_moreau_converges_in_first_order():
 @pytest.mark.parametrize("method", ["exact", "moreau", "solve_ivp"])
 def test_a_constant_restitution_is_newtons_law(method):
     options = {"method": method} | ({} if method == "exact" else {"steps_per_period": 400})
-    newton, same = (
-        simulate(by(two_bodies({"law": law}), **options), events=True) for law in ("newton", "same")
-    )
+    newton, same = (simulate(by(two_bodies({"law": law}), **options), events=True) for law in ("newton", "same"))
     assert len(newton.event_list) == len(same.event_list) > 0
     np.testing.assert_allclose(states(same), states(newton), rtol=0, atol=1e-9)
     for name, value in newton.energy.items():
         assert same.energy[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
 
 
-@pytest.mark.parametrize(
-    "solver", [{"method": "penalty"}, {"method": "penalty", "scheme": "hht"}, {"method": "cosim"}]
-)
+@pytest.mark.parametrize("solver", [{"method": "penalty"}, {"method": "penalty", "scheme": "hht"}, {"method": "cosim"}])
 def test_a_dashpot_has_one_restitution(solver):
     scene = by(dropped({"law": "fifth root", "c": C}), **solver)
     with pytest.raises(InputError, match=f'^contact.law: .* depends on the speed, .* not "{solver["method"]}"$'):
@@ -249,7 +250,9 @@ def test_refusals_know_the_law(law, message):
 
 def test_a_restitution_outside_its_range_is_refused():
     """1 - v / 2 is negative above 2 m/s."""
-    with pytest.raises(InputError, match='^contact: law "linear" gives a restitution of -.* must lie between 0 and 1$'):
+    with pytest.raises(
+        InputError, match=r'^contact: law "linear" gives a restitution of -.* must lie between 0 and 1$'
+    ):
         simulate(dropped({"law": "linear"}, restitution=0.5))
 
 

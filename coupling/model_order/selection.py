@@ -218,7 +218,9 @@ def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.n
     apart = list({_but_for_frequency(scene): scene for scene in scenes}.values())
     worst, met = 0.0, False
     for scene in (apart[place] for place in np.unique(np.linspace(0, len(apart) - 1, _SCENES).astype(int))):
-        smaller = model if not scene.contact.needs_residual_flexibility or _yields(model) else massless(model, model.size - 1)
+        smaller = (
+            model if not scene.contact.needs_residual_flexibility or _yields(model) else massless(model, model.size - 1)
+        )
         collisions = list(dict.fromkeys(_collisions(scene, smaller)))
         if not collisions:
             continue

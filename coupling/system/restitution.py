@@ -19,10 +19,9 @@ def law_address(law: ContactLaw, coefficients: np.ndarray) -> int:
 
     coefficients: (k,) of its contacts. Raises InputError where the restitution leaves [0, 1] up to 1 km/s.
     """
-    function = law.restitution_at
-    if function is None:
+    if not law.depends_on_speed:
         return 0
-    address = address_of(function)
+    address = address_of(law.restitution_at)
     for coefficient in coefficients:
         for speed in _SPEEDS:
             value = call(address, speed, coefficient)

@@ -9,9 +9,9 @@ from typing import Any, Protocol
 
 import h5py
 
+from vanedamp.files.entry_points import ExtensionError
 from vanedamp.files.store import StoreError
 from vanedamp.files.toml_input import InputError
-from vanedamp.files.entry_points import ExtensionError
 from vanedamp.studies.extensions import ExtensionPoint
 
 SECTIONS = ExtensionPoint(

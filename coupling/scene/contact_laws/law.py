@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import ClassVar, NamedTuple
 
 from vanedamp.files.toml_input import InputError
@@ -23,21 +22,12 @@ class Element(NamedTuple):
 class ContactLaw:
     """Base of the laws: a frozen record whose `law` names it in the scene's [contact] table, its fields the other keys.
 
-    A law that says nothing is rigid: a closed gap is a constraint, an impact multiplies the relative velocity by minus
-    the restitution, and this is the coefficient of the pair at every speed. A law whose restitution depends on the
-    speed has, as a static method,
-
-        restitution_at(speed, coefficient)    restitution in [0, 1] at a speed of approach (m/s, from 0), with the
-                                              `restitution` of the pair's element
-
-    which is compiled (numba): arithmetic and `math` on two floats, without state. What depends on the law's fields or
-    on the pair goes into the coefficient, so that a sweep over a field compiles nothing.
+    A law that says nothing else is rigid: a closed gap is a constraint, and an impact multiplies the relative velocity
+    by minus the restitution, which is the coefficient of the pair at every speed.
     """
 
     #: the value of `law` in the scene
     law: str
-    #: the restitution at a speed; None: the coefficient at every speed
-    restitution_at: ClassVar[Callable[[float, float], float] | None] = None
     #: whether a closed gap is a constraint with impacts, not a spring
     rigid: ClassVar[bool] = True
 
@@ -45,6 +35,21 @@ class ContactLaw:
     def title(self) -> str:
         """Name of the law in a sentence."""
         return f'the law "{self.law}"'
+
+    @staticmethod
+    def restitution_at(speed: float, coefficient: float) -> float:
+        """Restitution, within [0, 1], of a rigid contact at a speed of approach (m/s, from 0 on).
+
+        coefficient: the `restitution` of the pair's element. A law that overrides this is compiled (numba): arithmetic
+        and `math` on two floats. What depends on its fields or on the pair goes into the coefficient, so that a sweep
+        over a field compiles nothing.
+        """
+        return coefficient
+
+    @property
+    def depends_on_speed(self) -> bool:
+        """Whether the restitution does."""
+        return type(self).restitution_at is not ContactLaw.restitution_at
 
     @property
     def flexibility(self) -> float:

@@ -58,7 +58,8 @@ def _load_added() -> None:
 @cache
 def _union() -> TypeAdapter[ContactLaw]:
     """Return the union of the laws, told apart by their `law`."""
-    return TypeAdapter(Annotated[reduce(or_, _LAWS.values()), Field(discriminator="law")])
+    laws: Any = reduce(or_, _LAWS.values())
+    return TypeAdapter(Annotated[laws, Field(discriminator="law")])
 
 
 def _laws() -> TypeAdapter[ContactLaw]:

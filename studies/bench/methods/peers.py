@@ -82,7 +82,7 @@ class Coupled(NamedTuple):
 
 def one_restitution(name: str, scene: Scene) -> None:
     """Refuse, for a peer, a law whose restitution depends on the speed. Raises InputError."""
-    if scene.contact.restitution_at is not None:
+    if scene.contact.depends_on_speed:
         raise InputError(
             f"{name}: contact.law {scene.contact.law} has another restitution at every speed; its contacts have one"
         )
