@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from ctypes import CFUNCTYPE, c_double
+from ctypes import CFUNCTYPE, c_double, c_void_p, cast
 from functools import cache
 from typing import Any
 
 from llvmlite import ir
-from numba import cfunc, types
+from numba import cfunc, config, types
 from numba.extending import intrinsic, overload
 
 _PROTOTYPE = CFUNCTYPE(c_double, c_double, c_double)
 
 
-def address_of(function: Callable[[float, float], float]) -> int:
-    """Return the address of a function of two floats, compiled at the first call; divisions by zero give inf."""
-    address: int = _compiled(function).address
-    return address
+#: compiled functions, for ever: the code goes with them, and records hold its address
+_KEPT: list[Any] = []
 
 
 @cache
-def _compiled(function: Callable[[float, float], float]) -> Any:
-    # kept for ever: its code goes with it, and records hold its address. Not kept on disk: a hundredth of a second
-    return cfunc(types.float64(types.float64, types.float64), error_model="numpy")(function)
+def address_of(function: Callable[[float, float], float]) -> int:
+    """Return the address of a function of two floats, compiled at the first call; divisions by zero give inf."""
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
+        plain = _PROTOTYPE(function)
+        _KEPT.append(plain)
+        return int(cast(plain, c_void_p).value or 0)
+    compiled = cfunc(types.float64(types.float64, types.float64), error_model="numpy")(function)
+    _KEPT.append(compiled)
+    return int(compiled.address)
 
 
 def call(address: int, first: float, second: float) -> float:
