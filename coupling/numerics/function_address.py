@@ -25,7 +25,7 @@ def address_of(function: Callable[[float, float], float]) -> int:
         plain = _PROTOTYPE(function)
         _KEPT.append(plain)
         return int(cast(plain, c_void_p).value or 0)
-    compiled = cfunc(types.float64(types.float64, types.float64), error_model="numpy")(function)
+    compiled: Any = cfunc(types.float64(types.float64, types.float64), error_model="numpy")(function)
     _KEPT.append(compiled)
     return int(compiled.address)
 
