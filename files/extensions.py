@@ -61,6 +61,11 @@ class ExtensionPoint(NamedTuple):
         return _in_order(own | {name: _load(entry, self.kind, self.attributes) for name, entry in added.items()})
 
 
+def added_parts(kind: str, group: str) -> dict[str, Any]:
+    """Return what other packages add under a group, by name. Raises ExtensionError for what cannot be loaded."""
+    return {name: _load(entry, kind, ()) for name, entry in _added(kind, group, {}).items()}
+
+
 class Registry(NamedTuple):
     """Where parts of one kind come from that are loaded one by one, as they are wanted.
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from vanedamp.coupling.scene.contact_laws import damping_ratio
+from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.rom import error_estimate as ladder
 from vanedamp.rom.contact_pulse import Collision, pulse, pulse_spectrum, share_above
 from vanedamp.rom.reduced import ReducedModel

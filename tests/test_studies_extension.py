@@ -1,4 +1,4 @@
-"""Another package adds a command, a section of the report and a benchmark by entry points; nothing of ours changes."""
+"""Another package adds a command, a section, a benchmark and a contact law by entry points; nothing of ours changes."""
 
 import base64
 import csv
@@ -94,6 +94,29 @@ def run(folder, quick):
     write_json(folder / "bench_sum.json", {"total": total})
     print(f"the sum is {total}")
 '''
+LAW = '''
+"""A restitution that falls with the speed."""
+
+from typing import Literal
+
+from pydantic.dataclasses import dataclass
+
+from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
+from vanedamp.files.toml_input import STRICT, Positive
+
+
+@dataclass(frozen=True, config=STRICT)
+class Slower(ContactLaw):
+    half: Positive
+    law: Literal["slower"] = "slower"
+
+    @staticmethod
+    def restitution_at(speed, coefficient):
+        return 1.0 / (1.0 + speed / coefficient)
+
+    def element(self, restitution, mass, flexibility=None):
+        return Element(self.half)
+'''
 ENTRY_POINTS = """
 [vanedamp.commands]
 body-masses = acme.command
@@ -103,6 +126,9 @@ masses = acme.section
 
 [vanedamp.benchmarks]
 sum = acme.benchmark
+
+[vanedamp.contact_laws]
+slower = acme.law:Slower
 """
 SCENE = """
 [structure]
@@ -139,9 +165,10 @@ def install(folder, package, entry_points, **files):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """A folder of packages with the one that adds all three."""
+    """A folder of packages with the one that adds all four."""
     folder = tmp_path_factory.mktemp("site")
     parts = {"command__py": COMMAND, "section__py": SECTION, "section__html": TEMPLATE, "benchmark__py": BENCHMARK}
+    parts["law__py"] = LAW
     install(folder, "acme", ENTRY_POINTS, **parts)
     return folder
 
@@ -211,6 +238,22 @@ def test_benchmark_is_one_of_bench(vanedamp, tmp_path):
     )
     assert "the sum is 45" in succeeds(vanedamp("bench", "sum", "-o", "out", "--quick"))
     assert json.loads((tmp_path / "out" / "bench_sum.json").read_text()) == {"total": 45}
+
+
+def test_law_is_one_of_contact(vanedamp, tmp_path):
+    """An impact at a speed v leaves v / (1 + v)."""
+    scene = (tmp_path / "scene.toml").read_text() + "velocity = 1.0\n[gravity]\nacceleration = 0.0\n"
+    scene += "[time]\nperiods = 1\ntransient = 0\n[contact]\nlaw = 'slower'\n"
+    (tmp_path / "scene.toml").write_text(scene + "half = 1.0\n")
+    data = json.loads(succeeds(vanedamp("run", "scene.toml", "--json", "-", "--events")))
+    first = next(event for event in data["event_list"] if event["kind"] == "impact")
+    before, after = (abs(first[f"relative_velocity_{when}"]) for when in ("before", "after"))
+    assert after == pytest.approx(before / (1 + before), rel=1e-9)
+    (tmp_path / "scene.toml").write_text(scene)
+    finished = vanedamp("run", "scene.toml")
+    assert (finished.returncode, finished.stderr) == (
+        BAD_INPUT, "vanedamp: scene.toml: contact.half: missing; it is required here\n"
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(

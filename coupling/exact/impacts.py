@@ -13,6 +13,7 @@ from vanedamp.coupling.exact.state import CLOSED, COAST, OPEN, SPRUNG, STICK
 from vanedamp.coupling.numerics.complementarity import AT_LOW, DEPENDENT, FREE, solve_box
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.response.records import IMPACT_LOSS
+from vanedamp.coupling.system.restitution import restitution_at
 
 #: impacts of one contact that follow each other within this share of a period are the end of an inelastic collapse:
 #: bodies in a row can meet infinitely often in finite time (McNamara and Young 1992)
@@ -26,7 +27,7 @@ def bounce(system, st, rec, work, r):
     Returns False, with nothing changed, if it is not that: then `collide` decides.
     """
     friction, speed = system.friction_rows, st.velocity[r]
-    restitution = system.restitution[r]
+    restitution = restitution_at(system, r, -speed)
     last = st.time[0] - st.last_impact[r] < COLLAPSE * system.period
     if not rigid(system, r) or not system.moves_with_floor[r] or last or -speed * restitution <= st.settling[r]:
         return False
@@ -84,7 +85,7 @@ def collide(system, st, rec, work):
         speed = st.velocity[r] if abs(st.velocity[r]) > tiny else 0.0
         # kept before the jump, for the ledger and the log
         work.jerk[p], work.acceleration[p] = speed, min(speed, 0.0)
-        restitution = system.restitution[r]
+        restitution = restitution_at(system, r, -speed)
         collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * system.period
         if collapsed or -speed * restitution < _share(restitution) * st.settling[r]:
             restitution = 0.0
@@ -128,7 +129,7 @@ def _leave_slowly(system, st, work, k):
         r = work.listed[p]
         work.side[p] = problem.restitution[p] == 0.0 or work.acceleration[p] == 0.0
         after = problem.acceleration[p] - problem.restitution[p] * work.acceleration[p]
-        if problem.state[p] == AT_LOW and after < _share(system.restitution[r]) * st.settling[r]:
+        if problem.state[p] == AT_LOW and after < _share(restitution_at(system, r, after)) * st.settling[r]:
             work.side[p], found = True, True
     return found
 

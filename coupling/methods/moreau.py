@@ -34,6 +34,7 @@ from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Real
 
@@ -171,7 +172,7 @@ def _list_rows(system, times, motion, problem, mobility, free, speed, impulse, t
                 before = speed[r] if turn == 0 else now
                 if not last and before > slowest and now > -slowest:
                     continue
-                shift = system.restitution[r] * min(before, 0.0)
+                shift = restitution_at(system, r, -before) * min(before, 0.0)
             else:
                 if gap + h * min(speed[r], row_speed(system, r, free)) > 0.0:
                     continue

@@ -11,10 +11,10 @@ from pydantic import Field, model_validator
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.step_records import damped, load_at, row_speed
 from vanedamp.coupling.numerics.jit import inlined, kernel
-from vanedamp.coupling.scene.contact_laws import damping_ratio
+from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.system.system import System
-from vanedamp.files.toml_input import NonNegative, Positive, Real
+from vanedamp.files.toml_input import InputError, NonNegative, Positive, Real
 
 
 class PenaltyOptions(SteppingOptions):
@@ -41,8 +41,13 @@ def with_penalty(system: System, times: TimeGrid, options: PenaltyOptions) -> tu
     The spring makes a contact last `contact_steps` steps: unless given, 2 steps^(1/3) of them, which makes the error of
     a contact that is too soft and that of one resolved by too few steps fall alike. The dashpot gives an isolated
     collision its restitution.
-    Raises InputError for a restitution of 0.
+    Raises InputError for a restitution of 0, and for one that depends on the speed.
     """
+    if system.restitution_at:
+        raise InputError(
+            "contact.law: its restitution depends on the speed, but a dashpot has one restitution; "
+            f'take solver.method = "exact", "moreau" or "solve_ivp", not "{options.method}"'
+        )
     spring, dashpot = system.spring.copy(), system.dashpot.copy()
     for r in range(system.friction_rows, len(spring)):
         if np.isinf(spring[r]):

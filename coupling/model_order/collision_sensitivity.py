@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from vanedamp.coupling.methods.registry import respond
-from vanedamp.coupling.scene.contact_laws import Compliant
+from vanedamp.coupling.scene.contact_laws.compliant import Compliant
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.solver_options import options_of
 from vanedamp.coupling.scene.structures import Rom

@@ -22,7 +22,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.model_order.collision_sensitivity import sensitivity
-from vanedamp.coupling.scene.contact_laws import Compliant, Massless, Newton
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.reduced_model_file import reduced_model
@@ -118,14 +117,14 @@ def settled(scene: Scene, choices: Choices) -> Settled:
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
-    """What to know of a scene without open choices: that Newton's law, also the default, is on several modes."""
-    if not (isinstance(scene.structure, Rom) and isinstance(scene.contact, Newton) and (scene.damper or scene.stop)):
+    """What to know of a scene without open choices: that an impact law, also the default, is on several modes."""
+    if not (isinstance(scene.structure, Rom) and scene.contact.rigid and (scene.damper or scene.stop)):
         return ()
     size = reduced_model(scene.structure).size
     if size == 1:
         return ()
     return (
-        f"contact: Newton's law, the default, has no limit as modes are added, and the answer is that of {size} "
+        f"contact: {scene.contact.title} has no limit as modes are added, and the answer is that of {size} "
         'coordinates; take law = "compliant" with a stiffness, residual = true or both, or one natural mode '
         "(structure.modes = 1, natural = true)",
     )
@@ -134,14 +133,13 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 def _shared(scene: Scene, structure: Rom) -> float:
     """Largest flexibility that two walls have in common which can be touched at once, relative to their own."""
     law = scene.contact
-    if isinstance(law, Newton) or (isinstance(law, Compliant) and not law.residual):
+    if not law.takes_residual_flexibility:
         return 0.0
     model = reduced_model(structure)
     residual = model.residual_flexibility
     if residual is None:
         return 0.0
-    own = 0.0 if isinstance(law, Massless) or law.stiffness is None else 1.0 / law.stiffness
-    largest = 0.0
+    own, largest = law.flexibility, 0.0
     for (one, first), (other, second) in itertools.combinations(_touched(scene, model), 2):
         if one != other:
             size = math.sqrt((residual[first, first] + own) * (residual[second, second] + own))
@@ -183,7 +181,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     frequencies = frequency_grid(model, min(driven), max(driven))
 
     def collisions(smaller: ReducedModel) -> list[Collision]:
-        if any(map(_needs_residual, scenes)) and not _yields(smaller):
+        if any(scene.contact.needs_residual_flexibility for scene in scenes) and not _yields(smaller):
             return []  # it has no boundary without mass
         return list(dict.fromkeys(item for scene in scenes for item in _collisions(scene, smaller)))
 
@@ -199,7 +197,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     choice = min(choices, key=lambda item: (not item.met, item.chosen.size))
     if not choice.met:
         raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
-    if any(isinstance(scene.contact, Newton) for scene in scenes):
+    if any(scene.contact.rigid for scene in scenes):
         choice = replace(choice, sentence=choice.sentence + _NEWTON)
     return choice
 
@@ -227,7 +225,9 @@ def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.n
     apart = list({_but_for_frequency(scene): scene for scene in scenes}.values())
     worst, met = 0.0, False
     for scene in (apart[place] for place in np.unique(np.linspace(0, len(apart) - 1, _SCENES).astype(int))):
-        smaller = model if not _needs_residual(scene) or _yields(model) else massless(model, model.size - 1)
+        smaller = (
+            model if not scene.contact.needs_residual_flexibility or _yields(model) else massless(model, model.size - 1)
+        )
         collisions = list(dict.fromkeys(_collisions(scene, smaller)))
         if not collisions:
             continue
@@ -278,7 +278,7 @@ def _undamped(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> flo
 
 def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
     """Contacts of bodies with walls as they are on a model; none for rigid contacts. Raises InputError."""
-    if isinstance(scene.contact, Newton):
+    if scene.contact.rigid:
         return []
     first = spectrum(model.mass, model.stiffness)[1][:, 0]
     flexibility = model.residual_flexibility
@@ -292,13 +292,6 @@ def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
             element = scene.contact.element(damper.restitution, reduced, lost)
             found.append(Collision(label, damper.mass, element.stiffness, element.dashpot))
     return found
-
-
-def _needs_residual(scene: Scene) -> bool:
-    """Whether a contact is nothing but the flexibility that modes lack."""
-    return isinstance(scene.contact, Massless) or (
-        isinstance(scene.contact, Compliant) and scene.contact.stiffness is None
-    )
 
 
 def _yields(model: ReducedModel) -> bool:

@@ -23,7 +23,7 @@ from vanedamp.files.errors import VanedampError
 ZERO = np.int64(0)
 
 # what a file holds that enters compiled code: functions, and records, whose fields have their places there
-_MARKS = ("@entry", "@kernel", "@inlined", "(NamedTuple)")
+_MARKS = ("@entry", "@kernel", "@inlined", "@intrinsic", "(NamedTuple)")
 _PACKAGE = Path(__file__).parents[2]
 
 

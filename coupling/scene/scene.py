@@ -15,7 +15,8 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper, Stop
-from vanedamp.coupling.scene.contact_laws import Compliant, Contact, Massless, Newton
+from vanedamp.coupling.scene.contact_laws.newton import Newton
+from vanedamp.coupling.scene.contact_laws.registry import Contact
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
 from vanedamp.coupling.scene.solver_options import Solver, options_of
@@ -178,7 +179,7 @@ class Scene:
                 "gravity.direction: a direction in space is for a reduced model, whose interface has directions; "
                 "give orientation_deg"
             )
-        elif isinstance(self.contact, Massless) or (isinstance(self.contact, Compliant) and self.contact.residual):
+        elif self.contact.takes_residual_flexibility:
             raise ValueError(
                 'contact: the residual flexibility is that of a reduced model; take structure.model = "rom"'
             )

@@ -12,6 +12,7 @@ from vanedamp.coupling.system.cavities import check_directions
 from vanedamp.coupling.system.constraints import constraints_of
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
 from vanedamp.coupling.system.resonance import force_amplitude
+from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
@@ -64,7 +65,8 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         response=np.concatenate([response, np.zeros(bodies)]), table=complex(table), omega=omega,
         period=2 * np.pi / omega, floor=made.floor, J=made.J, rest=made.rest,
         delassus=on_structure @ on_structure.T + (on_bodies / mass) @ on_bodies.T, limit=made.limit,
-        spring=made.spring, dashpot=made.dashpot, restitution=made.restitution, free_travel=travel,
+        spring=made.spring, dashpot=made.dashpot, restitution=made.restitution,
+        restitution_at=law_address(scene.contact, made.restitution[made.friction_rows :]), free_travel=travel,
         left_body=made.left_body, right_body=made.right_body, moves_with_floor=made.moves_with_floor,
     )  # fmt: skip
 

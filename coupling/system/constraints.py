@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.scene.contact_laws import Element
+from vanedamp.coupling.scene.contact_laws.law import Element
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
@@ -159,8 +159,8 @@ def _gaps(scene: Scene, cavities: list[_Surfaces], owner: list[int]) -> list[_Ro
         for left, right in itertools.pairwise([-1, *inside, -1]) if inside else ():
             wall: np.ndarray = (right < 0) * surfaces.right - (left < 0) * surfaces.left
             pair = [scene.damper[i] for i in (left, right) if i >= 0]
-            # two bodies of different restitution meet with the geometric mean
-            restitution = float(np.prod([damper.restitution for damper in pair]) ** (1 / len(pair)))
+            coefficients = [damper.restitution for damper in pair]
+            restitution = coefficients[0] if len(pair) == 1 else scene.contact.pair_restitution(*coefficients)
             # the wall's mass is that of the structure's first mode, the same for every number of modes
             mobility = float(sum(1 / damper.mass for damper in pair) + (wall[:1] ** 2).sum())
             # between two bodies, the mean of what the cavity's walls yield

@@ -51,7 +51,8 @@ class System(NamedTuple):
     limit: np.ndarray  # (r,) friction force at slip, N; 0 for contacts
     spring: np.ndarray  # (r,) stiffness of a row while it is closed, N/m; inf: rigid
     dashpot: np.ndarray  # (r,) N s/m
-    restitution: np.ndarray  # (r,) of rigid contacts
+    restitution: np.ndarray  # (r,) of rigid contacts, or the coefficient from which their law takes it at a speed
+    restitution_at: int  # address of that law (numerics.function_address); 0: the coefficient at every speed
     free_travel: np.ndarray  # (r,) of the contact's cavity, m: the scale of its gap; inf for friction rows
     left_body: np.ndarray  # (r,) body to the left of a contact, -1: a wall
     right_body: np.ndarray  # (r,) body to the right of a contact, -1: a wall

@@ -12,6 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.motion import Unforced
 from vanedamp.coupling.numerics.complementarity import AT_LOW, DEPENDENT, Problem, solve_box
+from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 
 #: a flight shorter than this share of a period, and all that follow it, are the end of a chatter
@@ -46,7 +47,7 @@ def collide(
     system = u.system
     touching = np.flatnonzero(u.rigid_contact & (z[u.d] == 0))
     before = z[u.s][touching]
-    restitution = system.restitution[touching]
+    restitution = restitutions_at(system, touching, -before)
     share = np.maximum(1 - restitution, 0.1)
     slow = share * 0.5 * CHATTER * system.period * np.maximum(pressing[touching], 0.0)
     restitution = np.where(collapsed[touching] | (-restitution * before < slow), 0.0, restitution)

@@ -17,13 +17,18 @@ import numpy as np
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.bench.methods.peers import Coupled, PeerRun, coupled, tracked
+from vanedamp.studies.bench.methods.peers import Coupled, PeerRun, coupled, one_restitution, tracked
 
 
 def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
-    """Run with `setting` steps a period. Raises InputError for walls apart from the floor and for Jenkins elements."""
+    """Run with `setting` steps a period.
+
+    Raises InputError for walls apart from the floor, for Jenkins elements, and for a restitution that depends on the
+    speed.
+    """
     import exudyn
 
+    one_restitution("Exudyn", scene)
     if any(damper.stiffness is not None for damper in scene.friction_damper):
         raise InputError("Exudyn: this set-up knows no spring before a slider")
     equations = coupled(scene, round(setting))

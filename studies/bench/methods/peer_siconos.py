@@ -13,12 +13,16 @@ import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.bench.methods.peers import Coupled, PeerRun, coupled, tracked
+from vanedamp.studies.bench.methods.peers import Coupled, PeerRun, coupled, one_restitution, tracked
 
 
 def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
-    """Run with `setting` steps a period. Raises InputError for springs at contacts or before sliders."""
-    if scene.contact.law != "newton" or any(damper.stiffness is not None for damper in scene.friction_damper):
+    """Run with `setting` steps a period.
+
+    Raises InputError for springs at contacts or before sliders, and for a restitution that depends on the speed.
+    """
+    one_restitution("Siconos", scene)
+    if not scene.contact.rigid or any(damper.stiffness is not None for damper in scene.friction_damper):
         raise InputError("Siconos: its kernel has no law of a unilateral spring with a dashpot for Lagrangian systems")
     steps = round(setting)
     equations = coupled(scene, steps)

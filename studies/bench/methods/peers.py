@@ -85,6 +85,14 @@ class Coupled(NamedTuple):
     motion: Motion
 
 
+def one_restitution(name: str, scene: Scene) -> None:
+    """Refuse, for a peer, a law whose restitution depends on the speed. Raises InputError."""
+    if scene.contact.depends_on_speed:
+        raise InputError(
+            f"{name}: contact.law {scene.contact.law} has another restitution at every speed; its contacts have one"
+        )
+
+
 def coupled(scene: Scene, steps: int) -> Coupled:
     """The matrices that our own stepping methods use, with so many steps a period."""
     system = assemble(scene)

@@ -1,0 +1,95 @@
+"""What every contact law answers: other code asks a law these questions, and never for its class."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, NamedTuple
+
+from vanedamp.files.toml_input import InputError
+
+
+class Element(NamedTuple):
+    """The contact of a pair: rigid (stiffness inf), or a spring (N/m) and dashpot (N s/m) that push and never pull.
+
+    restitution: coefficient of restitution of the pair, or the coefficient that its law's `restitution_at` takes.
+    """
+
+    restitution: float
+    stiffness: float = math.inf
+    dashpot: float = 0.0
+
+
+class ContactLaw:
+    """Base of the laws: a frozen record whose `law` names it in the scene's [contact] table, its fields the other keys.
+
+    A law that says nothing else is rigid: a closed gap is a constraint, and an impact multiplies the relative velocity
+    by minus the restitution, which is the coefficient of the pair at every speed.
+    """
+
+    #: the value of `law` in the scene
+    law: str
+    #: whether a closed gap is a constraint with impacts, not a spring
+    rigid: ClassVar[bool] = True
+
+    @property
+    def title(self) -> str:
+        """Name of the law in a sentence."""
+        return f'the law "{self.law}"'
+
+    @staticmethod
+    def restitution_at(speed: float, coefficient: float) -> float:
+        """Restitution, within [0, 1], of a rigid contact at a speed of approach (m/s, from 0 on).
+
+        coefficient: the `restitution` of the pair's element. A law that overrides this is compiled (numba): arithmetic
+        and `math` on two floats. What depends on its fields or on the pair goes into the coefficient, so that a sweep
+        over a field compiles nothing.
+        """
+        return coefficient
+
+    @property
+    def depends_on_speed(self) -> bool:
+        """Whether the restitution does."""
+        return type(self).restitution_at is not ContactLaw.restitution_at
+
+    @property
+    def flexibility(self) -> float:
+        """Flexibility of the contact's own spring, m/N; 0 for a contact that has none."""
+        return 0.0
+
+    @property
+    def takes_residual_flexibility(self) -> bool:
+        """Whether a wall yields, too, by what a reduced model's modes lack of its static flexibility."""
+        return False
+
+    @property
+    def needs_residual_flexibility(self) -> bool:
+        """Whether nothing else yields, so that a model without residual flexibility has no such contact."""
+        return self.takes_residual_flexibility and self.flexibility == 0.0
+
+    def pair_restitution(self, left: float, right: float) -> float:
+        """Coefficient of two bodies that meet, from theirs at a wall: the geometric mean."""
+        mean: float = (left * right) ** 0.5
+        return mean
+
+    def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
+        """Element of a pair with a coefficient of restitution, a reduced mass (kg) and what the wall yields.
+
+        flexibility: m/N that the modes lack of the wall; None: not known yet.
+        Raises InputError, whose message begins with "restitution: ", for a coefficient that the law has no element for.
+        """
+        return Element(restitution)
+
+
+def spring_on_wall(own: float, flexibility: float | None) -> float:
+    """Stiffness of a spring (flexibility `own`) on a wall that yields; 1 where the wall is not known yet.
+
+    Raises InputError where nothing yields.
+    """
+    if flexibility is None:
+        return 1.0
+    if own + flexibility <= 0.0:
+        raise InputError(
+            "contact: the reduced model lacks no flexibility at the walls; take structure.natural = true with modes, "
+            "or a model of basis macneal or massless"
+        )
+    return 1.0 / (own + flexibility)
