@@ -71,7 +71,7 @@ def by_exponential(system, closed, loads, q, qd, times):
     free[:n, :n], free[:n, size : size + n] = -np.diag(system.of_structure.stiffness), -system.of_structure.damping
     free[:, -3] = loads
     # harmonic loads are the real part of (amplitude exp(i omega t)), in phase with the sine
-    free[:, -2] = -system.load.imag
+    free[:, -2] = -system.load[0].imag
     multiplier = -np.linalg.solve(jacobian @ inverse @ jacobian.T, jacobian @ inverse @ free)
     generator = np.zeros((2 * size + 3, 2 * size + 3))
     generator[:size, size : 2 * size] = np.eye(size)

@@ -9,39 +9,45 @@ Gomes and others, Co-simulation: a survey (2018).
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from scipy.linalg import expm
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, STEPS, TimeGrid
+from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, STEPS, TimeGrid, time_grid
 from vanedamp.coupling.methods.penalty import first_forces, net_load, row_force
 from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
 from vanedamp.coupling.numerics.jit import entry, kernel
 from vanedamp.coupling.system.system import System
 
 
-def cosimulation_matrices(system: System, times: TimeGrid) -> np.ndarray:
-    """Exact step of the structure: (2n, 4n + 2) on p, p', cos and sin of omega t, constant and linear modal loads."""
-    n = system.modes
-    rate = np.zeros((4 * n + 2, 4 * n + 2))
+def cosimulation_matrices(system: System, times: TimeGrid, substeps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, and (steps, 2n) what the
+    excitation adds at each step of a period; loads (steps * substeps + 1, N) of the excitation on the bodies' grid.
+    """
+    n, e, steps = system.modes, len(system.frequency), len(times.phase) - 1
+    rate = np.zeros((4 * n + 2 * e, 4 * n + 2 * e))
     rate[:n, n : 2 * n] = np.eye(n)
     rate[n : 2 * n, :n] = -np.diag(system.stiffness[:n])
     rate[n : 2 * n, n : 2 * n] = -system.damping[:n, :n]
-    rate[n : 2 * n, 2 * n] = system.load[:n].real
-    rate[n : 2 * n, 2 * n + 1] = -system.load[:n].imag
-    rate[2 * n, 2 * n + 1], rate[2 * n + 1, 2 * n] = -system.omega, system.omega
-    rate[n : 2 * n, 2 * n + 2 : 3 * n + 2] = np.eye(n)
-    rate[2 * n + 2 : 3 * n + 2, 3 * n + 2 :] = np.eye(n)
-    exact: np.ndarray = expm(rate * times.step)[: 2 * n]
-    return np.ascontiguousarray(exact)
+    rate[n : 2 * n, 2 * n : 3 * n] = np.eye(n)
+    rate[2 * n : 3 * n, 3 * n : 4 * n] = np.eye(n)
+    # cos and sin of each harmonic
+    load = system.of_structure.load.T
+    rate[n : 2 * n, 4 * n : 4 * n + e], rate[n : 2 * n, 4 * n + e :] = load.real, -load.imag
+    rate[4 * n : 4 * n + e, 4 * n + e :] = -np.diag(system.frequency)
+    rate[4 * n + e :, 4 * n : 4 * n + e] = np.diag(system.frequency)
+    exact = expm(rate * times.step)[: 2 * n]
+    phases = system.phases(2 * np.pi * np.arange(steps) / steps)
+    excited = np.hstack([phases.real, phases.imag]) @ exact[:, 4 * n :].T
+    loads = time_grid(system, steps * substeps).load
+    return np.ascontiguousarray(exact[:, : 4 * n]), np.ascontiguousarray(excited), loads
 
 
 @entry
 def march_cosimulation(
-    system, times, motion, records, log, matrix, memory, slow, gauss_seidel, hold, substeps, periods, budget, deepest
-):
-    """Step to the end of `periods`. memory (3, 4n + 2 + r): last velocities and mean forces; those before; scratch."""
+    system, times, motion, records, log, matrix, excited, loads, memory, slow, gauss_seidel, hold, substeps, periods,
+    budget, deepest,
+):  # fmt: skip
+    """Step to the end of `periods`. memory (3, 4n + r): last velocities and mean forces; those before; scratch."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
     h, steps = times.step, len(times.phase) - 1
     q, v, known = motion.coordinates[0], motion.coordinates[1], memory[2]
@@ -60,7 +66,7 @@ def march_cosimulation(
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
             open_step(system, times, motion, records, k, q, v, before)
-            _structure(system, times, motion, matrix, known, last_force, older_force, hold, k, q, v)
+            _structure(system, times, motion, matrix, excited, known, last_force, older_force, hold, k, q, v)
             for r in range(rows):
                 place[r], rate[r], bend[r] = 0.0, 0.0, 0.0
                 speed[r], mean[r] = row_speed(system, r, v), 0.0
@@ -74,7 +80,7 @@ def march_cosimulation(
                         change = motion.v[i] - v[i] if gauss_seidel else v[i] - last_speed[i]
                         bend[r] += system.J[r, i] * change / h
             copy(v, last_speed)
-            _bodies(system, times, motion, slow, substeps, k, place, rate, bend, mean)
+            _bodies(system, times, motion, loads, slow, substeps, k, place, rate, bend, mean)
             copy(last_force, older_force)
             copy(mean, last_force)
             for r in range(rows):
@@ -89,7 +95,7 @@ def march_cosimulation(
 
 
 @kernel
-def _structure(system, times, motion, matrix, known, force, older, hold, k, q, v):
+def _structure(system, times, motion, matrix, excited, known, force, older, hold, k, q, v):
     """The structure's macro-step under the forces that it was given."""
     n, h = system.modes, times.step
     for i in range(n):
@@ -100,25 +106,22 @@ def _structure(system, times, motion, matrix, known, force, older, hold, k, q, v
             if hold == 1:
                 slope += system.J[r, i] * (force[r] - older[r]) / h
         # the mean belongs to the middle of the last macro-step
-        known[2 * n + 2 + i], known[3 * n + 2 + i] = constant + 0.5 * h * slope, slope
-    known[2 * n], known[2 * n + 1] = times.phase[k, 0], times.phase[k, 1]
+        known[2 * n + i], known[3 * n + i] = constant + 0.5 * h * slope, slope
     for i in range(n):
-        p, rate = 0.0, 0.0
-        for j in range(4 * n + 2):
+        p, rate = excited[k, i], excited[k, n + i]
+        for j in range(4 * n):
             p += matrix[i, j] * known[j]
             rate += matrix[n + i, j] * known[j]
         motion.q[i], motion.v[i] = p, rate
 
 
 @kernel
-def _bodies(system, times, motion, slow, substeps, k, place, rate, bend, mean):
+def _bodies(system, times, motion, loads, slow, substeps, k, place, rate, bend, mean):
     """The bodies' macro-step on walls that move as they were told; adds up the mean forces of the rows."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
     small = times.step / substeps
     for j in range(substeps):
         t = (j + 1) * small
-        angle = system.omega * (k * times.step + t)
-        cosine, sine = math.cos(angle), math.sin(angle)
         for i in range(n, size):
             motion.q[i] += small * motion.half[i]
         for r in range(rows):
@@ -130,7 +133,7 @@ def _bodies(system, times, motion, slow, substeps, k, place, rate, bend, mean):
             row_force(system, motion, r, displacement, speed, slow, small * speed)
             mean[r] += 0.5 * motion.force[r] / substeps
         for i in range(n, size):
-            force = system.weight[i] + system.load[i].real * cosine - system.load[i].imag * sine
+            force = system.weight[i] + loads[k * substeps + j + 1, i]
             for r in range(rows):
                 force += system.J[r, i] * motion.force[r]
             change = small * force / system.mass[i]

@@ -124,10 +124,11 @@ def _march(scene: Scene, run: SteppedRun) -> March:
 
 def _cosimulation(scene: Scene, run: SteppedRun, slow: np.ndarray) -> March:
     solver = scene.solver
-    matrices = cosimulation_matrices(run.system, run.times)
-    memory = np.zeros((3, 4 * run.system.modes + 2 + len(run.system.J)))
+    substeps = solver.substeps or 10
+    matrices = cosimulation_matrices(run.system, run.times, substeps)
+    memory = np.zeros((3, 4 * run.system.modes + len(run.system.J)))
     gauss_seidel, hold = solver.exchange != "jacobi", 1 if solver.hold is None else solver.hold
     return lambda log, periods: march_cosimulation(
-        run.system, run.times, run.motion, run.records, log, matrices, memory, slow, gauss_seidel, hold,
-        solver.substeps or 10, periods, solver.max_events, solver.deepest,
+        run.system, run.times, run.motion, run.records, log, *matrices, memory, slow, gauss_seidel, hold,
+        substeps, periods, solver.max_events, solver.deepest,
     )  # fmt: skip
