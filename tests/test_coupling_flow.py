@@ -48,7 +48,7 @@ def random_system(seed, modes, bodies, labels, proportional=False):
     system = assemble(scene, ModalBasis(stiffness, damping, np.zeros((modes, 3)), rows, along, unknown, {}))
     # a base that moves at an angle of its own to each cavity
     shaken = 0.4j * system.of_bodies.mass * np.cos(np.maximum(np.arange(bodies) - 1, 0))
-    return system._replace(load=np.r_[-1j * rng.uniform(-1.0, 1.0, modes), shaken], alike=False), rng
+    return system._replace(load=np.r_[-1j * rng.uniform(-1.0, 1.0, modes), shaken][None], alike=False), rng
 
 
 def keys(system):
