@@ -113,8 +113,8 @@ def _dashpots(flows, st, work, s):
 @inlined
 def _with_excitation(system, flows, st, rec, work, s, period, tau, constant):
     """What is linear in the modes: harmonic, momentum, mean and work of the loads, by their linear maps."""
-    harm_r, harm_i, mom_r, mom_i, mean, free = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    old_harm_r, old_harm_i, old_mom_r, old_mom_i = 0.0, 0.0, 0.0, 0.0
+    work_r, work_i, harm_r, harm_i, mom_r, mom_i, mean, free = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    old_work_r, old_work_i, old_harm_r, old_harm_i, old_mom_r, old_mom_i = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for a in range(st.counters[AWAKE]):
         j = work.order[a]
         dr, di, tr, ti = work.change[a].real, work.change[a].imag, work.total[a].real, work.total[a].imag
@@ -125,61 +125,69 @@ def _with_excitation(system, flows, st, rec, work, s, period, tau, constant):
         mom_i += row[6] * dr + row[7] * di
         mean += row[8] * dr + row[9] * di
         free += row[10] * c.real + row[11] * c.imag
+        work_r += row[12] * dr + row[13] * di
+        work_i += row[14] * dr + row[15] * di
         old_harm_r += row[0] * tr + row[1] * ti
         old_harm_i += row[2] * tr + row[3] * ti
         old_mom_r += row[4] * tr + row[5] * ti
         old_mom_i += row[6] * tr + row[7] * ti
+        old_work_r += row[12] * tr + row[13] * ti
+        old_work_i += row[14] * tr + row[15] * ti
     # mode 0: phase x + i y, with the sums and changes of both factors as in _pairs
-    change, total = work.change[0].conjugate(), work.total[0].conjugate()
-    harmonic = total * complex(harm_r, harm_i) + change * complex(old_harm_r, old_harm_i)
-    momentum = total * complex(mom_r, mom_i) + change * complex(old_mom_r, old_mom_i)
+    change, total = work.change[0], work.total[0]
+    loads = total.real * work_r + total.imag * work_i + change.real * old_work_r + change.imag * old_work_i
+    harmonic = total.conjugate() * complex(harm_r, harm_i) + change.conjugate() * complex(old_harm_r, old_harm_i)
+    momentum = total.conjugate() * complex(mom_r, mom_i) + change.conjugate() * complex(old_mom_r, old_mom_i)
     # integral of exp(-i omega t)
-    flat = complex(0.0, 1.0 / system.omega) * change
+    flat = complex(0.0, 1.0 / system.omega) * change.conjugate()
+    st.ledger[EXCITATION] += 0.5 * loads
     rec.harmonic[period] += 0.5 * harmonic + constant * flat
     rec.momentum[period] += 0.5 * momentum
     rec.square[period] += constant * (mean + constant * tau)
-    for h in range(len(system.frequency)):
-        st.ledger[EXCITATION] += _work(flows, st, work, s, h)
-        if system.bodies > 0:
-            _free_bodies(system, flows, st, rec, work, s, h, period, tau, free)
+    for h in range(1, len(system.frequency)):
+        st.ledger[EXCITATION] += _work(flows.linear[s], st.counters[AWAKE], work.order, work.change, work.total, h)
+    if system.bodies > 0:
+        _free_bodies(system, flows, st, rec, work, s, period, tau, free)
 
 
-@inlined
-def _work(flows, st, work, s, h):
-    """Work of the loads of harmonic h on the modes, by its phase x + i y as in _with_excitation."""
+@kernel
+def _work(linear, count, order, changes, totals, h):
+    """Work of the loads of harmonic h on the modes, as _with_excitation has that of the first."""
     on_x, on_y, old_x, old_y = 0.0, 0.0, 0.0, 0.0
-    for a in range(st.counters[AWAKE]):
-        row = flows.linear[s, work.order[a], 12 + 4 * h : 16 + 4 * h]
-        dr, di, tr, ti = work.change[a].real, work.change[a].imag, work.total[a].real, work.total[a].imag
+    for a in range(count):
+        row = linear[order[a], 12 + 4 * h : 16 + 4 * h]
+        dr, di, tr, ti = changes[a].real, changes[a].imag, totals[a].real, totals[a].imag
         on_x += row[0] * dr + row[1] * di
         on_y += row[2] * dr + row[3] * di
         old_x += row[0] * tr + row[1] * ti
         old_y += row[2] * tr + row[3] * ti
-    change, total = work.change[h], work.total[h]
+    change, total = changes[h], totals[h]
     return 0.5 * (total.real * on_x + total.imag * on_y + change.real * old_x + change.imag * old_y)
 
 
 @inlined
-def _free_bodies(system, flows, st, rec, work, s, h, period, tau, waves):
-    """Momentum and work under harmonic h of the polynomial part of the bodies' motion."""
-    n, speed, drift, rate = system.modes, -waves, 0.0, system.frequency[h]
+def _free_bodies(system, flows, st, rec, work, s, period, tau, waves):
+    """Momentum and work of the polynomial part of the bodies' motion."""
+    n, speed, drift = system.modes, -waves, 0.0
     for b in range(system.bodies):
         drift += system.mass[n + b] * st.drifts[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
             speed += system.mass[n + b] * st.velocity[b]
-    flat = complex(0.0, 1.0 / rate) * work.change[h].conjugate()
-    momentum = speed * flat
-    if drift != 0.0:
-        # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
-        slope = work.bend[h].conjugate() + complex(0.0, rate * tau) * work.gain[h].conjugate()
-        momentum += drift / (rate * rate) * slope
-    if h == 0:
-        rec.momentum[period] += momentum
-    if system.alike:
-        load = system.load[h, n] / system.mass[n]
-        st.ledger[EXCITATION] += load.real * momentum.real + load.imag * momentum.imag
-    else:
-        st.ledger[EXCITATION] += _push(system, flows, st, work, s, h, tau, flat)
+    for h in range(len(system.frequency)):
+        rate = system.frequency[h]
+        flat = complex(0.0, 1.0 / rate) * work.change[h].conjugate()
+        momentum = speed * flat
+        if drift != 0.0:
+            # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
+            slope = work.bend[h].conjugate() + complex(0.0, rate * tau) * work.gain[h].conjugate()
+            momentum += drift / (rate * rate) * slope
+        if h == 0:
+            rec.momentum[period] += momentum
+        if system.alike:
+            load = system.load[h, n] / system.mass[n]
+            st.ledger[EXCITATION] += load.real * momentum.real + load.imag * momentum.imag
+        else:
+            st.ledger[EXCITATION] += _push(system, flows, st, work, s, h, tau, flat)
 
 
 @kernel
