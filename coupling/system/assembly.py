@@ -46,7 +46,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     travel = made.free_travel.copy()
     if scene.stop:  # whose gap may be none: how far their place moves counts as well
         stops, begun = slice(len(travel) - len(scene.stop), None), scene.initial
-        reach = np.abs(made.J[stops, :n]) @ (np.abs(force) / basis.stiffness)
+        reach = np.abs(made.J[stops, :n]) @ (np.abs(force).sum(axis=0) / basis.stiffness)
         reach += abs(begun.displacement) + abs(begun.velocity) / np.sqrt(basis.stiffness[0]) + np.finfo(float).tiny
         travel[stops] = np.maximum(travel[stops], reach)
     on_structure, on_bodies = made.J[:, :n], made.J[:, n:]
