@@ -142,7 +142,7 @@ def test_figures_beside_a_mode_that_the_third_harmonic_drives(tmp_path):
     excitation = {"frequency": FREQUENCY, "force": 1.0, "at": "a"}
     case = scene(THREE, structure=reduced(tmp_path, rate**2, rows), excitation=excitation, **tables)
     exact, other = simulate(case), simulate(case.replace({"solver": {"method": "solve_ivp", "rtol": 1e-11}}))
-    for name in ("amplitude_max", "amplitude_rms", "amplitude_harmonic", "attached_mass_fraction"):
+    for name in ("amplitude_rms", "amplitude_harmonic", "attached_mass_fraction"):
         assert getattr(exact, name) == pytest.approx(getattr(other, name), rel=1e-6), name
     assert exact.phase == pytest.approx(other.phase, abs=1e-6)
     largest = max(map(abs, exact.energy.values()))
