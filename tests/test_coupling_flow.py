@@ -48,7 +48,7 @@ def random_system(seed, modes, bodies, labels, proportional=False):
     system = assemble(scene, ModalBasis(stiffness, damping, np.zeros((modes, 3)), rows, along, unknown, {}))
     # a base that moves at an angle of its own to each cavity
     shaken = 0.4j * system.of_bodies.mass * np.cos(np.maximum(np.arange(bodies) - 1, 0))
-    return system._replace(load=np.r_[-1j * rng.uniform(-1.0, 1.0, modes), shaken], alike=False), rng
+    return system._replace(load=np.r_[-1j * rng.uniform(-1.0, 1.0, modes), shaken][None], alike=False), rng
 
 
 def keys(system):
@@ -71,7 +71,7 @@ def by_exponential(system, closed, loads, q, qd, times):
     free[:n, :n], free[:n, size : size + n] = -np.diag(system.of_structure.stiffness), -system.of_structure.damping
     free[:, -3] = loads
     # harmonic loads are the real part of (amplitude exp(i omega t)), in phase with the sine
-    free[:, -2] = -system.load.imag
+    free[:, -2] = -system.load[0].imag
     multiplier = -np.linalg.solve(jacobian @ inverse @ jacobian.T, jacobian @ inverse @ free)
     generator = np.zeros((2 * size + 3, 2 * size + 3))
     generator[:size, size : 2 * size] = np.eye(size)

@@ -105,7 +105,7 @@ class Leapfrog:
         system, records, h, p, friction = self.system, self.records, self.h, self.period, self.system.friction_rows
         before, q, v = self.response(k), self.q, self.v
         middle = q + 0.5 * h * v
-        load = (system.load * np.exp(1j * system.omega * (k + 0.5) * h)).real
+        load = (system.phases(system.omega * (k + 0.5) * h) @ system.load).real
         displacement, speed = system.J @ middle + system.rest, system.J @ v
         gap, closing = displacement[friction:], speed[friction:]
         force = np.zeros(len(displacement))
@@ -139,9 +139,10 @@ class Leapfrog:
 
     def response(self, k):
         """Displacement, velocity and exp(-i omega t) at step k."""
-        system, turn = self.system, np.exp(1j * self.system.omega * k * self.h)
-        x, rate = system.response @ self.q + (system.table * turn).real, system.response @ self.v
-        return float(x), float(rate + (1j * system.omega * system.table * turn).real), complex(turn.conjugate())
+        system, turns = self.system, self.system.phases(self.system.omega * k * self.h)
+        x = system.response @ self.q + (turns @ system.table).real
+        rate = system.response @ self.v + (turns @ (1j * system.frequency * system.table)).real
+        return float(x), float(rate), complex(turns[0].conjugate())
 
     def pressing(self, q):
         """Energy of pressed contacts."""

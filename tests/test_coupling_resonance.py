@@ -95,7 +95,7 @@ def driven(monkeypatch):
 
     def watched(flows, rows, s, closed):
         fill(flows, rows, s, closed)
-        found.append(int(flows.driven[s]))
+        found.append(int(np.ptp(flows.driven[s])))
 
     monkeypatch.setattr(flow, "_fill", watched)
     return found
@@ -141,7 +141,7 @@ def _first_impact(mpmath, case, near):
     k, c, omega, force, row = (
         mpmath.mpf(float(value))
         for value in (
-            structure.stiffness[0], structure.damping[0, 0], structure.omega, -structure.load[0].imag,
+            structure.stiffness[0], structure.damping[0, 0], structure.omega, -structure.load[0, 0].imag,
             structure.floor[0, 0],
         )
     )  # fmt: skip

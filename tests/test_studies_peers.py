@@ -64,6 +64,16 @@ def test_friction_and_bodies_in_one_cavity(name, setting):
     np.testing.assert_allclose(run.peak, simulate(scene).peak, rtol=5e-3)
 
 
+@pytest.mark.parametrize(("name", "setting"), [("Exudyn", 500), ("Siconos", 500), ("SUNDIALS CVODE", 1e-6)])
+def test_an_excitation_with_several_harmonics(name, setting):
+    needs(name)
+    harmonic = [{"order": 1, "amplitude": 0.8, "phase": 25.0}, {"order": 3, "amplitude": 1.3, "phase": -70.0}]
+    changes = {"time.periods": 2, "time.transient": 0, "excitation.harmonic": harmonic}
+    scene = method_scenes.double().replace(changes)
+    run = peers.run_peer(name, scene, 2, setting)
+    np.testing.assert_allclose(run.peak, simulate(scene).peak, rtol=1e-2)
+
+
 def test_a_soft_wall_is_refused_with_the_reason():
     needs("Siconos")
     scene = method_scenes.single().replace({"contact": {"law": "compliant", "stiffness": 1e8}})

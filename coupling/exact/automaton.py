@@ -182,14 +182,15 @@ def _find_flow(flows, key):
 
 @inlined
 def _phase(system, st):
-    angle = system.omega * st.time[0]
-    st.amplitude[0] = complex(math.cos(angle), math.sin(angle))
+    for h in range(len(system.frequency)):
+        angle = system.frequency[h] * st.time[0]
+        st.amplitude[h] = complex(math.cos(angle), math.sin(angle))
 
 
 @inlined
 def _enter(system, flows, st, work, s):
     """Begin subsystem s with the structure at st.coordinates and the row states as they are."""
-    n, b, y = len(st.constant), system.bodies, st.coordinates
+    n, b, e, y = len(st.constant), system.bodies, len(system.frequency), st.coordinates
     st.counters[FLOW], st.counters[SEARCHING] = s, 0
     sprung = flows.sprung[s]
     constant_loads(system, st, work)
@@ -211,15 +212,19 @@ def _enter(system, flows, st, work, s):
             st.drifts[n + i] += flows.body_acceleration[s, i, k] * work.loads[n + k]
     _phase(system, st)
     for i in range(2 * n):
-        work.coordinates[i] = y[i] - (flows.shape[s, i, 0] * st.amplitude[0]).real
+        work.coordinates[i] = y[i]
+        for h in range(e):
+            work.coordinates[i] -= (flows.shape[s, i, h] * st.amplitude[h]).real
         if i < n:
             work.coordinates[i] -= st.constant[i]
     if sprung:
         for i in range(b):
-            turn = st.amplitude[0]
-            work.slips[i] = st.displacement[i] - (flows.excited[s, i] * turn).real - st.slip_constant[i]
-            work.slips[b + i] = st.velocity[i] - (flows.excited[s, b + i] * turn).real
-    for j in range(1, flows.modes[s]):
+            work.slips[i], work.slips[b + i] = st.displacement[i], st.velocity[i]
+            for h in range(e):
+                work.slips[i] -= (flows.excited[s, i, h] * st.amplitude[h]).real
+                work.slips[b + i] -= (flows.excited[s, b + i, h] * st.amplitude[h]).real
+            work.slips[i] -= st.slip_constant[i]
+    for j in range(e, flows.modes[s]):
         total = 0.0j
         for i in range(2 * n):
             total += flows.project[s, j, i] * work.coordinates[i]
@@ -296,18 +301,19 @@ def _constant_forces(system, flows, st, work, s):
 @inlined
 def _wake(flows, st):
     """Put modes to sleep whose acceleration is negligible beside the largest, but none that the excitation drives."""
-    s, largest, fastest = st.counters[FLOW], 0.0, 0.0
+    s, e, largest, fastest = st.counters[FLOW], flows.driven.shape[1] - 1, 0.0, 0.0
     for j in range(flows.modes[s]):
         c = st.amplitude[j]
         size = abs(c.real) + abs(c.imag)
         largest = max(largest, size * flows.acceleration[s, j])
         fastest = max(fastest, size * flows.speed[s, j])
     st.fastest[0] = fastest
-    st.awake[0] = 0
-    count = 1
-    for j in range(1, flows.modes[s]):
+    for h in range(e):
+        st.awake[h] = h
+    count, last = e, flows.driven[s, e]
+    for j in range(e, flows.modes[s]):
         c = st.amplitude[j]
-        if j <= flows.driven[s] or (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > _ASLEEP * largest:
+        if j < last or (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > _ASLEEP * largest:
             st.awake[count] = j
             count += 1
         else:
@@ -318,25 +324,25 @@ def _wake(flows, st):
 @inlined
 def _amplitudes(flows, st, work, tau):
     """Changes of the awake modes' amplitudes over the segment."""
-    s = st.counters[FLOW]
+    s, e = st.counters[FLOW], flows.driven.shape[1] - 1
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
         z = flows.eigenvalue[s, j] * tau
         first = exp_minus_one(z)
         work.gain[a] = st.amplitude[j] * first
         work.bend[a] = st.amplitude[j] * exp_minus_line(z, first)
-    if flows.driven[s] > 0:
-        load = flows.load[s, : flows.driven[s] + 1]
-        _grow(flows.eigenvalue[s], load, st.amplitude[0], work.gain, work.bend, tau)
+    if flows.driven[s, e] > e:
+        _grow(flows.eigenvalue[s], flows.driven[s], flows.load[s], st.amplitude, work.gain, work.bend, tau)
 
 
 @kernel
-def _grow(eigenvalue, load, phase, gain, bend, tau):
-    """What the excitation adds to the modes that it drives: the first ones, always awake."""
-    for j in range(1, len(load)):
-        growth, beyond = secular(eigenvalue[j], eigenvalue[0], tau)
-        gain[j] += load[j] * phase * growth
-        bend[j] += load[j] * phase * beyond
+def _grow(eigenvalue, driven, load, phase, gain, bend, tau):
+    """What the harmonics add to the modes that they drive: the first ones, always awake."""
+    for h in range(len(driven) - 1):
+        for j in range(driven[h], driven[h + 1]):
+            growth, beyond = secular(eigenvalue[j], eigenvalue[h], tau)
+            gain[j] += load[j] * phase[h] * growth
+            bend[j] += load[j] * phase[h] * beyond
 
 
 @inlined
@@ -456,7 +462,7 @@ def _kick(flows, st, work):
     s = st.counters[FLOW]
     for r in range(len(st.state)):
         if work.impulse[r] != 0.0:
-            for j in range(1, flows.modes[s]):
+            for j in range(flows.driven[s, 0], flows.modes[s]):
                 st.amplitude[j] += flows.kick[s, r, j] * work.impulse[r]
     _wake(flows, st)
 

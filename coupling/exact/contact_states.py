@@ -231,19 +231,23 @@ def _free_acceleration(system, st, work):
     for r in range(len(st.state)):
         if st.state[r] == SPRUNG:
             add_force(system, work, r, spring_force(system, st, r))
-    phase = st.amplitude[0]
     for i in range(n):
         p, speed = st.coordinates[i], st.coordinates[n + i]
         damper = _damping_force(system, st.coordinates[n:], i)
         # sizes by amplitude: what passes through zero has the round-off of its peak
         work.sizes[i] = (
-            abs(work.loads[i]) + abs(system.load[i]) + abs(damper)
+            abs(work.loads[i]) + abs(damper)
             + system.stiffness[i] * abs(p) + np.sqrt(system.stiffness[i]) * abs(speed)
         )  # fmt: skip
-        work.loads[i] += (system.load[i] * phase).real - system.stiffness[i] * p - damper
+        work.loads[i] -= system.stiffness[i] * p + damper
     for i in range(n, size):
-        work.loads[i] += (system.load[i] * phase).real
-        work.sizes[i] = (abs(work.loads[i]) + abs(system.load[i])) / system.mass[i]
+        work.sizes[i] = abs(work.loads[i])
+    for h in range(len(system.frequency)):
+        for i in range(size):
+            work.loads[i] += (system.load[h, i] * st.amplitude[h]).real
+            work.sizes[i] += abs(system.load[h, i])
+    for i in range(n, size):
+        work.sizes[i] /= system.mass[i]
         work.loads[i] /= system.mass[i]
     for r in range(len(st.state)):
         total, terms = 0.0, 0.0
@@ -276,10 +280,13 @@ def _free_jerk(system, st, work, k):
     n, size, largest = len(st.constant), len(work.loads), 0.0
     for p in range(k):
         add_force(system, work, work.listed[p], work.reaction[p])
-    turn = 1j * system.omega * st.amplitude[0]
     for i in range(size):
-        work.rates[i] = (system.load[i] * turn).real
-        work.sizes[i] = system.omega * abs(system.load[i])
+        work.rates[i], work.sizes[i] = 0.0, 0.0
+    for h in range(len(system.frequency)):
+        turn = 1j * system.frequency[h] * st.amplitude[h]
+        for i in range(size):
+            work.rates[i] += (system.load[h, i] * turn).real
+            work.sizes[i] += system.frequency[h] * abs(system.load[h, i])
     for i in range(n):
         speed = st.coordinates[n + i]
         damper = _damping_force(system, work.loads, i)

@@ -45,7 +45,7 @@ def _gather(flows, st, work, s):
 
     Returns how many it feels, the excitation included.
     """
-    count, largest = st.counters[AWAKE], 0.0
+    count, e, largest = st.counters[AWAKE], flows.driven.shape[1] - 1, 0.0
     for a in range(count):
         j = st.awake[a]
         wave = flows.response[s, j] * st.amplitude[j]
@@ -54,7 +54,7 @@ def _gather(flows, st, work, s):
     felt, last = 0, count
     for a in range(count):
         wave = work.wave[a]
-        if a == 0 or abs(wave.real) + abs(wave.imag) > _NEGLIGIBLE * largest:
+        if a < e or abs(wave.real) + abs(wave.imag) > _NEGLIGIBLE * largest:
             place = felt
             felt += 1
         else:
@@ -74,14 +74,14 @@ def _pairs(flows, st, rec, work, s, period, felt):
 
     With c the amplitudes at the start, c + d at the end, the difference is d Q (2 c + d): it does not cancel.
     """
-    loss, square = 0.0, 0.0
+    loss, square, e = 0.0, 0.0, flows.driven.shape[1] - 1
     for a in range(st.counters[AWAKE]):
         j = work.order[a]
         dr, di, tr, ti = work.change[a].real, work.change[a].imag, work.total[a].real, work.total[a].imag
         form, other = flows.loss[s, j, j], flows.square[s, j, j]
         loss += dr * (form[0] * tr + form[1] * ti) + di * (form[2] * tr + form[3] * ti)
         square += dr * (other[0] * tr + other[1] * ti) + di * (other[2] * tr + other[3] * ti)
-        for b in range(a if a < felt or not flows.uncoupled[s] else 1):
+        for b in range(a if a < felt or not flows.uncoupled[s] else e):
             k = work.order[b]
             er, ei, ur, ui = work.change[b].real, work.change[b].imag, work.total[b].real, work.total[b].imag
             rr, ri, ir, ii = dr * ur + er * tr, dr * ui + ei * tr, di * ur + er * ti, di * ui + ei * ti
@@ -112,27 +112,27 @@ def _dashpots(flows, st, work, s):
 
 @inlined
 def _with_excitation(system, flows, st, rec, work, s, period, tau, constant):
-    """What is linear in the modes: work of the loads, harmonic, momentum and mean, by their linear maps."""
+    """What is linear in the modes: harmonic, momentum, mean and work of the loads, by their linear maps."""
     work_r, work_i, harm_r, harm_i, mom_r, mom_i, mean, free = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     old_work_r, old_work_i, old_harm_r, old_harm_i, old_mom_r, old_mom_i = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for a in range(st.counters[AWAKE]):
         j = work.order[a]
         dr, di, tr, ti = work.change[a].real, work.change[a].imag, work.total[a].real, work.total[a].imag
         row, c = flows.linear[s, j], st.amplitude[j]
-        work_r += row[0] * dr + row[1] * di
-        work_i += row[2] * dr + row[3] * di
-        harm_r += row[4] * dr + row[5] * di
-        harm_i += row[6] * dr + row[7] * di
-        mom_r += row[8] * dr + row[9] * di
-        mom_i += row[10] * dr + row[11] * di
-        mean += row[12] * dr + row[13] * di
-        free += row[14] * c.real + row[15] * c.imag
-        old_work_r += row[0] * tr + row[1] * ti
-        old_work_i += row[2] * tr + row[3] * ti
-        old_harm_r += row[4] * tr + row[5] * ti
-        old_harm_i += row[6] * tr + row[7] * ti
-        old_mom_r += row[8] * tr + row[9] * ti
-        old_mom_i += row[10] * tr + row[11] * ti
+        harm_r += row[0] * dr + row[1] * di
+        harm_i += row[2] * dr + row[3] * di
+        mom_r += row[4] * dr + row[5] * di
+        mom_i += row[6] * dr + row[7] * di
+        mean += row[8] * dr + row[9] * di
+        free += row[10] * c.real + row[11] * c.imag
+        work_r += row[12] * dr + row[13] * di
+        work_i += row[14] * dr + row[15] * di
+        old_harm_r += row[0] * tr + row[1] * ti
+        old_harm_i += row[2] * tr + row[3] * ti
+        old_mom_r += row[4] * tr + row[5] * ti
+        old_mom_i += row[6] * tr + row[7] * ti
+        old_work_r += row[12] * tr + row[13] * ti
+        old_work_i += row[14] * tr + row[15] * ti
     # mode 0: phase x + i y, with the sums and changes of both factors as in _pairs
     change, total = work.change[0], work.total[0]
     loads = total.real * work_r + total.imag * work_i + change.real * old_work_r + change.imag * old_work_i
@@ -144,51 +144,74 @@ def _with_excitation(system, flows, st, rec, work, s, period, tau, constant):
     rec.harmonic[period] += 0.5 * harmonic + constant * flat
     rec.momentum[period] += 0.5 * momentum
     rec.square[period] += constant * (mean + constant * tau)
+    for h in range(1, len(system.frequency)):
+        st.ledger[EXCITATION] += _work(flows.linear[s], st.counters[AWAKE], work.order, work.change, work.total, h)
     if system.bodies > 0:
-        _free_bodies(system, flows, st, rec, work, s, period, tau, free, flat)
+        _free_bodies(system, flows, st, rec, work, s, period, tau, free)
+
+
+@kernel
+def _work(linear, count, order, changes, totals, h):
+    """Work of the loads of harmonic h on the modes, as _with_excitation has that of the first."""
+    on_x, on_y, old_x, old_y = 0.0, 0.0, 0.0, 0.0
+    for a in range(count):
+        row = linear[order[a], 12 + 4 * h : 16 + 4 * h]
+        dr, di, tr, ti = changes[a].real, changes[a].imag, totals[a].real, totals[a].imag
+        on_x += row[0] * dr + row[1] * di
+        on_y += row[2] * dr + row[3] * di
+        old_x += row[0] * tr + row[1] * ti
+        old_y += row[2] * tr + row[3] * ti
+    change, total = changes[h], totals[h]
+    return 0.5 * (total.real * on_x + total.imag * on_y + change.real * old_x + change.imag * old_y)
 
 
 @inlined
-def _free_bodies(system, flows, st, rec, work, s, period, tau, waves, flat):
+def _free_bodies(system, flows, st, rec, work, s, period, tau, waves):
     """Momentum and work of the polynomial part of the bodies' motion."""
     n, speed, drift = system.modes, -waves, 0.0
     for b in range(system.bodies):
         drift += system.mass[n + b] * st.drifts[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
             speed += system.mass[n + b] * st.velocity[b]
-    momentum = speed * flat
-    if drift != 0.0:
-        # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
-        slope = work.bend[0].conjugate() + complex(0.0, system.omega * tau) * work.gain[0].conjugate()
-        momentum += drift / (system.omega * system.omega) * slope
-    rec.momentum[period] += momentum
-    if system.alike:
-        st.ledger[EXCITATION] += system.load[n].imag / system.mass[n] * momentum.imag
-    else:
-        st.ledger[EXCITATION] += _push(system, flows, st, work, s, tau, flat)
+    for h in range(len(system.frequency)):
+        rate = system.frequency[h]
+        flat = complex(0.0, 1.0 / rate) * work.change[h].conjugate()
+        momentum = speed * flat
+        if drift != 0.0:
+            # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
+            slope = work.bend[h].conjugate() + complex(0.0, rate * tau) * work.gain[h].conjugate()
+            momentum += drift / (rate * rate) * slope
+        if h == 0:
+            rec.momentum[period] += momentum
+        if system.alike:
+            load = system.load[h, n] / system.mass[n]
+            st.ledger[EXCITATION] += load.real * momentum.real + load.imag * momentum.imag
+        else:
+            st.ledger[EXCITATION] += _push(system, flows, st, work, s, h, tau, flat)
 
 
 @kernel
-def _push(system, flows, st, work, s, tau, flat):
+def _push(system, flows, st, work, s, h, tau, flat):
     """Work of the base on the polynomial part of the bodies' motion, in cavities of several directions."""
-    n, speed, drift = system.modes, 0.0, 0.0
+    n, speed, drift, rate = system.modes, 0.0j, 0.0j, system.frequency[h]
     for b in range(system.bodies):
-        drift += system.load[n + b].imag * st.drifts[n + b]
+        load = system.load[h, n + b].conjugate()
+        drift += load * st.drifts[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
             own = st.velocity[b]
             for a in range(st.counters[AWAKE]):
                 j = st.awake[a]
                 own -= (flows.velocity[s, b, j] * st.amplitude[j]).real
-            speed += system.load[n + b].imag * own
+            speed += load * own
     # integral of t exp(-i omega t), as in _free_bodies
-    slope = work.bend[0].conjugate() + complex(0.0, system.omega * tau) * work.gain[0].conjugate()
-    return speed * flat.imag + drift / (system.omega * system.omega) * slope.imag
+    slope = work.bend[h].conjugate() + complex(0.0, rate * tau) * work.gain[h].conjugate()
+    return (speed * flat + drift / (rate * rate) * slope).real
 
 
 @inlined
 def _slow_pair(flows, st, rec, s, period, i, tau, constant):
     """A pair of modes whose product hardly changes: by series of its integral."""
-    j, k, kind = flows.slow[s, i]
+    j, k, kind, h = flows.slow[s, i]
     c, rate = st.amplitude[j], flows.eigenvalue[s, j]
     if kind == ALONE:
         rec.square[period] += constant * (flows.slow_square[s, i] * c * _slow_integral(rate, tau)).real
@@ -196,9 +219,9 @@ def _slow_pair(flows, st, rec, s, period, i, tau, constant):
     other, rate_other = st.amplitude[k], flows.eigenvalue[s, k]
     if kind == DIFFERENCE:
         other, rate_other = other.conjugate(), rate_other.conjugate()
-    if kind == DIFFERENCE and k <= flows.driven[s] and j > 0:
-        # in a frame that turns with the excitation
-        excitation, phase = flows.eigenvalue[s, 0], st.amplitude[0]
+    if h >= 0:
+        # in a frame that turns with the harmonic
+        excitation, phase = flows.eigenvalue[s, h], st.amplitude[h]
         product = tau * _driven_integral(
             c, (rate - excitation) * tau, flows.load[s, j] * phase * tau,
             other, (rate_other + excitation) * tau, (flows.load[s, k] * phase).conjugate() * tau,
@@ -208,8 +231,9 @@ def _slow_pair(flows, st, rec, s, period, i, tau, constant):
     st.ledger[VISCOUS] += (flows.slow_loss[s, i] * product).real
     st.ledger[CONTACT] += (flows.slow_dashpot[s, i] * product).real
     rec.square[period] += (flows.slow_square[s, i] * product).real
-    if k == 0 and kind == DIFFERENCE:
-        st.ledger[EXCITATION] -= 0.5 * (flows.work[s, j] * product).imag
+    if kind == DIFFERENCE and k < flows.driven[s, 0]:
+        st.ledger[EXCITATION] += 0.5 * (flows.work[s, k, j] * product).real
+    if kind == DIFFERENCE and k == 0:
         rec.harmonic[period] += 0.5 * flows.response[s, j] * product
         rec.momentum[period] += 0.5 * flows.momentum[s, j] * product
 
@@ -297,9 +321,10 @@ def _sample(system, flows, st, rec, s, tau, constant):
             entry[0] += (flows.response[s, j] * st.amplitude[j] * (1.0 + first)).real
             for r in range(system.bodies):
                 entry[1 + r] += (flows.motion[s, r, j] * st.amplitude[j] * line).real
-        for j in range(1, flows.driven[s] + 1):
-            growth, beyond = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, 0], t)
-            drive = flows.load[s, j] * st.amplitude[0]
-            entry[0] += (flows.response[s, j] * drive * growth).real
-            for r in range(system.bodies):
-                entry[1 + r] += (flows.motion[s, r, j] * drive * beyond).real
+        for h in range(len(system.frequency)):
+            for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
+                growth, beyond = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, h], t)
+                drive = flows.load[s, j] * st.amplitude[h]
+                entry[0] += (flows.response[s, j] * drive * growth).real
+                for r in range(system.bodies):
+                    entry[1 + r] += (flows.motion[s, r, j] * drive * beyond).real

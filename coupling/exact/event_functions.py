@@ -54,7 +54,7 @@ def next_event(system, flows, st, ch):
     What is known beyond the period's end stays known in the next segment (`carry`).
     """
     s = st.counters[FLOW]
-    driven = flows.driven[s]
+    driven = _drives(flows, s)
     left = max(system.period - st.time[0], 0.0)
     shortest = RESOLUTION * system.period
     eigenvalue, awake = flows.eigenvalue[s], st.awake[: st.counters[AWAKE]]
@@ -79,9 +79,10 @@ def next_event(system, flows, st, ch):
         noise, second, calm = expand(
             ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau, ch.lower
         )
-        if driven > 0:
-            drive = ch.drive[k, : driven + 1]
-            more, bound = add_secular(ch.order[k], drive, eigenvalue, tau, system.period, ch.lower)
+        if driven:
+            more, bound = add_secular(
+                ch.order[k], ch.drive[k], flows.driven[s], eigenvalue, tau, system.period, ch.lower
+            )
             noise, second = noise + more, second + bound
             calm = calm + bound if calm >= 0.0 else calm
         step, found = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, system.period, shortest)
@@ -179,7 +180,7 @@ def _watch_motion(system, flows, st, ch, s, r, order, sign, what, k):
         else:
             curvature += rate.real * once.real - rate.imag * once.imag
         bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
-    if flows.driven[s] > 0:
+    if _drives(flows, s):
         on_motion, on_velocity = (0.0, sign) if order == VELOCITY else (sign, 0.0)
         first, second, largest, _ = _watch_drive(system, flows, st, ch, s, r, on_motion, on_velocity, 0.0, k)
         if order == VELOCITY:
@@ -187,7 +188,7 @@ def _watch_motion(system, flows, st, ch, s, r, order, sign, what, k):
         curvature += second
         bound += largest
     _know(st, ch, r, order, what, value, slope, bound - ch.k2[k], k)
-    if flows.driven[s] > 0:
+    if _drives(flows, s):
         ch.safe[k] = min(ch.safe[k], 2.0 * system.period)  # as far as the bounds hold
     if what == CLOSES or what == OPENS:
         st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * system.period
@@ -197,31 +198,40 @@ def _watch_motion(system, flows, st, ch, s, r, order, sign, what, k):
 
 
 @inlined
+def _drives(flows, s):
+    """Whether the excitation drives modes of subsystem s."""
+    e = flows.driven.shape[1] - 1
+    return flows.driven[s, e] > e
+
+
+@inlined
 def _watch_drive(system, flows, st, ch, s, r, on_motion, on_velocity, on_force, k):
     """Watch what the excitation adds to driven modes (`_watch_growth`)."""
-    load = flows.load[s, : flows.driven[s] + 1]
     return _watch_growth(
         flows.eigenvalue[s], flows.motion[s, r], flows.velocity[s, r], flows.force[s, r], on_motion, on_velocity,
-        on_force, load, st.amplitude[0], system.period, ch.drive[k],
+        on_force, flows.driven[s], flows.load[s], st.amplitude, system.period, ch.drive[k],
     )  # fmt: skip
 
 
 @kernel
-def _watch_growth(eigenvalue, motion, velocity, force, on_motion, on_velocity, on_force, load, phase, period, drive):
+def _watch_growth(
+    eigenvalue, motion, velocity, force, on_motion, on_velocity, on_force, driven, load, phase, period, drive
+):
     """Growth of driven modes in an event function, a sum of a row's motion, velocity and force times these factors.
 
     Returns its first two derivatives at the segment's start, and bounds of the second and third.
     """
     first, second, second_bound, third_bound = 0.0, 0.0, 0.0, 0.0
-    excitation = eigenvalue[0]
-    for j in range(1, len(load)):
-        rate = eigenvalue[j]
-        part = (on_motion * motion[j] + on_velocity * velocity[j] + on_force * force[j]) * load[j] * phase
-        drive[j] = part
-        first += part.real
-        second += (part * (rate + excitation)).real
-        second_bound += secular_bound(part, rate, excitation, period, 2)
-        third_bound += secular_bound(part, rate, excitation, period, 3)
+    for h in range(len(driven) - 1):
+        excitation = eigenvalue[h]
+        for j in range(driven[h], driven[h + 1]):
+            rate = eigenvalue[j]
+            part = (on_motion * motion[j] + on_velocity * velocity[j] + on_force * force[j]) * load[j] * phase[h]
+            drive[j] = part
+            first += part.real
+            second += (part * (rate + excitation)).real
+            second_bound += secular_bound(part, rate, excitation, period, 2)
+            third_bound += secular_bound(part, rate, excitation, period, 3)
     return first, second, second_bound, third_bound
 
 
@@ -247,11 +257,12 @@ def _leave(system, flows, st, ch, s, r, order, sign, k):
         second = g * rate * rate
         jerk += (second * rate).real
         snap += (abs(second.real) + abs(second.imag)) * square
-    excitation = flows.eigenvalue[s, 0]
-    for j in range(1, flows.driven[s] + 1):
-        rate, drive = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * flows.load[s, j] * st.amplitude[0]
-        jerk += (drive * (rate * rate + rate * excitation + excitation * excitation)).real
-        snap += secular_bound(drive, rate, excitation, system.period, 4)
+    for h in range(len(flows.driven[s]) - 1):
+        excitation = flows.eigenvalue[s, h]
+        for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
+            rate, drive = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * flows.load[s, j] * st.amplitude[h]
+            jerk += (drive * (rate * rate + rate * excitation + excitation * excitation)).real
+            snap += secular_bound(drive, rate, excitation, system.period, 4)
     quick = (2.0 if order == POSITION else 1.5) * jerk / snap
     shortest = 1e3 * RESOLUTION * system.period
     ch.safe[k], ch.known[k] = max(quick if quick == quick else system.period, shortest), EXPANDED
@@ -282,7 +293,7 @@ def _watch_spring(system, flows, st, ch, s, r, k):
     ch.k0[k] = spring * st.displacement[r] + dashpot * st.velocity[r]
     ch.k1[k] = spring * st.velocity[r] + dashpot * acceleration
     ch.k2[k] = spring * st.drift[r]
-    if flows.driven[s] > 0:
+    if _drives(flows, s):
         # the row's velocity has its share of the growth already, its acceleration has not
         acceleration, _, _, _ = _watch_drive(system, flows, st, ch, s, r, 0.0, 1.0, 0.0, k)
         ch.k1[k] += dashpot * acceleration
@@ -307,7 +318,7 @@ def _watch_force(system, flows, st, ch, s, r, side, limit, k):
         slope += rate.real * g.real - rate.imag * g.imag
         bound += size * (rate.real * rate.real + rate.imag * rate.imag)
     curvature, third = 0.0, 0.0
-    if flows.driven[s] > 0:  # a force that grows is always watched
+    if _drives(flows, s):  # a force that grows is always watched
         first, curvature, second_bound, third = _watch_drive(system, flows, st, ch, s, r, 0.0, 0.0, sign, k)
         slope += first
         bound += second_bound
@@ -318,7 +329,7 @@ def _watch_force(system, flows, st, ch, s, r, side, limit, k):
         constant += ADHESION * system.spring[r] * system.free_travel[r]
     ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
     _know(st, ch, r, FORCE, side, constant + value, slope, bound, k)
-    if flows.driven[s] > 0:
+    if _drives(flows, s):
         ch.safe[k] = min(ch.safe[k], 2.0 * system.period)  # as far as the bounds hold
     if st.released[r] == -side:
         for a in range(st.counters[AWAKE]):

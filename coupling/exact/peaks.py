@@ -34,12 +34,12 @@ def highest(system, flows, st, work, s, tau, constant, peak):
         wave += flows.response[s, j] * work.gain[a]
         x1 += wave.real
         v1 += rate.real * wave.real - rate.imag * wave.imag
-    driven = flows.driven[s]
-    if driven > 0:
-        load = flows.load[s, : driven + 1]
+    e = flows.driven.shape[1] - 1
+    if flows.driven[s, e] > e:
         more = _drive(
-            flows.eigenvalue[s], flows.response[s], load, st.amplitude[0], work.gain[0], system.period, work.drive
-        )
+            flows.eigenvalue[s], flows.response[s], flows.driven[s], flows.load[s], st.amplitude, work.gain,
+            system.period, work.drive,
+        )  # fmt: skip
         v0, v1, size, fourth = v0 + more[0], v1 + more[1], size + more[2] * tau, fourth + more[3]
     if size <= peak or tau <= 0.0:
         return peak
@@ -57,33 +57,35 @@ def highest(system, flows, st, work, s, tau, constant, peak):
         for a in range(count):
             work.turn[a] = exp_minus_one(work.rate[a] * h) + 1.0
     return _climb(
-        work.rate[:count], work.wave, work.turn, work.drive[: driven + 1], work.growth, constant, x0, v0, x1, v1, tau,
-        h, pieces, fourth, peak,
+        work.rate[:count], work.wave, work.turn, flows.driven[s], work.drive, work.growth, constant, x0, v0, x1, v1,
+        tau, h, pieces, fourth, peak,
     )  # fmt: skip
 
 
 @kernel
-def _drive(eigenvalue, response, load, phase, change, period, drive):
+def _drive(eigenvalue, response, driven, load, phase, change, period, drive):
     """Share of the response in the growth of driven modes: sets drive, 1/s.
 
     Returns what it adds to the speed at both ends and to the bounds of the response, by time, and fourth derivative.
     """
     v0, v1, size, fourth = 0.0, 0.0, 0.0, 0.0
-    for j in range(1, len(load)):
-        drive[j] = response[j] * load[j] * phase
-        v0 += drive[j].real
-        v1 += (response[j] * load[j] * (phase + change)).real
-        size += abs(drive[j].real) + abs(drive[j].imag)
-        fourth += secular_bound(drive[j], eigenvalue[j], eigenvalue[0], period, 4)
+    for h in range(len(driven) - 1):
+        for j in range(driven[h], driven[h + 1]):
+            drive[j] = response[j] * load[j] * phase[h]
+            v0 += drive[j].real
+            v1 += (response[j] * load[j] * (phase[h] + change[h])).real
+            size += abs(drive[j].real) + abs(drive[j].imag)
+            fourth += secular_bound(drive[j], eigenvalue[j], eigenvalue[h], period, 4)
     return v0, v1, size, fourth
 
 
 @inlined
-def _climb(rates, waves, turns, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak):
+def _climb(rates, waves, turns, driven, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak):
     """The largest |response| on a grid of so many pieces of length h, the last one shorter, and before."""
-    count, driven = len(rates), len(drives)
-    for j in range(1, driven):
-        growths[j], _ = secular(rates[j], rates[0], h)
+    count, e = len(rates), len(driven) - 1
+    for k in range(e):
+        for j in range(driven[k], driven[k + 1]):
+            growths[j], _ = secular(rates[j], rates[k], h)
     end, end_slope = x1, v1
     for i in range(pieces):
         x1, v1 = constant, 0.0
@@ -94,19 +96,21 @@ def _climb(rates, waves, turns, drives, growths, constant, x0, v0, x1, v1, tau, 
                 wave, rate = waves[a] * turns[a], rates[a]
                 x1 += wave.real
                 v1 += rate.real * wave.real - rate.imag * wave.imag
-            for j in range(1, driven):
-                x1 += (drives[j] * growths[j]).real
-                v1 += (drives[j] * (rates[j] * growths[j] + turns[0])).real
+            for k in range(e):
+                for j in range(driven[k], driven[k + 1]):
+                    x1 += (drives[j] * growths[j]).real
+                    v1 += (drives[j] * (rates[j] * growths[j] + turns[k])).real
             peak = max(peak, abs(x1))
         if v0 * v1 < 0.0 and _may_exceed(peak, x0, v0, x1, v1, h, fourth):
-            peak = max(peak, _extremum(rates, waves, drives, constant, x0, v0, x1, v1, h))
+            peak = max(peak, _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h))
         x0, v0 = x1, v1
         if i < pieces - 1:
             for a in range(count):
                 waves[a] *= turns[a]
-            for j in range(1, driven):
-                waves[j] += drives[j] * growths[j]
-                drives[j] *= turns[0]
+            for k in range(e):
+                for j in range(driven[k], driven[k + 1]):
+                    waves[j] += drives[j] * growths[j]
+                    drives[j] *= turns[k]
     return peak
 
 
@@ -121,7 +125,7 @@ def _may_exceed(peak, x0, v0, x1, v1, h, fourth):
 
 
 @kernel
-def _extremum(rates, waves, drives, constant, x0, v0, x1, v1, h):
+def _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h):
     """|x| where its slope vanishes within [0, h], v0 and v1 of opposite sign: Newton from the cubic interpolant."""
     # slope v0 + b u + c u^2, u = t/h; the root on [0, 1] by the formula that does not cancel
     b = 6.0 * (x1 - x0) / h - 4.0 * v0 - 2.0 * v1
@@ -150,22 +154,24 @@ def _extremum(rates, waves, drives, constant, x0, v0, x1, v1, h):
             x, v, w, third, fourth = x + d0, v + d1, w + d2, third + d3, fourth + d4
             fifth += twice * d4 - square * d3
             sixth += (abs(part.real) + abs(part.imag)) * square * square * square
-        for j in range(1, len(drives)):
-            rate, excitation = rates[j], rates[0]
-            growth, _ = secular(rate, excitation, t)
-            part, turn = drives[j] * growth, drives[j] * (1.0 + exp_minus_one(excitation * t))
-            x += part.real
-            part, turn = rate * part + turn, excitation * turn
-            v += part.real
-            part, turn = rate * part + turn, excitation * turn
-            w += part.real
-            part, turn = rate * part + turn, excitation * turn
-            third += part.real
-            part, turn = rate * part + turn, excitation * turn
-            fourth += part.real
-            part = rate * part + turn
-            fifth += part.real
-            sixth += secular_bound(drives[j], rate, excitation, 2.0 * math.pi / excitation.imag, 6)
+        for k in range(len(driven) - 1):
+            excitation = rates[k]
+            for j in range(driven[k], driven[k + 1]):
+                rate = rates[j]
+                growth, _ = secular(rate, excitation, t)
+                part, turn = drives[j] * growth, drives[j] * (1.0 + exp_minus_one(excitation * t))
+                x += part.real
+                part, turn = rate * part + turn, excitation * turn
+                v += part.real
+                part, turn = rate * part + turn, excitation * turn
+                w += part.real
+                part, turn = rate * part + turn, excitation * turn
+                third += part.real
+                part, turn = rate * part + turn, excitation * turn
+                fourth += part.real
+                part = rate * part + turn
+                fifth += part.real
+                sixth += secular_bound(drives[j], rate, excitation, 2.0 * math.pi / rates[0].imag, 6)
         if v * v0 > 0.0:
             lo = t
         else:

@@ -38,35 +38,38 @@ _CONVERGED = 1e-8
 
 
 @kernel
-def add_secular(order, drive, eigenvalue, t, period, lower):
+def add_secular(order, drive, driven, eigenvalue, t, period, lower):
     """Add Re sum_j drive_j D_j(t) to the lower polynomials of `expand`.
 
-    drive: (1 + driven modes,), the first of no meaning. Returns the round-off and a bound of the second derivative.
+    drive: (m,) of the modes from driven[h] to driven[h + 1], which harmonic h drives. Returns the round-off and a bound
+    of the second derivative.
     """
-    whole, slow, excitation = lower[0], lower[1], eigenvalue[0]
-    noise, second, first = 0.0, 0.0, exp_minus_one(excitation * t)
-    for j in range(1, len(drive)):
-        d, rate = drive[j], eigenvalue[j]
-        growth, beyond = secular(rate, excitation, t)
-        # derivatives by D' = lambda D + exp(i omega t)
-        now, turn = d * growth, d * (1.0 + first)
-        part, slope = now, rate * now + turn
-        if order == POSITION:
-            part, slope = d * beyond, rate * now + d * first
-        noise += abs(part.real) + abs(part.imag) + abs(now.real) + abs(now.imag)
-        for polynomial in (whole, slow):
-            polynomial[0] += part.real
-            polynomial[1] += slope.real
-        now = rate * now + turn
-        for p in range(2, DEGREE):
-            turn *= excitation
-            now = rate * now + turn
+    whole, slow, noise, second = lower[0], lower[1], 0.0, 0.0
+    for h in range(len(driven) - 1):
+        excitation = eigenvalue[h]
+        first = exp_minus_one(excitation * t)
+        for j in range(driven[h], driven[h + 1]):
+            d, rate = drive[j], eigenvalue[j]
+            growth, beyond = secular(rate, excitation, t)
+            # derivatives by D' = lambda D + exp(i omega t)
+            now, turn = d * growth, d * (1.0 + first)
+            part, slope = now, rate * now + turn
+            if order == POSITION:
+                part, slope = d * beyond, rate * now + d * first
+            noise += abs(part.real) + abs(part.imag) + abs(now.real) + abs(now.imag)
             for polynomial in (whole, slow):
-                polynomial[p] += now.real * _OVER_FACTORIAL[p]
-        left_out = secular_bound(d, rate, excitation, period, DEGREE) * _OVER_FACTORIAL[DEGREE]
-        for polynomial in (whole, slow):
-            polynomial[DEGREE] -= left_out
-        second += secular_bound(d, rate, excitation, period, 2)
+                polynomial[0] += part.real
+                polynomial[1] += slope.real
+            now = rate * now + turn
+            for p in range(2, DEGREE):
+                turn *= excitation
+                now = rate * now + turn
+                for polynomial in (whole, slow):
+                    polynomial[p] += now.real * _OVER_FACTORIAL[p]
+            left_out = secular_bound(d, rate, excitation, period, DEGREE) * _OVER_FACTORIAL[DEGREE]
+            for polynomial in (whole, slow):
+                polynomial[DEGREE] -= left_out
+            second += secular_bound(d, rate, excitation, period, 2)
     return _ROUND_OFF * noise, second
 
 

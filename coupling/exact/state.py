@@ -1,6 +1,7 @@
 """What changes during a run: the automaton's state, its event functions, its records and its scratch space.
 
-Sizes: r rows (friction rows first, then contacts), m complex modes, n modes of the structure, b bodies, k channels.
+Sizes: r rows (friction rows first, then contacts), m complex modes, e of them harmonics of the excitation, n modes of
+the structure, b bodies, k channels.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class State(NamedTuple):
     counters: np.ndarray  # int, by the names above
     time: np.ndarray  # (1,) within the period, s
     key: np.ndarray  # (r,) whether a row is closed: the set names the linear subsystem; counters[CLOSED_ROWS] of them
-    amplitude: np.ndarray  # (m,) complex modal amplitudes; the first is the excitation's phase
+    amplitude: np.ndarray  # (m,) complex modal amplitudes; the first e are the phases of the excitation's harmonics
     awake: np.ndarray  # (m,) the modes that are awake are the first counters[AWAKE] of these
     coordinates: np.ndarray  # (2n,) p and p' of the structure where a new subsystem begins
     constant: np.ndarray  # (n,) constant part of p
@@ -136,7 +137,7 @@ def new_state(system: System, modes: int, initial: InitialMotion) -> State:
         released=np.zeros(r, np.int64), settling=np.zeros(r), last_impact=np.full(r, -np.inf), push=np.zeros(r),
         fastest=np.zeros(1), ledger=np.zeros(len(ENERGIES)),
     )  # fmt: skip
-    state.amplitude[0] = 1.0
+    state.amplitude[: len(system.frequency)] = 1.0
     return state
 
 

@@ -1,15 +1,17 @@
 """Exact flow between two events: the linear subsystems that the sets of closed rows (system.constraints) name.
 
 Bodies held to the structure add their mass to it, bodies on closed springs (compliant contacts) their coordinate; the
-others move freely. The state of a subsystem is a vector of complex modal amplitudes c, and with c_0 the excitation
-(eigenvalue i omega), every displacement is  constant + polynomial + Re sum_j row_j c_j exp(lambda_j t),  exact for any
-t (quadratic eigenvalue problem of a viscously damped structure, Tisseur and Meerbergen 2001).
+others move freely. The state of a subsystem is a vector of complex modal amplitudes c, and with c_0 to c_(e-1) the
+harmonics of the excitation (eigenvalues i omega_h), every displacement is  constant + polynomial +
+Re sum_j row_j c_j exp(lambda_j t),  exact for any t (quadratic eigenvalue problem of a viscously damped structure,
+Tisseur and Meerbergen 2001).
 
-In step with the excitation a mode r would answer with load_r c_0/(i omega - lambda_r): near its own frequency, hardly
-damped, this and c_r are large and cancel. Such driven modes keep their whole motion in c_r, which the excitation makes
-grow by c_r' = lambda_r c_r + load_r c_0: c_r(t) = c_r exp(lambda_r t) + load_r c_0 D(t) with
-D(t) = (exp(i omega t) - exp(lambda_r t))/(i omega - lambda_r), which is t exp(i omega t) at resonance without damping
-(exact.root_search.secular). All rows stay functionals of c.
+In step with harmonic h a mode r would answer with load_r c_h/(i omega_h - lambda_r): near its own frequency, hardly
+damped, this and c_r are large and cancel. Such driven modes keep this motion in c_r, which the harmonic makes grow by
+c_r' = lambda_r c_r + load_r c_h: c_r(t) = c_r exp(lambda_r t) + load_r c_h D(t) with
+D(t) = (exp(i omega_h t) - exp(lambda_r t))/(i omega_h - lambda_r), which is t exp(i omega_h t) at resonance without
+damping (numerics.exponentials.secular). Harmonics lie further apart than that: each mode is driven by one of them. All
+rows stay functionals of c.
 """
 
 from __future__ import annotations
@@ -35,7 +37,7 @@ ROOM = 2**29
 FAR = 1e-6
 #: what rows feel of a mode counts at least as this share of what they feel of the others
 _UNFELT = 1e-8
-#: modes with |i omega - lambda| times the period below this are driven. Beyond, the response in step with the
+#: modes with |i omega_h - lambda| times the period below this are driven. Beyond, the response in step with the
 #: excitation is at most 1/NEAR times what one period adds: less than two digits cancel. Driven modes cost time, so that
 #: a wider bound would slow down scenes more than 0.3 % beside their resonance. exact.root_search.secular relies on it
 NEAR = 2e-2
@@ -51,10 +53,10 @@ class Flows(NamedTuple):
     """
 
     key: np.ndarray  # (s, r) which rows are closed
-    modes: np.ndarray  # (s,) number of complex modes, the excitation included
+    modes: np.ndarray  # (s,) number of complex modes, the excitation's e harmonics included
     eigenvalue: np.ndarray  # (s, m)
     shape: np.ndarray  # (s, 2n, m): (p, p') = constant + Re(shape c)
-    excited: np.ndarray  # (s, 2b): share of the excitation in the displacements xi of sprung bodies and their rates
+    excited: np.ndarray  # (s, 2b, e): share of the excitation in the displacements xi of sprung bodies and their rates
     project: np.ndarray  # (s, m, 2n): c = project ((p, p') - constant - excitation) + ...
     project_slip: np.ndarray  # (s, m, 2b): ... project_slip ((slips, rates) - constant - excitation)
     sprung: np.ndarray  # (s,) whether springs are closed
@@ -73,20 +75,21 @@ class Flows(NamedTuple):
     speed: np.ndarray  # (s, m): largest speed of a mode over all rows and the response
     acceleration: np.ndarray  # (s, m): largest acceleration of its terms, whether closed rows hold them or not
     turn: np.ndarray  # (s, m): change of its amplitude over an eighth of a period, as a factor
-    driven: np.ndarray  # (s,) number of driven modes: they come first, after the excitation
+    driven: np.ndarray  # (s, e + 1): harmonic h drives the modes from driven[h] to driven[h + 1]; the first is mode e
     load: np.ndarray  # (s, m): rate at which the excitation makes them grow
     # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a
     # segment is the form at its end minus the form at its start. Where the rate by which a product of two modes
     # changes vanishes beside the frequency the form would cancel: such pairs are left out of the forms, and listed.
-    work: np.ndarray  # (s, m) complex: velocity under the harmonic loads
+    work: np.ndarray  # (s, e, m) complex: velocity under the conjugate loads of each harmonic
     momentum: np.ndarray  # (s, m) complex: momentum of all bodies
-    linear: np.ndarray  # (s, m, 16): maps for work, harmonic and momentum; mean of x; momentum of the free bodies
+    linear: np.ndarray  # (s, m, 12 + 4e): maps for harmonic and momentum; mean of x; momentum of the free bodies; work
     loss: np.ndarray  # (s, m, m, 4): viscous loss of two modes, by their real and imaginary parts
     dashpot: np.ndarray  # (s, m, m, 4): loss in the dashpots of contacts
     square: np.ndarray  # (s, m, m, 4): squared response of two modes
     damped: np.ndarray  # (s,) whether contacts with dashpots are closed
     uncoupled: np.ndarray  # (s,) whether damping couples no two free modes
-    slow: np.ndarray  # (s, p, 3): pairs left out (j, k, kind), SUM, DIFFERENCE or ALONE; then modes (j, 0, CALM)
+    slow: np.ndarray  # (s, p, 4): pairs left out (j, k, kind, harmonic that both turn with or -1), SUM, DIFFERENCE or
+    # ALONE; then modes (j, 0, CALM, -1)
     slow_loss: np.ndarray  # (s, p) complex: viscous power of such a pair
     slow_dashpot: np.ndarray  # (s, p) complex: power in the dashpots
     slow_square: np.ndarray  # (s, p) complex: its share of the squared response
@@ -95,18 +98,18 @@ class Flows(NamedTuple):
 
 def empty_flows(system: System, capacity: int = 4) -> Flows:
     """Room for `capacity` subsystems, none of them filled (modes 0)."""
-    n, b, r = system.modes, system.bodies, len(system.delassus)
-    m = 2 * n + 1 + 2 * b * bool(np.isfinite(system.spring[system.friction_rows :]).any())
+    n, b, r, e = system.modes, system.bodies, len(system.delassus), len(system.frequency)
+    m = 2 * n + e + 2 * b * bool(np.isfinite(system.spring[system.friction_rows :]).any())
     pairs = m * (m + 3)
     z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
     return Flows(
-        np.zeros((capacity, r), np.bool_), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b), z(m, 2 * n),
+        np.zeros((capacity, r), np.bool_), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b, e), z(m, 2 * n),
         z(m, 2 * b), np.zeros(capacity, np.bool_), np.zeros((capacity, b), np.bool_),
         z(r, m), z(r, m), z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
-        f(b, b), z(b, m), z(m), f(m), f(m), z(m), np.zeros(capacity, np.int64), z(m),
-        z(m), z(m), f(m, 16), f(m, m, 4), f(m, m, 4), f(m, m, 4),
-        np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 3), np.int64),
+        f(b, b), z(b, m), z(m), f(m), f(m), z(m), np.zeros((capacity, e + 1), np.int64), z(m),
+        z(e, m), z(m), f(m, 12 + 4 * e), f(m, m, 4), f(m, m, 4), f(m, m, 4),
+        np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 4), np.int64),
         z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
     )  # fmt: skip
 
@@ -133,7 +136,7 @@ def add_flow(flows: Flows, system: System, closed: np.ndarray) -> Flows:
 
 
 def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
-    n, b = system.modes, system.bodies
+    n, b, e = system.modes, system.bodies, len(system.frequency)
     rigid, sprung = closed[np.isinf(system.spring[closed])], closed[np.isfinite(system.spring[closed])]
     carrier, cluster, inner = _attachment(system, rigid)
     springs = _sprung_bodies(system, cluster, sprung)
@@ -161,12 +164,8 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
     # from here on eta are the amplitudes of the real modes
     lift, drop, loads = lift @ real.shape, real.project @ drop, real.shape.T @ loads
     damping, stiffness = real.damping, np.diag(real.frequency**2)
-    modes, harmonic, growth = _excite(
-        system,
-        damping,
-        stiffness,
-        loads @ np.r_[system.of_structure.load, system.of_bodies.load],
-        complex_modes(real.frequency, damping),
+    modes, harmonic, driver, growth = _excite(
+        system, damping, stiffness, loads @ system.load.T, complex_modes(real.frequency, damping)
     )
     eigenvalue, shape, project = _one_of_each_pair(*modes)
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
@@ -174,21 +173,21 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
     _check_split(system, felt.max(axis=0), law, sprung, shape, project)
     flexibility = lift / real.frequency**2
     _check_rest(system, felt, flexibility @ loads)
-    m = len(eigenvalue) + 1
+    m = len(eigenvalue) + e
     flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, cluster < 0
-    flows.eigenvalue[s, :m] = np.r_[1j * system.omega, eigenvalue]
-    driven = len(growth)
-    flows.driven[s], flows.load[s, 1 : driven + 1] = driven, growth
+    flows.eigenvalue[s, :m] = np.r_[1j * system.frequency, eigenvalue]
+    driven = len(driver)
+    flows.driven[s], flows.load[s, e : e + driven] = e + np.searchsorted(driver, range(e + 1)), growth
     harmonic = lift @ harmonic
-    in_step = np.r_[harmonic, 1j * system.omega * harmonic + shape[: n + b, :driven] @ growth]
-    full = np.hstack([in_step[:, None], shape])
+    growing = shape[: n + b, :driven] @ (growth[:, None] * (driver[:, None] == range(e)))
+    full = np.hstack([np.vstack([harmonic, 1j * system.frequency * harmonic + growing]), shape])
     structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
     flows.shape[s, :, :m] = full[structure]
-    flows.excited[s] = full[xi, 0]
-    flows.project[s, 1:m], flows.project_slip[s, 1:m] = project[:, structure], project[:, xi]
-    flows.kick[s, :, 1:m] = system.of_structure.J @ project[:, n + b : 2 * n + b].T
+    flows.excited[s] = full[xi, :e]
+    flows.project[s, e:m], flows.project_slip[s, e:m] = project[:, structure], project[:, xi]
+    flows.kick[s, :, e:m] = system.of_structure.J @ project[:, n + b : 2 * n + b].T
     own = full[n : n + b].copy()
-    own[free, 0] -= (system.of_bodies.load / system.of_bodies.mass)[free] / system.omega**2
+    own[free, :e] -= (system.of_bodies.load / system.of_bodies.mass).T[free] / system.frequency**2
     body = carrier @ full[:n] + own
     for c in np.unique(springs.cluster[free]):
         members = free & (springs.cluster == c)
@@ -204,7 +203,7 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
         kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
         flows.held[s] = kept - flexibility @ (elastic @ lift).T @ elastic @ kept
     flows.response[s, :m] = system.of_structure.response @ full[:n]
-    flows.response[s, 0] += system.table
+    flows.response[s, :e] += system.table
     rate = np.abs(flows.eigenvalue[s, :m])
     size = np.abs(np.vstack([flows.motion[s, :, :m], flows.response[s, :m]])).max(axis=0)
     # terms by their sizes: a mode may be where no row feels it as long as others are closed
@@ -248,7 +247,7 @@ def _check_rest(system: System, felt: np.ndarray, static: np.ndarray) -> None:
 
 def _fill_forces(flows: Flows, system: System, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
     m = flows.modes[s]
-    rate, load = flows.eigenvalue[s, :m], flows.load[s, :m]
+    rate, load, e = flows.eigenvalue[s, :m], _growth(flows, s), len(system.frequency)
     spring, dashpot = system.spring[sprung, None], system.dashpot[sprung, None]
     push = -spring * flows.motion[s, sprung, :m] - dashpot * flows.velocity[s, sprung, :m]
     flows.force[s, sprung, :m], flows.impulse[s, sprung, :m] = push, _antiderivative(push, 1 / rate, load)
@@ -256,11 +255,9 @@ def _fill_forces(flows: Flows, system: System, s: int, full: np.ndarray, rigid: 
         return
     pull = system.of_structure.J @ np.hstack([-np.diag(system.of_structure.stiffness), -system.of_structure.damping])
     acceleration, size = pull @ full, np.abs(pull) @ np.abs(full)
-    excited = system.of_structure.J @ system.of_structure.load + system.of_bodies.J @ (
-        system.of_bodies.load / system.of_bodies.mass
-    )
-    acceleration[:, 0] += excited
-    size[:, 0] += np.abs(excited)
+    excited = system.J @ (system.load / system.mass).T
+    acceleration[:, :e] += excited
+    size[:, :e] += np.abs(excited)
     acceleration += system.delassus[:, sprung] @ flows.force[s, sprung, :m]
     inverse = np.linalg.inv(system.delassus[np.ix_(rigid, rigid)])
     flows.closed_inverse[s][np.ix_(rigid, rigid)] = inverse
@@ -272,63 +269,88 @@ def _fill_forces(flows: Flows, system: System, s: int, full: np.ndarray, rigid: 
 
 def _excite(
     system: System, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
-) -> tuple[_Modes, np.ndarray, np.ndarray]:
-    """The modes, driven ones first; eta (k,) in step with a harmonic load, without their share; their growth."""
+) -> tuple[_Modes, np.ndarray, np.ndarray, np.ndarray]:
+    """The modes, driven ones first, in order of the harmonics that drive them; eta (k, e) in step with the harmonics of
+    a load (k, e), without the share of the modes that they drive; harmonic and growth (d,) of each driven mode.
+    """
     eigenvalue, shape, project = modes
-    if not load.any():  # free decay, at any frequency
-        return modes, np.zeros_like(load), np.zeros(0)
-    k, apart = len(load), 1j * system.omega - eigenvalue
-    driven = np.abs(apart) * system.period < NEAR
-    if not driven.any():
-        dynamic = stiffness + 1j * system.omega * damping - system.omega**2 * np.eye(k)
-        return modes, np.linalg.solve(dynamic, load), np.zeros(0)
-    growth = project[:, k:] @ load
-    harmonic = shape[:k] @ np.where(driven, 0, growth / np.where(driven, 1, apart))
-    order = np.argsort(~driven, kind="stable")
-    # a real load is half of what turns with the excitation, half of what turns against it, in step with the conjugate
-    return (eigenvalue[order], shape[:, order], project[order]), harmonic, growth[driven] / 2
+    k, e = load.shape
+    harmonic, driver, growth = np.zeros((k, e), complex), np.full(2 * k, e), np.zeros(2 * k, complex)
+    for h in np.flatnonzero(load.any(axis=0)):  # without load: free decay, at any frequency
+        omega = system.frequency[h]
+        apart = 1j * omega - eigenvalue
+        driven = np.abs(apart) * system.period < NEAR
+        if not driven.any():
+            dynamic = stiffness + 1j * omega * damping - omega**2 * np.eye(k)
+            harmonic[:, h] = np.linalg.solve(dynamic, load[:, h])
+            continue
+        push = project[:, k:] @ load[:, h]
+        harmonic[:, h] = shape[:k] @ np.where(driven, 0, push / np.where(driven, 1, apart))
+        driver[driven] = h
+        # a real load is half of what turns with the harmonic, half of what turns against it, in step with the conjugate
+        growth[driven] = push[driven] / 2
+    if np.all(driver == e):
+        return modes, harmonic, driver[:0], growth[:0]
+    order = np.argsort(driver, kind="stable")
+    count = np.count_nonzero(driver < e)
+    first = order[:count]
+    return (eigenvalue[order], shape[:, order], project[order]), harmonic, driver[first], growth[first]
+
+
+def _growth(flows: Flows, s: int) -> np.ndarray:
+    """Rates (m, e) at which each harmonic makes the modes grow that it drives."""
+    m, driven = flows.modes[s], flows.driven[s]
+    growth = np.zeros((m, len(driven) - 1), complex)
+    for h in range(len(driven) - 1):
+        at = slice(driven[h], driven[h + 1])
+        growth[at, h] = flows.load[s, at]
+    return growth
 
 
 def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
     """Time derivative of functionals (..., m) of the amplitudes."""
-    m = flows.modes[s]
+    m, growth = flows.modes[s], _growth(flows, s)
     rate: np.ndarray = functional * flows.eigenvalue[s, :m]
-    rate[..., 0] += functional @ flows.load[s, :m]
+    rate[..., : growth.shape[1]] += functional @ growth
     return rate
 
 
 def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: np.ndarray) -> None:
-    n, m = system.modes, flows.modes[s]
-    velocity, rate, load = full[n:], flows.eigenvalue[s, :m], flows.load[s, :m]
+    n, m, e = system.modes, flows.modes[s], len(system.frequency)
+    velocity, rate, load = full[n:], flows.eigenvalue[s, :m], _growth(flows, s)
     body_rate = _rate(flows, s, body)
     response, momentum = flows.response[s, :m], system.of_bodies.mass @ body_rate
-    # all harmonic loads are in phase with the sine: real amplitudes
-    work = -system.of_structure.load.imag @ velocity - system.of_bodies.load.imag @ body_rate
+    speeds = np.vstack([velocity, body_rate])
+    work, work_back = system.load @ speeds, system.load.conj() @ speeds
     free = system.of_bodies.mass * (np.diagonal(flows.body_acceleration[s]) != 0)
-    # the excitation and the modes that it drives turn together: a product of one with a conjugate one is slow
-    together = np.arange(m) <= flows.driven[s]
-    along, _ = _reciprocal(rate + rate[0], system.period)
-    against, _ = _reciprocal(rate - rate[0], system.period, together)
+    # a harmonic and the modes that it drives turn together: a product of one with a conjugate one is slow
+    frame = np.r_[0:e, np.full(m - e, -1)]
+    for h in range(e):
+        frame[flows.driven[s, h] : flows.driven[s, h + 1]] = h
+    together = (frame[:, None] == frame) & (frame >= 0)
+    along, _ = _reciprocal(rate + rate[:e, None], system.period)
+    against, _ = _reciprocal(rate - rate[:e, None], system.period, together[:e])
     back, _ = _reciprocal(rate.conj() - rate[0], system.period)
     alone, slow_alone = _reciprocal(rate, system.period)
     mean = 2 * _antiderivative(response, alone, load)
     free_momentum = free @ flows.velocity[s, : len(free), :m]
-    work_along, work_against = _antiderivative(work, along, load), work * against
-    response_back = _antiderivative(response.conj(), back, load.conj())
-    momentum_back = _antiderivative(momentum.conj(), back, load.conj())
-    flows.work[s, :m], flows.momentum[s, :m] = work, momentum
-    flows.linear[s, :m] = np.hstack([
-        _real_map(-0.5j * (work_along - work_against), 0 * work).take([0, 1], axis=-1),
-        _real_map(0.5 * (work_along + work_against), 0 * work).take([0, 1], axis=-1),
-        _real_map(0.5 * response * against, 0.5 * response_back),
-        _real_map(0.5 * momentum * against, 0.5 * momentum_back),
+    response_back, momentum_back = (_antiderivative(part.conj(), back, load.conj()) for part in (response, momentum))
+    flows.work[s, :, :m], flows.momentum[s, :m] = work_back, momentum
+    flows.linear[s, :m, :12] = np.hstack([
+        _real_map(0.5 * _antiderivative(response, against[0], load), 0.5 * response_back),
+        _real_map(0.5 * _antiderivative(momentum, against[0], load), 0.5 * momentum_back),
         np.column_stack([mean.real, -mean.imag, free_momentum.real, -free_momentum.imag]),
     ])  # fmt: skip
+    for h in range(e):
+        with_load = _antiderivative(work[h], along[h], load)
+        with_conjugate = _antiderivative(work_back[h], against[h], load)
+        on_x, on_y = 0.5 * (with_load + with_conjugate), 0.5j * (with_load - with_conjugate)
+        flows.linear[s, :m, 12 + 4 * h : 16 + 4 * h] = np.column_stack([on_x.real, -on_x.imag, on_y.real, -on_y.imag])
     sprung = np.isfinite(system.spring) & flows.force[s].any(axis=1)
     push, damper = flows.velocity[s, sprung, :m], np.diag(system.dashpot[sprung])
     reciprocal, slow = zip(
         _reciprocal(rate[:, None] + rate, system.period),
-        _reciprocal(rate[:, None] + rate.conj(), system.period, np.outer(together, together)),
+        _reciprocal(rate[:, None] + rate.conj(), system.period, together),
         strict=True,
     )
     forms = (flows.loss, flows.dashpot, flows.square), (flows.slow_loss, flows.slow_dashpot, flows.slow_square)
@@ -342,21 +364,23 @@ def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: n
             product[kind], integral[kind] = _antiderivatives(product[kind], reciprocal[kind], load, other)
         form[s, :m, :m] = _real_form(*integral)
     flows.damped[s] = system.dashpot[sprung].any()
-    flows.uncoupled[s] = system.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + 1
+    flows.uncoupled[s] = system.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + e
     # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
     # is taken at once (exact.energy_balance)
     calm = np.abs(rate) * system.period < SLOW / 2
     products[2] = [np.where(np.outer(calm, calm), 0, product) for product in products[2]]
-    listed = [(j, k, kind) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
+    listed = [(j, k, kind, -1) for kind in (SUM, DIFFERENCE) for j, k in np.argwhere(slow[kind]) if j >= k]
+    # a mode that is slow beside a harmonic, or beside modes that it drives, is seen from the harmonic's frame
+    listed = [(*pair[:3], frame[pair[1]] if pair[2] == DIFFERENCE and pair[0] >= e else -1) for pair in listed]
     count = len(listed)
-    for i, (j, k, kind) in enumerate(listed):
+    for i, (j, k, kind, _) in enumerate(listed):
         half = 0.5 if j == k else 1.0
         for form, product in zip(forms[1], products, strict=True):
             form[s, i] = half * product[kind][j, k]
-    listed += [(j, 0, ALONE) for j in np.flatnonzero(slow_alone)]
+    listed += [(j, 0, ALONE, -1) for j in np.flatnonzero(slow_alone)]
     flows.slow_square[s, count : len(listed)] = 2 * np.where(calm, 0, response)[slow_alone]
-    listed += [(j, 0, CALM) for j in np.flatnonzero(calm)]
-    flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 3)
+    listed += [(j, 0, CALM, -1) for j in np.flatnonzero(calm)]
+    flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 4)
     flows.slow_count[s] = len(listed)
 
 
@@ -369,10 +393,10 @@ def _reciprocal(rate: np.ndarray, period: float, together: np.ndarray | bool = F
 def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Functional (..., m) of the amplitudes whose rate is the one given; `reciprocal` of the rates of its terms.
 
-    By parts: a driven mode's rate has a term in mode 0.
+    By parts: a driven mode's rate has a term in its harmonic, by `load` (m, e).
     """
-    integral: np.ndarray = functional * reciprocal
-    integral[..., 0] -= integral @ load * reciprocal[0]
+    integral, e = functional * reciprocal, load.shape[1]
+    integral[..., :e] -= integral @ load * reciprocal[:e]
     return integral
 
 
@@ -380,11 +404,11 @@ def _antiderivatives(
     product: np.ndarray, reciprocal: np.ndarray, left: np.ndarray, right: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same for a form (m, m), with the loads on its two factors: what is left to slow pairs, and the form."""
-    rest, integral = product, product * reciprocal
-    for _ in range(2 if left.any() else 0):  # the second time for the pair of mode 0 with itself
+    rest, integral, e = product, product * reciprocal, left.shape[1]
+    for _ in range(2 if left.any() else 0):  # the second time for pairs of harmonics
         rest = product.copy()
-        rest[0] -= left @ integral
-        rest[:, 0] -= integral @ right
+        rest[:e] -= left.T @ integral
+        rest[:, :e] -= integral @ right
         integral = rest * reciprocal
     return rest, integral
 

@@ -9,7 +9,6 @@ Gomes and others, Co-simulation: a survey (2018).
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal
 
 import numpy as np
@@ -56,41 +55,49 @@ def begin(system: System, options: Options, initial: InitialMotion, records: Rec
     """Return a run. Raises InputError for a rigid contact of restitution 0."""
     times = time_grid(system, options.steps_per_period)
     soft, slow = with_penalty(system, times, options)
-    matrix = cosimulation_matrices(soft, times)
-    memory = np.zeros((3, 4 * soft.modes + 2 + len(soft.J)))
     gauss_seidel, hold, substeps = options.exchange == "gauss_seidel", options.hold, options.substeps
+    matrices = cosimulation_matrices(soft, times, substeps)
+    memory = np.zeros((3, 4 * soft.modes + len(soft.J)))
     budget, deepest = options.max_events, options.penetration
 
     def march(motion: Motion, log: np.ndarray, periods: int) -> int:
         return march_cosimulation(
-            soft, times, motion, records, log, matrix, memory, slow, gauss_seidel, hold, substeps, periods, budget,
+            soft, times, motion, records, log, *matrices, memory, slow, gauss_seidel, hold, substeps, periods, budget,
             deepest,
         )  # fmt: skip
 
     return SteppedRun(soft, march, initial, records, events)
 
 
-def cosimulation_matrices(system: System, times: TimeGrid) -> np.ndarray:
-    """Exact step of the structure: (2n, 4n + 2) on p, p', cos and sin of omega t, constant and linear modal loads."""
-    n = system.modes
-    rate = np.zeros((4 * n + 2, 4 * n + 2))
+def cosimulation_matrices(system: System, times: TimeGrid, substeps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, and (steps, 2n) what the
+    excitation adds at each step of a period; loads (steps * substeps + 1, N) of the excitation on the bodies' grid.
+    """
+    n, e, steps = system.modes, len(system.frequency), len(times.phase) - 1
+    rate = np.zeros((4 * n + 2 * e, 4 * n + 2 * e))
     rate[:n, n : 2 * n] = np.eye(n)
     rate[n : 2 * n, :n] = -np.diag(system.stiffness[:n])
     rate[n : 2 * n, n : 2 * n] = -system.damping[:n, :n]
-    rate[n : 2 * n, 2 * n] = system.load[:n].real
-    rate[n : 2 * n, 2 * n + 1] = -system.load[:n].imag
-    rate[2 * n, 2 * n + 1], rate[2 * n + 1, 2 * n] = -system.omega, system.omega
-    rate[n : 2 * n, 2 * n + 2 : 3 * n + 2] = np.eye(n)
-    rate[2 * n + 2 : 3 * n + 2, 3 * n + 2 :] = np.eye(n)
-    exact: np.ndarray = expm(rate * times.step)[: 2 * n]
-    return np.ascontiguousarray(exact)
+    rate[n : 2 * n, 2 * n : 3 * n] = np.eye(n)
+    rate[2 * n : 3 * n, 3 * n : 4 * n] = np.eye(n)
+    # cos and sin of each harmonic
+    load = system.of_structure.load.T
+    rate[n : 2 * n, 4 * n : 4 * n + e], rate[n : 2 * n, 4 * n + e :] = load.real, -load.imag
+    rate[4 * n : 4 * n + e, 4 * n + e :] = -np.diag(system.frequency)
+    rate[4 * n + e :, 4 * n : 4 * n + e] = np.diag(system.frequency)
+    exact = expm(rate * times.step)[: 2 * n]
+    phases = system.phases(2 * np.pi * np.arange(steps) / steps)
+    excited = np.hstack([phases.real, phases.imag]) @ exact[:, 4 * n :].T
+    loads = time_grid(system, steps * substeps).load
+    return np.ascontiguousarray(exact[:, : 4 * n]), np.ascontiguousarray(excited), loads
 
 
 @entry
 def march_cosimulation(
-    system, times, motion, records, log, matrix, memory, slow, gauss_seidel, hold, substeps, periods, budget, deepest
-):
-    """Step to the end of `periods`. memory (3, 4n + 2 + r): last velocities and mean forces; those before; scratch."""
+    system, times, motion, records, log, matrix, excited, loads, memory, slow, gauss_seidel, hold, substeps, periods,
+    budget, deepest,
+):  # fmt: skip
+    """Step to the end of `periods`. memory (3, 4n + r): last velocities and mean forces; those before; scratch."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
     h, steps = times.step, len(times.phase) - 1
     q, v, known = motion.coordinates[0], motion.coordinates[1], memory[2]
@@ -109,7 +116,7 @@ def march_cosimulation(
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
             open_step(system, times, motion, records, k, q, v, before)
-            _structure(system, times, motion, matrix, known, last_force, older_force, hold, k, q, v)
+            _structure(system, times, motion, matrix, excited, known, last_force, older_force, hold, k, q, v)
             for r in range(rows):
                 place[r], rate[r], bend[r] = 0.0, 0.0, 0.0
                 speed[r], mean[r] = row_speed(system, r, v), 0.0
@@ -123,7 +130,7 @@ def march_cosimulation(
                         change = motion.v[i] - v[i] if gauss_seidel else v[i] - last_speed[i]
                         bend[r] += system.J[r, i] * change / h
             copy(v, last_speed)
-            _bodies(system, times, motion, slow, substeps, k, place, rate, bend, mean)
+            _bodies(system, times, motion, loads, slow, substeps, k, place, rate, bend, mean)
             copy(last_force, older_force)
             copy(mean, last_force)
             for r in range(rows):
@@ -138,7 +145,7 @@ def march_cosimulation(
 
 
 @kernel
-def _structure(system, times, motion, matrix, known, force, older, hold, k, q, v):
+def _structure(system, times, motion, matrix, excited, known, force, older, hold, k, q, v):
     """The structure's macro-step under the forces that it was given."""
     n, h = system.modes, times.step
     for i in range(n):
@@ -149,25 +156,22 @@ def _structure(system, times, motion, matrix, known, force, older, hold, k, q, v
             if hold == 1:
                 slope += system.J[r, i] * (force[r] - older[r]) / h
         # the mean belongs to the middle of the last macro-step
-        known[2 * n + 2 + i], known[3 * n + 2 + i] = constant + 0.5 * h * slope, slope
-    known[2 * n], known[2 * n + 1] = times.phase[k, 0], times.phase[k, 1]
+        known[2 * n + i], known[3 * n + i] = constant + 0.5 * h * slope, slope
     for i in range(n):
-        p, rate = 0.0, 0.0
-        for j in range(4 * n + 2):
+        p, rate = excited[k, i], excited[k, n + i]
+        for j in range(4 * n):
             p += matrix[i, j] * known[j]
             rate += matrix[n + i, j] * known[j]
         motion.q[i], motion.v[i] = p, rate
 
 
 @kernel
-def _bodies(system, times, motion, slow, substeps, k, place, rate, bend, mean):
+def _bodies(system, times, motion, loads, slow, substeps, k, place, rate, bend, mean):
     """The bodies' macro-step on walls that move as they were told; adds up the mean forces of the rows."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
     small = times.step / substeps
     for j in range(substeps):
         t = (j + 1) * small
-        angle = system.omega * (k * times.step + t)
-        cosine, sine = math.cos(angle), math.sin(angle)
         for i in range(n, size):
             motion.q[i] += small * motion.half[i]
         for r in range(rows):
@@ -179,7 +183,7 @@ def _bodies(system, times, motion, slow, substeps, k, place, rate, bend, mean):
             row_force(system, motion, r, displacement, speed, slow, small * speed)
             mean[r] += 0.5 * motion.force[r] / substeps
         for i in range(n, size):
-            force = system.weight[i] + system.load[i].real * cosine - system.load[i].imag * sine
+            force = system.weight[i] + loads[k * substeps + j + 1, i]
             for r in range(rows):
                 force += system.J[r, i] * motion.force[r]
             change = small * force / system.mass[i]

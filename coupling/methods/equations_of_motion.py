@@ -20,6 +20,8 @@ class TimeGrid(NamedTuple):
 
     step: float  # s
     phase: np.ndarray  # (steps + 1, 2) cos and sin of omega t within a period
+    load: np.ndarray  # (steps + 1, N) of the excitation, N
+    table: np.ndarray  # (steps + 1, 2) displacement and velocity of a base whose motion is the response
     travel: np.ndarray  # (r,) free travel of a rigid contact's cavity, m; inf: nothing to check
 
 
@@ -46,8 +48,14 @@ class Motion(NamedTuple):
 def time_grid(system: System, steps: int) -> TimeGrid:
     """The grid of `steps` steps a period."""
     angle = 2 * np.pi * np.arange(steps + 1) / steps
+    phases = system.phases(angle)
+    table = np.column_stack([system.table, 1j * system.frequency * system.table])
     travel = np.where(np.isinf(system.spring), system.free_travel, np.inf)
-    return TimeGrid(system.period / steps, np.column_stack([np.cos(angle), np.sin(angle)]), travel)
+    return TimeGrid(
+        step=system.period / steps, phase=np.column_stack([np.cos(angle), np.sin(angle)]),
+        load=np.ascontiguousarray((phases @ system.load).real), table=np.ascontiguousarray((phases @ table).real),
+        travel=travel,
+    )  # fmt: skip
 
 
 def start(system: System, initial: InitialMotion) -> Motion:

@@ -23,18 +23,18 @@ _BOUND = 1e30
 
 
 @inlined
-def response_of(system, q, cosine, sine):
-    """Displacement at the response."""
-    x = system.table.real * cosine - system.table.imag * sine
+def response_of(system, times, k, q):
+    """Displacement at the response, at step k of the period."""
+    x = times.table[k, 0]
     for i in range(system.modes):
         x += system.response[i] * q[i]
     return x
 
 
 @inlined
-def rate_of(system, v, cosine, sine):
-    """Velocity at the response."""
-    rate = -system.omega * (system.table.real * sine + system.table.imag * cosine)
+def rate_of(system, times, k, v):
+    """Velocity at the response, at step k of the period."""
+    rate = times.table[k, 1]
     for i in range(system.modes):
         rate += system.response[i] * v[i]
     return rate
@@ -98,15 +98,14 @@ def tally(system, times, motion, records, k, q, v, impulse, before, deepest):
     """
     h, n, p = times.step, system.modes, motion.counters[PERIOD]
     c0, s0, c1, s1 = times.phase[k, 0], times.phase[k, 1], times.phase[k + 1, 0], times.phase[k + 1, 1]
-    x0, x1 = response_of(system, q, c0, s0), response_of(system, motion.q, c1, s1)
-    rate0, rate1 = rate_of(system, v, c0, s0), rate_of(system, motion.v, c1, s1)
+    x0, x1 = response_of(system, times, k, q), response_of(system, times, k + 1, motion.q)
+    rate0, rate1 = rate_of(system, times, k, v), rate_of(system, times, k + 1, motion.v)
     _waves(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, motion.v)
     size = abs(x1)
     for i in range(len(q)):
         moved = motion.q[i] - q[i]
         size = max(size, abs(motion.v[i]))
-        load = system.load[i]
-        motion.losses[EXCITATION] += 0.5 * (load.real * (c0 + c1) - load.imag * (s0 + s1)) * moved
+        motion.losses[EXCITATION] += 0.5 * (times.load[k, i] + times.load[k + 1, i]) * moved
         for j in range(n if i < n else 0):
             if system.damping[i, j] != 0.0:
                 motion.losses[VISCOUS] += 0.5 * system.damping[i, j] * (v[j] + motion.v[j]) * moved
@@ -190,7 +189,7 @@ def sample(system, times, motion, records, k, q):
     stride = steps // each
     if k % stride == 0 and k // stride < each:
         entry = records.samples[motion.counters[PERIOD] * each + k // stride]
-        entry[0] = response_of(system, q, times.phase[k, 0], times.phase[k, 1])
+        entry[0] = response_of(system, times, k, q)
         for i in range(b):
             entry[1 + i] = row_speed(system, i, q)
 
@@ -221,7 +220,7 @@ def damped(system, v, i):
 @inlined
 def load_at(system, times, k, i):
     """Load on coordinate i at step k of the period, weight included, N."""
-    return system.load[i].real * times.phase[k, 0] - system.load[i].imag * times.phase[k, 1] + system.weight[i]
+    return times.load[k, i] + system.weight[i]
 
 
 @inlined

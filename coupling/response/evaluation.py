@@ -158,8 +158,9 @@ def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> f
 
 def _exchanged(system: System, records: Records) -> float:
     """Energy that comes and goes within a period, J: in collisions, and what the loads lend to each mode and body."""
-    modes = np.abs(system.of_structure.load) ** 2 / np.maximum(system.of_structure.stiffness, system.omega**2)
-    bodies = np.abs(system.of_bodies.load) ** 2 / (system.of_bodies.mass * system.omega**2)
+    rate = system.frequency[:, None]
+    modes = np.abs(system.of_structure.load) ** 2 / np.maximum(system.of_structure.stiffness, rate**2)
+    bodies = np.abs(system.of_bodies.load) ** 2 / (system.of_bodies.mass * rate**2)
     return float(max(records.collided.max(), (modes.sum() + bodies.sum()) / 2))
 
 
@@ -181,12 +182,15 @@ def _state_scale(system: System, section: np.ndarray) -> np.ndarray:
 def _attached(
     system: System, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
 ) -> float | None:
-    """Share of the bodies' mass that the structure feels: Re(F / (omega^2 X)) / sum m, F all contact forces on it."""
+    """Share of the bodies' mass that the structure feels: Re(F / (omega^2 X)) / sum m, F all contact forces on it.
+
+    Of several harmonics, those of order 1.
+    """
     # a structure that does not move feels no mass: its harmonic is 0, or what damping has left of the start
     if not system.bodies or abs(harmonic) <= np.sqrt(np.finfo(float).tiny) or len(section) <= first + 1:
         return None
     change = section[-1, 2] - section[first, 2]
-    on_bodies = 2 / span * (change + 1j * system.omega * momentum) - system.of_bodies.load.sum()
+    on_bodies = 2 / span * (change + 1j * system.omega * momentum) - system.of_bodies.load[0].sum()
     return float((-on_bodies / (system.omega**2 * harmonic)).real / system.of_bodies.mass.sum())
 
 

@@ -20,8 +20,10 @@ def put_section(system, records, period, p, p_rate, slip, slip_velocity, springs
     springs of rows, J; ledger: (6,) J, whose stored energy is set.
     """
     n, b, entry, part = system.modes, system.bodies, records.section[period], records.parts[period]
-    x, rate = system.table.real, -system.omega * system.table.imag
-    energy, momentum = springs, 0.0
+    x, rate, energy, momentum = 0.0, 0.0, springs, 0.0
+    for h in range(len(system.table)):
+        x += system.table[h].real
+        rate -= system.frequency[h] * system.table[h].imag
     for i in range(n):
         x += system.response[i] * p[i]
         rate += system.response[i] * p_rate[i]

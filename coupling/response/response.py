@@ -60,9 +60,10 @@ class Response:
     """What a structure with loose bodies did. Amplitudes and energies are those of the evaluated periods.
 
     amplitude_*: of the displacement at excitation.at (m), with the half width of the mean's 95 % confidence interval
-    (None if there are too few periods); energy: J over the evaluated time, `stored` its change;
-    energy_residual: imbalance of the whole run's ledger relative to its largest term; attached_mass_fraction: share
-    of the bodies' mass that the structure feels (None without bodies or motion); peak: (periods,) largest |x| of each
+    (None if there are too few periods); amplitude_harmonic, phase: of its part at the excitation's frequency, order 1;
+    energy: J over the evaluated time, `stored` its change; energy_residual: imbalance of the whole run's ledger
+    relative to its largest term; attached_mass_fraction: share of the bodies' mass that the structure feels at that
+    frequency (None without bodies or motion); peak: (periods,) largest |x| of each
     period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
     time, displacement, body_displacement: samples, empty if none were asked for; penetration: deepest overlap of bodies
     and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model

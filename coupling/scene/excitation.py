@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
+import cmath
 import math
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, Real
+from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, Real, Whole
+
+
+@dataclass(frozen=True, config=STRICT)
+class Harmonic:
+    """One sine of an excitation: amplitude sin(order 2 pi f t + phase), the phase in degrees.
+
+    amplitude: in units of what excites, be it force, base acceleration, or displacement of a prescribed motion.
+    """
+
+    order: Annotated[Whole, Field(gt=0)]
+    amplitude: NonNegative
+    phase: Real = 0.0
+
+    @property
+    def share(self) -> complex:
+        """Complex amplitude relative to a sine of amplitude 1 and phase 0."""
+        return cmath.rect(self.amplitude, math.radians(self.phase))
 
 
 @dataclass(frozen=True, config=STRICT)
 class Excitation:
-    """Harmonic excitation at `frequency` (Hz): one of force (N), base_acceleration (m/s^2), resonance_amplitude (m).
+    """Periodic excitation at `frequency` (Hz): one of force (N), base_acceleration (m/s^2), resonance_amplitude (m).
 
     resonance_amplitude is the displacement to which the force brings a resonance of the structure without bodies: of a
     model with several, the one that responds most within `resonance_near`, a frequency or [lowest, highest] (Hz);
     default: the excitation's frequency, or the range over which it is swept.
     `at` is the interface label of force and response on a reduced model; the base moves in its direction.
+    harmonic: sines whose sum excites, at multiples of the frequency; that of order 1 has amplitude 1 and phase 0 unless
+    it is among them. resonance_amplitude speaks of a sine of order 1 and amplitude 1.
     """
 
     frequency: Positive
@@ -26,6 +48,7 @@ class Excitation:
     resonance_amplitude: Positive | None = None
     resonance_near: Positive | tuple[Positive, Positive] | None = None
     at: str | None = None
+    harmonic: tuple[Harmonic, ...] = ()
 
     def __post_init__(self) -> None:
         given = [self.force, self.base_acceleration, self.resonance_amplitude]
@@ -34,12 +57,22 @@ class Excitation:
         low, high = self.resonance_range
         if low > high:
             raise ValueError(f"resonance_near: expected [lowest, highest], not [{low:g}, {high:g}]")
+        orders = [harmonic.order for harmonic in self.harmonic]
+        for index, order in enumerate(orders):
+            if order in orders[:index]:
+                raise ValueError(f"harmonic[{index}].order: {order} is given twice; orders must differ")
 
     @property
     def resonance_range(self) -> tuple[float, float]:
         """Lowest and highest frequency, Hz, near which the resonance of resonance_amplitude is sought."""
         near = self.frequency if self.resonance_near is None else self.resonance_near
         return near if isinstance(near, tuple) else (near, near)
+
+    @property
+    def shares(self) -> dict[int, complex]:
+        """Complex amplitudes of the sines by their orders, rising from 1: order 1 is there even if it has none."""
+        given = {1: 1.0 + 0.0j} | {harmonic.order: harmonic.share for harmonic in self.harmonic}
+        return {order: given[order] for order in sorted(given) if order == 1 or given[order]}
 
 
 @dataclass(frozen=True, config=STRICT)

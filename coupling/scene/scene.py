@@ -193,7 +193,9 @@ class Scene:
         if isinstance(self.structure, Prescribed):
             excitation = self.excitation
             if excitation.force or excitation.base_acceleration or excitation.resonance_amplitude:
-                raise ValueError("excitation: a prescribed motion takes frequency alone; structure sets the amplitude")
+                raise ValueError(
+                    "excitation: a prescribed motion takes only frequency and harmonics; structure sets the amplitude"
+                )
             for name in ("friction_damper", "stop"):
                 if getattr(self, name):
                     raise ValueError(f"{name}: a prescribed motion feels no force; remove it")

@@ -21,7 +21,7 @@ _UNITS = {
     "frequency": "Hz", "gap": "m", "mass": "kg", "stiffness": "N/m", "damping": "N s/m", "force": "N",
     "base_acceleration": "m/s^2", "acceleration": "m/s^2", "resonance_amplitude": "m", "displacement_amplitude": "m",
     "position": "m", "displacement": "m", "velocity": "m/s", "normal_load": "N", "normal_force": "N",
-    "orientation_deg": "degree",
+    "orientation_deg": "degree", "phase": "degree",
 }  # fmt: skip
 #: tops of the linear curves over the swept frequencies and their units, each an array over the other axes
 PEAKS = {

@@ -32,27 +32,29 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     Raises InputError for an unknown label or an unusable model.
     """
     basis = basis or basis_of(scene)
-    omega, n = 2 * np.pi * scene.excitation.frequency, len(basis.stiffness)
+    omega, n, shares = 2 * np.pi * scene.excitation.frequency, len(basis.stiffness), scene.excitation.shares
+    frequency, share = omega * np.array(list(shares)), np.array(list(shares.values()))[:, None]
     check_directions(scene, basis)
     at = forced_label(scene)
     response = interface_row(basis, at, "excitation.at")
-    base, table = (scene.excitation.base_acceleration or 0.0) * -1j * basis.directions[at], 0.0j
+    base = share * (scene.excitation.base_acceleration or 0.0) * -1j * basis.directions[at]
+    table = np.zeros((len(share), 1), complex)
     if isinstance(scene.structure, Prescribed):
-        table = -1j * scene.structure.displacement_amplitude
-        base = -(omega**2) * table * basis.directions[at]
-    force = -1j * response * force_amplitude(scene, basis, response) - basis.base @ base
+        table = share * -1j * scene.structure.displacement_amplitude
+        base = -(frequency[:, None] ** 2) * table * basis.directions[at]
+    force = share * -1j * response * force_amplitude(scene, basis, response) - base @ basis.base.T
     made = constraints_of(scene, basis, at)
     travel = made.free_travel.copy()
     if scene.stop:  # whose gap may be none: how far their place moves counts as well
         stops, begun = slice(len(travel) - len(scene.stop), None), scene.initial
-        reach = np.abs(made.J[stops, :n]) @ (np.abs(force) / basis.stiffness)
+        reach = np.abs(made.J[stops, :n]) @ (np.abs(force).sum(axis=0) / basis.stiffness)
         reach += abs(begun.displacement) + abs(begun.velocity) / np.sqrt(basis.stiffness[0]) + np.finfo(float).tiny
         travel[stops] = np.maximum(travel[stops], reach)
     on_structure, on_bodies = made.J[:, :n], made.J[:, n:]
     mass = np.array([damper.mass for damper in scene.damper])
     along = np.reshape([basis.directions[label] for label in made.floors], (-1, 3))
     gravity = np.reshape([scene.gravity.components(direction) for direction in along], (-1, 2))[:, 0]
-    accelerated = along @ base
+    accelerated = base @ along.T
     bodies = len(mass)
     damping = np.zeros((n + bodies, n + bodies))
     damping[:n, :n] = basis.damping
@@ -60,10 +62,10 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         modes=n, bodies=bodies, friction_rows=made.friction_rows, mass=np.concatenate([np.ones(n), mass]),
         stiffness=np.concatenate([basis.stiffness, np.zeros(bodies)]), damping=damping,
         proportional=bool(np.count_nonzero(basis.damping - np.diag(np.diag(basis.damping))) == 0),
-        load=np.concatenate([force, -mass * accelerated]) + 0j,
-        weight=np.concatenate([np.zeros(n), mass * gravity]), alike=bool(np.all(accelerated == accelerated[:1])),
-        response=np.concatenate([response, np.zeros(bodies)]), table=complex(table), omega=omega,
-        period=2 * np.pi / omega, floor=made.floor, J=made.J, rest=made.rest,
+        load=np.hstack([force, -mass * accelerated]) + 0j,
+        weight=np.concatenate([np.zeros(n), mass * gravity]), alike=bool(np.all(accelerated == accelerated[:, :1])),
+        response=np.concatenate([response, np.zeros(bodies)]), table=table.ravel(), frequency=frequency,
+        omega=omega, period=2 * np.pi / omega, floor=made.floor, J=made.J, rest=made.rest,
         delassus=on_structure @ on_structure.T + (on_bodies / mass) @ on_bodies.T, limit=made.limit,
         spring=made.spring, dashpot=made.dashpot, restitution=made.restitution,
         restitution_at=law_address(scene.contact, made.restitution[made.friction_rows :]), free_travel=travel,

@@ -34,10 +34,10 @@ class LinearPeak(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearResponse:
-    """A linear structure with n modes under its excitation.
+    """A linear structure with n modes under its excitation, of e harmonics.
 
-    stiffness (n,), damping (n, n), mass (n, n), load (n,) complex and response (n,) in modal coordinates; table:
-    complex displacement of a prescribed motion, m.
+    stiffness (n,), damping (n, n), mass (n, n), load (e, n) complex and response (n,) in modal coordinates; table (e,):
+    complex displacements of a prescribed motion, m; order (e,) of the harmonics, as multiples of the frequency.
     """
 
     stiffness: np.ndarray
@@ -45,14 +45,21 @@ class LinearResponse:
     mass: np.ndarray
     load: np.ndarray
     response: np.ndarray
-    table: complex
+    table: np.ndarray
+    order: np.ndarray
 
     def amplitude(self, frequencies: np.ndarray) -> np.ndarray:
-        """Amplitudes of the response (f,), m, at frequencies (f,) in Hz."""
-        omega = 2 * np.pi * np.asarray(frequencies, float)[:, None, None]
+        """Amplitudes of the response (f,), m, at frequencies (f,), Hz; of several harmonics the peak over a period."""
+        waves = [self._wave(h, np.asarray(frequencies, float)) for h in range(len(self.order))]
+        return np.abs(waves[0]) if len(waves) == 1 else _peak(np.array(waves), self.order)
+
+    def _wave(self, h: int, frequencies: np.ndarray) -> np.ndarray:
+        """Complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,) in Hz."""
+        omega = 2 * np.pi * self.order[h] * frequencies[:, None, None]
         dynamic = np.diag(self.stiffness) + 1j * omega * self.damping - omega**2 * self.mass
-        loads = np.broadcast_to(self.load[:, None], (len(omega), len(self.load), 1))
-        return np.abs(np.linalg.solve(dynamic, loads)[:, :, 0] @ self.response + self.table)
+        loads = np.broadcast_to(self.load[h][:, None], (len(omega), self.load.shape[1], 1))
+        wave: np.ndarray = np.linalg.solve(dynamic, loads)[:, :, 0] @ self.response + self.table[h]
+        return wave
 
     def peak(self, low: float, high: float) -> LinearPeak:
         """The largest amplitude from low to high, Hz, to round-off; at one of the two where no resonance is higher."""
@@ -82,19 +89,39 @@ class LinearResponse:
         return found
 
     def _resonances(self) -> tuple[np.ndarray, np.ndarray]:
-        """Natural frequencies and half-power widths (n,), Hz."""
-        squares, shapes = eigh(np.diag(self.stiffness), self.mass) if len(self.load) else (self.load.real, self.mass)
+        """Frequencies at which a harmonic meets a natural one, and half-power widths there (e n,), Hz."""
+        squares, shapes = eigh(np.diag(self.stiffness), self.mass) if len(self.mass) else (np.zeros(0), self.mass)
         widths = np.einsum("ik,ij,jk->k", shapes, self.damping, shapes) / (2 * np.pi)
-        return np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), widths
+        natural = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+        return np.divide.outer(natural, self.order).ravel(), np.divide.outer(widths, self.order).ravel()
+
+
+def _peak(waves: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Largest |Re sum_h waves_h exp(i order_h angle)| (f,) over all angles; waves (e, f): from a grid, by Newton."""
+    step = np.pi / (8 * order.max())
+    angle = np.broadcast_to(np.arange(0, 2 * np.pi, step)[:, None], (16 * order.max(), waves.shape[1]))
+    found = np.zeros(waves.shape[1])
+    for _ in range(6):
+        turning = waves * np.exp(1j * np.multiply.outer(angle, order)).swapaxes(1, 2)
+        value, slope, bend = ((turning * (1j * order[:, None]) ** p).sum(axis=1).real for p in range(3))
+        found = np.maximum(found, np.abs(value).max(axis=0))
+        # towards a maximum of |x|, no further than the neighbours
+        move = np.divide(-slope, bend, out=np.copysign(step, value * slope), where=value * bend < 0)
+        angle = angle + np.clip(move, -step, step)
+    return found
 
 
 def linear_responses(scene: Scene) -> tuple[LinearResponse, LinearResponse]:
     """Without bodies, and with every body glued to its cavity's floor. Raises InputError."""
     system = assemble(scene)
     modes, bodies = system.of_structure, system.of_bodies
-    glued_load = modes.load + system.floor.T @ bodies.load
+    glued_load = modes.load + bodies.load @ system.floor
+    order = system.order
+    moves = np.flatnonzero(system.load.any(axis=1) | (system.table != 0) | (order == order[-1]))
     free, glued = (
-        LinearResponse(modes.stiffness, modes.damping, mass, load, modes.response, system.table)
+        LinearResponse(
+            modes.stiffness, modes.damping, mass, load[moves], modes.response, system.table[moves], order[moves]
+        )
         for mass, load in ((np.diag(modes.mass), modes.load), (glued_mass(system), glued_load))
     )
     return free, glued

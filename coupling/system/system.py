@@ -1,7 +1,8 @@
 """The record of a scene as matrices, the same for every method: M q'' + C q' + K q = loads + J^T lambda.
 
 q = (p, x) are the real modal coordinates of the structure, mass-normalised, and the positions of the bodies. All motion
-is relative to the base: a prescribed motion is a structure without modes on a moving base. Everything unilateral or
+is relative to the base: a prescribed motion is a structure without modes on a moving base. The excitation is a sum of e
+exponentials, its harmonics, and so are the loads: Re sum_h load_h exp(i frequency_h t). Everything unilateral or
 frictional is a row of J (system.constraints), whose displacement is J q + rest.
 """
 
@@ -37,12 +38,13 @@ class System(NamedTuple):
     stiffness: np.ndarray  # (N,) squared undamped angular frequencies; 0 for bodies
     damping: np.ndarray  # (N, N)
     proportional: bool  # whether damping couples no two modes
-    load: np.ndarray  # (N,) complex amplitude of the harmonic load exp(i omega t), N
+    load: np.ndarray  # (e, N) complex amplitudes of the loads of all harmonics, N
     weight: np.ndarray  # (N,) gravity along each body's cavity, N
     alike: bool  # whether the base accelerates all bodies alike: their cavities have one angle to its motion
     response: np.ndarray  # (N,) functional of the response
-    table: complex  # displacement amplitude of a base whose motion is the response (prescribed), m
-    omega: float  # rad/s
+    table: np.ndarray  # (e,) complex displacements of a base whose motion is the response (prescribed), m
+    frequency: np.ndarray  # (e,) angular frequencies of the harmonics, rad/s
+    omega: float  # the first of them, rad/s
     period: float  # s
     floor: np.ndarray  # (b, n) motion of the floor under each body
     J: np.ndarray  # (r, N)
@@ -68,8 +70,18 @@ class System(NamedTuple):
         """What belongs to the bodies."""
         return self._part(slice(self.modes, None))
 
+    @property
+    def order(self) -> np.ndarray:
+        """Multiples (e,) of omega that the harmonics are."""
+        return np.rint(self.frequency / self.omega).astype(int)
+
+    def phases(self, angle: np.ndarray) -> np.ndarray:
+        """Phasors (k, e) of the harmonics at angles omega t (k,)."""
+        phasors: np.ndarray = np.exp(1j * np.multiply.outer(angle, self.order))
+        return phasors
+
     def _part(self, at: slice) -> Part:
         return Part(
-            self.mass[at], self.stiffness[at], self.damping[at, at], self.load[at], self.weight[at], self.response[at],
-            self.J[:, at],
+            self.mass[at], self.stiffness[at], self.damping[at, at], self.load[:, at], self.weight[at],
+            self.response[at], self.J[:, at],
         )  # fmt: skip

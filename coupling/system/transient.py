@@ -37,12 +37,13 @@ class _Transient:
         system = assemble(scene)
         start, modes = initial_motion(scene, system), system.of_structure
         own, dashpot = np.sqrt(modes.stiffness), np.diag(modes.damping)
-        dynamic = modes.stiffness - system.omega**2 + 1j * system.omega * dashpot
+        rate = system.frequency[:, None]
+        dynamic = modes.stiffness - rate**2 + 1j * rate * dashpot
         self.excited, self.omega, self.damping = bool(modes.load.any()), system.omega, dashpot
         with np.errstate(divide="ignore", invalid="ignore"):
             self.steady = modes.response * modes.load / dynamic
             # displacement or velocity to make up for, and the initial state
-            self.begun = np.abs(self.steady) * np.maximum(1.0, system.omega / own)
+            self.begun = (np.abs(self.steady) * np.maximum(1.0, rate / own)).sum(axis=0)
             self.begun += np.abs(modes.response) * (np.abs(start.p) + np.abs(start.p_rate) / own)
             # the slower one of an overdamped mode's two
             self.rates = dashpot / 2 - np.sqrt(np.maximum(dashpot**2 / 4 - modes.stiffness, 0.0))
@@ -52,7 +53,8 @@ class _Transient:
             return 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
             decay = np.exp(-self.rates * 2 * np.pi / self.omega * periods)
-            share = np.nansum(self.begun * decay) / abs(np.nansum(self.steady))
+            # of several harmonics the root of the squares, as in the rms
+            share = np.nansum(self.begun * decay) / np.linalg.norm(np.nansum(self.steady, axis=1))
         return float(share) if np.isfinite(share) else np.inf
 
 

@@ -38,7 +38,7 @@ class Mode(NamedTuple):
 
 @dataclass(frozen=True)
 class Flow:
-    """The linear motion in one mode, on the extended state (q, r, q', r', e, 1, sin t, cos t) of size s.
+    """The linear motion in one mode, on the extended state (q, r, q', r', e, sines, cosines, 1) of size s.
 
     rate (s, s): z' = rate z. guards (g, s): rows that are positive as long as the mode lasts. level (g,): 0 for an
     opening, 1 for a velocity, 2 for a force per mass, 3 for a velocity beside stiff contacts. press (c, s): the closing
@@ -52,7 +52,7 @@ class Flow:
 
     @functools.cached_property
     def fastest(self) -> float:
-        """The largest natural frequency or rate of decay, or the excitation's frequency (which is 1)."""
+        """The largest natural frequency or rate of decay, or frequency in the excitation (the first is 1)."""
         return float(np.abs(np.linalg.eigvals(self.rate)).max())
 
     @functools.cached_property
@@ -67,7 +67,7 @@ class Flow:
     def relative(self) -> np.ndarray:
         """The derivatives for a state in which r counts from the start of a piece of motion: openings without reach."""
         rows = self.derivatives.copy()
-        rows[0, self.level == 0, -3] = 0.0
+        rows[0, self.level == 0, -1] = 0.0
         return rows
 
     def signs(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -161,22 +161,26 @@ class Modes:
     def _flow(self, mode: Mode) -> Flow:
         system = self.system
         n, b = len(system.M), len(system.m)
-        one, sine = system.size - 3, system.size - 2
+        harmonics, own = len(system.orders), 2 * (n + b) + len(system.spring)
+        one, sines, cosines = -1, slice(own, own + harmonics), slice(own + harmonics, -1)
         slide = -np.array(mode.floor) * system.friction
         # accelerations without the forces that hold contacts
         structure = np.zeros((n, system.size))
         structure[:, :n] = -system.inverse @ system.K
         structure[:, n + b : 2 * n + b] = -system.inverse @ system.C
         structure[:, one] = -system.inverse @ system.W @ slide
-        structure[:, sine] = system.inverse @ system.force
-        springs = slice(2 * (n + b), one)
+        forced = np.outer(system.inverse @ system.force, system.shares)
+        structure[:, sines], structure[:, cosines] = forced.real, forced.imag
+        springs = slice(2 * (n + b), own)
         structure[:, springs] = -system.inverse @ system.V.T @ np.diag(system.spring)
         push = self._push(mode)
         structure += system.inverse @ system.walls.T @ push
         bodies = -system.W.T @ structure
         bodies += np.diag(1 / system.m) @ system.G.T @ push
         bodies[:, one] += slide / system.m + system.weight
-        bodies[:, sine] -= system.base
+        shaken = np.outer(system.base, system.base_shares)
+        bodies[:, sines] -= shaken.real
+        bodies[:, cosines] -= shaken.imag
         stuck = [index for index, state in enumerate(mode.floor) if state == STUCK]
         moving = [c for c in sorted(mode.closed) if not self._holds(c, mode)]
         held = np.vstack([np.eye(b)[stuck].reshape(len(stuck), b), system.G[moving].reshape(len(moving), b)])
@@ -194,7 +198,7 @@ class Modes:
         for element, state in enumerate(mode.casing):
             if state == STUCK:
                 rate[2 * (n + b) + element, n + b : 2 * n + b] = system.V[element]
-        rate[sine, sine + 1], rate[sine + 1, sine] = 1.0, -1.0
+        rate[sines, cosines], rate[cosines, sines] = np.diag(system.orders), -np.diag(system.orders)
         guards = self._guards(mode, dict(zip(stuck, forces, strict=False)), forces[len(stuck) :])
         return Flow(rate, *guards, -system.G @ bodies)
 
@@ -210,7 +214,7 @@ class Modes:
         """(s,) opening of a contact on the extended state."""
         system, row = self.system, np.zeros(self.system.size)
         q, r, _, _ = system.split(row)
-        q[:], r[:], row[-3] = system.H[contact], system.G[contact], system.reach[contact]
+        q[:], r[:], row[-1] = system.H[contact], system.G[contact], system.reach[contact]
         return row
 
     def _pressing(self, contact: int) -> np.ndarray:
@@ -249,7 +253,7 @@ class Modes:
         for element, state in enumerate(mode.casing):
             at = 2 * (n + b) + element
             if state == STUCK:
-                rows += [system.limit[element] * eye[-3] + sign * eye[at] for sign in (1.0, -1.0)]
+                rows += [system.limit[element] * eye[-1] + sign * eye[at] for sign in (1.0, -1.0)]
             else:
                 rows.append(state * np.r_[np.zeros(n + b), system.V[element], np.zeros(system.size - 2 * n - b)])
         levels += [2] * (len(rows) - len(levels))
@@ -284,7 +288,7 @@ class Modes:
             for bodies, is_open, sign in ((chain[:count], left_open, -1.0), (chain[-count:], right_open, 1.0)):
                 if is_open:
                     row = sign * sum(hold[body] for body in bodies)
-                    row[system.size - 3] += system.friction[bodies].sum()
+                    row[-1] += system.friction[bodies].sum()
                     rows.append(row / system.m[bodies].sum())
         return rows
 

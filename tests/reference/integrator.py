@@ -6,7 +6,6 @@ short that samples bound what an event function can do between them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -61,7 +60,8 @@ class Reference:
     def x(self, time: np.ndarray | float) -> np.ndarray:
         """Displacement (m) of the structure at excitation.at, or of the table, at times (s) of any shape."""
         if not len(self.system.M):
-            return self.system.length * self.system.table * np.sin(np.asarray(time) * self.system.omega)
+            turn = np.asarray(time) * self.system.omega
+            return self.system.length * self.system.table * self.system.wave(self.system.shares, turn)
         return np.tensordot(self.system.output, self.states(time)[0], 1)
 
     def r(self, damper: int, time: np.ndarray | float) -> np.ndarray:
@@ -164,9 +164,10 @@ def _march(
         system.split(shift)[1][:] = system.split(y)[1]
     step /= flow.fastest
     openings = np.where(flow.level == 0, flow.guards @ z, 0.0)
-    matrix, one, sine = np.ascontiguousarray(flow.rate[:-3, :-3]), flow.rate[:-3, -3], flow.rate[:-3, -2]
+    k = len(y)
+    matrix, loads = np.ascontiguousarray(flow.rate[:k, :k]), np.ascontiguousarray(flow.rate[:k, k:])
     solver = DOP853(
-        lambda t, y: matrix @ y + (one + math.sin(t) * sine),
+        lambda t, y: matrix @ y + loads @ system.extended(t, y)[k:],
         start,
         y - shift,
         end,

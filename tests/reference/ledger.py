@@ -18,7 +18,8 @@ def ledger(result: Reference) -> dict[str, float]:
     y = result.solution(t)
     _, _, qd, rd = system.split(y)
     bodies = rd + system.W.T @ qd
-    load = (system.force @ qd - (system.m * system.base) @ bodies) * np.sin(t)
+    load = (system.force @ qd) * system.wave(system.shares, t)
+    load -= ((system.m * system.base) @ bodies) * system.wave(system.base_shares, t)
     terms = {
         "excitation": load,
         "viscous": np.einsum("nt,nm,mt->t", qd, system.C, qd),

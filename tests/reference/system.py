@@ -3,7 +3,10 @@
 Coordinates: q of the structure, r of the bodies relative to their cavities, e of elongations of Jenkins springs. Every
 contact and friction force is internal to r, so that with h the forces that the cavities exert on the bodies
 
-    M q'' = f sin t - C q' - K q - W h - V^T k e,        r'' = h / m + g - a sin t - W^T q''
+    M q'' = f s(t) - C q' - K q - W h - V^T k e,        r'' = h / m + g - a s(t) - W^T q''
+
+where s is sin t, or a sum of harmonics Im sum_k shares_k exp(i orders_k t); for a that of base_shares, which are shares
+orders^2 where a displacement is prescribed.
 
 Compliant walls may push on functionals of their own: M q'' has then (H - G W^T)^T lambda, and h has G^T lambda without
 reaction on W, where lambda = -stiffness (opening + delay * speed).
@@ -66,7 +69,7 @@ class System:
             raise NotImplementedError("Newton's law with walls and floor on different interface labels")
         else:
             self.H[:] = 0.0  # a touch is a touch to the last bit
-        self.size = 2 * (len(self.M) + len(self.m)) + len(self.spring) + 3
+        self.size = 2 * (len(self.M) + len(self.m)) + len(self.spring) + 2 * len(self.orders) + 1
 
     def _bodies(self, scene: Scene) -> None:
         unit = self.length * self.omega**2
@@ -110,6 +113,10 @@ class System:
         excitation, bodies = scene.excitation, len(self.m)
         unit = self.length * self.omega**2
         base = (excitation.base_acceleration or 0.0) / unit
+        given = {1: (1.0, 0.0)} | {part.order: (part.amplitude, part.phase) for part in excitation.harmonic}
+        self.orders = np.array(list(given), float)
+        sizes, phases = np.array(list(given.values())).T
+        self.shares = self.base_shares = sizes * np.exp(1j * np.radians(phases))
         if excitation.resonance_amplitude is not None:
             raise NotImplementedError("resonance_amplitude: give the force")
         self.table = 0.0
@@ -118,7 +125,7 @@ class System:
             self.table = scene.structure.displacement_amplitude / self.length
             M, C, K = np.zeros((3, 0, 0))
             self.output, load = np.zeros(0), np.zeros(0)
-            self.base = np.full(bodies, -self.table)
+            self.base, self.base_shares = np.full(bodies, -self.table), self.shares * self.orders**2
             row = lambda label: np.zeros(0)  # noqa: E731
         elif isinstance(scene.structure, Rigid):
             structure = scene.structure
@@ -189,9 +196,13 @@ class System:
         return (-self.stiffness * (opening + self.delay * (self.G @ rd + self.H @ qd).T)).T
 
     def extended(self, t: np.ndarray | float, y: np.ndarray) -> np.ndarray:
-        """The state of shape (..., ) with 1, sin t and cos t below it."""
-        t = np.asarray(t)
-        return np.concatenate([y, [np.ones_like(t), np.sin(t), np.cos(t)]])
+        """The state of shape (..., ) with sines, cosines and 1 below it."""
+        turn = np.multiply.outer(self.orders, np.asarray(t, float))
+        return np.concatenate([y, np.sin(turn), np.cos(turn), np.ones((1, *turn.shape[1:]))])
+
+    def wave(self, shares: np.ndarray, t: np.ndarray | float) -> np.ndarray:
+        """Im sum_k shares_k exp(i orders_k t) at times of any shape."""
+        return np.tensordot(shares, np.exp(1j * np.multiply.outer(self.orders, t)), 1).imag
 
     def split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Views of q, r, q', r' in a state."""

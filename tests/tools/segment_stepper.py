@@ -56,6 +56,7 @@ class Segment:
     constant: np.ndarray
     amplitude: np.ndarray
     eigenvalue: np.ndarray
+    harmonic: np.ndarray  # that drives each mode; 0 where none does
     load: np.ndarray
     motion: np.ndarray
     velocity_row: np.ndarray
@@ -68,11 +69,12 @@ class Segment:
         system, n = self.system, len(self.constant)
         z = self.eigenvalue[:, None] * tau
         # of driven modes: D(t) = t exp(i omega t) (1 + w), where 1 + w = (exp(d) - 1)/d
-        d = np.where(self.load[:, None] == 0.0, 0.0, z - z[0])
+        turn = z[self.harmonic]
+        d = np.where(self.load[:, None] == 0.0, 0.0, z - turn)
         w = np.divide(_exp_minus_line(d), d, out=np.zeros_like(d), where=d != 0.0)
-        drive = self.load[:, None] * self.amplitude[0] * tau
-        first = self.amplitude[:, None] * np.expm1(z) + drive * (1.0 + w) * np.exp(z[0])
-        line = self.amplitude[:, None] * _exp_minus_line(z) + drive * (w + (1.0 + w) * np.expm1(z[0]))
+        drive = (self.load * self.amplitude[self.harmonic])[:, None] * tau
+        first = self.amplitude[:, None] * np.expm1(z) + drive * (1.0 + w) * np.exp(turn)
+        line = self.amplitude[:, None] * _exp_minus_line(z) + drive * (w + (1.0 + w) * np.expm1(turn))
         now = self.amplitude[:, None] + first
         gap = np.repeat(self.displacement[:, None], len(tau), 1)
         speed = np.repeat(self.velocity[:, None], len(tau), 1)
@@ -86,8 +88,9 @@ class Segment:
         _ride(system, gap, speed)
         y = (self.shape @ now).real
         y[:n] += self.constant[:, None]
-        parts = (gap, speed, self._forces(now), y[:n], y[n:], speed[: system.bodies] + system.floor @ y[n:], now[0])
-        return Moment(*(part.T[0] if single else part.T for part in parts))
+        parts = (gap, speed, self._forces(now), y[:n], y[n:], speed[: system.bodies] + system.floor @ y[n:])
+        phases = now[: len(system.frequency)]
+        return Moment(*(part.T[0] if single else part.T for part in (*parts, phases)))
 
     @property
     def moves(self) -> np.ndarray:
@@ -108,16 +111,16 @@ class Segment:
 
     def kinematic(self) -> np.ndarray:
         """(r,) accelerations at the beginning as the motion has them (rows that move)."""
-        change = self.eigenvalue * self.amplitude + self.load * self.amplitude[0]
+        change = self.eigenvalue * self.amplitude + self.load * self.amplitude[self.harmonic]
         return self.drift + (self.velocity_row @ change).real
 
     def dynamic(self, moment: Moment) -> np.ndarray:
         """(r,) accelerations by Newton's second law under the forces of a moment."""
         system = self.system
         modes, bodies = system.of_structure, system.of_bodies
-        on_structure = (modes.load * moment.phase).real + moment.force @ modes.J
+        on_structure = (moment.phase @ modes.load).real + moment.force @ modes.J
         on_structure = on_structure - modes.stiffness * moment.p - modes.damping @ moment.p_rate
-        on_bodies = bodies.weight + (bodies.load * moment.phase).real + moment.force @ bodies.J
+        on_bodies = bodies.weight + (moment.phase @ bodies.load).real + moment.force @ bodies.J
         return modes.J @ on_structure + bodies.J @ (on_bodies / bodies.mass)
 
     def speed_size(self) -> float:
@@ -126,7 +129,7 @@ class Segment:
         modal = np.abs(self.shape[n:]) @ np.abs(self.amplitude)
         moving = np.abs(self.velocity).max()
         moving += np.abs(self.velocity_row).max(axis=0, initial=0.0) @ np.abs(self.amplitude)
-        return float(max(moving, modal.max(initial=0.0), np.abs(system.table) * system.omega))
+        return float(max(moving, modal.max(initial=0.0), np.abs(system.table) @ system.frequency))
 
     def force_size(self) -> np.ndarray:
         """(r,) amplitudes of the terms that the force of each row is a sum of."""
@@ -137,9 +140,9 @@ class Segment:
         system, n, force = self.system, len(self.constant), self.force_size()
         y = np.abs(self.shape) @ np.abs(self.amplitude)
         modes, bodies = system.of_structure, system.of_bodies
-        on_structure = np.abs(modes.load) + force @ np.abs(modes.J) + np.abs(modes.damping) @ y[n:]
+        on_structure = np.abs(modes.load).sum(axis=0) + force @ np.abs(modes.J) + np.abs(modes.damping) @ y[n:]
         on_structure = on_structure + modes.stiffness * (np.abs(self.constant) + y[:n])
-        on_bodies = np.abs(bodies.weight) + np.abs(bodies.load) + force @ np.abs(bodies.J)
+        on_bodies = np.abs(bodies.weight) + np.abs(bodies.load).sum(axis=0) + force @ np.abs(bodies.J)
         return np.abs(modes.J) @ on_structure + np.abs(bodies.J) @ (on_bodies / bodies.mass)
 
 
@@ -189,6 +192,7 @@ class Stepper:
             state=state.state.copy(), displacement=state.displacement.copy(), velocity=state.velocity.copy(),
             drift=state.drift.copy(), held=state.held.copy(), level=state.level.copy(),
             constant=state.constant.copy(), amplitude=state.amplitude[awake], eigenvalue=flows.eigenvalue[s, awake],
+            harmonic=np.clip(np.searchsorted(flows.driven[s], awake, "right") - 1, 0, len(flows.driven[s]) - 2),
             load=flows.load[s, awake],
             motion=flows.motion[s][:, awake], velocity_row=flows.velocity[s][:, awake],
             force=flows.force[s][:, awake], shape=flows.shape[s, : 2 * n][:, awake],

@@ -49,7 +49,7 @@ class _Decision:
         system = u.system
         self.p, self.d = [z[u.p], z[u.p_rate]], [z[u.d], z[u.s]]
         self.force: list[np.ndarray] = []
-        self.turn = np.exp(1j * system.omega * t)
+        self.turn = np.exp(1j * system.frequency * t)
         self.state, self.side = np.full(u.r, UNFORCED), np.full(u.r, -1)
         self.order, self.held = np.zeros(u.r, int), np.zeros(u.r)
         self.bound, self.moving = np.full(u.r, -1), np.zeros(u.r, bool)
@@ -133,10 +133,10 @@ class _Decision:
         """Forces and accelerations, k times derived. Returns False if the problem has no solution."""
         u, system = self.unforced, self.unforced.system
         known = self._known(k)
-        turn = (1j * system.omega) ** k * self.turn
+        turn = (1j * system.frequency) ** k * self.turn
         modes, loose = system.of_structure, system.of_bodies
-        structure = (modes.load * turn).real - modes.stiffness * self.p[k] - modes.damping @ self.p[k + 1]
-        bodies = u.by_mass @ (loose.load * turn).real + (u.by_mass @ loose.weight if k == 0 else 0.0)
+        structure = (turn @ modes.load).real - modes.stiffness * self.p[k] - modes.damping @ self.p[k + 1]
+        bodies = u.by_mass @ (turn @ loose.load).real + (u.by_mass @ loose.weight if k == 0 else 0.0)
         free = modes.J @ structure + bodies + system.delassus @ known
         scale = float(self._sizes(k, known).max(initial=0.0))
         members = np.flatnonzero(self.resting)
@@ -170,8 +170,8 @@ class _Decision:
         modes, loose = system.of_structure, system.of_bodies
         own = np.sqrt(modes.stiffness)
         rate = np.abs(self.p[k + 1]) + own * np.abs(self.p[k])
-        modal = own * rate + np.abs(modes.damping) @ rate + system.omega**k * np.abs(modes.load)
-        bodies = system.omega**k * np.abs(loose.load) + (np.abs(loose.weight) if k == 0 else 0.0)
+        modal = own * rate + np.abs(modes.damping) @ rate + system.frequency**k @ np.abs(modes.load)
+        bodies = system.frequency**k @ np.abs(loose.load) + (np.abs(loose.weight) if k == 0 else 0.0)
         return np.abs(modes.J) @ modal + np.abs(u.by_mass) @ bodies + np.abs(system.delassus) @ np.abs(known)
 
     def _solve(self, k: int, members: np.ndarray, free: np.ndarray, scale: float) -> bool:

@@ -16,7 +16,7 @@ _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, 
 class Recorder:
     """Records of a run by an integrator.
 
-    functionals: (k, size + 3) loads and velocities of structure and bodies, displacement and rate of the response, the
+    functionals: (k, extent) loads and velocities of structure and bodies, displacement and rate of the response, the
     bodies' momentum, on the extended state; states: of the rows.
     """
 
@@ -55,7 +55,7 @@ class Recorder:
         s, friction = extended[u.s], system.friction_rows
         slide = self.states[:friction] == SLIDE
         sprung = (self.states == SPRUNG)[friction:]
-        cosine, sine = extended[u.cosine], extended[u.sine]
+        cosine, sine = extended[u.cosine][0], extended[u.sine][0]
         rates = np.empty(self.count)
         rates[:_PUSH] = (
             loads @ speeds, speeds[: u.n] @ self.damping @ speeds[: u.n], -(force[:friction] * slide) @ s[:friction],
@@ -166,13 +166,16 @@ class Recorder:
 
 def _functionals(u: Unforced) -> np.ndarray:
     system, b = u.system, u.system.bodies
-    loads, speeds = np.zeros((2, u.n + b, u.size + 3))
-    loads[:, u.cosine], loads[:, u.sine] = system.load.real, -system.load.imag
+    loads, speeds = np.zeros((2, u.n + b, u.extent))
+    loads[:, u.cosine], loads[:, u.sine] = system.load.real.T, -system.load.imag.T
     speeds[: u.n, u.p_rate] = np.eye(u.n)
     speeds[u.n :, u.p_rate] = system.floor
     speeds[u.n :, u.s.start : u.s.start + b] = np.eye(b)
-    response = np.zeros((2, u.size + 3))
+    response = np.zeros((2, u.extent))
     response[0, u.p] = response[1, u.p_rate] = system.of_structure.response
     response[0, u.cosine], response[0, u.sine] = system.table.real, -system.table.imag
-    response[1, u.cosine], response[1, u.sine] = -system.omega * system.table.imag, -system.omega * system.table.real
+    response[1, u.cosine], response[1, u.sine] = (
+        -system.frequency * system.table.imag,
+        -system.frequency * system.table.real,
+    )
     return np.vstack([loads, speeds, response, system.of_bodies.mass @ speeds[u.n :]])

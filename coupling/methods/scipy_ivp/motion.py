@@ -3,7 +3,8 @@
 The state z = (p, d, p', s) holds the structure's modal coordinates, the displacements of all rows (slips, elongations
 of springs before sliders, gaps; system.constraints), and both their rates. That gaps are differences of slips is a
 linear invariant, which Runge-Kutta methods keep to round-off; and a closed gap, or a slip that sticks, is zero to the
-last bit. With 1, cos and sin of the excitation behind it, everything is a linear functional of the extended state.
+last bit. With 1, cos and sin of the excitation's harmonics behind it, everything is a linear functional of this
+extended state.
 """
 
 from __future__ import annotations
@@ -55,7 +56,9 @@ class Unforced:
         self.system, self.n, self.r, self.size = system, n, r, 2 * (n + r)
         self.p, self.d = slice(0, n), slice(n, n + r)
         self.p_rate, self.s = slice(n + r, 2 * n + r), slice(2 * n + r, 2 * (n + r))
-        self.one, self.cosine, self.sine = self.size, self.size + 1, self.size + 2
+        e = len(system.frequency)
+        self.extent, self.one = self.size + 1 + 2 * e, self.size
+        self.cosine, self.sine = slice(self.size + 1, self.size + 1 + e), slice(self.size + 1 + e, self.extent)
         self.soft = np.isfinite(system.spring)
         contacts = np.arange(r) >= system.friction_rows
         self.rigid_contact, self.soft_contact = contacts & ~self.soft, contacts & self.soft
@@ -64,37 +67,37 @@ class Unforced:
         self.limit = system.limit
         modes, bodies = system.of_structure, system.of_bodies
         self.by_mass = bodies.J / bodies.mass
-        self.structure = np.zeros((n, self.size + 3))
+        self.structure = np.zeros((n, self.extent))
         self.structure[:, self.p], self.structure[:, self.p_rate] = -np.diag(modes.stiffness), -modes.damping
-        self.structure[:, self.cosine], self.structure[:, self.sine] = modes.load.real, -modes.load.imag
+        self.structure[:, self.cosine], self.structure[:, self.sine] = modes.load.real.T, -modes.load.imag.T
         self.accelerations = modes.J @ self.structure
         self.accelerations[:, self.one] += self.by_mass @ bodies.weight
-        self.accelerations[:, self.cosine] += self.by_mass @ bodies.load.real
-        self.accelerations[:, self.sine] -= self.by_mass @ bodies.load.imag
+        self.accelerations[:, self.cosine] += self.by_mass @ bodies.load.real.T
+        self.accelerations[:, self.sine] -= self.by_mass @ bodies.load.imag.T
 
     def extended(self, t: float | np.ndarray, z: np.ndarray) -> np.ndarray:
         """The states (size, ...) at times t (...) with 1, cos and sin below them."""
-        phase = self.system.omega * np.asarray(t, float)
-        return np.concatenate([z, [np.ones_like(phase), np.cos(phase), np.sin(phase)]])
+        phase = np.multiply.outer(self.system.frequency, np.asarray(t, float))
+        return np.concatenate([z, np.ones((1, *phase.shape[1:])), np.cos(phase), np.sin(phase)])
 
     def rates(self, motion: Motion, extended: np.ndarray) -> np.ndarray:
         """The rates (size + 3,) of an extended state, or of its rates."""
-        omega = self.system.omega
-        turn = [0.0, -omega * extended[self.sine], omega * extended[self.cosine]]
-        return np.concatenate([motion.rate @ extended, turn])
+        frequency = self.system.frequency
+        turn = -frequency * extended[self.sine], frequency * extended[self.cosine]
+        return np.concatenate([motion.rate @ extended, [0.0], *turn])
 
 
 class Motion:
     """The linear system that the states of the rows name.
 
-    rate: (size, size + 3), z' on the extended state; force: (r, size + 3), of all rows.
+    rate: (size, extent), z' on the extended state; force: (r, extent), of all rows.
     """
 
     def __init__(self, unforced: Unforced, contacts: Contacts) -> None:
         u, system = unforced, unforced.system
         self.unforced, self.contacts = u, contacts
         state, mobility = contacts.state, system.delassus
-        self.force = np.zeros((u.r, u.size + 3))
+        self.force = np.zeros((u.r, u.extent))
         self.force[:, u.one] = contacts.held
         for r in np.flatnonzero(state == SPRUNG):
             self.force[r, u.d.start + r], self.force[r, u.s.start + r] = -system.spring[r], -system.dashpot[r]
@@ -104,7 +107,7 @@ class Motion:
             self.force[closed] -= np.linalg.solve(mobility[np.ix_(closed, closed)], free)
         accelerations = u.accelerations + mobility @ self.force
         accelerations[(state == REST) | (state == HELD)] = 0.0
-        self.rate = np.zeros((u.size, u.size + 3))
+        self.rate = np.zeros((u.size, u.extent))
         self.rate[u.p, u.p_rate] = np.eye(u.n)
         self.rate[u.d, u.s] = np.diag(~(u.slider & (state == SLIDE)))
         self.rate[u.p_rate] = u.structure + system.of_structure.J.T @ self.force
@@ -115,14 +118,14 @@ class Motion:
         found: list[tuple[np.ndarray, int, int, int]] = []
         for r in range(self.unforced.r):
             found += self._guards_of(r)
-        functionals = np.array([entry[0] for entry in found]).reshape(len(found), self.unforced.size + 3)
+        functionals = np.array([entry[0] for entry in found]).reshape(len(found), self.unforced.extent)
         row, kind, order = (np.array([entry[i] for entry in found], int) for i in (1, 2, 3))
         return Guards(functionals, row, kind, order)
 
     def _guards_of(self, r: int) -> list[tuple[np.ndarray, int, int, int]]:
         u, contacts = self.unforced, self.contacts
         state, order, side = contacts.state[r], int(contacts.order[r]), contacts.side[r]
-        place, speed = np.zeros((2, u.size + 3))
+        place, speed = np.zeros((2, u.extent))
         place[u.d.start + r] = speed[u.s.start + r] = 1.0
         contact = r >= u.system.friction_rows
         if state == SLIDE:
@@ -134,7 +137,7 @@ class Motion:
             return [(-place, r, OPENS, 0)] + ([] if order == NEVER else [(push, r, PUSHES, order)])
         if state == HELD:
             return []
-        bound = np.zeros(u.size + 3)
+        bound = np.zeros(u.extent)
         bound[u.one] = u.limit[r]
         found = [(bound + self.force[r], LOW)] + ([] if contact else [(bound - self.force[r], HIGH)])
         orders = [order if kind == side else 0 for _, kind in found]

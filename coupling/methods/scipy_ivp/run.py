@@ -192,7 +192,7 @@ class IvpRun:
 
     def rate(self, t: float, y: np.ndarray) -> np.ndarray:
         """Rates of the state and of the integrals."""
-        u, phase = self.unforced, self.system.omega * t
+        u, phase = self.unforced, self.system.frequency * t
         self._extended[: u.size] = y[: u.size]
         self._extended[u.cosine], self._extended[u.sine] = np.cos(phase), np.sin(phase)
         found = self._linear @ self._extended
@@ -228,7 +228,7 @@ class IvpRun:
         self.motion = Motion(u, contacts)
         self.guards = self.motion.guards()
         self._linear = np.vstack([self.motion.rate, self.motion.force, self.record.functionals])
-        self._extended = np.ones(u.size + 3)
+        self._extended = np.ones(u.extent)
         self.record.states = contacts.state
 
     def _arrive(self, row: int, kind: int, z: np.ndarray) -> None:
@@ -274,5 +274,5 @@ def _reach(u: Unforced) -> float:
     lengths = [*gaps, *(u.limit[u.slider] / system.spring[u.slider])]
     lengths = [length for length in lengths if length > 0]
     modes = system.of_structure
-    static = np.abs(modes.J) @ (np.abs(modes.load) / modes.stiffness)
+    static = np.abs(modes.J) @ (np.abs(modes.load).sum(axis=0) / modes.stiffness)
     return float(min(lengths, default=static.max(initial=1e-12)))

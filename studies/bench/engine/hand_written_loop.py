@@ -46,7 +46,7 @@ class ImpactOscillator(NamedTuple):
         """The oscillator of a scene with a rigid structure and one body without friction and gravity."""
         structure, (damper,), (cavity,) = scene.structure, scene.damper, scene.cavity
         along = scene.gravity.acceleration * scene.gravity.orientation_deg
-        assert isinstance(structure, Rigid) and damper.friction == 0 and along == 0
+        assert isinstance(structure, Rigid) and damper.friction == 0 and along == 0 and not scene.excitation.harmonic
         return cls(
             structure.mass, structure.viscous, structure.stiffness, excitation_force(scene),
             2 * math.pi * scene.excitation.frequency, damper.mass, cavity.gap, damper.restitution,

@@ -68,7 +68,8 @@ def explicit_run(
     start, peak = np.array([scene.damper[0].position, scene.damper[0].velocity]), np.zeros(periods)
     contact = np.array([half, system.spring[-1], system.dashpot[-1], scene.damper[0].mass])
     arrays = (stiffness.indptr, stiffness.indices, stiffness.data, mass, *_sparse(response), *_sparse(wall))
-    phase = load * np.sin(2 * np.pi * np.arange(steps) / steps)
+    angle = 2 * np.pi * np.arange(steps) / steps
+    phase = load * sum((share * np.exp(1j * order * angle)).imag for order, share in scene.excitation.shares.items())
     impacts = np.zeros(periods, np.int64)
     _march(*arrays, phase, h, damping, contact, start, np.zeros(0), impacts)  # compiles
     started = time.thread_time()

@@ -112,10 +112,10 @@ def _model(world: Any, equations: Coupled, turn: np.ndarray, units: _Units) -> t
     ground = world.AddMarker(MarkerNodeCoordinate(nodeNumber=world.AddNode(NodePointGround()), coordinate=0))
     markers = [world.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=i)) for i in range(size)]
     kept = []
-    for marker, load in zip(markers, turn.T @ system.load / units.force, strict=True):
-        if load:
+    for marker, load in zip(markers, turn.T @ system.load.T / units.force, strict=True):
+        if load.any():
             item = world.AddLoad(LoadCoordinate(markerNumber=marker, load=0.0))
-            kept.append(CreateSymbolicUserFunction(world, _load(load), "loadUserFunction", item))
+            kept.append(CreateSymbolicUserFunction(world, _load(load, system.order), "loadUserFunction", item))
             world.SetLoadParameter(item, "loadUserFunction", kept[-1])
     for r, row in enumerate(system.J @ turn):
         ends = [next((markers[i] for i in range(size) if sign * row[i] > 0.5), ground) for sign in (-1, 1)]
@@ -126,14 +126,15 @@ def _model(world: Any, equations: Coupled, turn: np.ndarray, units: _Units) -> t
     return node, kept
 
 
-def _load(load: complex) -> Any:
-    """A harmonic load, as source that Exudyn turns into an expression of its own."""
+def _load(load: np.ndarray, order: np.ndarray) -> Any:
+    """A sum of harmonic loads (e,), as source that Exudyn turns into an expression of its own."""
     import exudyn
 
     names: dict[str, Any] = {"exudyn": exudyn}
-    angle = f"{2 * np.pi!r} * t"
-    text = (
-        f"{float(load.real)!r} * exudyn.symbolic.cos({angle}) - ({float(load.imag)!r}) * exudyn.symbolic.sin({angle})"
+    text = " + ".join(
+        f"({float(part.real)!r}) * exudyn.symbolic.cos({2 * np.pi * k!r} * t)"
+        f" - ({float(part.imag)!r}) * exudyn.symbolic.sin({2 * np.pi * k!r} * t)"
+        for part, k in zip(load, order.tolist(), strict=True)
     )
     exec(f"def load(mbs, t, load):\n    return {text}", names)
     return names["load"]

@@ -28,8 +28,8 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     equations = coupled(scene, steps)
     simulation, structure, kept = _model(equations, periods)
     system, h = equations.system, equations.times.step
-    angle = system.omega * h * (np.arange(steps) + 0.5)
-    loads = np.outer(np.cos(angle), system.load.real) - np.outer(np.sin(angle), system.load.imag) + system.weight
+    phases = system.phases(system.omega * h * (np.arange(steps) + 0.5))
+    loads = (phases @ system.load).real + system.weight
     # views of its own memory, taken once: each call would leave one behind
     force, place = structure.fExt(), structure.q()
     q = np.zeros((periods * steps + 1, len(system.mass)))

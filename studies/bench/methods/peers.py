@@ -103,8 +103,7 @@ def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> 
     """Return the result of a run of equal steps. q: (periods * steps + 1, N) coordinates at the steps."""
     system, times, steps = equations.system, equations.times, len(equations.times.phase) - 1
     periods = (len(q) - 1) // steps
-    phase = np.tile(times.phase[:-1], (periods, 1))
-    x = q[:-1] @ system.response + system.table.real * phase[:, 0] - system.table.imag * phase[:, 1]
+    x = q[:-1] @ system.response + np.tile(times.table[:-1, 0], periods)
     every = np.arange(0, periods * steps, steps // samples) if samples else np.zeros(0, int)
     slips = q[every] @ system.J[: system.bodies].T
     gaps = system.J @ q.T + system.rest[:, None]
