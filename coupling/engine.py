@@ -1,7 +1,4 @@
-"""The exact engine: a scene in, a response out. Event-driven, closed-form between events, no time step.
-
-What a scene leaves open is chosen here (model_order.selection); the run itself is that of methods.registry.
-"""
+"""A scene in, a response out: resolve `modes = "auto"`, then run the scene with its method (methods.registry)."""
 
 from __future__ import annotations
 
