@@ -22,7 +22,7 @@ from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.recorder import cubic_peak, record_section
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.scene.contact_laws import damping_ratio
+from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.sweep.sweep import sweep

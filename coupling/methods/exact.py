@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.response.evaluation import Run
-from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.solver_options import SolverOptions
-from vanedamp.coupling.system.assembly import InitialMotion
-from vanedamp.coupling.system.system import System
+
+if TYPE_CHECKING:  # a scene takes the options without the engine
+    from vanedamp.coupling.response.evaluation import Run
+    from vanedamp.coupling.response.records import Records
+    from vanedamp.coupling.system.assembly import InitialMotion
+    from vanedamp.coupling.system.system import System
 
 VARIANTS = (Variant("exact engine", "#1d4f91", "*", setting=None),)
 RESTARTS = True
