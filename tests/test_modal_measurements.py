@@ -104,7 +104,7 @@ def polar(folder, header, degrees, scale=1.0):
     frequencies = np.linspace(100.0, 200.0, 201)
     values = scale / (150.0**2 - frequencies**2 + 3j * frequencies)
     angle = np.angle(values, deg=degrees)
-    rows = "".join(f"{f!r},{abs(h)!r},{a!r}\n" for f, h, a in zip(frequencies, values, angle, strict=True))
+    rows = "".join(f"{float(f)!r},{float(abs(h))!r},{float(a)!r}\n" for f, h, a in zip(frequencies, values, angle, strict=True))
     (folder / "polar.csv").write_text(header + rows)
     return values
 
