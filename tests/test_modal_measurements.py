@@ -104,7 +104,8 @@ def polar(folder, header, degrees, scale=1.0):
     frequencies = np.linspace(100.0, 200.0, 201)
     values = scale / (150.0**2 - frequencies**2 + 3j * frequencies)
     angle = np.angle(values, deg=degrees)
-    rows = "".join(f"{float(f)!r},{float(abs(h))!r},{float(a)!r}\n" for f, h, a in zip(frequencies, values, angle, strict=True))
+    columns = np.column_stack([frequencies, np.abs(values), angle]).tolist()
+    rows = "".join(f"{f!r},{size!r},{turn!r}\n" for f, size, turn in columns)
     (folder / "polar.csv").write_text(header + rows)
     return values
 
