@@ -211,12 +211,8 @@ def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> fl
 
 def _glued(scene: Scene, model: ReducedModel) -> ReducedModel:
     """The model with every body glued to its cavity's floor."""
-    floors = {cavity.name: cavity.labels()[2] for cavity in scene.cavity}
-    mass = np.array(model.mass)
-    for damper in scene.damper:
-        row = model.row(str(floors[damper.cavity]))
-        mass += damper.mass * np.outer(row, row)
-    return replace(model, mass=mass)
+    floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
+    return model.with_masses((floors[damper.cavity], damper.mass) for damper in scene.damper)
 
 
 def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.ndarray) -> float:

@@ -199,9 +199,9 @@ def events_of(system: System, chunks: Sequence[np.ndarray]) -> list[Event]:
     events = []
     entries = np.concatenate(chunks) if chunks else np.zeros((0, 6))
     _complete(system, entries)
+    places = [_place(system, row) for row in range(len(system.J))] if len(entries) else []
     for entry in entries:
-        row = int(entry[2])
-        body, side = _place(system, row)
+        body, side = places[int(entry[2])]
         # speeds of the gap, turned into speeds of the body relative to what it meets
         sign = -1.0 if side in ("right", "body") else 1.0
         before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
