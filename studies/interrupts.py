@@ -37,10 +37,32 @@ def swallowed_interrupts_again() -> Iterator[None]:
 
 @contextmanager
 def uninterrupted_children() -> Iterator[None]:
-    """Processes that are started meanwhile never see an interrupt: they inherit that it is blocked.
+    """Processes that are started meanwhile never see an interrupt, and their start is never cut in two.
 
-    To have them ignore it is too late, and shows a traceback, for an interrupt while they load.
+    They inherit that it is blocked. To have them ignore it is too late, and shows a traceback, for an interrupt while
+    they load. The parent sees it at the end: blocked here, it may still come by way of another thread, and a process
+    whose parent stops in the middle of its start shows a traceback as well.
     """
+    handler = signal.getsignal(signal.SIGINT)
+    main = threading.current_thread() is threading.main_thread()
+    if not main or not callable(handler):
+        with _blocked():
+            yield
+        return
+    late = list[tuple[Any, ...]]()
+    with _blocked():
+        signal.signal(signal.SIGINT, lambda *arguments: late.append(arguments))
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, handler)
+    if late:
+        handler(*late[-1])
+
+
+@contextmanager
+def _blocked() -> Iterator[None]:
+    """Block interrupts in this thread and the processes that it starts."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

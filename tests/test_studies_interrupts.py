@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import pytest
 
 from tests.tools.input_files import SCENE, changed
 from tests.tools.processes import environment
-from vanedamp.studies.interrupts import swallowed_interrupts_again
+from vanedamp.studies.interrupts import swallowed_interrupts_again, uninterrupted_children
 
 # hours of work
 LONG = changed(SCENE, ("periods = 30", "periods = 2000"), ("num = 4", "num = 100_000"))
@@ -129,3 +130,19 @@ def test_interrupts_that_a_callback_swallows_come_again():
     with swallowed_interrupts_again():
         assert sys.unraisablehook is not before
     assert sys.unraisablehook is before
+
+
+def test_interrupts_wait_while_processes_start_whichever_thread_gets_them():
+    end, whole = threading.Event(), False
+    other = threading.Thread(target=end.wait)
+    other.start()  # does not block interrupts, so the system gives it those of the process
+    try:
+        with pytest.raises(KeyboardInterrupt), uninterrupted_children():
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.05)
+            whole = True
+    finally:
+        end.set()
+        other.join()
+    assert whole
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
