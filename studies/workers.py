@@ -52,7 +52,8 @@ class WorkerPool(Executor):
     def _new(self) -> ProcessPoolExecutor:
         # fresh processes: a fork of one that holds MPI or threads is not safe
         context = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(self._max_workers, mp_context=context, initializer=_end_with_parent)
+        with uninterrupted_children():  # a semaphore that was made and not noted yet is warned of at the end
+            return ProcessPoolExecutor(self._max_workers, mp_context=context, initializer=_end_with_parent)
 
 
 def _end_with_parent() -> None:
