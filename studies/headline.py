@@ -95,7 +95,9 @@ class Headline:
             return f"no damped peak: {self.points_left_out} of {self.points} points are not ok"
         at = f"{axis} = {format_value(self.damped_peak_at)}{unit}"
         if not math.isfinite(self.peak_ratio):
-            text = f"damped peak (mean) {self.damped_peak:.4g} m, at {at}; the undamped one has no bound"
+            unbounded = self.undamped_peak == math.inf
+            compared = "the undamped one has no bound" if unbounded else "there is no undamped one to compare with"
+            text = f"damped peak (mean) {self.damped_peak:.4g} m, at {at}; {compared}"
         elif self.undamped_at_edge or axis != FREQUENCY:
             text = (
                 f"highest damped mean {self.peak_ratio:.3f} of the highest undamped amplitude {self.undamped_peak:.4g} "

@@ -23,7 +23,7 @@ from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.jit import entry, kernel
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.assembly import InitialMotion, Loads
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Whole
 
@@ -31,6 +31,7 @@ VARIANTS = (
     Variant("co-simulation, Jacobi, hold 0", "#7e22ce", "v", {"exchange": "jacobi", "hold": 0}),
     Variant("co-simulation, Gauss-Seidel, hold 1", "#be185d", "<", {"exchange": "gauss_seidel", "hold": 1}),
 )
+WAVEFORMS = True
 
 
 class Options(PenaltyOptions):
@@ -51,12 +52,14 @@ class Options(PenaltyOptions):
         return self.steps_per_period * self.substeps
 
 
-def begin(system: System, options: Options, initial: InitialMotion, records: Records, events: bool) -> Run:
+def begin(
+    system: System, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
+) -> Run:
     """Return a run. Raises InputError for a rigid contact of restitution 0."""
-    times = time_grid(system, options.steps_per_period)
+    times = time_grid(system, options.steps_per_period, loads)
     soft, slow = with_penalty(system, times, options)
     gauss_seidel, hold, substeps = options.exchange == "gauss_seidel", options.hold, options.substeps
-    matrices = cosimulation_matrices(soft, times, substeps)
+    matrices = cosimulation_matrices(soft, times, substeps, loads)
     memory = np.zeros((3, 4 * soft.modes + len(soft.J)))
     budget, deepest = options.max_events, options.penetration
 
@@ -69,11 +72,14 @@ def begin(system: System, options: Options, initial: InitialMotion, records: Rec
     return SteppedRun(soft, march, initial, records, events)
 
 
-def cosimulation_matrices(system: System, times: TimeGrid, substeps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def cosimulation_matrices(
+    system: System, times: TimeGrid, substeps: int, loads: Loads | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, and (steps, 2n) what the
     excitation adds at each step of a period; loads (steps * substeps + 1, N) of the excitation on the bodies' grid.
+    Loads that are no harmonics (`loads`) are linear over a macro-step.
     """
-    n, e, steps = system.modes, len(system.frequency), len(times.phase) - 1
+    n, e, steps = system.modes, 0 if loads else len(system.frequency), len(times.phase) - 1
     rate = np.zeros((4 * n + 2 * e, 4 * n + 2 * e))
     rate[:n, n : 2 * n] = np.eye(n)
     rate[n : 2 * n, :n] = -np.diag(system.stiffness[:n])
@@ -81,15 +87,19 @@ def cosimulation_matrices(system: System, times: TimeGrid, substeps: int) -> tup
     rate[n : 2 * n, 2 * n : 3 * n] = np.eye(n)
     rate[2 * n : 3 * n, 3 * n : 4 * n] = np.eye(n)
     # cos and sin of each harmonic
-    load = system.of_structure.load.T
+    load, frequency = system.of_structure.load[:e].T, np.diag(system.frequency[:e])
     rate[n : 2 * n, 4 * n : 4 * n + e], rate[n : 2 * n, 4 * n + e :] = load.real, -load.imag
-    rate[4 * n : 4 * n + e, 4 * n + e :] = -np.diag(system.frequency)
-    rate[4 * n + e :, 4 * n : 4 * n + e] = np.diag(system.frequency)
+    rate[4 * n : 4 * n + e, 4 * n + e :] = -frequency
+    rate[4 * n + e :, 4 * n : 4 * n + e] = frequency
     exact = expm(rate * times.step)[: 2 * n]
-    phases = system.phases(2 * np.pi * np.arange(steps) / steps)
-    excited = np.hstack([phases.real, phases.imag]) @ exact[:, 4 * n :].T
-    loads = time_grid(system, steps * substeps).load
-    return np.ascontiguousarray(exact[:, : 4 * n]), np.ascontiguousarray(excited), loads
+    if loads:
+        held = times.load[:, :n]
+        excited = np.hstack([held[:-1], np.diff(held, axis=0) / times.step]) @ exact[:, 2 * n :].T
+    else:
+        phases = system.phases(2 * np.pi * np.arange(steps) / steps)
+        excited = np.hstack([phases.real, phases.imag]) @ exact[:, 4 * n :].T
+    fine = time_grid(system, steps * substeps, loads).load
+    return np.ascontiguousarray(exact[:, : 4 * n]), np.ascontiguousarray(excited), fine
 
 
 @entry

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.assembly import InitialMotion, Loads
 from vanedamp.coupling.system.system import System
 
 # counters of a run
@@ -45,15 +45,16 @@ class Motion(NamedTuple):
     listed: np.ndarray  # (r,) int, scratch space
 
 
-def time_grid(system: System, steps: int) -> TimeGrid:
-    """The grid of `steps` steps a period."""
+def time_grid(system: System, steps: int, loads: Loads | None = None) -> TimeGrid:
+    """The grid of `steps` steps a period. loads: of an excitation that is no sum of the system's harmonics."""
     angle = 2 * np.pi * np.arange(steps + 1) / steps
     phases = system.phases(angle)
     table = np.column_stack([system.table, 1j * system.frequency * system.table])
     travel = np.where(np.isinf(system.spring), system.free_travel, np.inf)
+    load = (phases @ system.load).real if loads is None else loads(angle[:-1])[[*range(steps), 0]]
     return TimeGrid(
         step=system.period / steps, phase=np.column_stack([np.cos(angle), np.sin(angle)]),
-        load=np.ascontiguousarray((phases @ system.load).real), table=np.ascontiguousarray((phases @ table).real),
+        load=np.ascontiguousarray(load), table=np.ascontiguousarray((phases @ table).real),
         travel=travel,
     )  # fmt: skip
 

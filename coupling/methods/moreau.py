@@ -33,12 +33,13 @@ from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.solver_options import SteppingOptions
-from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.assembly import InitialMotion, Loads
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Real
 
 VARIANTS = (Variant("Moreau-Jean", "#c2410c", "o"),)
+WAVEFORMS = True
 
 #: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
 _TURNS, _ROUND_OFF = 20, 1e-12
@@ -51,9 +52,15 @@ class Options(SteppingOptions):
     theta: Annotated[Real, Field(ge=0.5, le=1)] = 0.5
 
 
-def begin(system: System, options: Options, initial: InitialMotion, records: Records, events: bool) -> Run:
+def begin(
+    system: System, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
+) -> Run:
     """Return a run."""
-    times, theta, problem = time_grid(system, options.steps_per_period), options.theta, new_problem(len(system.J))
+    times, theta, problem = (
+        time_grid(system, options.steps_per_period, loads),
+        options.theta,
+        new_problem(len(system.J)),
+    )
     matrices = moreau_matrices(system, times, theta)
     budget, deepest = options.max_events, options.penetration
 

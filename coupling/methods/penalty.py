@@ -16,7 +16,7 @@ from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.system.assembly import InitialMotion, Loads
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Real
 
@@ -25,6 +25,7 @@ VARIANTS = (
     Variant("penalty, Newmark", "#65a30d", "D", {"scheme": "newmark"}),
     Variant("penalty, HHT", "#0e7490", "^", {"scheme": "hht"}),
 )
+WAVEFORMS = True
 
 
 class Options(PenaltyOptions):
@@ -41,9 +42,11 @@ class Options(PenaltyOptions):
         return self
 
 
-def begin(system: System, options: Options, initial: InitialMotion, records: Records, events: bool) -> Run:
+def begin(
+    system: System, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
+) -> Run:
     """Return a run. Raises InputError for a rigid contact of restitution 0."""
-    times = time_grid(system, options.steps_per_period)
+    times = time_grid(system, options.steps_per_period, loads)
     soft, slow = with_penalty(system, times, options)
     budget, deepest = options.max_events, options.penetration
     if options.scheme == "central_difference":

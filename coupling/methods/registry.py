@@ -16,7 +16,7 @@ from vanedamp.coupling.response.restart import given, taken
 from vanedamp.coupling.response.restart_state import Handover
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
-from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
+from vanedamp.coupling.system.assembly import assemble, initial_motion, loads_of, physical_scale
 from vanedamp.files.toml_input import InputError
 
 
@@ -42,6 +42,7 @@ def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: 
     `scene` has no open choices. Raises InputError for a scene that the model does not allow.
     """
     started = time.perf_counter()
+    check_waveform(scene, "exact")
     system = assemble(scene)
     system = system._replace(response=np.r_[functional, np.zeros(system.bodies)])
     records = new_records(system, scene.time.simulated, samples_per_period)
@@ -59,19 +60,30 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     if start is not None and (reason := why_no_restart(scene)):
         raise InputError(f"continuation: {reason}")
     scene.solver.check_samples(samples_per_period)
+    check_waveform(scene, scene.solver.method)
     system = assemble(scene)
     initial = initial_motion(scene, system) if start is None else given(system, physical_scale(scene, system), start)
     records = new_records(system, scene.time.simulated, samples_per_period)
-    return method.begin(system, scene.solver, initial, records, events)
+    signal = scene.excitation.signal
+    further = {} if signal is None else {"loads": loads_of(scene, signal)}
+    return method.begin(system, scene.solver, initial, records, events, **further)
 
 
 def why_no_restart(scene: Scene) -> str | None:
     """Why runs of the scene's method cannot begin with the state of another; None if they can."""
-    if _restarts(METHODS.part(scene.solver.method)):
+    return _why_not(scene.solver.method, "RESTARTS")
+
+
+def check_waveform(scene: Scene, method: str) -> None:
+    """Raise InputError for an excitation that a method does not take, since it is no sum of sines."""
+    signal = scene.excitation.signal
+    if signal is not None and (reason := _why_not(method, "WAVEFORMS")):
+        raise InputError(f'excitation.waveform: shape "{signal.shape}" is no sum of sines and {reason}')
+
+
+def _why_not(method: str, ability: str) -> str | None:
+    """Why a method does not take what methods with an ability (RESTARTS, WAVEFORMS) take; None if it has it."""
+    if getattr(METHODS.part(method), ability, False):
         return None
-    able = [name for name, method in METHODS.all().items() if _restarts(method)]
-    return f"is for solver.method {' or '.join(able)}, not {scene.solver.method}"
-
-
-def _restarts(method: Method) -> bool:
-    return getattr(method, "RESTARTS", False)
+    able = [name for name, part in METHODS.all().items() if getattr(part, ability, False)]
+    return f"is for solver.method {' or '.join(able)}, not {method}"

@@ -75,7 +75,7 @@ def settle_all(scenes: Sequence[Scene]) -> list[Settled]:
 def choices_of(scenes: Iterable[Scene]) -> Choices:
     """The number of modes that suits all scenes with one model and tolerance, for each of these.
 
-    Raises InputError for a scene with stops, whose impacts the estimate does not know.
+    Raises InputError for a scene with stops, whose impacts the estimate does not know, or with a waveform.
     """
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
@@ -83,6 +83,11 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
             if scene.stop:
                 raise InputError(
                     'structure.modes: "auto" weighs collisions of bodies, not those of stops; give a number of modes'
+                )
+            if scene.excitation.signal is not None:
+                raise InputError(
+                    'structure.modes: "auto" weighs errors at the frequencies of sines, and a waveform has no highest '
+                    "one; give a number of modes"
                 )
             groups.setdefault(_group(scene), []).append(scene)
     return {key: _choice(members) for key, members in groups.items()}

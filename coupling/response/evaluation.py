@@ -158,7 +158,7 @@ def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> f
 
 def _exchanged(system: System, records: Records) -> float:
     """Energy that comes and goes within a period, J: in collisions, and what the loads lend to each mode and body."""
-    rate = system.frequency[:, None]
+    rate = np.maximum(system.frequency, system.omega)[:, None]  # the mean of a waveform counts as a slow load
     modes = np.abs(system.of_structure.load) ** 2 / np.maximum(system.of_structure.stiffness, rate**2)
     bodies = np.abs(system.of_bodies.load) ** 2 / (system.of_bodies.mass * rate**2)
     return float(max(records.collided.max(), (modes.sum() + bodies.sum()) / 2))

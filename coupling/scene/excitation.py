@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.scene.waveform import AnyWaveform, Waveform
 from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, Real, Whole
 
 
@@ -40,6 +41,7 @@ class Excitation:
     `at` is the interface label of force and response on a reduced model; the base moves in its direction.
     harmonic: sines whose sum excites, at multiples of the frequency; that of order 1 has amplitude 1 and phase 0 unless
     it is among them. resonance_amplitude speaks of a sine of order 1 and amplitude 1.
+    waveform: another signal over the period in place of the sines, by a class of other code (scene.waveform).
     """
 
     frequency: Positive
@@ -49,6 +51,7 @@ class Excitation:
     resonance_near: Positive | tuple[Positive, Positive] | None = None
     at: str | None = None
     harmonic: tuple[Harmonic, ...] = ()
+    waveform: AnyWaveform | None = None
 
     def __post_init__(self) -> None:
         given = [self.force, self.base_acceleration, self.resonance_amplitude]
@@ -61,6 +64,8 @@ class Excitation:
         for index, order in enumerate(orders):
             if order in orders[:index]:
                 raise ValueError(f"harmonic[{index}].order: {order} is given twice; orders must differ")
+        if self.waveform is not None and self.harmonic:
+            raise ValueError("give one of harmonic and waveform")
 
     @property
     def resonance_range(self) -> tuple[float, float]:
@@ -70,9 +75,19 @@ class Excitation:
 
     @property
     def shares(self) -> dict[int, complex]:
-        """Complex amplitudes of the sines by their orders, rising from 1: order 1 is there even if it has none."""
+        """Complex amplitudes of the sines by their orders, 1 first: it is there even if it has none.
+
+        Of a `signal` those of its Fourier series, which drive no run (Waveform.harmonics).
+        """
+        if self.waveform is not None:
+            return self.waveform.harmonics()
         given = {1: 1.0 + 0.0j} | {harmonic.order: harmonic.share for harmonic in self.harmonic}
         return {order: given[order] for order in sorted(given) if order == 1 or given[order]}
+
+    @property
+    def signal(self) -> Waveform | None:
+        """The waveform that is no finite sum of sines, known by its values only; None for a sum."""
+        return self.waveform if self.waveform is not None and self.waveform.shares is None else None
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -196,6 +196,8 @@ class Scene:
                 raise ValueError(
                     "excitation: a prescribed motion takes only frequency and harmonics; structure sets the amplitude"
                 )
+            if excitation.signal is not None:
+                raise ValueError("excitation.waveform: a prescribed motion takes a sum of sines; give harmonics")
             for name in ("friction_damper", "stop"):
                 if getattr(self, name):
                     raise ValueError(f"{name}: a prescribed motion feels no force; remove it")

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.methods.registry import why_no_restart
+from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
 from vanedamp.coupling.model_order.selection import Choices, choices_of, is_open, settled, warnings_of
 from vanedamp.coupling.scene.paths import assign, axis_values
 from vanedamp.coupling.scene.scene import Scene
@@ -167,6 +167,7 @@ def _check_method(scene: Scene) -> None:
     direction = scene.continuation.direction
     if direction != "independent" and (reason := why_no_restart(scene)):
         raise InputError(f'continuation.direction: "{direction}" {reason}; take "independent"')
+    check_waveform(scene, scene.solver.method)
 
 
 def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:

@@ -93,7 +93,7 @@ def _result(grid: Grid, finished: Finished, provenance: dict[str, Any]) -> Sweep
 
 
 def _peaks(grid: Grid) -> dict[str, np.ndarray]:
-    """Tops of the linear curves over the swept frequencies; nan at a combination of the other axes that is no scene."""
+    """Tops of the linear curves over the swept frequencies; nan at a combination of the other axes that has none."""
     others = {path: values for path, values in grid.axes.items() if path != FREQUENCY}
     if len(set(grid.axes.get(FREQUENCY, ()))) < 2:
         return {}
@@ -103,7 +103,7 @@ def _peaks(grid: Grid) -> dict[str, np.ndarray]:
         try:
             scene = points.scene({**dict(zip(others, values, strict=True)), FREQUENCY: low})
             found.append(tops(*(response.peak(low, high) for response in linear_responses(scene))))
-        except InputError:  # told as the status of its points
+        except InputError:  # the points' status, or a waveform
             found.append(dict.fromkeys(PEAKS, np.nan))
     shape = tuple(len(values) for values in others.values())
     return {name: frozen(np.reshape([item[name] for item in found], shape)) for name in PEAKS}

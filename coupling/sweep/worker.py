@@ -137,7 +137,9 @@ def _shares(response: Response) -> np.ndarray:
 
 
 def _linear(scene: Scene) -> list[float]:
-    """Amplitude of the response without bodies, and with every body glued to its cavity's floor, m."""
+    """Amplitude of the response without bodies, and with every body glued to its cavity's floor, m; nan if unknown."""
+    if scene.excitation.signal is not None:
+        return [np.nan, np.nan]
     frequency = np.array([scene.excitation.frequency])
     return [float(response.amplitude(frequency)[0]) for response in linear_responses(scene)]
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid
+from vanedamp.coupling.scene.waveform import Waveform
 from vanedamp.coupling.system.cavities import check_directions
 from vanedamp.coupling.system.constraints import constraints_of
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
@@ -15,6 +18,9 @@ from vanedamp.coupling.system.resonance import force_amplitude
 from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
+
+#: loads (k, N) on the coordinates of a system, N, at angles omega t (k,) in [0, 2 pi)
+Loads = Callable[[np.ndarray], np.ndarray]
 
 
 class InitialMotion(NamedTuple):
@@ -71,6 +77,13 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         restitution_at=law_address(scene.contact, made.restitution[made.friction_rows :]), free_travel=travel,
         left_body=made.left_body, right_body=made.right_body, moves_with_floor=made.moves_with_floor,
     )  # fmt: skip
+
+
+def loads_of(scene: Scene, signal: Waveform) -> Loads:
+    """Return the loads of the scene's excitation with a signal in place of its sine."""
+    sine = assemble(replace(scene, excitation=replace(scene.excitation, waveform=None)))
+    level = -sine.load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
+    return lambda angle: np.outer(signal.sampled(angle), level)
 
 
 def initial_motion(scene: Scene, system: System) -> InitialMotion:

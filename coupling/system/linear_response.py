@@ -14,6 +14,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.resonance import receptance_of
 from vanedamp.coupling.system.system import System
+from vanedamp.files.toml_input import InputError
 
 #: frequencies over a range, and around each resonance in half-power widths: between two of them no maximum hides
 _EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
@@ -112,7 +113,13 @@ def _peak(waves: np.ndarray, order: np.ndarray) -> np.ndarray:
 
 
 def linear_responses(scene: Scene) -> tuple[LinearResponse, LinearResponse]:
-    """Without bodies, and with every body glued to its cavity's floor. Raises InputError."""
+    """Without bodies, and with every body glued to its cavity's floor.
+
+    Raises InputError, also for an excitation that is no sum of sines: what its Fourier series leaves out of a peak has
+    no bound that holds for every waveform.
+    """
+    if scene.excitation.signal is not None:
+        raise InputError("excitation.waveform: linear curves are those of sums of sines; give harmonics")
     system = assemble(scene)
     modes, bodies = system.of_structure, system.of_bodies
     glued_load = modes.load + bodies.load @ system.floor

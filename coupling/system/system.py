@@ -2,8 +2,9 @@
 
 q = (p, x) are the real modal coordinates of the structure, mass-normalised, and the positions of the bodies. All motion
 is relative to the base: a prescribed motion is a structure without modes on a moving base. The excitation is a sum of e
-exponentials, its harmonics, and so are the loads: Re sum_h load_h exp(i frequency_h t). Everything unilateral or
-frictional is a row of J (system.constraints), whose displacement is J q + rest.
+exponentials, its harmonics, and so are the loads: Re sum_h load_h exp(i frequency_h t). Those of an excitation that is
+no such sum are a function of the angle beside the system (system.assembly.loads_of), whose first harmonics these are.
+Everything unilateral or frictional is a row of J (system.constraints), whose displacement is J q + rest.
 """
 
 from __future__ import annotations

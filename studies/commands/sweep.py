@@ -87,7 +87,10 @@ def _print_summary(result: Sweep, responses: Sequence[ForcedResponse]) -> None:
     """Print the headlines, and how many points are not ok."""
     for response in responses:
         if not response.reference > 0:
-            print(f"{response.name}: nothing excites the structure, and there is no undamped maximum to compare with")
+            print(
+                f"{response.name}: nothing excites the structure, or a waveform without linear curves: there is no "
+                "undamped maximum to compare with"
+            )
             continue
         print(response.sentence)
     bad = [status for status in result.status.ravel() if status != "ok"]
