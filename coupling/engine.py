@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from vanedamp.coupling.methods.registry import respond
-from vanedamp.coupling.model_order.selection import settle, warnings_of
+from vanedamp.coupling.model_order.selection import select_model_order, warnings_of
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 
 
@@ -17,7 +17,7 @@ def simulate(
     scene: Scene,
     events: bool = False,
     samples_per_period: int = 0,
-    start: Handover | None = None,
+    start: RestartState | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Response:
     """Run a scene from time zero over `scene.time.simulated` excitation periods.
@@ -28,7 +28,7 @@ def simulate(
     Raises InputError for a scene that the model does not allow; numerical trouble is a status of the response.
     """
     started = time.perf_counter()
-    settled = settle(scene)
-    response = respond(settled.scene, events, samples_per_period, start, progress)
+    selected = select_model_order(scene)
+    response = respond(selected.scene, events, samples_per_period, start, progress)
     took = time.perf_counter() - started
-    return replace(response, estimate=settled.estimate, warnings=warnings_of(settled.scene), wall_time_s=took)
+    return replace(response, estimate=selected.estimate, warnings=warnings_of(selected.scene), wall_time_s=took)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from vanedamp.coupling.methods.registry import run_with_response
-from vanedamp.coupling.model_order.selection import settle
+from vanedamp.coupling.model_order.selection import select_model_order
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
@@ -32,12 +32,12 @@ class History(NamedTuple):
 
 
 def histories(scene: Scene, outputs: Sequence[str], samples_per_period: int = 100) -> History:
-    """The named outputs of a scene's reduced model over its run, from time zero.
+    """Return the named outputs of a scene's reduced model over its run, from time zero.
 
-    What a massless boundary's own yielding adds to an output is left out. Raises InputError for a structure that is no
+    The contribution of a massless boundary's own yielding is left out. Raises InputError for a structure that is no
     reduced model, or an output that it does not have.
     """
-    scene = settle(scene).scene
+    scene = select_model_order(scene).scene
     structure = scene.structure
     if not isinstance(structure, Rom):
         raise InputError('structure.model: outputs are those of a reduced model; take model = "rom"')

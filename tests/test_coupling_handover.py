@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
 
@@ -83,7 +83,7 @@ def test_a_smaller_gap_takes_the_bodies_in():
 
 def test_plain_data_is_exact():
     final = simulate(scene("row", 3)).final
-    again = Handover.from_list(final.to_list())
+    again = RestartState.from_list(final.to_list())
     for first, second in zip(final.to_list(), again.to_list(), strict=True):
         assert first == second
 

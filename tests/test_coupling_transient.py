@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.model_order.selection import settle
+from vanedamp.coupling.model_order.selection import select_model_order
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.transient import LIMIT, left_over, outlasted
@@ -73,7 +73,7 @@ def test_default_suits_the_damping(zeta, transient):
 
 def test_default_where_no_length_would_do():
     """With next to no damping the default stays; the run tells that it was too short."""
-    assert settle(scene(1e-6)).scene.time == scene(1e-6).time
+    assert select_model_order(scene(1e-6)).scene.time == scene(1e-6).time
     assert left_over(scene(1e-6), LIMIT) > 0.01
     response = simulate(scene(1e-6))
     assert (response.periods, response.transient, response.status) == (1500, 1000, "not_steady")

@@ -9,7 +9,7 @@ import pytest
 from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.small_structures import rod
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.model_order.selection import settle, settle_all
+from vanedamp.coupling.model_order.selection import select_model_order, select_model_orders
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.assembly import assemble
@@ -70,10 +70,10 @@ def test_each_wall_yields_by_its_own_flexibility(tmp_path):
     lost = np.diag(np.linalg.inv(stiffness) - np.outer(shapes[:, 0], shapes[:, 0]) / squares[0])
     assert 1 / springs(made) == pytest.approx(lost[[0, 2]], rel=1e-9)
     # one body cannot touch both walls at once, two can: what the walls have in common is told
-    assert settle(made).estimate is None
+    assert select_model_order(made).estimate is None
     pair = made.replace({"damper": [{"cavity": "c", "mass": 0.05}] * 2})
     common = -shapes[0, 0] * shapes[2, 0] / squares[0] + np.linalg.inv(stiffness)[0, 2]
-    told = settle(pair).estimate
+    told = select_model_order(pair).estimate
     assert told["shared_flexibility"] == pytest.approx(abs(common) / np.sqrt(lost[0] * lost[2]), rel=1e-9)
     assert f"{100 * told['shared_flexibility']:.0f} % of their residual flexibility in common" in told["sentence"]
 
@@ -84,7 +84,7 @@ def test_massless_wall_yields_by_what_the_modes_lack(file):
         # flexibility of the unit rod, 1, less that of its modes sqrt(2) sin(omega x) at the tip
         omegas = (np.arange(1, modes + 1) - 0.5) * np.pi
         assert springs(made) == pytest.approx(1 / (1 - np.sum(2 / omegas**2)), rel=1e-3)
-        assert settle(made) == (made, None)
+        assert select_model_order(made) == (made, None)
     both = scene(
         file, contact={"law": "compliant", "stiffness": 7.0, "residual": True}, structure__natural=True,
         structure__modes=1,
@@ -129,7 +129,7 @@ def test_massless_contact_is_a_collision_in_closed_form(tmp_path):
 def test_auto_chooses_and_says_so(file):
     law = {"law": "compliant", "stiffness": 50.0}
     made = scene(file, contact=law, structure__modes="auto", structure__tolerance=0.05, damper__restitution=0.7)
-    settled, estimate = settle(made)
+    settled, estimate = select_model_order(made)
     assert settled.structure.natural
     assert 1 < settled.structure.modes < 41
     assert estimate["modes"] == settled.structure.modes
@@ -137,13 +137,13 @@ def test_auto_chooses_and_says_so(file):
     assert estimate["sentence"].startswith(f"{settled.structure.modes} modes")
     assert ": estimated error" in estimate["sentence"]
     assert estimate["attached"] == settled.structure.attached
-    assert settle(settled).scene == settled
+    assert select_model_order(settled).scene == settled
     response = simulate(made)
     assert response.estimate == estimate
     assert response.to_json()["estimate"]["sentence"] == estimate["sentence"]
-    stricter = settle(scene(file, contact=law, structure__modes="auto", structure__tolerance=0.02)).scene
+    stricter = select_model_order(scene(file, contact=law, structure__modes="auto", structure__tolerance=0.02)).scene
     assert stricter.structure.modes >= settled.structure.modes
-    newton = settle(scene(file, structure__modes="auto", structure__tolerance=0.05)).estimate
+    newton = select_model_order(scene(file, structure__modes="auto", structure__tolerance=0.05)).estimate
     assert "Newton's impacts have no limit" in newton["sentence"]
 
 
@@ -166,7 +166,7 @@ def test_a_wide_band_sees_the_collisions_of_the_narrow_one(tmp_path):
     counts = []
     for band in ([0.97, 0.985, 1.0], [0.83, 0.86, 0.89, 0.92, 0.975, 0.99, 1.02, 1.05]):
         swept = [made.replace({"excitation.frequency": share * first}) for share in band]
-        counts.append(settle_all(swept)[0].estimate["modes"])
+        counts.append(select_model_orders(swept)[0].estimate["modes"])
     assert counts[0] > 1
     assert counts[1] >= counts[0]
 
@@ -176,8 +176,8 @@ def test_gaps_of_a_sweep_are_tried_apart(file):
     law = {"law": "compliant", "stiffness": 50.0}
     made = scene(file, contact=law, structure__modes="auto", structure__tolerance=0.05, damper__restitution=0.7,
                  excitation__force=None, excitation__resonance_amplitude=0.6, excitation__frequency=0.247)  # fmt: skip
-    alone = settle(made).estimate["modes"]
-    both = settle_all([made.replace({"cavity.c.gap": gap}) for gap in (50.0, 0.5)])[0].estimate["modes"]
+    alone = select_model_order(made).estimate["modes"]
+    both = select_model_orders([made.replace({"cavity.c.gap": gap}) for gap in (50.0, 0.5)])[0].estimate["modes"]
     assert both >= alone > 1
 
 

@@ -12,8 +12,8 @@ from vanedamp.coupling.methods import Method, exact
 from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart import given, taken
-from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.response.restart import restart_from, restart_state
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.system.assembly import assemble, initial_motion, loads_of, physical_scale
@@ -24,20 +24,20 @@ def respond(
     scene: Scene,
     events: bool = False,
     samples_per_period: int = 0,
-    start: Handover | None = None,
+    start: RestartState | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Response:
-    """The response of a scene without open choices (coupling.engine.simulate says the rest)."""
+    """Return the response of a scene without open choices. Arguments as in coupling.engine.simulate."""
     started = time.perf_counter()
     run = run_of(scene, events, samples_per_period, start)
     status, transient = run_scene(run, scene, progress)
     outcome, last = run.outcome(), run.final()
-    final = None if last is None else taken(outcome.system, physical_scale(scene, outcome.system), last)
+    final = None if last is None else restart_state(outcome.system, physical_scale(scene, outcome.system), last)
     return replace(evaluate(scene, outcome, status, transient, started), final=final)
 
 
 def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:
-    """A run of the engine whose response is another functional (n,) of the structure's modes; of all periods.
+    """Run all periods in the exact engine with another functional (n,) of the structure's modes as the response.
 
     `scene` has no open choices. Raises InputError for a scene that the model does not allow.
     """
@@ -51,8 +51,8 @@ def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: 
     return evaluate(scene, run.outcome(), status, transient, started)
 
 
-def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, start: Handover | None = None) -> Run:
-    """A run of the scene's method at time zero.
+def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, start: RestartState | None = None) -> Run:
+    """Return a run of the scene's method at time zero.
 
     Raises InputError for what the method cannot do, such as to begin with the state of another run.
     """
@@ -62,7 +62,8 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     scene.solver.check_samples(samples_per_period)
     check_waveform(scene, scene.solver.method)
     system = assemble(scene)
-    initial = initial_motion(scene, system) if start is None else given(system, physical_scale(scene, system), start)
+    scale = physical_scale(scene, system)
+    initial = initial_motion(scene, system) if start is None else restart_from(system, scale, start)
     records = new_records(system, scene.time.simulated, samples_per_period)
     signal = scene.excitation.signal
     further = {} if signal is None else {"loads": loads_of(scene, signal)}
@@ -70,7 +71,7 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
 
 
 def why_no_restart(scene: Scene) -> str | None:
-    """Why runs of the scene's method cannot begin with the state of another; None if they can."""
+    """Return why runs of the scene's method cannot begin with the state of another; None if they can."""
     return _why_not(scene.solver.method, "RESTARTS")
 
 
@@ -82,7 +83,7 @@ def check_waveform(scene: Scene, method: str) -> None:
 
 
 def _why_not(method: str, ability: str) -> str | None:
-    """Why a method does not take what methods with an ability (RESTARTS, WAVEFORMS) take; None if it has it."""
+    """Return why a method lacks an ability, RESTARTS or WAVEFORMS; None if it has it."""
     if getattr(METHODS.part(method), ability, False):
         return None
     able = [name for name, part in METHODS.all().items() if getattr(part, ability, False)]

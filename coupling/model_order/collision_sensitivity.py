@@ -1,7 +1,7 @@
 """How much a response depends on its collisions: short runs of a model of few modes with other pulses.
 
-A body in a narrow cavity goes with its walls whatever its collisions are like; one that rattles does not. The runs tell
-which, at the price of some hundred periods of the cheapest model.
+A body in a narrow cavity goes with its walls whatever its collisions are like; one that rattles does not. The runs show
+which it is, at the price of some hundred periods of the cheapest model.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def sensitivity(
     modes: int,
     undamped: float,
 ) -> float:
-    """Change of the mean amplitude, in units of the undamped one (m), for a relative change of all collisions' pulses.
+    """Return the change of the mean amplitude over the undamped one (m), for a relative change of all pulses.
 
     The largest over the frequencies (Hz), with `modes` natural modes, as few as the motion there takes. wall: the first
     mode's entry of the wall's functional; pulse: that of the collision on the whole model.

@@ -1,4 +1,4 @@
-"""What a scene leaves open, settled: how many modes of a reduced model it needs, how long its transient is.
+"""Model order selection: how many modes of a reduced model a scene needs, and how long its transient is.
 
 `modes = "auto"` takes the fewest natural modes whose estimated error stays within the tolerance (rom.error_estimate):
 of the receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus
@@ -8,7 +8,7 @@ the file is the measure.
 A boundary without mass yields under its contact force by the flexibility G that the modes lack, u = Phi eta + G f,
 while it touches and not otherwise. For one contact at a time this is a spring 1/G between body and modes, which is what
 the engine runs, at every wall with its own G. Left out are the boundary's motion under friction on the floor and under
-forces at other coordinates; where walls that can be touched at once have much of G in common, the estimate tells.
+forces at other coordinates; where walls that can be touched at once have much of G in common, the estimate warns.
 """
 
 from __future__ import annotations
@@ -34,46 +34,46 @@ from vanedamp.rom.error_estimate import Choice, choose, frequency_grid, natural_
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
 
-#: bodies that hit twice a period act like up to 1.7 times their mass (docs/engine.md: attached mass), and damp besides
+#: bodies that hit twice a period act like up to 1.7 times their mass, and damp the response as well
 _IMPACTS = 2.0
-#: share of a flexibility in common that is told
+#: share of a flexibility in common from which on a warning is given
 _SHARED = 0.1
-#: what the sensitivity of the one-mode model is short of that of a richer one, at most, by experience
+#: empirical upper bound of sensitivity(richer model) / sensitivity(one mode)
 _CAUTION = 5.0
 #: resonances in the range that are tried, share of the highest from which on they count, and places on the way from
 #: loose (0) to glued bodies (1)
 _RESONANCES, _SEEN, _PLACES = 4, 0.03, (0.0, 0.5, 1.0)
 #: scenes of a sweep that are tried, of those that differ in more than their frequency
 _SCENES = 4
-#: between a single collision and the response, in which collisions meet the waves of those before
+#: safety factor: collisions interact through residual vibration
 _SAFETY = 1.5
-_NEWTON = "; of the forced response alone: Newton's impacts have no limit as modes grow, compliant contacts have"
+_NEWTON = "; of the forced response only: Newton's impacts have no limit as modes grow, compliant contacts have"
 
 
 #: the choice of a number of modes by file, `modes` and tolerance
 Choices = Mapping[tuple[Any, ...], Choice]
 
 
-class Settled(NamedTuple):
+class Selected(NamedTuple):
     """A scene without open choices, and the estimate of the model chosen (None if there was no choice)."""
 
     scene: Scene
     estimate: dict[str, Any] | None
 
 
-def settle(scene: Scene) -> Settled:
-    """The scene with its number of modes. Raises InputError when there is no good choice."""
-    return settle_all([scene])[0]
+def select_model_order(scene: Scene) -> Selected:
+    """Return the scene with its number of modes. Raises InputError when there is no good choice."""
+    return select_model_orders([scene])[0]
 
 
-def settle_all(scenes: Sequence[Scene]) -> list[Settled]:
-    """The same for the points of a sweep: those with one model and tolerance share the choice that suits them all."""
+def select_model_orders(scenes: Sequence[Scene]) -> list[Selected]:
+    """Select for the points of a sweep: those with one model and tolerance share the choice that suits them all."""
     choices = choices_of(scenes)
-    return [settled(scene, choices) for scene in scenes]
+    return [with_choice(scene, choices) for scene in scenes]
 
 
 def choices_of(scenes: Iterable[Scene]) -> Choices:
-    """The number of modes that suits all scenes with one model and tolerance, for each of these.
+    """Return the number of modes that suits all scenes with one model and tolerance, for each of these.
 
     Raises InputError for a scene with stops, whose impacts the estimate does not know, or with a waveform.
     """
@@ -93,8 +93,8 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
     return {key: _choice(members) for key, members in groups.items()}
 
 
-def is_open(scene: Scene) -> bool:
-    """Whether a scene leaves something to settle."""
+def needs_selection(scene: Scene) -> bool:
+    """Whether a scene leaves its number of modes open."""
     return isinstance(scene.structure, Rom) and scene.structure.modes == "auto"
 
 
@@ -103,13 +103,13 @@ def _group(scene: Scene) -> tuple[Any, ...]:
     return (structure.file, structure.modes, structure.tolerance) if isinstance(structure, Rom) else ()
 
 
-def settled(scene: Scene, choices: Choices) -> Settled:
-    """The scene with the choice that was made for it."""
+def with_choice(scene: Scene, choices: Choices) -> Selected:
+    """Return the scene with the choice that was made for it."""
     structure, choice = scene.structure, choices.get(_group(scene))
     if not isinstance(structure, Rom):
-        return Settled(timed(scene), None)
+        return Selected(timed(scene), None)
     if choice is None:
-        return Settled(timed(scene), _warning(_shared(scene, structure)))
+        return Selected(timed(scene), _warning(_shared(scene, structure)))
     structure = replace(structure, modes=choice.chosen.modes, natural=True, attached=choice.chosen.attached)
     scene = replace(scene, structure=structure)
     contacts = _collisions(scene, reduced_model(structure))
@@ -118,11 +118,11 @@ def settled(scene: Scene, choices: Choices) -> Settled:
     warning = _warning(_shared(scene, structure))
     if warning is not None:
         estimate |= warning | {"sentence": f"{choice.sentence}; {warning['sentence']}"}
-    return Settled(timed(scene), estimate)
+    return Selected(timed(scene), estimate)
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
-    """What to know of a scene without open choices: that an impact law, also the default, is on several modes."""
+    """Return the warnings of a scene without open choices: that an impact law acts on several modes."""
     if not (isinstance(scene.structure, Rom) and scene.contact.rigid and (scene.damper or scene.stop)):
         return ()
     size = reduced_model(scene.structure).size
@@ -136,7 +136,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 
 
 def _shared(scene: Scene, structure: Rom) -> float:
-    """Largest flexibility that two walls have in common which can be touched at once, relative to their own."""
+    """Return the largest shared flexibility of two walls that can be touched at once, relative to their own."""
     law = scene.contact
     if not law.takes_residual_flexibility:
         return 0.0
@@ -153,7 +153,7 @@ def _shared(scene: Scene, structure: Rom) -> float:
 
 
 def _touched(scene: Scene, model: ReducedModel) -> list[tuple[int, int]]:
-    """(body, wall's place in the interface) of all contacts of bodies with walls."""
+    """Return (body, wall's place in the interface) of all contacts of bodies with walls."""
     found = []
     for cavity in scene.cavity:
         bodies = [index for index, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
@@ -173,7 +173,7 @@ def _warning(shared: float) -> dict[str, Any] | None:
 
 
 def _choice(scenes: Sequence[Scene]) -> Choice:
-    """The fewest natural modes for all of these scenes, which have one model."""
+    """Return the fewest natural modes for all of these scenes, which have one model."""
     first = scenes[0]
     structure, at = first.structure, first.excitation.at
     assert isinstance(structure, Rom) and at is not None
@@ -198,7 +198,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
         rungs = natural_ladder(model, frequencies, labels, [at], collisions, attached)
         rungs = [replace(rung, collision=share * rung.collision) for rung in rungs]
         choices.append(choose(rungs, structure.tolerance, rigid))
-    # the first of equals: natural modes alone
+    # the first of equals: natural modes without attachment modes
     choice = min(choices, key=lambda item: (not item.met, item.chosen.size))
     if not choice.met:
         raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
@@ -208,20 +208,20 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
 
 
 def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
-    """How much the bodies can change the response: between loose and glued to their floors, relative to the larger."""
+    """Return the difference of the responses with loose and with glued bodies, relative to the larger."""
     at = str(scene.excitation.at)
     loose, glued = (item.frf(frequencies, at, at) for item in (model, _glued(scene, model)))
     return float((np.abs(glued - loose) / np.maximum(np.abs(loose), np.abs(glued))).max())
 
 
 def _glued(scene: Scene, model: ReducedModel) -> ReducedModel:
-    """The model with every body glued to its cavity's floor."""
+    """Return the model with every body glued to its cavity's floor."""
     floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
     return model.with_masses((floors[damper.cavity], damper.mass) for damper in scene.damper)
 
 
 def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.ndarray) -> float:
-    """The largest over collisions, of scenes that differ in more than their frequency; 1 where none can be told."""
+    """Return the largest sensitivity over collisions and scenes that differ in more than frequency; 1 if unknown."""
     squares, shapes = spectrum(model.mass, model.stiffness)
     apart = list({_but_for_frequency(scene): scene for scene in scenes}.values())
     worst, met = 0.0, False
@@ -245,13 +245,13 @@ def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.n
 
 
 def _but_for_frequency(scene: Scene) -> tuple[Any, ...]:
-    """What tells scenes of one model apart, other than their frequency."""
+    """Return what distinguishes scenes of one model, other than their frequency."""
     drive = replace(scene.excitation, frequency=1.0)
     return (drive, scene.cavity, scene.damper, scene.friction_damper, scene.gravity, scene.contact)
 
 
 def _trials(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> tuple[list[float], int]:
-    """Frequencies at which bodies collide if they do anywhere in the range, Hz, and the natural modes that this takes.
+    """Return frequencies (Hz) at which bodies collide if they do anywhere in the range, and the modes needed there.
 
     The highest resonances in the range, from that of the loose to that of the glued bodies, between which a damped peak
     lies; without one, the ends and the middle of the range.
@@ -270,7 +270,7 @@ def _trials(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> tuple
 
 
 def _undamped(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
-    """Largest amplitude without bodies in the range, m; 0 where no force drives it."""
+    """Return the largest amplitude without bodies in the range, m; 0 where no force drives it."""
     assert isinstance(scene.structure, Rom)
     force = excitation_force(replace(scene, structure=replace(scene.structure, modes=None)))
     at = str(scene.excitation.at)
@@ -278,7 +278,7 @@ def _undamped(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> flo
 
 
 def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
-    """Contacts of bodies with walls as they are on a model; none for rigid contacts. Raises InputError."""
+    """Return the contacts of bodies with walls on a model; none for rigid contacts. Raises InputError."""
     if scene.contact.rigid:
         return []
     first = spectrum(model.mass, model.stiffness)[1][:, 0]

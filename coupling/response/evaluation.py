@@ -1,4 +1,4 @@
-"""From what a run has recorded to its response: means, harmonic, ledger, attached mass, list of events.
+"""From the records of a run to its response: means, harmonic, ledger, attached mass, list of events.
 
 Every method leaves the same records behind, so that figures of different methods mean the same.
 """
@@ -31,18 +31,18 @@ class Run(Protocol):
     """A run of any method that can be continued."""
 
     def advance_to(self, periods: int) -> Status:
-        """Continue to the end of so many periods, or to what ends the run."""
+        """Continue to the end of the given number of periods, or to the run's end before. Returns its status."""
 
     def outcome(self) -> Outcome:
-        """What the run leaves behind."""
+        """Return the records of the run so far, and its figures."""
 
     def final(self) -> InitialMotion | None:
-        """The motion that another run can begin with; None for one that ended within a period, or leaves none."""
+        """Return the motion that another run can begin with; None if the run ended within a period, or keeps none."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run leaves behind: records of `periods` periods, counters, chunks of its log.
+    """The outcome of a run: records of `periods` periods, counters, chunks of its log.
 
     open_ledger: energy residual above which the method's figures are not to be used; penetration: relative to the
     free travel.
@@ -91,7 +91,7 @@ def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | Non
 
 
 def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started: float) -> Response:
-    """The response of a run that began at `started` (time.perf_counter) and dropped `transient` periods."""
+    """Return the response of a run that began at `started` (time.perf_counter) and dropped `transient` periods."""
     system, records, done = run.system, run.records, run.periods
     first = min(transient, max(done - 1, 0))
     window = slice(first, done)
@@ -143,11 +143,11 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
 
 
 def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> float:
-    """Imbalance of the energy ledger (periods + 1, 6), relative to the energy that flowed.
+    """Return the imbalance of the energy ledger (periods + 1, 6), relative to the energy that flowed.
 
-    That is the largest of its terms, stored energy by its parts (periods + 1, 1 + b): what a heavy body only carries
-    along is no flow. `exchanged` (J) is what comes and goes within a period. A thousandth of the energy there is always
-    counts: below it the ledger would be judged by the round-off of what is only carried along.
+    That is the largest of its terms, stored energy by its parts (periods + 1, 1 + b): energy that a heavy body only
+    carries along is no flow. `exchanged` (J) comes and goes within a period. A thousandth of the stored energy always
+    counts: below it the ledger would be judged by the round-off of energy that is only carried along.
     """
     change = ledger - ledger[0]
     imbalance = change[-1, recs.EXCITATION] - change[-1, recs.VISCOUS :].sum()
@@ -157,7 +157,7 @@ def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> f
 
 
 def _exchanged(system: System, records: Records) -> float:
-    """Energy that comes and goes within a period, J: in collisions, and what the loads lend to each mode and body."""
+    """Return the energy that comes and goes within a period, J: in collisions, and lent by the loads."""
     rate = np.maximum(system.frequency, system.omega)[:, None]  # the mean of a waveform counts as a slow load
     modes = np.abs(system.of_structure.load) ** 2 / np.maximum(system.of_structure.stiffness, rate**2)
     bodies = np.abs(system.of_bodies.load) ** 2 / (system.of_bodies.mass * rate**2)
@@ -165,12 +165,11 @@ def _exchanged(system: System, records: Records) -> float:
 
 
 def _state_scale(system: System, section: np.ndarray) -> np.ndarray:
-    """(states,) what each state of the section is to be measured by.
+    """Return the scale (states,) of each state of the section.
 
-    A displacement and its velocity have one scale, because either may vanish at the period's start. The bodies'
-    momentum is measured by what it would be at the largest speed: beside a heavy body, which all but rests, it is a
-    small difference of the slip's speed and the structure's, and its slow drift is nothing that the motion in the
-    cavity feels.
+    A displacement and its velocity have one scale, because either may vanish at the period's start. The scale of the
+    bodies' momentum is that at the largest speed: of a heavy body, which almost rests, it is a small difference of
+    the slip's speed and the structure's, and its slow drift does not act on the motion in the cavity.
     """
     largest, b = np.abs(section).max(axis=0), system.bodies
     x = max(largest[0], largest[1] / system.omega)
@@ -182,11 +181,11 @@ def _state_scale(system: System, section: np.ndarray) -> np.ndarray:
 def _attached(
     system: System, section: np.ndarray, momentum: complex, harmonic: complex, first: int, span: float
 ) -> float | None:
-    """Share of the bodies' mass that the structure feels: Re(F / (omega^2 X)) / sum m, F all contact forces on it.
+    """Return the attached mass over that of the bodies, Re(F / (omega^2 X)) / sum m; F: all contact forces on it.
 
     Of several harmonics, those of order 1.
     """
-    # a structure that does not move feels no mass: its harmonic is 0, or what damping has left of the start
+    # a structure that does not move feels no mass: its harmonic is 0, or the remainder of a decayed start
     if not system.bodies or abs(harmonic) <= np.sqrt(np.finfo(float).tiny) or len(section) <= first + 1:
         return None
     change = section[-1, 2] - section[first, 2]
@@ -195,14 +194,14 @@ def _attached(
 
 
 def events_of(system: System, chunks: Sequence[np.ndarray]) -> list[Event]:
-    """The events of a compiled log: chunks of entries time, kind, row, velocity before and after, impulse."""
+    """Return the events of a compiled log: chunks of entries time, kind, row, velocity before and after, impulse."""
     events = []
     entries = np.concatenate(chunks) if chunks else np.zeros((0, 6))
     _complete(system, entries)
     places = [_place(system, row) for row in range(len(system.J))] if len(entries) else []
     for entry in entries:
         body, side = places[int(entry[2])]
-        # speeds of the gap, turned into speeds of the body relative to what it meets
+        # speeds of the gap, turned into speeds of the body relative to the wall or body that it meets
         sign = -1.0 if side in ("right", "body") else 1.0
         before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
         events.append(Event(float(entry[0]), recs.KINDS[int(entry[1])], body, side, before, after, impulse))
@@ -223,7 +222,7 @@ def _complete(system: System, entries: np.ndarray) -> None:
 
 
 def _place(system: System, row: int) -> tuple[int, str]:
-    """Number and side of a row: of a body and where it acts; of a friction damper, "casing"; of a stop, "stop"."""
+    """Return number and side of a row: of a body and where it acts; of a friction damper "casing", of a stop "stop"."""
     if system.bodies <= row < system.friction_rows:
         return row - system.bodies, "casing"
     bodies = np.flatnonzero(system.of_bodies.J[row])

@@ -8,7 +8,7 @@ from vanedamp.coupling.response.records import STORED
 
 @entry
 def record_section(system, records, period, p, p_rate, slip, slip_velocity, springs, ledger):
-    """Record section and ledger at the start of a period, for every method: what Python calls."""
+    """Record section and ledger at the start of a period, for every method: the entry from Python."""
     put_section(system, records, period, p, p_rate, slip, slip_velocity, springs, ledger)
 
 
@@ -46,7 +46,7 @@ def put_section(system, records, period, p, p_rate, slip, slip_velocity, springs
 
 @entry
 def cubic_peak(h, x0, x1, rate0, rate1):
-    """|x| where the straight line through two velocities is zero, on the cubic through both ends; 0 if nowhere."""
+    """Return |x| on the cubic through both ends where the line through both velocities is zero; 0 if nowhere."""
     if not rate0 * rate1 < 0.0:
         return 0.0
     t = rate0 / (rate0 - rate1)

@@ -1,4 +1,4 @@
-"""What a run of any method records: sections, energies, samples, events, and the codes of these."""
+"""Records of a run by any method: sections, energies, samples, events, and the codes of these."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES
 
 
 class Records(NamedTuple):
-    """What a run leaves behind. One entry a period unless said otherwise."""
+    """Records of a run, made once and filled as it advances. One entry a period unless said otherwise."""
 
     peak: np.ndarray  # largest |x|, m
     harmonic: np.ndarray  # complex integral of x exp(-i omega t), m s
@@ -37,7 +37,7 @@ class Records(NamedTuple):
 
 
 def new_records(system: System, periods: int, samples: int) -> Records:
-    """Room for `periods` periods with `samples` samples each."""
+    """Return empty records for `periods` periods with `samples` samples each."""
     b = system.bodies
     return Records(
         peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.files.store import Variable, save
 
 
@@ -43,7 +43,7 @@ class Event:
     """One event: time (s), kind, number of the body, side, speeds (m/s) and impulse (N s).
 
     side: "left", "right" (walls), "body" (the next body to the right), "floor"; "casing" for a friction damper, "stop"
-    for a stop, whose number is then meant. Speeds are the body's relative to what it meets; at a stop, of its gap.
+    for a stop, whose number is then meant. Speeds are relative to the wall or body met; at a stop, of its gap.
     """
 
     time: float
@@ -57,7 +57,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Response:
-    """What a structure with loose bodies did. Amplitudes and energies are those of the evaluated periods.
+    """The response of a structure with loose bodies. Amplitudes and energies are those of the evaluated periods.
 
     amplitude_*: of the displacement at excitation.at (m), with the half width of the mean's 95 % confidence interval
     (None if there are too few periods); amplitude_harmonic, phase: of its part at the excitation's frequency, order 1;
@@ -67,8 +67,8 @@ class Response:
     period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
     time, displacement, body_displacement: samples, empty if none were asked for; penetration: deepest overlap of bodies
     and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model
-    whose number of modes was chosen automatically (model_order.selection), None otherwise; warnings: what to know of
-    the scene before its figures are used; final: the state at its end, with which another run can begin, None for one
+    whose number of modes was chosen automatically (model_order.selection), None otherwise; warnings: to be read
+    before its figures are used; final: the state at its end, with which another run can begin, None for one
     that ended within a period, or whose method leaves none.
     """
 
@@ -100,11 +100,11 @@ class Response:
     body_displacement: np.ndarray
     penetration: float = 0.0
     estimate: dict[str, Any] | None = None
-    final: Handover | None = None
+    final: RestartState | None = None
     warnings: tuple[str, ...] = ()
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
-        """The result as plain data, with the list of events if wanted."""
+        """Return the result as plain data, with the list of events if wanted."""
         names = (
             "frequency", "amplitude_max", "amplitude_mean", "amplitude_mean_confidence", "amplitude_rms",
             "amplitude_harmonic", "phase",
@@ -150,10 +150,10 @@ class Response:
 def classify(
     section: np.ndarray, scale: np.ndarray, impacts: np.ndarray, friction_loss: float, longest: int = 16
 ) -> str:
-    """ "periodic-k", "non-periodic", "no-contact" or "stuck" from the section (periods + 1, states) of a steady state.
+    """Return "periodic-k", "non-periodic", "no-contact" or "stuck" from the section (periods + 1, states) of a run.
 
     A response has period k if the last section equals those k, 2k, ... periods before it within 1e-6 of each
-    state's scale (states,), over at least 8 repetitions or half of what there is.
+    state's scale (states,), over at least 8 repetitions or half of the section.
     """
     if not impacts.any():
         return "no-contact" if friction_loss > 0 else "stuck"

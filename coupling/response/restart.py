@@ -6,31 +6,31 @@ from dataclasses import astuple
 
 import numpy as np
 
-from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.system.assembly import InitialMotion, row_motion
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 
-def taken(system: System, scale: float, last: InitialMotion) -> Handover:
-    """The handover of a run from its last motion.
+def restart_state(system: System, scale: float, last: InitialMotion) -> RestartState:
+    """Return the restart state of a run from its last motion.
 
     scale: displacement per modal coordinate (system.assembly.physical_scale).
     """
     b, friction, slip = system.bodies, system.friction_rows, last.displacement
-    return Handover(
+    return RestartState(
         frozen(scale * last.p), frozen(scale * last.p_rate), frozen(slip[:b]), frozen(last.velocity[:b]),
         frozen(np.where(np.isfinite(system.spring), slip, 0.0)[b:friction]), frozen(system.free_travel[friction:]),
     )  # fmt: skip
 
 
-def given(system: System, scale: float, start: Handover) -> InitialMotion:
-    """The motion at the start of a run of another scene.
+def restart_from(system: System, scale: float, start: RestartState) -> InitialMotion:
+    """Return the motion at the start of a run of another scene.
 
     Bodies that would stand in a wall or in each other, because the gap is smaller now, are moved to where they touch,
-    and so is a structure beyond a rigid stop, by the nearest way; springs of friction dampers are unloaded to what
-    their sliders hold. Raises InputError for a scene of another size.
+    and so is a structure beyond a rigid stop, by the shortest way; springs of friction dampers are unloaded to the
+    limits of their sliders. Raises InputError for a scene of another size.
     """
     b, friction = system.bodies, system.friction_rows
     sizes = (system.modes, system.modes, b, b, friction - b, len(system.J) - friction)
@@ -49,7 +49,7 @@ def given(system: System, scale: float, start: Handover) -> InitialMotion:
 
 
 def _before_stops(system: System, p: np.ndarray) -> np.ndarray:
-    """Modal coordinates (n,) of a structure that no rigid stop is inside of: as many turns as there are stops."""
+    """Return modal coordinates (n,) outside of all rigid stops, moved out of each in turn, once for every stop."""
     stops = [
         r for r in range(system.friction_rows, len(system.J))
         if not system.of_bodies.J[r].any() and np.isinf(system.spring[r])
@@ -61,10 +61,10 @@ def _before_stops(system: System, p: np.ndarray) -> np.ndarray:
     return p
 
 
-def _inside(system: System, start: Handover, p: np.ndarray) -> np.ndarray:
-    """Slips (b,) of bodies inside their cavities: pushed in from the left walls, then from the right ones.
+def _inside(system: System, start: RestartState, p: np.ndarray) -> np.ndarray:
+    """Return slips (b,) of bodies inside their cavities: pushed in from the left walls, then from the right ones.
 
-    A compliant wall stays pressed as it was if its gap is what it was.
+    A compliant wall stays pressed if its gap has not changed.
     """
     friction = system.friction_rows
     slip, still, unloaded = np.array(start.slip), np.zeros(system.bodies), np.zeros(friction - system.bodies)

@@ -1,4 +1,4 @@
-"""What one run hands to the next: the physical state of structure and bodies at the start of an excitation period.
+"""The restart state: the physical state of structure and bodies at the start of an excitation period.
 
 The phase of the excitation needs no entry: a run ends with a whole period and the next begins with one.
 """
@@ -13,13 +13,13 @@ from vanedamp.files.store import frozen
 
 
 @dataclass(frozen=True, eq=False)
-class Handover:
+class RestartState:
     """The state of a scene with n modes, b bodies, d friction dampers and c gaps, arrays read-only.
 
     displacement, velocity: (n,) m and m/s of the structure; of a reduced model its real modes, mass-normalised
     slip, slip_velocity: (b,) m and m/s of the bodies relative to their floors
     elongation: (d,) m of the friction dampers' springs; 0 for rigid ones
-    gap: (c,) m, free travel of each gap's cavity: what the slips belong to
+    gap: (c,) m, free travel of each gap's cavity, which the slips belong to
     """
 
     displacement: np.ndarray
@@ -30,10 +30,10 @@ class Handover:
     gap: np.ndarray
 
     def to_list(self) -> list[list[float]]:
-        """Plain data, exact: Python writes the shortest text of a double that reads as the same."""
+        """Return plain data, exact: Python writes the shortest text of a double that reads as the same."""
         return [array.tolist() for array in astuple(self)]
 
     @classmethod
-    def from_list(cls, data: list[list[float]]) -> Handover:
-        """The record of `to_list`."""
+    def from_list(cls, data: list[list[float]]) -> RestartState:
+        """Return the state of which `to_list` made the data."""
         return cls(*(frozen(values) for values in data))

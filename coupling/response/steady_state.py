@@ -14,10 +14,10 @@ _CONSTANT = 1e-6
 
 
 def transient_length(series: np.ndarray) -> int | None:
-    """Entries to drop from the front of a series (n,) before it is stationary; None if the series is too short.
+    """Return how many entries of a series (n,) precede its stationary part; None if the series is too short.
 
-    The marginal standard error rule MSER (White 1997): the truncation that makes the squared standard error of what is
-    left smallest. A minimum in the second half of the series means that its end is not in sight, unless that half is
+    The marginal standard error rule MSER (White 1997): the truncation after which the squared standard error of the
+    mean is smallest. A minimum in the second half of the series means that its end is not in sight, unless that half is
     constant: a periodic response.
     """
     n = len(series)
@@ -37,7 +37,7 @@ def transient_length(series: np.ndarray) -> int | None:
 
 
 def mean_confidence(series: np.ndarray) -> float | None:
-    """Half width of the 95 % confidence interval of the mean of a stationary series (n,); None if it is too short.
+    """Return the half width of the 95 % confidence interval of a stationary series' mean; None if it is too short.
 
     Batch means (Law and Kelton, section 9.5): means of ten long batches are nearly independent even where the entries
     are not.

@@ -1,1 +1,1 @@
-"""What the user says: scenes as validated records."""
+"""Scenes as validated records: the user's input."""

@@ -11,7 +11,7 @@ from vanedamp.files.toml_input import STRICT, Fraction, NonNegative, Positive, R
 
 
 def _addressable(name: str) -> str:
-    """A name that a dotted path such as cavity.c1.gap can hold, and tell from an index and from a key."""
+    """Return a name that a dotted path such as cavity.c1.gap can hold, distinct from an index and from a key."""
     if not name or "." in name or name.isdecimal() or name in ("name", "gap", "left", "right", "floor"):
         raise ValueError("expected a word that is no number and no key and has no dot, such as 'c1'")
     return name
@@ -28,7 +28,7 @@ class Cavity:
     floor: str | None = None
 
     def labels(self) -> tuple[str | None, str | None, str | None]:
-        """Labels of left wall, right wall and floor; one that is given alone serves all three."""
+        """Return the labels of left wall, right wall and floor; a single one serves all three."""
         given = self.floor or self.left or self.right
         return self.left or given, self.right or given, self.floor or given
 

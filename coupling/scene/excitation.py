@@ -18,7 +18,7 @@ from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, 
 class Harmonic:
     """One sine of an excitation: amplitude sin(order 2 pi f t + phase), the phase in degrees.
 
-    amplitude: in units of what excites, be it force, base acceleration, or displacement of a prescribed motion.
+    amplitude: in units of the force, base acceleration, or displacement of a prescribed motion.
     """
 
     order: Annotated[Whole, Field(gt=0)]
@@ -107,10 +107,10 @@ class Gravity:
             raise ValueError("give one of orientation_deg and direction")
 
     def components(self, cavity: np.ndarray) -> tuple[float, float]:
-        """Acceleration (m/s^2) along a cavity, positive to the right, and across it, pressing on its floor.
+        """Return the acceleration (m/s^2) along a cavity, positive to the right, and across it, pressing on its floor.
 
-        cavity: (3,) unit vector from its left wall to its right one; without meaning for gravity by an angle. What
-        gravity by a direction presses a body on is floor, whichever side that is.
+        cavity: (3,) unit vector from its left wall to its right one; without meaning for gravity by an angle. Gravity
+        by a direction presses a body on its floor, whichever side that is.
         """
         if self.direction is None:
             angle = math.radians(self.orientation_deg)

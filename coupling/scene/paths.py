@@ -22,7 +22,7 @@ class Range:
 
 
 def axis_values(values: Range | Sequence[Any]) -> list[Any]:
-    """The values of one axis of the [sweep] table."""
+    """Return the values of one axis of the [sweep] table."""
     if isinstance(values, Range):
         return [float(value) for value in np.linspace(values.start, values.stop, values.num)]
     return list(values)

@@ -1,4 +1,4 @@
-"""The scene: a structure, its cavities, the loose bodies in them and what excites it all (SI units throughout)."""
+"""The scene: a structure, its cavities, the loose bodies in them and the excitation (SI units throughout)."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class Time:
 
     @property
     def simulated(self) -> int:
-        """Periods simulated, at most: 1500 if nothing was said."""
+        """Largest number of periods simulated: 1500 by default."""
         return 1500 if self.periods is None else self.periods
 
     @property
     def dropped(self) -> int:
-        """Periods left out of the evaluation unless the state tells: two thirds if nothing was said."""
+        """Periods left out of the evaluation unless `steady` decides: two thirds by default."""
         return self.simulated * 2 // 3 if self.transient is None else self.transient
 
 
@@ -206,12 +206,12 @@ class Scene:
 
     @classmethod
     def load(cls, path: str | Path) -> Scene:
-        """The scene in a TOML file; a reduced model's file is taken relative to it. Raises InputError."""
+        """Read the scene in a TOML file; a reduced model's file is taken relative to it. Raises InputError."""
         return cls.of(read_toml(path), path)
 
     @classmethod
     def of(cls, data: dict[str, Any], path: str | Path) -> Scene:
-        """The scene in the tables of a TOML file that lies at `path`."""
+        """Return the scene in the tables of a TOML file that lies at `path`."""
         structure = data.get("structure")
         if isinstance(structure, dict) and isinstance(structure.get("file"), str):
             structure["file"] = str(Path(path).parent / structure["file"])
@@ -233,7 +233,7 @@ class Scene:
 
     @property
     def moved(self) -> bool:
-        """Whether anything is said that moves the structure or the bodies, here or in an axis of the sweep."""
+        """Whether something moves the structure or the bodies, here or in an axis of the sweep."""
         given = self.excitation.force, self.excitation.base_acceleration, self.excitation.resonance_amplitude
         swept = {path.split(".")[0] for path in self.sweep if path != "excitation.frequency"}
         return (
@@ -247,12 +247,12 @@ class Scene:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain nested data as in the file, without what is None."""
+        """Return plain nested data as in the file, without values that are None."""
         data: dict[str, Any] = TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
         return data
 
     def replace(self, values: Mapping[str, Any]) -> Scene:
-        """Another scene with some values changed, by their dotted paths ("cavity.c1.gap", "damper.0.mass").
+        """Return another scene with some values changed, by their dotted paths ("cavity.c1.gap", "damper.0.mass").
 
         A path that names a list without index ("damper.mass") changes every entry. Raises InputError.
         """
@@ -262,7 +262,7 @@ class Scene:
         return validate(Scene, data, "scene")
 
     def sweep_points(self) -> tuple[dict[str, np.ndarray], Iterator[dict[str, Any]]]:
-        """The grid of the [sweep] table: (axes by path, the points of their product with the last axis fastest)."""
+        """Return the grid of the [sweep] table: axes by path, points of their product with the last axis fastest."""
         axes = {path: axis_values(values) for path, values in self.sweep.items()}
         points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
         return {path: np.asarray(values) for path, values in axes.items()}, points

@@ -36,8 +36,8 @@ class SolverOptions(BaseModel):
     """The options of every method; those of one derive from it, with a Literal for `method` and defaults for all.
 
     max_events: the budget of events after which a run ends with status 'event_budget'. Unlike the other tables this is
-    a model, which knows what was given (`model_fields_set`): defaults differ from method to method, so that a scene
-    whose method is replaced keeps what was given, and nothing else.
+    a model, which knows the given options (`model_fields_set`): defaults differ from method to method, so that a scene
+    whose method is replaced keeps the given options, and nothing else.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
@@ -47,11 +47,11 @@ class SolverOptions(BaseModel):
 
     @property
     def seconds_per_period(self) -> float:
-        """Processor time of an excitation period, s, roughly: to refuse what nobody would wait for."""
+        """Processor time of an excitation period, s, roughly: to refuse runs that nobody would wait for."""
         return PERIOD_SECONDS
 
     def check_samples(self, samples: int) -> None:
-        """Raise InputError where that many samples of a period cannot be taken."""
+        """Raise InputError where this number of samples of a period cannot be taken."""
 
 
 class SteppingOptions(SolverOptions):
@@ -118,7 +118,7 @@ def _by_method(value: Any, handler: Any) -> Any:
 
 
 def _plain(options: SolverOptions) -> dict[str, Any]:
-    """Return what was given as plain data, with what every method has."""
+    """Return the given options as plain data, with those that every method has."""
     return options.model_dump(mode="json", include=options.model_fields_set | set(SolverOptions.model_fields))
 
 

@@ -1,4 +1,4 @@
-"""Waveforms: what other code adds to the excitations of a scene, in its table [excitation.waveform].
+"""Waveforms: excitations that other code adds, named in the table [excitation.waveform] of a scene.
 
 A waveform is the time signal of one period, w(omega t), where a plain excitation has sin(omega t): frequency, level
 (force, base acceleration) and place stay the excitation's. So a new excitation is one class, which need not know the
@@ -36,14 +36,14 @@ class Waveform:
         return None
 
     def values(self, angle: np.ndarray) -> np.ndarray:
-        """The signal (k,) at angles omega t (k,) in [0, 2 pi), relative to the level of the excitation."""
+        """Return the signal (k,) at angles omega t (k,) in [0, 2 pi), relative to the level of the excitation."""
         raise NotImplementedError(f"{type(self).__qualname__} has neither shares nor values")
 
     def harmonics(self) -> dict[int, complex]:
         """Return the shares by order, 1 first, which is there even if it has none. Raises InputError.
 
-        A signal without shares has those of its Fourier series, the mean (order 0) last: the first harmonic, and a
-        scale for what transients and energies are compared with. They drive no run.
+        A signal without shares has those of its Fourier series, the mean (order 0) last: they give the first harmonic,
+        and the scales of transients and energies. They drive no run.
         """
         if self.shares is None:
             values = self.sampled(2 * np.pi * np.arange(_SAMPLES) / _SAMPLES)
@@ -58,7 +58,7 @@ class Waveform:
         return shares
 
     def sampled(self, angle: np.ndarray) -> np.ndarray:
-        """Return the values (k,) at angles (k,) in [0, 2 pi). Raises InputError for what are no finite numbers."""
+        """Return the values (k,) at angles (k,) in [0, 2 pi). Raises InputError for other than finite numbers."""
         values = np.asarray(self.values(angle), float)
         if values.shape != angle.shape or not np.isfinite(values).all():
             raise InputError(f"{self._place}: its values must be a finite number for each angle")

@@ -1,6 +1,6 @@
-"""Finished points of a sweep on disk: what a sweep that was killed goes on from.
+"""Finished points of a sweep on disk, from which a killed sweep resumes.
 
-The file is written anew each time and takes the place of the old one when it is complete, so that a kill at any moment
+Each write makes a new file, which takes the place of the old one when it is complete, so that a kill at any moment
 leaves one that can be read. Writing takes at most a thirtieth of the time.
 """
 
@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sweep.worker import Block, Finished, Task
+from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult
 from vanedamp.files.store import StoreError, Variable, clear_leftovers, digest, load, save
 from vanedamp.files.toml_input import InputError
 
@@ -25,11 +25,11 @@ _SHARE = 30
 
 
 class Checkpoint:
-    """Finished points, in memory and in a file (path None: in memory alone). A context manager."""
+    """Finished points, in memory and in a file (path None: in memory only). A context manager."""
 
     def __init__(self, path: str | Path | None, scene: Scene, size: int, provenance: Mapping[str, Any]) -> None:
         """Take up the file's points. Raises InputError for a file of another sweep, or one that cannot be read."""
-        self.finished = Finished(size)
+        self.finished = SweepTable(size)
         self._path = None if path is None else Path(path)
         self._belongs = {"scene": scene.to_dict(), "model": _models(scene), "provenance": dict(provenance)}
         self._next = 0.0
@@ -45,9 +45,9 @@ class Checkpoint:
         if kind is None or not issubclass(kind, StoreError):
             self._write()
 
-    def add(self, task: Task, block: Block, more: bool) -> None:
+    def add(self, task: Task, result: TaskResult, more: bool) -> None:
         """Take over a task's points; more: whether its chain goes on. Raises StoreError, such as for a full disk."""
-        self.finished.add(task, block, more)
+        self.finished.add(task, result, more)
         self._unsaved = True
         if time.perf_counter() >= self._next:
             self._write()
@@ -86,25 +86,25 @@ class Checkpoint:
         except (StoreError, KeyError) as error:
             raise InputError(
                 f"{path}: a checkpoint that cannot be read ({error}); nothing was done to it: move it away, or delete "
-                "it to begin anew"
+                "it to start again"
             ) from error
-        for name, told in (("scene", "scene"), ("model", "reduced model"), ("provenance", "version of the software")):
+        for name, what in (("scene", "scene"), ("model", "reduced model"), ("provenance", "version of the software")):
             if found[name] != json.loads(json.dumps(self._belongs[name])):
                 raise InputError(
-                    f"{path}: the checkpoint of another {told}; nothing was done to it: move it away, or delete it to "
-                    "begin anew"
+                    f"{path}: the checkpoint of another {what}; nothing was done to it: move it away, or delete it to "
+                    "start again"
                 )
         texts, states = (json.loads(entry) for entry in variables["texts_and_states"])
         self.finished.put(variables["point"], variables["values"], variables["codes"], texts)
-        self.finished.states = {int(number): Handover.from_list(state) for number, state in states.items()}
+        self.finished.states = {int(number): RestartState.from_list(state) for number, state in states.items()}
 
 
 def clear(path: str | Path) -> None:
-    """Remove a checkpoint whose sweep is safe, with what killed writers of it have left."""
+    """Remove a checkpoint whose sweep is safe, and temporary files of interrupted writes."""
     Path(path).unlink(missing_ok=True)
     clear_leftovers(path)
 
 
 def _models(scene: Scene) -> dict[str, str]:
-    """Digest of every reduced model that the sweep names, by its file."""
+    """Return the digest of every reduced model that the sweep names, by its file."""
     return {file: digest(file) for file in scene.files if Path(file).is_file()}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
-from vanedamp.coupling.model_order.selection import Choices, choices_of, is_open, settled, warnings_of
+from vanedamp.coupling.model_order.selection import Choices, choices_of, needs_selection, warnings_of, with_choice
 from vanedamp.coupling.scene.paths import assign, axis_values
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
@@ -20,7 +20,7 @@ from vanedamp.files.toml_input import InputError, nearest, validate
 
 FREQUENCY = "excitation.frequency"
 _DIRECTION, _ALONG = "continuation.direction", "continuation.along"
-#: what cannot change from one run to the next: their states would not fit
+#: values that cannot change from one run to the next: their states would not fit
 _FIXED = ("structure.model", "structure.file", "structure.modes", "structure.natural", "structure.tolerance")
 
 
@@ -28,16 +28,16 @@ class Points:
     """Scenes of a grid from the values of their axes: little to send to a worker, however large the grid."""
 
     def __init__(self, base: Scene, choices: Choices) -> None:
-        """base: a scene without sweep; choices: those of its numbers of modes."""
+        """Take a scene without sweep, and the choices of its numbers of modes."""
         self.base, self.choices = base, choices
         self._data = base.to_dict()
 
     def scene(self, values: Mapping[str, Any]) -> Scene:
-        """The scene at a point, without open choices. Raises InputError for a point that is no scene."""
-        return settled(self.raw(values), self.choices).scene
+        """Return the scene at a point, without open choices. Raises InputError for a point that is no scene."""
+        return with_choice(self.raw(values), self.choices).scene
 
     def raw(self, values: Mapping[str, Any]) -> Scene:
-        """The same with its choices open."""
+        """Return the scene at a point with its choices open. Raises InputError for a point that is no scene."""
         try:
             for path, value in values.items():  # each point sets the same places
                 assign(self._data, path.split("."), value, path)
@@ -63,7 +63,7 @@ class Grid:
     base      the scene without its sweep
     choices   numbers of modes that suit all points, where they were left open
     estimate  of the model chosen, None where there was no choice
-    warnings  what to know of the first point's scene before figures are used
+    warnings  of the first point's scene, to be read before figures are used
     along     the axis along which runs are linked, None if they are not
     """
 
@@ -86,12 +86,12 @@ class Grid:
         return math.prod(self.shape)
 
     def values(self, index: int) -> dict[str, Any]:
-        """Values of the axes at a point, counted from 0 with the last axis fastest."""
+        """Return the values of the axes at a point, counted from 0 with the last axis fastest."""
         places = np.unravel_index(index, self.shape)
         return {path: values[int(place)] for (path, values), place in zip(self.axes.items(), places, strict=True)}
 
     def chains(self) -> Iterator[Chain]:
-        """All points, in chains that can run side by side."""
+        """Yield all points, in chains that can run side by side."""
         if self.along is None:
             yield Chain(range(self.size), False)
             return
@@ -112,16 +112,16 @@ class PointList:
         self.choices: Choices = {}
 
     def values(self, index: int) -> Mapping[str, Any]:
-        """What a point changes in the base."""
+        """Return the values that a point changes in the base."""
         return self._points[index]
 
     def chains(self) -> Iterator[Chain]:
-        """All points, in one go."""
+        """Yield all points as one chain."""
         yield Chain(range(self.size), False)
 
 
 def grid(scene: Scene) -> Grid:
-    """The grid of a scene's [sweep] table. Raises InputError for a point that is no scene, before any run."""
+    """Return the grid of a scene's [sweep] table. Raises InputError for a point that is no scene, before any run."""
     axes = {path: axis_values(values) for path, values in scene.sweep.items()}
     if not axes:
         raise InputError(
@@ -133,20 +133,20 @@ def grid(scene: Scene) -> Grid:
         made = points.raw(values)
         first = first or made
         linked = linked or made.continuation.direction != "independent"
-        leaves_open = leaves_open or is_open(made)
+        leaves_open = leaves_open or needs_selection(made)
         _check_method(made)
     assert first is not None
     along = _along(scene, axes) if linked else None
     base = _with_range(points.base, axes)
     points = Points(base, {})
     choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if leaves_open else {}
-    start = settled(first, choices)
+    start = with_choice(first, choices)
     assemble(start.scene)
     return Grid(scene, axes, base, choices, start.estimate, along, warnings_of(start.scene))
 
 
 def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
-    """The scene whose level is that of one resonance for all of the swept frequencies."""
+    """Return the scene whose level is that of one resonance for all of the swept frequencies."""
     swept = axes.get(FREQUENCY)
     if swept is None or not _ordered(swept) or scene.excitation.resonance_near is not None:
         return scene
@@ -154,7 +154,7 @@ def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
 
 
 def _telling(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
-    """Points that tell whether all are scenes: a frequency is good or bad whatever the other values are."""
+    """Yield points that decide whether all are scenes: a frequency is good or bad whatever the other values are."""
     first = {path: values[0] for path, values in axes.items()}
     others = {path: values for path, values in axes.items() if path != FREQUENCY}
     for values in itertools.product(*others.values()):
@@ -171,7 +171,7 @@ def _check_method(scene: Scene) -> None:
 
 
 def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:
-    """The axis along which runs are linked. Raises InputError where there is none or where states would not fit."""
+    """Return the axis along which runs are linked. Raises InputError where none is or states do not fit."""
     along = scene.continuation.along
     if along is None:
         numeric = [path for path, values in axes.items() if _ordered(values)]
@@ -181,7 +181,7 @@ def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:
     if along not in axes:
         raise InputError(f"continuation.along: the sweep has no axis '{along}'; {nearest(along, list(axes))}")
     if not _ordered(axes[along]):
-        raise InputError(f"continuation.along: the values of {along} are no numbers, which alone have neighbours")
+        raise InputError(f"continuation.along: the values of {along} are no numbers; only numbers have neighbours")
     fixed = isinstance(scene.structure, Rom) and along.startswith("structure.")
     if fixed or along in _FIXED or _ALONG in axes:
         path = _ALONG if _ALONG in axes else along

@@ -45,8 +45,9 @@ class Sweep:
     peaks                 by the names of PEAKS: tops of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
                           undamped one, over the axes other than the frequency; empty for a sweep at one frequency
+    provenance            versions and further data of the caller (JSON-able)
+
     A point of the grid is the same whoever ran it, and whenever: no time is taken.
-    provenance            versions and whatever else the caller knows (JSON-able)
     """
 
     scene: Scene
@@ -73,20 +74,20 @@ class Sweep:
         return self.status.shape
 
     def units(self) -> dict[str, str]:
-        """Unit of every axis by its path."""
+        """Return the unit of every axis by its path."""
         return {path: _UNITS.get(path.rsplit(".", 1)[-1], "1") for path in self.axes}
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data: axes and units by path, measures as nested lists (nan where there is none)."""
+        """Return plain data: axes and units by path, measures as nested lists (nan where there is none)."""
         names = (*MEASURES, "energy_share", "status", "classification")
         estimate = self.provenance.get("estimate")
-        told = {"warnings": list(self.provenance.get("warnings", ()))}
-        told |= {} if estimate is None else {"estimate": estimate}
+        notes = {"warnings": list(self.provenance.get("warnings", ()))}
+        notes |= {} if estimate is None else {"estimate": estimate}
         axes = {path: values.tolist() for path, values in self.axes.items()}
         return (
             {"axes": axes, "units": self.units() | MEASURES | {name: PEAKS[name] for name in self.peaks}}
             | {"loss": list(LOSSES)}
-            | told
+            | notes
             | {name: getattr(self, name).tolist() for name in names}
             | {name: values.tolist() for name, values in self.peaks.items()}
         )

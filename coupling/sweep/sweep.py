@@ -22,7 +22,7 @@ from vanedamp.coupling.sweep.worker import (
     LOSSES,
     MEASURES,
     TEXTS,
-    Finished,
+    SweepTable,
 )
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_responses
 from vanedamp.files.store import frozen
@@ -51,8 +51,8 @@ def sweep(
         finished = kept.finished
         if progress is not None:
             progress(finished.count, grid.size)
-        for task, rest, block in _run(grid, finished, executor):
-            kept.add(task, block, bool(rest))
+        for task, rest, result in _run(grid, finished, executor):
+            kept.add(task, result, bool(rest))
             if progress is not None:
                 progress(finished.count, grid.size)
     return _result(grid, finished, provenance)
@@ -63,21 +63,21 @@ def run_list(
     points: Sequence[Mapping[str, Any]],
     executor: Executor | None = None,
     progress: Callable[[int], None] | None = None,
-) -> Finished:
-    """Runs of scenes that differ from `base` in some values, by their paths; all points name the same paths.
+) -> SweepTable:
+    """Run scenes that differ from `base` in some values, by their paths; all points name the same paths.
 
     progress: called with the number of points done.
     """
     listed = PointList(base, points)
-    finished = Finished(listed.size)
-    for task, rest, block in _run(listed, finished, executor):
-        finished.add(task, block, bool(rest))
+    finished = SweepTable(listed.size)
+    for task, rest, result in _run(listed, finished, executor):
+        finished.add(task, result, bool(rest))
         if progress is not None:
             progress(finished.count)
     return finished
 
 
-def _result(grid: Grid, finished: Finished, provenance: dict[str, Any]) -> Sweep:
+def _result(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Sweep:
     columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
     return Sweep(
         scene=grid.scene,
@@ -93,7 +93,7 @@ def _result(grid: Grid, finished: Finished, provenance: dict[str, Any]) -> Sweep
 
 
 def _peaks(grid: Grid) -> dict[str, np.ndarray]:
-    """Tops of the linear curves over the swept frequencies; nan at a combination of the other axes that has none."""
+    """Return the tops of the linear curves over the swept frequencies; nan where there is none."""
     others = {path: values for path, values in grid.axes.items() if path != FREQUENCY}
     if len(set(grid.axes.get(FREQUENCY, ()))) < 2:
         return {}
@@ -110,7 +110,7 @@ def _peaks(grid: Grid) -> dict[str, np.ndarray]:
 
 
 def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:
-    """Tops of both linear curves by the names of PEAKS."""
+    """Return the tops of both linear curves by the names of PEAKS."""
     values = (undamped.amplitude, undamped.frequency, undamped.width, fixed.amplitude, fixed.frequency)
     return dict(zip(PEAKS, values, strict=True))
 

@@ -1,4 +1,4 @@
-"""Runs of a sweep's points: what a worker does, and the finished points in arrays."""
+"""Runs of a sweep's points by a worker, and the finished points in arrays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points
 from vanedamp.coupling.system.linear_response import linear_responses
@@ -22,7 +22,7 @@ MEASURES = {
     "amplitude_harmonic": "m", "amplitude_undamped": "m", "amplitude_fixed": "m",
     "impacts_per_period": "1", "attached_mass_fraction": "1", "energy_residual": "1",
 }  # fmt: skip
-#: what takes the energy, the last axis of `energy_share`
+#: losses of energy, the last axis of `energy_share`
 LOSSES = ("viscous", "friction", "impact", "contact")
 TEXTS = ("status", "classification")
 #: all columns of a point: measures, then shares of the losses
@@ -36,20 +36,20 @@ class Task(NamedTuple):
 
     points: Sequence[int]
     linked: bool = False
-    start: Handover | None = None
+    start: RestartState | None = None
     chain: int = 0
 
 
-class Block(NamedTuple):
-    """What a task leaves: values (k, columns), nan where there is none, texts (k, 2), and the last state."""
+class TaskResult(NamedTuple):
+    """The result of a task: values (k, columns), nan where there is none, texts (k, 2), and the last state."""
 
     values: np.ndarray
     texts: list[tuple[str, str]]
-    final: Handover | None
+    final: RestartState | None
 
 
-def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> Block:
-    """The task of a worker: the runs of some points, given by the values of the axes."""
+def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> TaskResult:
+    """Run some points, given by the values of the axes: the task of a worker."""
     maker, state = Points(base, choices), task.start
     values = np.full((len(points), len(COLUMNS)), np.nan)
     texts: list[tuple[str, str]] = []
@@ -57,18 +57,18 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
         final = _run(maker, point, state if task.linked else None, row, texts)
         # a run that broke off within a period leaves the state that it began with
         state = state if final is None else final
-    return Block(values, texts, state if task.linked else None)
+    return TaskResult(values, texts, state if task.linked else None)
 
 
-def broken(error: BaseException) -> Block:
-    """A point whose run has broken, or has broken its worker."""
-    told = " ".join(f"error: {type(error).__name__}: {error}".split())
+def broken(error: BaseException) -> TaskResult:
+    """Return the result of a point whose run has broken, or has broken its worker."""
+    text = " ".join(f"error: {type(error).__name__}: {error}".split())
     if isinstance(error, BrokenExecutor):
-        told = "error: the worker process ended abruptly (killed, or out of memory)"
-    return Block(np.full((1, len(COLUMNS)), np.nan), [(told, "")], None)
+        text = "error: the worker process ended abruptly (killed, or out of memory)"
+    return TaskResult(np.full((1, len(COLUMNS)), np.nan), [(text, "")], None)
 
 
-class Finished:
+class SweepTable:
     """The finished points of a grid: some 120 bytes each.
 
     values: (points, columns); codes: (points, 2) places of the texts in `texts`; done: (points,);
@@ -79,23 +79,23 @@ class Finished:
         self.values = np.full((size, len(COLUMNS)), np.nan)
         self.codes = np.zeros((size, len(TEXTS)), np.int32)
         self.done = np.zeros(size, bool)
-        self.states: dict[int, Handover] = {}
+        self.states: dict[int, RestartState] = {}
         self._places: dict[str, int] = {}
         self.count = 0
 
     @property
     def texts(self) -> list[str]:
-        """Every status and classification, once."""
+        """Unique status and classification strings."""
         return list(self._places)
 
-    def add(self, task: Task, block: Block, more: bool) -> None:
-        """Take over what a task has left; more: whether its chain goes on."""
+    def add(self, task: Task, result: TaskResult, more: bool) -> None:
+        """Take over the result of a task; more: whether its chain goes on."""
         where = list(task.points)
-        codes = [[self._places.setdefault(text, len(self._places)) for text in pair] for pair in block.texts]
-        self.put(where, block.values, np.array(codes))
+        codes = [[self._places.setdefault(text, len(self._places)) for text in pair] for pair in result.texts]
+        self.put(where, result.values, np.array(codes))
         self.states.pop(task.chain, None)
-        if more and task.linked and block.final is not None:
-            self.states[task.chain] = block.final
+        if more and task.linked and result.final is not None:
+            self.states[task.chain] = result.final
 
     def put(self, where: Any, values: np.ndarray, codes: np.ndarray, texts: Sequence[str] | None = None) -> None:
         """Set points, with codes that refer to `texts` (default: those of this record)."""
@@ -107,13 +107,13 @@ class Finished:
         self.count = int(np.count_nonzero(self.done))
 
     def text(self, name: str) -> np.ndarray:
-        """Status or classification of every point, objects (points,)."""
+        """Return status or classification of every point, objects (points,)."""
         return np.array(self.texts, object)[self.codes[:, TEXTS.index(name)]]
 
 
 def _run(
-    maker: Points, point: Mapping[str, Any], start: Handover | None, row: np.ndarray, texts: list[tuple[str, str]]
-) -> Handover | None:
+    maker: Points, point: Mapping[str, Any], start: RestartState | None, row: np.ndarray, texts: list[tuple[str, str]]
+) -> RestartState | None:
     """Run one point into its row and its texts. Returns its last state."""
     try:
         scene = maker.scene(point)
@@ -137,15 +137,15 @@ def _shares(response: Response) -> np.ndarray:
 
 
 def _linear(scene: Scene) -> list[float]:
-    """Amplitude of the response without bodies, and with every body glued to its cavity's floor, m; nan if unknown."""
+    """Return the amplitude without bodies, and with every body glued to its cavity's floor, m; nan if unknown."""
     if scene.excitation.signal is not None:
         return [np.nan, np.nan]
     frequency = np.array([scene.excitation.frequency])
     return [float(response.amplitude(frequency)[0]) for response in linear_responses(scene)]
 
 
-def tasks_of(grid: Grid | PointList, finished: Finished, most: int) -> Iterator[tuple[Task, Sequence[int]]]:
-    """Tasks of at most so many points that can run side by side, each with the rest of its chain.
+def tasks_of(grid: Grid | PointList, finished: SweepTable, most: int) -> Iterator[tuple[Task, Sequence[int]]]:
+    """Yield tasks of at most `most` points that can run side by side, each with the rest of its chain.
 
     All tasks of chains that are not linked, and the first of those that are; of points that are not done.
     """

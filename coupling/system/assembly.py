@@ -87,7 +87,7 @@ def loads_of(scene: Scene, signal: Waveform) -> Loads:
 
 
 def initial_motion(scene: Scene, system: System) -> InitialMotion:
-    """The motion that a scene begins with."""
+    """Return the motion that a scene begins with."""
     n = system.modes
     scale = physical_scale(scene, system)  # an initial state is that of a rigid structure: others have none
     p, p_rate = np.full(n, scene.initial.displacement / scale), np.full(n, scene.initial.velocity / scale)
@@ -102,7 +102,7 @@ def initial_motion(scene: Scene, system: System) -> InitialMotion:
 
 
 def physical_scale(scene: Scene, system: System) -> float:
-    """Displacement per modal coordinate of a rigid structure, which has only one, whatever its mass; 1 for others."""
+    """Return the displacement per modal coordinate of a rigid structure, which has only one; 1 for others."""
     return float(system.response[0]) if isinstance(scene.structure, Rigid) else 1.0
 
 
@@ -110,7 +110,7 @@ def row_motion(
     system: System, slip: np.ndarray, slip_velocity: np.ndarray, p: np.ndarray, p_rate: np.ndarray,
     elongation: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Displacement and velocity (r,) of every row, from slips (b,), modal coordinates (n,) and their rates.
+    """Return displacement and velocity (r,) of every row, from slips (b,), modal coordinates (n,) and their rates.
 
     elongation: (friction dampers,) of the springs before the sliders, m.
     """

@@ -1,4 +1,4 @@
-"""Directions of cavities in space: what a reduced model says of them, and what does not fit together.
+"""Directions of cavities in space: those that a reduced model gives, and checks that they fit together.
 
 Left wall, right wall and floor of a cavity have one direction, that of the body's motion from the left wall to the
 right one. Along it the body feels gravity and the base's motion.
@@ -81,7 +81,10 @@ def _check_parallel(cavity: Cavity, key: str, directions: Vectors) -> None:
 
 
 def _check_walls(cavity: Cavity, key: str, directions: Vectors, normals: Vectors) -> None:
-    """One label for a whole cavity may be any surface, and a wall that is floor too follows the floor."""
+    """Raise InputError for walls that do not face the cavity.
+
+    One label for a whole cavity may be any surface, and a wall that is floor too follows the floor.
+    """
     if len(set(cavity.labels())) == 1:
         return
     for side, label, opposite in (("left", cavity.left, cavity.right), ("right", cavity.right, cavity.left)):
@@ -104,7 +107,7 @@ def _check_walls(cavity: Cavity, key: str, directions: Vectors, normals: Vectors
 
 
 def _angle(first: np.ndarray, second: np.ndarray) -> float:
-    """Angle of two vectors, degrees; 0 where one is zero."""
+    """Return the angle of two vectors, degrees; 0 where one is zero."""
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second)))
 
 

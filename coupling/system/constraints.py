@@ -104,7 +104,7 @@ def constraints_of(scene: Scene, basis: ModalBasis, at: str) -> Constraints:
 
 
 class _Surfaces(NamedTuple):
-    """Labels of left wall, right wall and floor of a cavity, their functionals (n,), and what its walls yield, m/N."""
+    """Labels of left wall, right wall and floor of a cavity, functionals (n,), flexibilities of the walls (m/N)."""
 
     labels: tuple[str, str, str]
     left: np.ndarray
@@ -124,7 +124,7 @@ def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> _Surfaces:
 
 
 def surface_labels(scene: Scene, index: int) -> tuple[str, str, str]:
-    """Interface labels of left wall, right wall and floor of a cavity."""
+    """Return the interface labels of left wall, right wall and floor of a cavity."""
     if not isinstance(scene.structure, Rom):
         return ("structure",) * 3
     left, right, floor = scene.cavity[index].labels()
@@ -132,7 +132,7 @@ def surface_labels(scene: Scene, index: int) -> tuple[str, str, str]:
 
 
 def _slips(scene: Scene, basis: ModalBasis, floor: np.ndarray, floors: list[str]) -> list[_Row]:
-    """The slip of each body on its floor."""
+    """Return a row for the slip of each body on its floor."""
     rows = []
     for i, damper in enumerate(scene.damper):
         _, across = scene.gravity.components(basis.directions[floors[i]])
@@ -142,7 +142,7 @@ def _slips(scene: Scene, basis: ModalBasis, floor: np.ndarray, floors: list[str]
 
 
 def _friction_dampers(scene: Scene, basis: ModalBasis, at: str) -> list[_Row]:
-    """The structure's motion against the casing at each friction damper."""
+    """Return a row for the structure's motion against the casing at each friction damper."""
     rows = []
     for i, damper in enumerate(scene.friction_damper):
         structure = interface_row(basis, damper.at or at, f"friction_damper[{i}].at")
@@ -152,7 +152,7 @@ def _friction_dampers(scene: Scene, basis: ModalBasis, at: str) -> list[_Row]:
 
 
 def _gaps(scene: Scene, cavities: list[_Surfaces], owner: list[int]) -> list[_Row]:
-    """All gaps, cavity by cavity from left to right."""
+    """Return the rows of all gaps, cavity by cavity from left to right."""
     rows = []
     for index, (cavity, surfaces) in enumerate(zip(scene.cavity, cavities, strict=True)):
         inside = [i for i, where in enumerate(owner) if where == index]
@@ -163,7 +163,7 @@ def _gaps(scene: Scene, cavities: list[_Surfaces], owner: list[int]) -> list[_Ro
             restitution = coefficients[0] if len(pair) == 1 else scene.contact.pair_restitution(*coefficients)
             # the wall's mass is that of the structure's first mode, the same for every number of modes
             mobility = float(sum(1 / damper.mass for damper in pair) + (wall[:1] ** 2).sum())
-            # between two bodies, the mean of what the cavity's walls yield
+            # between two bodies, the mean flexibility of the cavity's walls
             yields = surfaces.flexibility[0] if left < 0 else surfaces.flexibility[1]
             yields = yields if len(pair) == 1 else 0.5 * sum(surfaces.flexibility)
             element = scene.contact.element(restitution, 1 / mobility, yields)
@@ -173,7 +173,7 @@ def _gaps(scene: Scene, cavities: list[_Surfaces], owner: list[int]) -> list[_Ro
 
 
 def _stops(scene: Scene, basis: ModalBasis) -> list[_Row]:
-    """The gap of each stop, which closes as the structure moves to that side, against the ground or a second point."""
+    """Return a row for the gap of each stop, which closes as the structure moves to that side."""
     rows = []
     for i, stop in enumerate(scene.stop):
         ends = [(stop.at or "structure", "at", 1.0)] + ([(stop.to, "to", -1.0)] if stop.to else [])
@@ -187,5 +187,5 @@ def _stops(scene: Scene, basis: ModalBasis) -> list[_Row]:
 
 
 def _coefficient(friction: float) -> float:
-    """A coefficient of friction, zero where it is nothing beside the round-off of other forces."""
+    """Return a coefficient of friction, zero where it is lost in the round-off of other forces."""
     return friction if friction > _SMOOTH else 0.0

@@ -50,12 +50,12 @@ class LinearResponse:
     order: np.ndarray
 
     def amplitude(self, frequencies: np.ndarray) -> np.ndarray:
-        """Amplitudes of the response (f,), m, at frequencies (f,), Hz; of several harmonics the peak over a period."""
+        """Return amplitudes of the response (f,), m, at frequencies (f,), Hz; of harmonics the peak over a period."""
         waves = [self._wave(h, np.asarray(frequencies, float)) for h in range(len(self.order))]
         return np.abs(waves[0]) if len(waves) == 1 else _peak(np.array(waves), self.order)
 
     def _wave(self, h: int, frequencies: np.ndarray) -> np.ndarray:
-        """Complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,) in Hz."""
+        """Return complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,) in Hz."""
         omega = 2 * np.pi * self.order[h] * frequencies[:, None, None]
         dynamic = np.diag(self.stiffness) + 1j * omega * self.damping - omega**2 * self.mass
         loads = np.broadcast_to(self.load[h][:, None], (len(omega), self.load.shape[1], 1))
@@ -63,7 +63,7 @@ class LinearResponse:
         return wave
 
     def peak(self, low: float, high: float) -> LinearPeak:
-        """The largest amplitude from low to high, Hz, to round-off; at one of the two where no resonance is higher."""
+        """Return the largest amplitude from low to high, Hz, to round-off; at an end where no resonance is higher."""
         natural, widths = self._resonances()
         inside = (natural >= low) & (natural <= high)
         for frequency in natural[inside & (widths == 0.0)]:
@@ -79,7 +79,7 @@ class LinearResponse:
         return LinearPeak(frequency, amplitude, width)
 
     def _refined(self, grid: np.ndarray, heights: np.ndarray, top: int) -> tuple[float, float]:
-        """Height and frequency of the maximum around a point of the grid; that point where it is an edge's."""
+        """Return height and frequency of the maximum around a point of the grid; that point at an edge."""
         found = float(heights[top]), float(grid[top])
         if 0 < top < len(grid) - 1:
             refined = minimize_scalar(
@@ -90,7 +90,7 @@ class LinearResponse:
         return found
 
     def _resonances(self) -> tuple[np.ndarray, np.ndarray]:
-        """Frequencies at which a harmonic meets a natural one, and half-power widths there (e n,), Hz."""
+        """Return frequencies at which a harmonic meets a natural one, and half-power widths there (e n,), Hz."""
         squares, shapes = eigh(np.diag(self.stiffness), self.mass) if len(self.mass) else (np.zeros(0), self.mass)
         widths = np.einsum("ik,ij,jk->k", shapes, self.damping, shapes) / (2 * np.pi)
         natural = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
@@ -98,7 +98,7 @@ class LinearResponse:
 
 
 def _peak(waves: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """Largest |Re sum_h waves_h exp(i order_h angle)| (f,) over all angles; waves (e, f): from a grid, by Newton."""
+    """Return the largest |Re sum_h waves_h exp(i order_h angle)| (f,) over all angles; waves (e, f). By Newton."""
     step = np.pi / (8 * order.max())
     angle = np.broadcast_to(np.arange(0, 2 * np.pi, step)[:, None], (16 * order.max(), waves.shape[1]))
     found = np.zeros(waves.shape[1])
@@ -113,10 +113,10 @@ def _peak(waves: np.ndarray, order: np.ndarray) -> np.ndarray:
 
 
 def linear_responses(scene: Scene) -> tuple[LinearResponse, LinearResponse]:
-    """Without bodies, and with every body glued to its cavity's floor.
+    """Return the responses without bodies, and with every body glued to its cavity's floor.
 
-    Raises InputError, also for an excitation that is no sum of sines: what its Fourier series leaves out of a peak has
-    no bound that holds for every waveform.
+    Raises InputError, also for an excitation that is no sum of sines: the peak that a truncated Fourier series leaves
+    out has no bound that holds for every waveform.
     """
     if scene.excitation.signal is not None:
         raise InputError("excitation.waveform: linear curves are those of sums of sines; give harmonics")
@@ -135,13 +135,13 @@ def linear_responses(scene: Scene) -> tuple[LinearResponse, LinearResponse]:
 
 
 def glued_mass(system: System) -> np.ndarray:
-    """Modal mass matrix (n, n) of the structure with every body glued to its floor."""
+    """Return the modal mass matrix (n, n) of the structure with every body glued to its floor."""
     mass: np.ndarray = np.diag(system.of_structure.mass) + (system.floor.T * system.of_bodies.mass) @ system.floor
     return mass
 
 
 def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np.ndarray:
-    """Complex displacement of the response per newton at `excitation.at`, m/N, shape (f,).
+    """Return the complex displacement of the response per newton at `excitation.at`, m/N, shape (f,).
 
     Without bodies, or (`fixed`) with every body glued to its cavity's floor.
     """

@@ -42,12 +42,12 @@ _AXIS = frozen([1.0, 0.0, 0.0])
 
 
 def forced_label(scene: Scene) -> str:
-    """Interface label of force and response; a structure without an interface has only one, "structure"."""
+    """Return the interface label of force and response; a structure without an interface has only one, "structure"."""
     return str(scene.excitation.at) if isinstance(scene.structure, Rom) else "structure"
 
 
 def interface_row(basis: ModalBasis, label: str, key: str) -> np.ndarray:
-    """The functional (n,) of an interface label, named in a scene under `key`. Raises InputError for an unknown one."""
+    """Return the functional (n,) of an interface label, named in a scene under `key`. Raises InputError."""
     try:
         return basis.rows[label]
     except KeyError:
@@ -55,7 +55,7 @@ def interface_row(basis: ModalBasis, label: str, key: str) -> np.ndarray:
 
 
 def basis_of(scene: Scene) -> ModalBasis:
-    """The modes of a scene's structure. Raises InputError for an unusable model."""
+    """Return the modes of a scene's structure. Raises InputError for an unusable model."""
     structure = scene.structure
     if isinstance(structure, Rigid):
         root = np.sqrt(structure.mass)
@@ -75,10 +75,10 @@ def _rom_basis(structure: Rom, _stamp: int) -> ModalBasis:
 
 
 def modal_basis(model: ReducedModel) -> ModalBasis:
-    """Real modes of a reduced model.
+    """Return the real modes of a reduced model.
 
-    Raises InputError if the structure can move freely (no support), or if round-off of its stiffness alone moves the
-    lowest natural frequency by more than a thousandth.
+    Raises InputError if the structure can move freely (no support), or if round-off of its stiffness by itself moves
+    the lowest natural frequency by more than a thousandth.
     """
     if model.rigid_modes:
         raise InputError("structure: the reduced model has rigid-body motion; support it before reduction")

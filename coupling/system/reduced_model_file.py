@@ -12,15 +12,15 @@ from vanedamp.rom.truncation import massless, truncated, with_attachment_modes
 
 
 def file_stamp(file: str) -> int:
-    """Tells a file from a later one of that name."""
+    """Return a number that distinguishes a file from a later one of that name."""
     path = Path(file)
     return path.stat().st_mtime_ns if path.is_file() else 0
 
 
 def reduced_model(structure: Rom) -> ReducedModel:
-    """The reduced model of a structure, with so many of its modes as it says. Raises InputError for an open choice."""
+    """Return the reduced model of a structure, with its number of modes. Raises InputError for an open choice."""
     if structure.modes == "auto":
-        raise InputError('structure.modes: "auto" is still open; model_order.selection.settle chooses')
+        raise InputError('structure.modes: "auto" is still open; model_order.selection.select_model_order chooses')
     return _restricted(
         structure.file, file_stamp(structure.file), structure.modes, structure.natural, structure.attached
     )

@@ -15,7 +15,7 @@ from vanedamp.files.toml_input import InputError
 
 
 def excitation_force(scene: Scene) -> float:
-    """Amplitude of the exciting force, N (resonance_amplitude resolved)."""
+    """Return the amplitude of the exciting force, N (resonance_amplitude resolved)."""
     if isinstance(scene.structure, Prescribed):
         return 0.0
     basis = basis_of(scene)
@@ -23,8 +23,8 @@ def excitation_force(scene: Scene) -> float:
 
 
 class Resonance(NamedTuple):
-    """A resonance without bodies: its mode from 0 of so many, frequency (Hz), displacement of the response per newton
-    (m/N) and modal mass there (kg)."""
+    """A resonance without bodies: its mode (from 0), the number of modes, frequency (Hz), displacement of the
+    response per newton (m/N) and modal mass there (kg)."""
 
     mode: int
     modes: int
@@ -34,7 +34,7 @@ class Resonance(NamedTuple):
 
 
 def chosen_resonance(scene: Scene) -> Resonance:
-    """The resonance that `resonance_amplitude` means: of the mode that responds most within `resonance_near`.
+    """Return the resonance that `resonance_amplitude` means: of the mode that responds most within `resonance_near`.
 
     Raises InputError for a structure without damping.
     """
@@ -51,7 +51,7 @@ def receptance_of(
 
 
 def force_amplitude(scene: Scene, basis: ModalBasis, response: np.ndarray) -> float:
-    """Amplitude of the exciting force at the functional `response` (n,) of the basis, N."""
+    """Return the amplitude of the exciting force at the functional `response` (n,) of the basis, N."""
     excitation = scene.excitation
     if excitation.resonance_amplitude is None:
         return excitation.force or 0.0
@@ -74,7 +74,7 @@ def _chosen(scene: Scene, basis: ModalBasis, response: np.ndarray) -> Resonance:
 
 @lru_cache(maxsize=64)
 def _resonance(stiffness_: bytes, damping_: bytes, response_: bytes, mode: int) -> tuple[float, float]:
-    """Frequency (Hz) and height (m/N) of a mode's resonance: once for all frequencies of a sweep."""
+    """Return frequency (Hz) and height (m/N) of a mode's resonance: once for all frequencies of a sweep."""
     stiffness, response = np.frombuffer(stiffness_), np.frombuffer(response_)
     damping = np.frombuffer(damping_).reshape(len(stiffness), -1)
     resonance = np.sqrt(stiffness[mode])

@@ -63,12 +63,12 @@ class System(NamedTuple):
 
     @property
     def of_structure(self) -> Part:
-        """What belongs to the modal coordinates."""
+        """The part of the modal coordinates."""
         return self._part(slice(0, self.modes))
 
     @property
     def of_bodies(self) -> Part:
-        """What belongs to the bodies."""
+        """The part of the bodies."""
         return self._part(slice(self.modes, None))
 
     @property
@@ -77,7 +77,7 @@ class System(NamedTuple):
         return np.rint(self.frequency / self.omega).astype(int)
 
     def phases(self, angle: np.ndarray) -> np.ndarray:
-        """Phasors (k, e) of the harmonics at angles omega t (k,)."""
+        """Return the phasors (k, e) of the harmonics at angles omega t (k,)."""
         phasors: np.ndarray = np.exp(1j * np.multiply.outer(angle, self.order))
         return phasors
 

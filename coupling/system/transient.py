@@ -1,7 +1,8 @@
-"""The structure's own transient: how long it lasts is known before a run, whether it has ended is seen after it.
+"""The structure's own transient: its length is known before a run, and whether it has ended is seen afterwards.
 
-From rest, each mode starts with what it lacks to its steady amplitude and loses it as exp(-zeta omega t); bodies that
-take energy only shorten that. At its resonance a mode of damping ratio zeta has exp(-2 pi zeta n) left after n periods.
+From rest, each mode starts with its steady amplitude missing, and the difference decays as exp(-zeta omega t); bodies
+that take energy only shorten that. At its resonance a mode of damping ratio zeta has exp(-2 pi zeta n) left after n
+periods.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _BATCHES, _SHORTEST, _CERTAIN = 10, 25, 5.0
 
 
 def left_over(scene: Scene, periods: float) -> float:
-    """Share of the steady response that the transient of the excited modes still has after `periods` periods, at most.
+    """Return an upper bound of the transient left after `periods` periods, as a share of the steady response.
 
     0 for a structure that nothing excites.
     """
@@ -31,7 +32,7 @@ def left_over(scene: Scene, periods: float) -> float:
 
 
 class _Transient:
-    """What each mode of a scene's structure begins with beside its steady response, and how fast it loses it."""
+    """The transient of each mode of a scene's structure: its start, and its rate of decay."""
 
     def __init__(self, scene: Scene) -> None:
         system = assemble(scene)
@@ -59,7 +60,7 @@ class _Transient:
 
 
 def timed(scene: Scene) -> Scene:
-    """The scene with a transient that suits its damping, where it leaves the number of periods open.
+    """Return the scene with a transient that suits its damping, where it leaves the number of periods open.
 
     As many periods as leave `time.tolerance` of the steady response, at least the default; the default too where LIMIT
     would not do: then nothing but the bodies can end the transient in time.
@@ -79,10 +80,10 @@ def timed(scene: Scene) -> Scene:
 def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray) -> bool:
     """Whether the transient that a scene leaves out was long enough; peaks, impacts: (n,) of the periods evaluated.
 
-    It was where the structure alone leaves less than `time.tolerance`. Otherwise bodies may have ended it, which the
-    peaks tell. Without impacts the motion is linear but for friction: peaks that spread or, extrapolated with the
-    slowest decay, are off by more than the tolerance belong to a transient. With impacts peaks spread anyway: from 500
-    periods on, the means of both halves must agree within the tolerance or the scatter.
+    It was where the structure without bodies leaves less than `time.tolerance`. Otherwise bodies may have ended it,
+    which the peaks show. Without impacts the motion is linear but for friction: peaks that spread or, extrapolated with
+    the slowest decay, are off by more than the tolerance belong to a transient. With impacts peaks spread anyway: from
+    500 periods on, the means of both halves must agree within the tolerance or the scatter.
     """
     transient, tolerance = _Transient(scene), scene.time.tolerance
     if transient.left_over(scene.time.dropped) <= tolerance or not peaks.any():
@@ -97,7 +98,7 @@ def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray) -> bool:
 
 
 def _drifts(peaks: np.ndarray, tolerance: float) -> bool:
-    """Whether the means of both halves differ by more than the tolerance and what the second half's batches explain."""
+    """Whether the means of both halves differ by more than the tolerance and the second half's scatter."""
     half = len(peaks) // 2
     size = half // _BATCHES
     if size < _SHORTEST:

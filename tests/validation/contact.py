@@ -15,7 +15,7 @@ from tests.validation.page import Case, Figure, case
 from tests.validation.unilateral_spring import unilateral_spring
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.response.restart_state import RestartState
 
 # a body so heavy that it is the ground: what an impact gives it in speed is below round-off of the structure's
 GROUND = 1e15
@@ -144,7 +144,7 @@ def _doubling(restitution: float, ratio: float) -> float:
 
     def moved(change: np.ndarray) -> np.ndarray:
         slip, speed = start + change
-        given = Handover(nothing, nothing, np.array([slip]), np.array([speed]), nothing, np.full(2, 2e3))
+        given = RestartState(nothing, nothing, np.array([slip]), np.array([speed]), nothing, np.full(2, 2e3))
         final = simulate(data, start=given).final
         assert final is not None
         return np.array([final.slip[0], final.slip_velocity[0]])

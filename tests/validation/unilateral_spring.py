@@ -12,7 +12,7 @@ from tests.tools.closed_form_scenes import scene
 from tests.validation.page import Figure, case
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart_state import Handover
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.rom.reduced import ReducedModel
 
@@ -46,7 +46,7 @@ class Chain:
         rows = np.array([system.floor[0], system.of_structure.response])
         modal = np.linalg.solve(rows, state.reshape(2, 2).T)
         slip, speed = np.array([GAP - _HALF_GAP - state[0]]), np.array([-state[2]])
-        start = Handover(modal[:, 0], modal[:, 1], slip, speed, np.zeros(0), np.full(2, 2 * _HALF_GAP))
+        start = RestartState(modal[:, 0], modal[:, 1], slip, speed, np.zeros(0), np.full(2, 2 * _HALF_GAP))
         response = simulate(data, samples_per_period=samples, start=start)
         assert response.status == "ok" and response.final is not None
         return response, np.concatenate([rows @ response.final.displacement, rows @ response.final.velocity])

@@ -1,1 +1,1 @@
-"""Contact laws: what a gap does when it closes. Each is one class in a file of its own (law.ContactLaw says how)."""
+"""Contact laws: the behaviour of a gap that closes. Each is one class in a file of its own (law.ContactLaw)."""

@@ -18,8 +18,8 @@ class Compliant(ContactLaw):
     """Spring (`stiffness`, N/m) and dashpot while the gap is closed; the contact ends when its force vanishes.
 
     The dashpot gives an isolated collision of the pair's reduced mass the restitution asked for. With `residual` the
-    spring is in series with what a reduced model's modes lack of its wall's static flexibility; without a `stiffness`
-    it is that alone.
+    spring is in series with the residual flexibility of its wall, the part of the static one that a reduced model's
+    modes lack; without a `stiffness` it is that only.
     """
 
     rigid: ClassVar[bool] = False
@@ -42,7 +42,7 @@ class Compliant(ContactLaw):
         return self.residual
 
     def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
-        """Element of a pair, as of every law. Raises InputError at restitution 0."""
+        """Return the element of a pair, as every law does. Raises InputError at restitution 0."""
         own = self.flexibility
         stiffness = spring_on_wall(own, flexibility) if self.residual else 1.0 / own
         dashpot = 2 * damping_ratio(restitution) * math.sqrt(stiffness * mass)
@@ -50,7 +50,7 @@ class Compliant(ContactLaw):
 
 
 def damping_ratio(restitution: float) -> float:
-    """Damping ratio of a spring-dashpot contact that ends at zero force, from its restitution in (0, 1].
+    """Return the damping ratio of a spring-dashpot contact that ends at zero force, from its restitution in (0, 1].
 
     restitution = exp(-(pi - 2 a) tan a) with damping ratio sin a, down to exp(-2) at critical damping; below, the same
     with hyperbolic functions: exp(-2 z acosh(z)/sqrt(z^2 - 1)). Raises InputError outside (0, 1].
@@ -62,7 +62,7 @@ def damping_ratio(restitution: float) -> float:
 
 
 def _turn(ratio: float) -> float:
-    """acos(z)/sqrt(1 - z^2) of a damping ratio z, and its continuation acosh(z)/sqrt(z^2 - 1) above critical damping.
+    """Return acos(z)/sqrt(1 - z^2) of a damping ratio z, or its continuation acosh(z)/sqrt(z^2 - 1) above 1.
 
     By half angles, which keep their digits about z = 1.
     """

@@ -1,4 +1,4 @@
-"""What every contact law answers: other code asks a law these questions, and never for its class."""
+"""The contract of contact laws: other code asks a law these questions, and never for its class."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ class ContactLaw:
 
     @staticmethod
     def restitution_at(speed: float, coefficient: float) -> float:
-        """Restitution, within [0, 1], of a rigid contact at a speed of approach (m/s, from 0 on).
+        """Return the restitution, within [0, 1], of a rigid contact at a speed of approach (m/s, from 0 on).
 
         coefficient: the `restitution` of the pair's element. A law that overrides this is compiled (numba): arithmetic
-        and `math` on two floats. What depends on its fields or on the pair goes into the coefficient, so that a sweep
-        over a field compiles nothing.
+        and `math` on two floats. Anything that depends on its fields or on the pair goes into the coefficient, so that
+        a sweep over a field compiles nothing.
         """
         return coefficient
 
@@ -58,7 +58,7 @@ class ContactLaw:
 
     @property
     def takes_residual_flexibility(self) -> bool:
-        """Whether a wall yields, too, by what a reduced model's modes lack of its static flexibility."""
+        """Whether a wall yields, too, by the part of its static flexibility that a reduced model's modes lack."""
         return False
 
     @property
@@ -67,21 +67,21 @@ class ContactLaw:
         return self.takes_residual_flexibility and self.flexibility == 0.0
 
     def pair_restitution(self, left: float, right: float) -> float:
-        """Coefficient of two bodies that meet, from theirs at a wall: the geometric mean."""
+        """Return the coefficient of two bodies that meet, from theirs at a wall: the geometric mean."""
         mean: float = (left * right) ** 0.5
         return mean
 
     def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
-        """Element of a pair with a coefficient of restitution, a reduced mass (kg) and what the wall yields.
+        """Return the element of a pair with a restitution, a reduced mass (kg) and a residual flexibility.
 
-        flexibility: m/N that the modes lack of the wall; None: not known yet.
+        flexibility: of the wall, m/N; None: not known yet.
         Raises InputError, whose message begins with "restitution: ", for a coefficient that the law has no element for.
         """
         return Element(restitution)
 
 
 def spring_on_wall(own: float, flexibility: float | None) -> float:
-    """Stiffness of a spring (flexibility `own`) on a wall that yields; 1 where the wall is not known yet.
+    """Return the stiffness of a spring (flexibility `own`) on a wall that yields; 1 where the wall is not known yet.
 
     Raises InputError where nothing yields.
     """

@@ -27,7 +27,7 @@ class Massless(ContactLaw):
         return True
 
     def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
-        """Element of a pair: the wall as a spring. Raises InputError for a restitution."""
+        """Return the element of a pair: the wall as a spring. Raises InputError for a restitution."""
         if restitution != 1.0:
             raise InputError(
                 f"restitution: a massless contact loses nothing and has no impact law; drop it (got {restitution:g})"

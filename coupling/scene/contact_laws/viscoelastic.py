@@ -24,11 +24,11 @@ class Viscoelastic(ContactLaw):
 
     @staticmethod
     def restitution_at(speed: float, coefficient: float) -> float:
-        """Restitution at a speed of approach (m/s)."""
+        """Return the restitution at a speed of approach (m/s)."""
         return max(1.0 - coefficient * speed**0.2, 0.0)
 
     def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
-        """Element of any pair. Raises InputError for a restitution."""
+        """Return the element of any pair. Raises InputError for a restitution."""
         if restitution != 1.0:
             raise InputError(
                 f"restitution: that of a viscoelastic contact follows from its speed and contact.coefficient; "

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.model_order.selection import settle_all
+from vanedamp.coupling.model_order.selection import select_model_orders
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import write_csv
 from vanedamp.studies.bench.engine.inside import time_of_a_period
@@ -100,10 +100,11 @@ def judge(trial: Trial, name: str, periods: int) -> list[Verdict]:
 
 
 def chosen_for(trial: Trial, tolerance: float) -> dict[str, Any]:
-    """The estimate of the model that is chosen for a trial's band and a tolerance."""
+    """Return the estimate of the model that is chosen for a trial's band and a tolerance."""
     scene = trial.scene.replace({"structure.tolerance": tolerance})
     scene = scene.replace({"excitation.resonance_near": [min(trial.band), max(trial.band)]})
-    estimate = settle_all([scene.replace({"excitation.frequency": frequency}) for frequency in trial.band])[0].estimate
+    scenes = [scene.replace({"excitation.frequency": frequency}) for frequency in trial.band]
+    estimate = select_model_orders(scenes)[0].estimate
     assert estimate is not None
     return estimate
 
