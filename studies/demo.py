@@ -32,7 +32,7 @@ All figures of the paper: vanedamp paper -o paper"""
 
 
 def run_demo(folder: Path, workers: int | None = None) -> Path:
-    """Modes, rigid model, reduction, three figures of the paper, the report. Returns the report's path."""
+    """Make modes, rigid model, reduction, three figures of the paper and the report. Returns the report's path."""
     started = time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)
     results = [folder / "modes.h5", folder / "rom.h5"]
@@ -61,7 +61,7 @@ def run_demo(folder: Path, workers: int | None = None) -> Path:
 
 
 def _summary(folder: Path) -> None:
-    """The mode and the rigid model's forced response with the gap reference/2 in one picture, summary.png."""
+    """Draw the mode and the rigid model's forced response with the gap reference/2 in one picture, summary.png."""
     _, attributes = load(folder / "modes.h5", "modes")
     picture = mode_picture(folder / "modes.h5", int(attributes["first_bending"]))
     _, response, _ = forced_responses(Sweep.load(folder / "fig9.h5"))

@@ -59,7 +59,7 @@ class Headline:
     points_left_out: int
 
     def relative(self, height: float) -> float:
-        """An amplitude, m, over the undamped maximum; nan where that has no bound or is none."""
+        """Return an amplitude, m, over the undamped maximum; nan where that has no bound or is none."""
         return height / self.undamped_peak if 0.0 < self.undamped_peak < math.inf else math.nan
 
     @property
@@ -89,7 +89,7 @@ class Headline:
         return remarks
 
     def sentence(self, axis: str, units: str, low: Any, high: Any) -> str:
-        """The headline for people; low, high: the range along the axis."""
+        """Return the headline for people; low, high: the range along the axis."""
         unit = "" if units == "1" else f" {units}"
         if not math.isfinite(self.damped_peak):
             return f"no damped peak: {self.points_left_out} of {self.points} points are not ok"
@@ -110,12 +110,12 @@ class Headline:
         return "; ".join([text, *self.remarks])
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return asdict(self) | {"peak_ratio": self.peak_ratio, "too_coarse": self.too_coarse}
 
 
 def format_value(value: Any) -> str:
-    """A value of an axis in a few digits; text as it is."""
+    """Return a value of an axis in a few digits; text as it is."""
     return str(value) if isinstance(value, str) else f"{value:.6g}"
 
 
@@ -129,7 +129,7 @@ def headline(
     peaks: Mapping[str, float],
     along_frequency: bool,
 ) -> Headline:
-    """The headline of damped curves (n,) over ascending x (n,), which are nan at points that are not ok.
+    """Return the headline of damped curves (n,) over ascending x (n,), nan at points that are not ok.
 
     undamped, fixed: linear curves (n,) at the points; peaks: of them between the points, by the names of
     coupling.sweep.sweep.PEAKS, where they are known.
@@ -181,7 +181,7 @@ def _top(x: np.ndarray, curve: np.ndarray, along_frequency: bool) -> _Top:
 
 
 def _step(x: np.ndarray, place: float) -> float:
-    """The widest step of ascending points (n,) that a place lies in; beyond them, its distance."""
+    """Return the widest step of ascending points (n,) that a place lies in; beyond them, its distance."""
     if not x[0] <= place <= x[-1]:
         return float(np.abs(x - place).min())
     left, right = np.searchsorted(x, place, "left"), np.searchsorted(x, place, "right")

@@ -16,7 +16,7 @@ _SOON = 0.02
 
 @contextmanager
 def swallowed_interrupts_again() -> Iterator[None]:
-    """An interrupt that a callback cannot pass on comes again: LLVM has some while compiled functions are loaded."""
+    """Repeat an interrupt that a callback cannot pass on: LLVM has some while compiled functions are loaded."""
     before, again = sys.unraisablehook, list[threading.Timer]()
 
     def hook(unraisable: Any) -> None:
@@ -37,7 +37,7 @@ def swallowed_interrupts_again() -> Iterator[None]:
 
 @contextmanager
 def uninterrupted_children() -> Iterator[None]:
-    """Processes that are started meanwhile never see an interrupt, and their start is never cut in two.
+    """Keep interrupts from processes that are started meanwhile, and from cutting their start in two.
 
     They inherit that it is blocked. To have them ignore it is too late, and shows a traceback, for an interrupt while
     they load. The parent sees it at the end: blocked here, it may still come by way of another thread, and a process

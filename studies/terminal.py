@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on standard error with rate and time left, on a terminal only."""
+    """Show a progress bar on standard error with rate and time left, on a terminal only."""
     from tqdm import tqdm
 
     with tqdm(desc=title, disable=None, leave=False) as bar:

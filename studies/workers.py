@@ -57,7 +57,7 @@ class WorkerPool(Executor):
 
 
 def _end_with_parent() -> None:
-    """A worker whose parent was killed would wait for work for ever."""
+    """End this worker with its parent: it would wait for work for ever."""
     parent = multiprocessing.parent_process()
     assert parent is not None
 
@@ -70,7 +70,7 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def workers(count: int | None) -> Iterator[Executor | None]:
-    """Worker processes with the engine compiled, one for every core by default; None for a single one."""
+    """Yield worker processes with the engine compiled, one for every core by default; None for a single one."""
     count = count or available_cores()
     if count == 1:
         yield None
@@ -99,5 +99,5 @@ def run_module(module: str, *arguments: str, threads: int | None = None, **optio
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """Return the cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -90,7 +90,7 @@ def test_another_scene_is_refused(tmp_path, monkeypatch):
     partial = tmp_path / "sweep.partial"
     sweep(scene(), checkpoint=partial)
     content, made = partial.read_bytes(), runs(monkeypatch)
-    with pytest.raises(InputError, match=r"sweep.partial: the checkpoint of another scene; .* delete it to start again"):
+    with pytest.raises(InputError, match=r"the checkpoint of another scene; .* delete it to start again"):
         sweep(scene(gravity={"acceleration": 1.0}), checkpoint=partial)
     with pytest.raises(InputError, match="of another version of the software"):
         sweep(scene(), checkpoint=partial, provenance={"versions": {"numpy": "0.1"}})

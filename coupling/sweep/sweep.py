@@ -17,13 +17,7 @@ from vanedamp.coupling.sweep.grid import FREQUENCY, Grid, PointList, Points
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.coupling.sweep.schedule import _run
-from vanedamp.coupling.sweep.worker import (
-    COLUMNS,
-    LOSSES,
-    MEASURES,
-    TEXTS,
-    SweepTable,
-)
+from vanedamp.coupling.sweep.worker import COLUMNS, LOSSES, MEASURES, TEXTS, SweepTable
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_responses
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, validate

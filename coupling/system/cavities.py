@@ -74,8 +74,8 @@ def _check_parallel(cavity: Cavity, key: str, directions: Vectors) -> None:
         if angle > _PARALLEL:
             fault = "against" if angle > 180.0 - _PARALLEL else f"at {angle:.0f} degrees to"
             raise InputError(
-                f"{key}.{side}: '{label}' points {fault} '{other}', {_shown(directions[label])} and "
-                f"{_shown(directions[other])}: both walls and the floor take the one direction from the left wall to "
+                f"{key}.{side}: '{label}' points {fault} '{other}', {_format(directions[label])} and "
+                f"{_format(directions[other])}: both walls and the floor take the one direction from the left wall to "
                 "the right one; mend the interface's directions and reduce again"
             )
 
@@ -94,14 +94,14 @@ def _check_walls(cavity: Cavity, key: str, directions: Vectors, normals: Vectors
         along = normals[label] if side == "left" else -normals[label]
         if _ALONG < angle < 180.0 - _ALONG:
             raise InputError(
-                f"{key}.{side}: '{label}' has a direction {_shown(directions[label])} at {angle:.0f} degrees to its "
+                f"{key}.{side}: '{label}' has a direction {_format(directions[label])} at {angle:.0f} degrees to its "
                 f"wall's normal, so that bodies would slide along the wall; give the interface the direction "
-                f"{_shown(along)} and reduce again"
+                f"{_format(along)} and reduce again"
             )
         if opposite is not None and opposite != label and (angle > 90.0) == (side == "left"):
             raise InputError(
-                f"{key}.{side}: along its direction {_shown(directions[label])} '{label}' is the wall at the other end "
-                f"(its material's outward normal is {_shown(normals[label])}): swap left and right, or turn the "
+                f"{key}.{side}: along its direction {_format(directions[label])} '{label}' is the wall at the other "
+                f"end (its material's outward normal is {_format(normals[label])}): swap left and right, or turn the "
                 "directions of both walls and the floor round and reduce again"
             )
 
@@ -111,5 +111,5 @@ def _angle(first: np.ndarray, second: np.ndarray) -> float:
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second)))
 
 
-def _shown(vector: np.ndarray) -> str:
+def _format(vector: np.ndarray) -> str:
     return "[" + ", ".join(f"{round(value, 3) + 0.0:g}" for value in vector) + "]"

@@ -18,7 +18,7 @@ Clock = Callable[[], float]
 
 
 def in_turns(clocks: Mapping[str, Clock], rounds: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """Seconds (rounds,) of every clock; a first round, which loads what is compiled, does not count."""
+    """Return the seconds (rounds,) of every clock; a first round, which loads compiled code, does not count."""
     names = list(clocks)
     times = {name: np.zeros(rounds) for name in names}
     for clock in clocks.values():
@@ -30,14 +30,14 @@ def in_turns(clocks: Mapping[str, Clock], rounds: int, rng: np.random.Generator)
 
 
 def seconds(task: Callable[..., Any], *arguments: Any) -> float:
-    """CPU time of the thread for a call: what else the machine does counts less than in time by the clock."""
+    """Return the thread's CPU time for a call: other work of the machine counts less than in time by the clock."""
     started = time.thread_time()
     task(*arguments)
     return time.thread_time() - started
 
 
 def spread(values: np.ndarray) -> dict[str, float]:
-    """Median and quartiles of (rounds,) values. Ratios are taken round by round before."""
+    """Return median and quartiles of (rounds,) values. Ratios are taken round by round before."""
     low, median, high = np.quantile(values, (0.25, 0.5, 0.75))
     return {"median": float(median), "low": float(low), "high": float(high)}
 

@@ -58,7 +58,7 @@ class Calibration:
         return None if amplitude is None else self.rigid.resonance_force(amplitude)
 
     def to_json(self) -> dict[str, Any]:
-        """The result as plain data."""
+        """Return the result as plain data."""
         return {
             "status": "ok",
             "first_bending": self.analysis.first_bending,
@@ -152,7 +152,7 @@ def calibrate(case: Case) -> Calibration:
 
 
 def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> Case:
-    """The case with Young's moduli and support stiffnesses times their factors."""
+    """Return the case with Young's moduli and support stiffnesses times their factors."""
     material: dict[str, MaterialTable] = dict(case.material)
     elastic = dict(case.support.elastic)
     known = parts_by_name(case, structure.solid.domain.volumes)
@@ -185,7 +185,7 @@ def _tuned(structure: Structure, table: TuneTable) -> Tuning:
 
 
 def _poles(frf: Frf, band: tuple[float, float], count: int, frequency: float) -> Poles:
-    """The modes of the band. A refusal tells where the response's peak lies beside the computed mode."""
+    """Return the modes of the band. A refusal names the response's peak and the computed mode."""
     try:
         return identify(frf.band(*band), count)
     except FrfError as error:
@@ -252,7 +252,7 @@ def _tuning_json(tuning: Tuning, case: Case) -> dict[str, Any]:
 
 
 def parts_by_name(case: Case, volumes: Iterable[str]) -> dict[str, list[str]]:
-    """Every name that `vary` may hold, with the parts of Solid.stiffness_parts that it stands for."""
+    """Return every name that `vary` may hold, with the parts of Solid.stiffness_parts that it stands for."""
     groups = list(volumes)
     names = {f"material.{group}": [f"material.{group}"] for group in groups}
     rest = [f"material.{group}" for group in groups if group not in case.material]

@@ -1,4 +1,4 @@
-"""The [calibration] table of a case file: what was measured, and what may be tuned to it."""
+"""The [calibration] table of a case file: measurements, and the values that may be tuned to them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class DampingTable:
     """A frequency response (CSV: Hz, real, imaginary ...; or UFF 58) that gives the damping ratio of the first bending.
 
-    quantity  what a CSV holds, and columns how: left out, its header tells; band in Hz, left out: 5 % to either side of
+    quantity  in a CSV, and columns its form: left out, the header decides; band in Hz, left out: 5 % to either side of
     the mode; modes in that band
     """
 

@@ -65,20 +65,20 @@ class External:
 
     @classmethod
     def load(cls, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
-        """The checked model that a file describes, with warnings. Raises what `read` and `model` raise."""
+        """Return the checked model that a file describes, with warnings. Raises what `read` and `model` raise."""
         return cls.read(path).model(path)
 
     @classmethod
     def read(cls, path: str | Path) -> External:
-        """The tables of a TOML file. Raises InputError."""
+        """Return the tables of a TOML file. Raises InputError."""
         return validate(cls, read_toml(path), str(path))
 
     def files(self, path: str | Path) -> list[Path]:
-        """The files that the tables of the file `path` may name, relative to it."""
+        """Return the files that the tables of the file `path` may name, relative to it."""
         return [Path(path).parent / name for name in asdict(self.matrices).values() if isinstance(name, str)]
 
     def model(self, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
-        """The checked model from the tables of the file `path`, with warnings; the files they name are relative to it.
+        """Return the checked model from the tables of the file `path`, with warnings; file names are relative to it.
 
         Raises InputError, rom.external.ExternalError and rom.reduced.ReducedModelError.
         """
@@ -106,7 +106,7 @@ class External:
 
 
 def _doubts(model: ReducedModel) -> tuple[str, ...]:
-    """A warning when mass or frequency of the first straining mode hint at wrong units."""
+    """Return a warning when mass or frequency of the first straining mode hint at wrong units."""
     first = model.rigid_modes
     if first == model.size:
         return ()

@@ -1,7 +1,7 @@
 """Bodies glued into their cavities: meshed as a part of the cluster, against masses added to a reduced model.
 
 The second is what scenes assume of a body that sticks. It knows the tangential motion of the floor only; the meshed
-body also moves radially and turns, and stiffens the shroud that it is glued to. The record tells one from the other.
+body also moves radially and turns, and stiffens the shroud that it is glued to. The record separates the two.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class TiedComparison:
     added_mass_hz   without bodies, their mass added to the reduced model's cavity floors, along the tangent
     tied_hz         with meshed bodies
     soft_hz         ... of a hundredth of their modulus: their mass counts, their stiffness hardly
-    weightless_hz   ... of a millionth of their density: their stiffness alone
+    weightless_hz   ... of a millionth of their density: their stiffness only
     """
 
     mass: float
@@ -46,7 +46,7 @@ class TiedComparison:
 
     @property
     def stiffening(self) -> float:
-        """Rise of the frequency by the bodies' stiffness alone, relative."""
+        """Relative rise of the frequency by the bodies' stiffness only."""
         return self.weightless_hz / self.free_hz - 1.0
 
 
@@ -90,7 +90,7 @@ def _with_bodies_of(case: Case, material: MaterialTable) -> Case:
 
 
 def _without_bodies(case: Case, mesh: VaneClusterMesh, floors: dict[str, InterfaceTable]) -> Case:
-    """The case with empty cavities, its interface the tangential motion of their floors."""
+    """Return the case with empty cavities, its interface the tangential motion of their floors."""
     bare = replace(mesh.parameters, damper_width=0.0, damper_height=0.0, damper_depth=0.0)
     materials = {group: table for group, table in case.material.items() if group != _GROUP}
     return replace(

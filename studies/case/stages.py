@@ -51,7 +51,7 @@ class Structure:
 
 
 def assemble(case: Case) -> Structure:
-    """Mesh, groups, matrices. Raises the errors of the modal package, and InputError for unknown groups."""
+    """Return mesh, groups and matrices. Raises the errors of the modal package, and InputError for unknown groups."""
     label = case.response_label  # an open choice is refused before the work
     with _mesh(case) as path:
         scale = case.mesh.scale if isinstance(case.mesh, MeshFile) else 1.0
@@ -66,7 +66,7 @@ def assemble(case: Case) -> Structure:
 
 @contextlib.contextmanager
 def _mesh(case: Case) -> Iterator[Path]:
-    """The mesh file, or one that the generator or the import writes for the moment."""
+    """Yield the mesh file, or a temporary one that the generator or the import writes."""
     mesh = case.mesh
     if isinstance(mesh, MeshFile) and not mesh.foreign:
         yield Path(mesh.file)
@@ -84,7 +84,7 @@ def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
 
 
 def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
-    """The case's interface coordinates on its matrices, all of them or those named."""
+    """Return the case's interface coordinates on its matrices, all of them or those named."""
     tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
     coordinates = [
         InterfaceCoordinate(label, table.facets, _direction(label, table, matrices), table.kind, table.motion)
@@ -104,7 +104,7 @@ def _direction(label: str, table: InterfaceTable, matrices: SystemMatrices) -> t
 
 @dataclass(frozen=True, eq=False)
 class ModalAnalysis:
-    """Modes and what they mean.
+    """Modes and their figures.
 
     effective_mass  (m, 3) kg along x, y, z; movable_mass (3,) kg is what they would sum to over all modes
     first_bending   index of the mode that carries most mass along `direction`, or is most like the case's shape; None
@@ -131,7 +131,7 @@ class ModalAnalysis:
     wall_time_s: float
 
     def to_json(self) -> dict[str, Any]:
-        """The result as plain data."""
+        """Return the result as plain data."""
         data: dict[str, Any] = {
             "frequency_hz": self.modes.frequencies_hz.tolist(),
             "effective_mass": self.effective_mass.tolist(),
@@ -154,7 +154,7 @@ class ModalAnalysis:
         return data
 
     def mesh(self) -> tuple[dict[str, Variable], int]:
-        """The nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
+        """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""
         cells, types, points = self.structure.solid.vtk_mesh()
         corners = cells.reshape(len(types), -1)[:, 1:]
         variables = {
@@ -181,7 +181,7 @@ class ModalAnalysis:
 
 
 def modal_analysis(structure: Structure) -> ModalAnalysis:
-    """Modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
+    """Return modes, effective masses, first bending, its rigid model and the fatigue amplitude of a structure."""
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
     label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
@@ -207,7 +207,7 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
 
 
 def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) -> Modes:
-    """The case's modes, multiple ones turned to the response coordinate, or else to the direction of the bending."""
+    """Return the case's modes, multiple ones turned to the response coordinate, or else to the bending's direction."""
     table, size = case.modes, matrices.free.size
     count = table.count or 10
     # one more, so that the last of them is not half of a pair
@@ -220,7 +220,7 @@ def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) 
 
 
 def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> tuple[str, ...]:
-    """A warning when another mode moves the response coordinate at nearly the same frequency."""
+    """Return a warning when another mode moves the response coordinate at nearly the same frequency."""
     near = rivals(modes, bending, functional, _NEAR, _NOTABLE)
     if not near.size:
         return ()
@@ -233,14 +233,14 @@ def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> t
 
 
 def bending_mode(case: Case, modes: Modes, matrices: SystemMatrices) -> int:
-    """Index of the first bending: most like the case's shape, or else with most effective mass along its direction."""
+    """Return the index of the first bending: most like the case's shape, or of most effective mass along it."""
     if case.modes.shape is not None:
         return mode_like(modes, matrices, read_shapes(case.modes.shape))
     return first_bending(modes, matrices, case.modes.direction)
 
 
 def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[int | None, tuple[str, ...]]:
-    """The first bending among the modes that strain the structure, or None and why there is none.
+    """Return the first bending among the modes that strain the structure, or None and why there is none.
 
     Raises ParticipationError for a held structure whose lowest modes lack it.
     """
@@ -259,7 +259,7 @@ def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[
 
 
 def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[str, ...]:
-    """A warning when sizes, masses, sound speeds or the first straining frequency hint at wrong units."""
+    """Return a warning when sizes, masses, sound speeds or the first straining frequency hint at wrong units."""
     matrices = structure.matrices
     materials = {name: (table.young, table.density) for name, table in structure.case.material.items()}
     remarks = doubts(materials, float(np.ptp(matrices.coordinates, axis=0).max()), matrices.total_mass, first_hz)
@@ -267,7 +267,7 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
 
 
 def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:
-    """The model with the stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
+    """Return the model with stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
 
     A hot spot is where a natural mode of the model has its largest von Mises stress, or the largest one away from the
     spots before it; the first `modes` modes have `spots` each. Needs a model with its recovery.
@@ -306,7 +306,7 @@ def reduction(
     max_frequency: float | None = None,
     keep_recovery: bool = False,
 ) -> ReducedModel:
-    """The case's structure at its interface, with so many modes or (None) as many as a tolerance needs.
+    """Reduce the case's structure to its interface, with `modes` modes or (None) as many as a tolerance needs.
 
     The estimate of its error is in the model's provenance. It covers receptances of the whole interface up to
     max_frequency, by default 1.5 times the first natural frequency. Craig-Bampton models have a block of quasi-static

@@ -94,7 +94,7 @@ def _kind(table: Any) -> str:
 
 
 def _gather(table: Any) -> Any:
-    """The table with a generator's parameters in a table of their own."""
+    """Return the table with a generator's parameters in a table of their own."""
     if not isinstance(table, Mapping) or "generator" not in table:
         return table
     own = {key: table[key] for key in ("generator", "degree") if key in table}
@@ -127,14 +127,14 @@ class MaterialTable:
 
     @property
     def elastic(self) -> Material:
-        """Return what the finite elements need of it."""
+        """Return it as the finite elements take it."""
         from vanedamp.modal.elasticity import Material  # dolfinx is slow to load, and a bad file wants a quick answer
 
         return Material(self.young, self.poisson, self.density)
 
 
 def _components(clamped: Any) -> Any:
-    """{facet group: components} from a list of groups and of such tables."""
+    """Return {facet group: components} from a list of groups and of such tables."""
     merged: dict[Any, Any] = {}
     for entry in [clamped] if isinstance(clamped, Mapping) else clamped if isinstance(clamped, list) else [None]:
         if not isinstance(entry, str | Mapping):
@@ -147,7 +147,7 @@ def _components(clamped: Any) -> Any:
 
 
 def _axes(stiffness: Any) -> Any:
-    """One number stands for all three axes."""
+    """Return one number for each of three axes, which a single one stands for."""
     return [stiffness] * 3 if isinstance(stiffness, int | float) else stiffness
 
 
@@ -165,7 +165,7 @@ class ElasticTable:
 
     @property
     def springs(self) -> ElasticSupport:
-        """Return what the finite elements need of it."""
+        """Return it as the finite elements take it."""
         from vanedamp.modal.elasticity import ElasticSupport
 
         return ElasticSupport(self.stiffness, self.normal, self.tangential)
@@ -245,7 +245,7 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """The case in a TOML file; a mesh file is taken relative to it. Raises InputError, for absurd units too."""
+        """Read the case in a TOML file; a mesh file is relative to it. Raises InputError, for absurd units too."""
         data = read_toml(path)
         mesh = data.get("mesh")
         if isinstance(mesh, dict):
@@ -280,7 +280,7 @@ class Case:
         return min((t.fatigue_strength for t in self.material.values() if t.fatigue_strength is not None), default=None)
 
     def strengths(self, volumes: Iterable[str]) -> dict[str, float]:
-        """Fatigue strength of every volume group, Pa; the least of all where a group's material has none."""
+        """Return the fatigue strength of every volume group, Pa; the least of all where a group's material has none."""
         least = self.fatigue_strength
         if least is None:
             return {}
@@ -344,7 +344,7 @@ def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) ->
 
 
 def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
-    """Settle what the union of mesh tables cannot say in one line, and find the file."""
+    """Check mesh tables beyond their union's one-line errors, and find the file."""
     generator, file = mesh.get("generator"), mesh.get("file")
     if (generator is None) == (file is None):
         raise InputError(f"{path}: mesh: give one of file and generator")

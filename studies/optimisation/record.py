@@ -46,7 +46,7 @@ class Optimum:
         return 1.0 - self.amplitude_tolerances
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return self.design._asdict() | {
             "amplitude": self.amplitude, "amplitude_tolerances": self.amplitude_tolerances,
             "reduction": self.reduction, "reduction_tolerances": self.reduction_tolerances,
@@ -54,7 +54,7 @@ class Optimum:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> Optimum:
-        """The record of `to_json`."""
+        """Return the record of `to_json`."""
         design = Design(data["mass_ratio"], data["gap_ratio"], int(data["bodies"]))
         return cls(design, data["amplitude"], data["amplitude_tolerances"])
 
@@ -104,7 +104,7 @@ class Optimisation:
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data, arrays as nested lists."""
+        """Return plain data, arrays as nested lists."""
         arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
         return self._plain() | {"study": dict(self.study), "headlines": dict(self.headlines)} | arrays
 

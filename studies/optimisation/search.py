@@ -90,7 +90,7 @@ def optimise(
 
 
 def deviations(study: Study) -> list[_Deviation]:
-    """The sample of the tolerances: the design itself, and a Latin hypercube over those that are not zero."""
+    """Return the sample of the tolerances: the design itself, and a Latin hypercube over those that are not zero."""
     widths = {name: width for name, width in asdict(study.table.tolerances).items() if width > 0}
     if not widths:
         return [_NONE]
@@ -119,27 +119,27 @@ class _Trial:
         self._expected = len(table.frequencies) * designs
 
     def nominal(self, designs: Sequence[Design]) -> np.ndarray:
-        """Amplitudes (d,) of designs as they are."""
+        """Return the amplitudes (d,) of designs as they are."""
         return self._judge(designs, self.sample[:1])
 
     def robust(self, designs: Sequence[Design]) -> np.ndarray:
-        """Amplitudes (d,) of designs within the tolerances."""
+        """Return the amplitudes (d,) of designs within the tolerances."""
         return self._judge(designs, self.sample)
 
     def optimum(self, design: Design) -> Optimum:
-        """Both amplitudes of a design."""
+        """Return both amplitudes of a design."""
         both = self.nominal([design]), self.robust([design])
         for amplitudes, robust in zip(both, (False, True), strict=True):
             self._remember([design], amplitudes, robust)
         return Optimum(design, float(both[0][0]), float(both[1][0]))
 
     def response(self, design: Design) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes (f,) over the reference of a design, nan where its run is not ok, and without bodies."""
+        """Return the amplitudes (f,) of a design over the reference, nan where not ok, and those without bodies."""
         damped, undamped = self._run([design], self.sample[:1])
         return damped[0, 0], undamped[0, 0]
 
     def headline(self, design: Design, damped: np.ndarray) -> Headline:
-        """The headline of a design's amplitudes (f,) over the reference."""
+        """Return the headline of a design's amplitudes (f,) over the reference."""
         frequencies, known = self.study.table.frequencies, self.study.reference * damped
         undamped, fixed = self.study.linear(design, self.sample[0])
         band = float(frequencies[0]), float(frequencies[-1])
@@ -149,7 +149,7 @@ class _Trial:
         )  # fmt: skip
 
     def search(self, judge: Callable[[Sequence[Design]], np.ndarray], first: np.ndarray | None) -> Design:
-        """The best design by differential evolution, from a first generation or from a Latin hypercube."""
+        """Return the best design by differential evolution, from a first generation or from a Latin hypercube."""
         table, names = self.study.table, self._variables
         if not names:
             return self._design([])
@@ -171,7 +171,7 @@ class _Trial:
         return self._design(minimum.x)
 
     def best_designs(self, best: Design) -> np.ndarray:
-        """The best designs so far (s, variables), that one first, as the first generation of another search."""
+        """Return the best designs so far (s, variables), that one first, as the first generation of another search."""
         ordered = sorted(self.history, key=lambda entry: (entry[0] != best, entry[1]))
         distinct = list(dict.fromkeys(design for design, _, _ in ordered))
         return np.array([[getattr(design, name) for name in self._variables] for design in distinct], float)
@@ -180,7 +180,7 @@ class _Trial:
         self.history += [(design, float(a), robust) for design, a in zip(designs, amplitudes, strict=True)]
 
     def _design(self, values: Sequence[float] | np.ndarray) -> Design:
-        """The design of the variables' values; the others are held."""
+        """Return the design of the variables' values; the others are held."""
         held = {name: getattr(self.study.table.variables, name)[0] for name in Design._fields}
         chosen = held | dict(zip(self._variables, map(float, values), strict=True))
         return Design(chosen["mass_ratio"], chosen["gap_ratio"], round(chosen["bodies"]))
@@ -193,7 +193,7 @@ class _Trial:
         return np.asarray(band.max(axis=1) if table.over_tolerances == "worst" else band.mean(axis=1))
 
     def _run(self, designs: Sequence[Design], sample: Sequence[_Deviation]) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes (d, s, f) over the reference at the same level, with the bodies and without.
+        """Return the amplitudes (d, s, f) over the reference at the same level, with the bodies and without.
 
         nan with the bodies where a run is not ok, and without them where it is no scene.
         """
@@ -219,13 +219,13 @@ class _Trial:
         return damped, undamped
 
     def _tell(self, done: int) -> None:
-        """Show progress: so many runs of the list at hand."""
+        """Show progress: the runs done of the list at hand."""
         if self._progress is not None:
             self._progress(self.scenes + done, max(self._expected, self.scenes + done))
 
 
 def _plain(data: Any) -> Any:
-    """Plain data with lists for tuples."""
+    """Return plain data with lists for tuples."""
     if isinstance(data, dict):
         return {key: _plain(value) for key, value in data.items()}
     return [_plain(value) for value in data] if isinstance(data, list | tuple) else data

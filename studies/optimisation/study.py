@@ -26,7 +26,7 @@ _MOST_FREQUENCIES = 10_000
 
 
 def _bounds(value: Any) -> Any:
-    """One number is a variable that is held."""
+    """Return the bounds of a variable; a single number holds it."""
     return [value, value] if isinstance(value, int | float) else value
 
 
@@ -147,7 +147,7 @@ class Study(NamedTuple):
 
     @classmethod
     def load(cls, path: str | Path) -> Study:
-        """The study in a TOML file. Raises InputError."""
+        """Read the study in a TOML file. Raises InputError."""
         data = read_toml(path)
         if "optimise" not in data:
             raise InputError(f"{path}: optimise: missing; say what is best in an [optimise] table (docs/sweeps.md)")
@@ -185,7 +185,7 @@ class Study(NamedTuple):
             assemble(scene)
 
     def with_bodies(self, count: int) -> Scene:
-        """The scene with so many bodies like its first one, put into its cavities in turn."""
+        """Return the scene with `bodies` bodies like its first one, put into its cavities in turn."""
         first, names = self.scene.damper[0], [cavity.name for cavity in self.scene.cavity]
         cavities = sorted(index % len(names) for index in range(count))
         bodies = tuple(
@@ -195,7 +195,7 @@ class Study(NamedTuple):
         return replace(self.scene, damper=bodies)
 
     def linear(self, design: Design, deviation: Mapping[str, float]) -> tuple[LinearResponse, LinearResponse]:
-        """Without bodies, and with those of a design glued to their floors."""
+        """Return the linear responses without bodies, and with those of a design glued to their floors."""
         point = self.point(design, deviation, float(self.table.frequencies[0]))
         return linear_responses(Points(self.with_bodies(design.bodies), {}).scene(point))
 

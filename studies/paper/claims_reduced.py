@@ -14,7 +14,7 @@ from vanedamp.studies.report.claims import Claim
 
 
 def fig12(curves: Curves) -> list[Claim]:
-    """Undamped, damped, fixed."""
+    """Judge undamped, damped and fixed curves."""
     reduced, rigid = curves["reduced"][0], curves["rigid"][0]
     return [
         _level(reduced, rigid),
@@ -107,7 +107,7 @@ def _scatter(reduced: Curve, rigid: Curve) -> Claim:
 
 
 def irregularity(response: Response) -> dict[str, float]:
-    """Standard deviation over mean of a steady response: times between impacts, their impulses, peaks of the periods.
+    """Return standard deviations over means of a steady response: times between impacts, impulses, peaks of periods.
 
     `usual_count` is the share of periods that have the most frequent number of impacts.
     """
@@ -131,7 +131,7 @@ def _variation(values: Sequence[float] | np.ndarray) -> float:
 
 
 def fig13(reduced: Response, rigid: Response, alike: Response) -> list[Claim]:
-    """The reduced model and the rigid one at their damped peaks; alike: the reduced one from a start 1 % aside."""
+    """Judge reduced and rigid model at their damped peaks; alike: the reduced one from a start 1 % aside."""
     mine, other = irregularity(reduced), irregularity(rigid)
     # the structure near its resonance hides what its body does
     ours, others = reduced.slip[reduced.transient :], alike.slip[alike.transient :]

@@ -22,7 +22,7 @@ SHOWN, PARTLY, NOT_SHOWN = "shown", "partly", "not shown"
 
 
 def claim(said: str, ours: str, word: str, why: str = "", figures: Mapping[str, float | None] | None = None) -> Claim:
-    """A claim of the paper, what comes out here, and plain figures."""
+    """Return a claim of the paper, the finding here, and plain figures."""
     plain = {name: None if value is None else float(value) for name, value in (figures or {}).items()}
     if word != SHOWN and not why:
         why = "The figures lie outside of what counts as shown here."
@@ -30,12 +30,12 @@ def claim(said: str, ours: str, word: str, why: str = "", figures: Mapping[str, 
 
 
 def verdict(shown: bool | np.bool_, partly: bool | np.bool_ = False) -> str:
-    """The word for a claim that holds, holds in part or does not."""
+    """Return the word for a claim that holds, holds in part or does not."""
     return SHOWN if shown else PARTLY if partly else NOT_SHOWN
 
 
 def fig9(curves: Curves) -> list[Claim]:
-    """Gap: reference, reference/2, reference/10."""
+    """Judge gaps: reference, reference/2, reference/10."""
     gaps = dict(zip(("reference", "reference/2", "reference/10"), curves[""], strict=True))
     peaks = {name: curve.peak() for name, curve in gaps.items()}
     tops = {name: float(curve.largest.max()) for name, curve in gaps.items()}
@@ -74,7 +74,7 @@ def fig9(curves: Curves) -> list[Claim]:
 
 
 def fig10(curves: Curves) -> list[Claim]:
-    """One body against two."""
+    """Judge one body against two."""
     kinds = ("single", "separate", "shared")
     reductions = {name: 1 - float(curves[name][0].smooth.max()) for name in kinds}
     peaks = {name: curves[name][0].peak() for name in kinds}
@@ -106,7 +106,7 @@ _TOGETHER = 0.3
 
 
 def fig14(curves: Curves) -> list[Claim]:
-    """Single, double, quad; horizontal to vertical."""
+    """Judge single, double, quad; horizontal to vertical."""
     tops = {name: [float(curve.smooth.max()) for curve in of] for name, of in curves.items()}
     slack = {name: [2 * curve.peak().confidence + 0.01 for curve in of] for name, of in curves.items()}
     kinds = ("single", "double", "quad", "double_aside", "quad_aside")
@@ -179,7 +179,7 @@ _BARS = ("light", "nominal", "heavy")
 
 
 def fig19(curves: Curves, bar: Bar, mass: float) -> list[Claim]:
-    """Mass by +-6 %, with the gap and without; bar: of nominal mass (kg)."""
+    """Judge masses 6 % off, with and without the gap; bar: of nominal mass (kg)."""
     reference = curves["nominal"][0].reference
     change = 0.06 * bar.length(mass)
     peaks = {name: curves[name][0].peak() for name in curves}
@@ -211,7 +211,7 @@ def fig19(curves: Curves, bar: Bar, mass: float) -> list[Claim]:
 
 
 def attached_closed_form(amplitude: np.ndarray, half_gap: float, restitution: float) -> tuple[np.ndarray, np.ndarray]:
-    """Theta and attached mass fraction of the 1:1 impact regime at an amplitude (n,) in the unit of the half gap.
+    """Return theta and attached mass fraction of the 1:1 impact regime at amplitudes (n,) in half gaps.
 
     Theurich and Krack's analytics for a light body (repository tobiaswdm/CC); xi the amplitude in half gaps,
     rho = 2 (1-e)/(pi (1+e)), Theta = (1 + sqrt((1 + rho^2) xi^2 - rho^2))/(1 + rho^2), a = 8 Theta (Theta-1)/(pi xi)^2.
@@ -229,13 +229,13 @@ MOST_THETA = 1 / (1 - 4 / np.pi**2)
 
 
 def regime(curve: Curve, half_gap: float, restitution: float) -> tuple[np.ndarray, np.ndarray]:
-    """Which points (n,) are in the symmetric 1:1 regime, and its attached mass fraction there."""
+    """Return which points (n,) are in the symmetric 1:1 regime, and its attached mass fraction there."""
     theta, attached = attached_closed_form(curve.mean, half_gap, restitution)
     return curve.periodic & (np.abs(curve.impacts - 2) < 1e-9) & (theta < MOST_THETA), attached
 
 
 def mistuning(curves: Curves, half_gaps: list[float], restitution: float) -> list[Claim]:
-    """Attached mass in the 1:1 regime; half_gaps: of the curves, in undamped amplitudes."""
+    """Judge the attached mass in the 1:1 regime; half_gaps: of the curves, in undamped amplitudes."""
     errors: list[float] = []
     fractions: list[float] = []
     for curve, half in zip(curves[""], half_gaps, strict=True):

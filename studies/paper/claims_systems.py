@@ -20,13 +20,13 @@ NAMES = {
 
 
 def claims(curves: Curves) -> list[Claim]:
-    """Each system beside the multi-body damper, by the tops of the smoothed means."""
+    """Judge each system beside the multi-body damper, by the tops of the smoothed means."""
     multi = _top(curves, "multi_body")
     return [_friction_damper(curves, multi), _bodies(curves, multi), _particles(curves, multi), *_rotating(curves)]
 
 
 def top(curve: Curve) -> float:
-    """Top of the smoothed means where impacts scatter them, or else of the means."""
+    """Return the top of the smoothed means where impacts scatter them, or else of the means."""
     return float((curve.smooth if curve.impacts.any() else curve.mean).max())
 
 

@@ -85,14 +85,14 @@ class Curve:
         return {name: float(np.sqrt(np.mean(values[hit] ** 2))) for name, values in distance.items()}
 
     def peak(self, values: np.ndarray | None = None) -> Peak:
-        """The top of a curve (n,), by default of the means."""
+        """Return the top of a curve (n,), by default of the means."""
         values = self.mean if values is None else values
         top = int(np.argmax(values))
         return Peak(float(self.frequency[top]), float(values[top]), float(self.confidence[top]), top)
 
 
 def curves(sweep: Sweep, name: str) -> list[Curve]:
-    """A curve for every combination of the axes before the last, which is the frequency; without points not ok."""
+    """Return a curve for every combination of the axes before the last, the frequency; without points not ok."""
     responses = forced_responses(sweep, name)
     count = len(responses[0].x)
     confidence, classification = (

@@ -3,7 +3,7 @@
 The file has a `title`, a `[frequencies]` table (start, stop and number of points), the `[scene]` that all curves share,
 and a `[curve.<name>]` for each curve that differs from it, with the tables that it replaces; a figure of one curve has
 none, and a curve may have `frequencies` of its own. Quantities in quotes are multiples of what the structure is like:
-"0.5 amplitude". A cavity with a `count` stands for so many alike, a damper with a `count` for so many bodies in a row.
+"0.5 amplitude". A cavity or damper with a `count` stands for that number of equal cavities, or of bodies in a row.
 
 A `[bar]` (density in kg/m^3, section in m^2) is a body that fills its cavity but for the gap: a curve that is `longer`
 by a share of its tangential length is heavier by that share, and its gap is less by as much as the bar is longer.
@@ -54,7 +54,7 @@ class Structure:
 
     @classmethod
     def load(cls, modes: Path, rom: Path) -> Structure:
-        """From the record that `vanedamp modal` wrote. Raises InputError without rigid model and fatigue strength."""
+        """Read the record that `vanedamp modal` wrote. Raises InputError without rigid model and fatigue strength."""
         _, attributes = load(modes, "modes")
         if "rigid" not in attributes or "fatigue" not in attributes:
             raise InputError(f"{modes}: needs a rigid model and a fatigue strength; name both in the case")
@@ -64,7 +64,7 @@ class Structure:
         )
 
     def unit(self, name: str) -> float:
-        """The value of a unit: a field's, `force` at the undamped resonance (N), or `inertia` of the mass there (N)."""
+        """Return a unit: a field's value, `force` at the undamped resonance (N), or `inertia` of the mass there (N)."""
         values = {
             "mass": self.mass, "stiffness": self.stiffness, "damping_ratio": self.damping_ratio,
             "frequency": self.frequency, "amplitude": self.amplitude,
@@ -93,7 +93,7 @@ class Bar:
     section: Positive
 
     def length(self, mass: float) -> float:
-        """m, along the cavity."""
+        """Return the length along the cavity, m."""
         return mass / (self.density * self.section)
 
 
@@ -120,7 +120,7 @@ class PaperFigure:
 
     @classmethod
     def load(cls, name: str, structure: Structure, effort: Effort | None = None) -> PaperFigure:
-        """The figure of that name, on a structure. Raises InputError, naming the file."""
+        """Read the figure of that name, on a structure. Raises InputError, naming the file."""
         file = FOLDER / f"{name}.toml"
         data = read_toml(file)
         try:
@@ -148,12 +148,12 @@ class PaperFigure:
         return cls(name, data["title"], scenes)
 
     def stem(self, curve: str) -> str:
-        """Name of the files of a curve, without suffix."""
+        """Return the name of the files of a curve, without suffix."""
         return f"{self.name}_{curve}" if curve else self.name
 
 
 def with_length(scene: Scene, bar: Bar, longer: float) -> Scene:
-    """The scene with a bar longer by a share of its length: heavier by that share, the gap less by the difference.
+    """Return the scene with a bar longer by a share of its length: heavier by that share, the gap less by the same.
 
     Of a scene with one cavity and one body. Raises InputError if it does not fit.
     """
@@ -168,7 +168,7 @@ def with_length(scene: Scene, bar: Bar, longer: float) -> Scene:
 
 
 def with_frequencies(scene: Scene, frequencies: Frequencies, points: int) -> Scene:
-    """The scene with a last axis of frequencies in its [sweep], finer around its linear resonances."""
+    """Return the scene with a last axis of frequencies in its [sweep], finer around its linear resonances."""
     peaks = [peak for peak in linear_peaks(scene) if frequencies.start < peak < frequencies.stop]
     if not peaks:
         grid = np.linspace(frequencies.start, frequencies.stop, points)
@@ -178,7 +178,7 @@ def with_frequencies(scene: Scene, frequencies: Frequencies, points: int) -> Sce
 
 
 def linear_peaks(scene: Scene) -> list[float]:
-    """First natural frequencies with all bodies fixed and without them, Hz, of a rigid or a reduced structure."""
+    """Return the first natural frequencies with all bodies fixed and without them, Hz, of any structure."""
     structure = scene.structure
     if isinstance(structure, Rom):
         floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
@@ -200,7 +200,7 @@ def write_scene(scene: Scene, path: Path) -> None:
 
 
 def _whole(structure: Rom) -> ReducedModel:
-    """The reduced model with all that its file holds."""
+    """Return the reduced model with all that its file holds."""
     return reduced_model(replace(structure, modes=None))
 
 
@@ -211,7 +211,7 @@ def _damping_ratio(scene: Scene) -> float:
 
 
 def _scaled(data: Any, structure: Structure) -> Any:
-    """Data with its quantities as numbers."""
+    """Return data with its quantities as numbers."""
     if isinstance(data, dict):
         return {key: _scaled(value, structure) for key, value in data.items()}
     if isinstance(data, list):
@@ -221,7 +221,7 @@ def _scaled(data: Any, structure: Structure) -> Any:
 
 
 def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables of both, with the values of the second where they differ; lists are replaced as a whole."""
+    """Return the tables of both, with the values of the second where they differ; lists are replaced as a whole."""
     merged = {key: _merged(value, {}) if isinstance(value, Mapping) else value for key, value in base.items()}
     for key, value in changes.items():
         merged[key] = _merged(base.get(key, {}), value) if isinstance(value, Mapping) else value
@@ -229,7 +229,7 @@ def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 
 def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
-    """Tables with counted cavities and bodies spelt out; they start spread over the middle of their free travel."""
+    """Return tables with counted cavities and bodies spelt out; these start spread about mid-travel."""
     cavities, names = [], {}
     for table in tables.get("cavity", []):
         count = table.get("count")

@@ -21,7 +21,7 @@ _GREY, _DARK = "#94a3b8", "#475569"
 
 
 def responses_picture(curves: Mapping[str, Curve], title: str, path: Path, linear: str | None = None) -> None:
-    """Forced responses of curves by their labels, with the undamped and fixed curves of one (default: the first)."""
+    """Draw forced responses by their labels, with the undamped and fixed curves of one (default: the first)."""
     figure, axes = subplots(size=(9.5, 5.2))
     _linear(axes, curves[linear or next(iter(curves))])
     for (label, curve), colour in zip(curves.items(), COLOURS, strict=False):
@@ -31,7 +31,7 @@ def responses_picture(curves: Mapping[str, Curve], title: str, path: Path, linea
 
 
 def panels_picture(panels: Mapping[str, Mapping[str, Curve]], title: str, path: Path) -> None:
-    """The same, in panels side by side by their titles."""
+    """Draw forced responses in panels side by side, by their titles."""
     figure, row = subplots(1, len(panels), size=(5.6 * len(panels), 5.2), sharey=True)
     for axes, (name, curves) in zip(row, panels.items(), strict=True):
         _linear(axes, next(iter(curves.values())))
@@ -45,7 +45,7 @@ def panels_picture(panels: Mapping[str, Mapping[str, Curve]], title: str, path: 
 def orientations_picture(
     curves: Mapping[str, Sequence[Curve]], angles: Sequence[float], title: str, path: Path
 ) -> None:
-    """Horizontal and vertical responses, and the tops over the angle."""
+    """Draw horizontal and vertical responses, and the tops over the angle."""
     curves = {label: of for label, of in curves.items() if "starts" not in label}
     figure, (first, second, third) = subplots(1, 3, size=(16, 5.2))
     for axes, index, name in ((first, 0, "horizontal"), (second, -1, "vertical")):
@@ -71,7 +71,7 @@ def orientations_picture(
 
 
 def history_picture(response: Response, reference: float, title: str, path: Path, last: int = 30) -> None:
-    """The last periods with a mark at every impact, the peaks of the periods, and the times between impacts."""
+    """Draw the last periods with a mark at every impact, the peaks of the periods, and the times between impacts."""
     figure = Figure(figsize=(12, 7), layout="constrained")
     grid = figure.add_gridspec(2, 2)
     top, left, right = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
@@ -117,7 +117,7 @@ def history_picture(response: Response, reference: float, title: str, path: Path
 def mistuning_picture(
     curves: Sequence[Curve], half_gaps: Sequence[float], restitution: float, title: str, path: Path
 ) -> None:
-    """Attached mass fraction over the amplitude in half gaps, beside the closed form."""
+    """Draw the attached mass fraction over the amplitude in half gaps, beside the closed form."""
     figure, axes = subplots(size=(9.5, 5.2))
     for curve, half, colour in zip(curves, half_gaps, COLOURS, strict=False):
         chosen, _ = regime(curve, half, restitution)
@@ -148,7 +148,7 @@ def mistuning_picture(
 
 
 def systems_picture(curves: Mapping[str, Sequence[Curve]], title: str, path: Path) -> None:
-    """The best of each system, and its tops."""
+    """Draw the best of each system, and its tops."""
     figure, (left, right) = subplots(1, 2, size=(14.5, 5.6), width_ratios=[1.5, 1])
     _linear(left, curves["single_body"][0])
     labels, tops, means, colours = [], [], [], []

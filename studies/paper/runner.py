@@ -41,7 +41,7 @@ MODES = 12
 
 @dataclass(frozen=True)
 class Session:
-    """Where studies go and what computes them.
+    """Folder, pool and effort of studies.
 
     pool: of processes, None for this one; effort: less than the figures' files say; resume: take over what the folder
     has of the same scene, model and versions; computed: sweeps of this session by the stem of their files.
@@ -78,7 +78,7 @@ def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None,
 
 
 def prepare(folder: Path, resume: bool = False) -> Structure:
-    """The shipped cluster's modes.h5 and rom.h5 in a folder; resume: unless they are there, of this case and mesh."""
+    """Make the shipped cluster's modes.h5 and rom.h5 in a folder; resume: unless those of this case are there."""
     case, mesh, source = folder / "case.toml", folder / "vane_cluster.msh", FOLDER / "case.toml"
     modes, reduced = folder / "modes.h5", folder / "rom.h5"
     same = all(old.is_file() and old.read_bytes() == new.read_bytes() for old, new in ((case, source), (mesh, SHIPPED)))
@@ -103,7 +103,7 @@ def _made_by_us(modes: Path, reduced: Path, count: int) -> bool:
 
 
 def study(name: str, session: Session) -> Study:
-    """One study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
+    """Run one study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
     if name == "fig13":
         return _history(session)
     figure = PaperFigure.load(name, session.structure, session.effort)
@@ -119,7 +119,7 @@ def study(name: str, session: Session) -> Study:
 
 
 def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
-    """The sweep of a curve: of this session, of the folder where it may be taken over, or computed."""
+    """Return the sweep of a curve: of this session, of the folder with `resume`, or computed."""
     scene, stem = figure.scenes[curve], figure.stem(curve)
     path = session.folder / f"{stem}.h5"
     checkpoint = Path(f"{path}.partial")
@@ -204,7 +204,7 @@ def _half_gaps(scene: Scene, reference: float) -> list[float]:
 
 
 def _history(session: Session) -> Study:
-    """Fig. 13: the run at the damped peak of Fig. 12, with samples and events."""
+    """Run Fig. 13: the scene at the damped peak of Fig. 12, with samples and events."""
     data = read_toml(FOLDER / "fig13.toml")
     figure = PaperFigure.load("fig12", session.structure, session.effort)
     runs = {}
@@ -229,7 +229,7 @@ def _written(study: Study, folder: Path) -> Study:
 
 
 def print_claims(study: Study, seconds: float) -> None:
-    """Print a study's claims: what the paper says, what comes out here, the verdict."""
+    """Print a study's claims: the paper's words, the finding here, the verdict."""
     print(f"\n{study.study}: {study.title} ({seconds:.1f} s)")
     for claim in study.claims:
         rows = [("paper", claim.claim), ("here", claim.ours), (claim.verdict, claim.why)]

@@ -39,7 +39,7 @@ class Chart:
 def chart(
     name: str, figure: go.Figure, header: Sequence[str], rows: Iterable[Iterable[Any]], sources: Iterable[str]
 ) -> Chart:
-    """A figure and its table, numbers in full."""
+    """Return a figure and its table, numbers in full."""
     buttons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]]  # no button that would send data anywhere
     if any(trace.type == "mesh3d" for trace in figure.data):
         buttons = [["toImage", "orbitRotation", "pan3d", "zoom3d", "resetCameraDefault3d"]]
@@ -49,7 +49,7 @@ def chart(
 
 
 def dressed(figure: go.Figure, height: int) -> go.Figure:
-    """The looks that all charts of a page share."""
+    """Return the looks that all charts of a page share."""
     figure.update_xaxes(**AXIS)
     figure.update_yaxes(**AXIS)
     figure.update_layout(
@@ -60,7 +60,7 @@ def dressed(figure: go.Figure, height: int) -> go.Figure:
 
 
 def axis_title(path: str, units: str) -> str:
-    """Title of an axis of a sweep."""
+    """Return the title of an axis of a sweep."""
     if path == "excitation.frequency":
         return "excitation frequency, Hz"
     return f"{path}, {units}".removesuffix(", 1")

@@ -1,4 +1,4 @@
-"""Forced responses: what a sweep says along one axis, beside the linear curves of the structure."""
+"""Forced responses: curves along one axis of a sweep, and the linear curves of the structure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ForcedResponse:
     undamped, fixed    linear amplitudes at the points, of all that have any
     damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks
     energy_share       (n, 4) of viscous, friction, impact and contact loss
-    headline           what the curve comes to
+    headline           figures and sentence of the curve
     source             the file it comes from
     """
 
@@ -50,14 +50,14 @@ class ForcedResponse:
         return f"{self.name}: {sentence}"
 
     def to_json(self) -> dict[str, Any]:
-        """The headline as plain data: what the curve is of, its range, its figures and the sentence."""
+        """Return the headline as plain data: name and range of the curve, its figures and the sentence."""
         ends = [value.item() if isinstance(value, np.generic) else value for value in (self.x[0], self.x[-1])]
         curve = {"name": self.name, "axis": self.axis, "range": ends}
         return curve | self.headline.to_json() | {"sentence": self.sentence}
 
 
 def model_name(scene: Scene) -> str:
-    """The rung of the model ladder, in words."""
+    """Return the structure's model in words."""
     structure = scene.structure
     if isinstance(structure, Rom):
         return "reduced model" if structure.modes is None else f"reduced model, {structure.modes} modes"
@@ -65,7 +65,7 @@ def model_name(scene: Scene) -> str:
 
 
 def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedResponse]:
-    """One forced response for every combination of the other axes.
+    """Return one forced response for every combination of the other axes.
 
     They run along the excitation frequency if the sweep has it, or else along its longest axis of numbers.
     """
@@ -115,7 +115,7 @@ def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> For
 
 
 def peaks_of(sweep: Sweep, point: tuple[Any, ...]) -> dict[str, Any]:
-    """Tops of the linear curves of a part of a sweep, by the names of coupling.sweep.sweep.PEAKS."""
+    """Return the tops of the linear curves of a part of a sweep, by the names of coupling.sweep.sweep.PEAKS."""
     if not sweep.peaks:
         return {}
     along = list(sweep.axes).index(FREQUENCY)
@@ -123,12 +123,12 @@ def peaks_of(sweep: Sweep, point: tuple[Any, ...]) -> dict[str, Any]:
 
 
 def for_people(units: str) -> tuple[float, str]:
-    """Factor and unit in which values of a unit are shown."""
+    """Return the factor and unit in which values of a unit are shown."""
     return (1e6, "µm") if units == "m" else (1.0, units)
 
 
 def quantity(value: Any, units: str) -> str:
-    """A value with its unit, lengths in micrometres."""
+    """Return a value with its unit, lengths in micrometres."""
     factor, larger = for_people(units)
     if factor != 1.0 and not isinstance(value, str):
         return f"{value * factor:.4g} {larger}"
@@ -136,7 +136,7 @@ def quantity(value: Any, units: str) -> str:
 
 
 def resonance_grid(start: float, stop: float, peaks: list[float], width: float, num: int) -> np.ndarray:
-    """(num,) ascending frequencies from start to stop, half of them evenly and half around the peaks.
+    """Return ascending frequencies (num,) from start to stop, half of them evenly and half around the peaks.
 
     peaks: frequencies, each of which is a point of the grid; width: of a peak, as a share of its frequency.
     """

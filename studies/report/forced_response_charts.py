@@ -18,7 +18,7 @@ _PANELS = 3  # energy panels side by side
 
 
 def responses_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Undamped, fixed and damped (maximum and mean) amplitudes over each other, relative to the undamped maximum."""
+    """Draw undamped, fixed and damped (maximum and mean) amplitudes, relative to the undamped maximum."""
     figure = go.Figure()
     linear: list[np.ndarray] = []
     for response, colour in zip(responses, _cycle(responses), strict=True):
@@ -45,7 +45,7 @@ def responses_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
 
 
 def mistuning_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Attached mass fraction and impacts per period."""
+    """Draw attached mass fraction and impacts per period."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     for response, colour in zip(responses, _cycle(responses), strict=True):
         curves = (response.attached_mass_fraction, response.impacts_per_period)
@@ -61,7 +61,7 @@ def mistuning_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
 
 
 def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Where the energy goes: stacked shares of the losses, one panel a response."""
+    """Draw where the energy goes: stacked shares of the losses, one panel a response."""
     columns = min(len(responses), _PANELS)
     rows = -(-len(responses) // columns)
     figure = make_subplots(

@@ -20,15 +20,14 @@ _MOST_PANELS = 6
 
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
-    """The two axes of a sweep's map: the frequency, or else the longest, and the longest other; None without."""
+    """Return the two axes of a sweep's map: the frequency, or else the longest, and the longest other; None without."""
     numeric = [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and len(values) >= _FEWEST]
     numeric.sort(key=lambda path: (path != FREQUENCY, -len(sweep.axes[path])))
     return (numeric[0], numeric[1]) if len(numeric) > 1 else None
 
 
 def map_figure(sweep: Sweep) -> go.Figure:
-    """Mean amplitude relative to the undamped maximum, without points that are not ok; a panel for every combination of
-    the other axes."""
+    """Draw the mean amplitude over the undamped maximum, of points that are ok; a panel a combination of other axes."""
     panels = list(_panels(sweep))[:_MOST_PANELS]
     columns = min(len(panels), 2)
     figure = make_subplots(
@@ -52,14 +51,14 @@ def map_figure(sweep: Sweep) -> go.Figure:
 
 
 def map_rows(sweep: Sweep) -> Iterator[list[object]]:
-    """Panel, the two axes' values and the relative amplitude of every point."""
+    """Yield panel, values of the two axes and the relative amplitude of every point."""
     for name, x, y, values in _panels(sweep):
         for row, upper in enumerate(y.tolist()):
             yield from ([name, across, upper, values[row, i]] for i, across in enumerate(x.tolist()))
 
 
 def _panels(sweep: Sweep) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
-    """Name, values of the two axes and relative amplitudes (up, across), for every combination of the others."""
+    """Yield name, values of two axes and relative amplitudes (up, across), for every combination of the others."""
     axes = map_axes(sweep)
     assert axes is not None
     paths, units = list(sweep.axes), sweep.units()

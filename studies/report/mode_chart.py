@@ -23,7 +23,7 @@ _FACES: dict[int, tuple[tuple[int, ...], ...]] = {
 
 
 def surface(cells: np.ndarray) -> np.ndarray:
-    """(triangles, 3) corners of the cells' outer faces, seen from outside.
+    """Return corners (triangles, 3) of the cells' outer faces, seen from outside.
 
     cells: (cells, nodes) of tetrahedra or hexahedra, corners first. Raises KeyError for other cells.
     """
@@ -34,7 +34,7 @@ def surface(cells: np.ndarray) -> np.ndarray:
 
 
 def sharp_edges(points: np.ndarray, triangles: np.ndarray, angle_deg: float = 30.0) -> np.ndarray:
-    """(edges, 2) nodes of the edges of a closed surface whose two triangles differ by more than an angle."""
+    """Return the nodes (edges, 2) of edges of a closed surface whose two triangles differ by more than an angle."""
     normals = np.cross(
         points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
     )
@@ -56,7 +56,7 @@ class Surface(NamedTuple):
 
 
 def small_surface(values: Mapping[str, np.ndarray]) -> Surface | None:
-    """The surface of a record of modes, if a page can carry it."""
+    """Return the surface of a record of modes, if a page can carry it."""
     cells = values["cell"]
     if cells.shape[1] not in _FACES:
         return None
@@ -65,7 +65,7 @@ def small_surface(values: Mapping[str, np.ndarray]) -> Surface | None:
 
 
 def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.Figure:
-    """The modes of a record of `vanedamp modal`, one at a time, beginning with `mode`."""
+    """Draw the modes of a record of `vanedamp modal`, one at a time, beginning with `mode`."""
     nodes, triangles = of
     points = values["coordinates"][nodes]
     chosen = range(min(len(values["frequency"]), max(_MOST_MODES, mode + 1)))
@@ -93,7 +93,7 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
 
 
 def mode_rows(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> Iterator[list[float]]:
-    """x, y, z (m) and the displacements of a mode at the nodes of the surface."""
+    """Yield x, y, z (m) and the displacements of a mode at the nodes of the surface."""
     moved = values["shape"][mode].reshape(-1, 3)
     yield from np.column_stack([values["coordinates"][of.nodes], moved[of.nodes]]).tolist()
 

@@ -8,7 +8,7 @@ from vanedamp.studies.optimisation.record import Optimisation, Optimum
 
 
 def optimisation_figure(record: Optimisation) -> go.Figure:
-    """Contours of the reduction over mass ratio and gap, both optima marked."""
+    """Draw contours of the reduction over mass ratio and gap, both optima marked."""
     table = record.study["optimise"]
     of = f"{table['over_band']} amplitude in the band"
     count = record.nominal.design.bodies

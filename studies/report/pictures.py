@@ -22,7 +22,7 @@ _EXAGGERATION = 0.06
 
 
 def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
-    """PNG of a mode in a file of `vanedamp modal`: deformed, coloured by displacement.
+    """Return the PNG of a mode in a file of `vanedamp modal`: deformed, coloured by displacement.
 
     None where no picture can be rendered. VTK has a process of its own: it aborts without a graphics library, and its
     C++ library does not get on with those of the finite elements.
@@ -37,7 +37,7 @@ def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
 
 
 def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path) -> None:
-    """PNG of the mode beside the forced response: undamped, with bodies, with the bodies fixed."""
+    """Write a PNG of the mode beside the forced response: undamped, with bodies, with the bodies fixed."""
     from matplotlib.image import imread
 
     from vanedamp.studies.figures import GREY, draw_grid, save, subplots
@@ -74,7 +74,7 @@ def save_vtk(modes: Modes, coordinates: np.ndarray, cells: np.ndarray, cell_type
 
 
 def _vtk_bytes(grid: Any, xml: bool) -> bytes:
-    """The content of a .vtu (xml) or .vtk file: on a full disk VTK's own writers end the process, or say nothing."""
+    """Return the content of a .vtu (xml) or .vtk file; VTK's writers end the process on a full disk, or are silent."""
     from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 

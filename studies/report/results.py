@@ -1,4 +1,4 @@
-"""Results in files: what a report is made of. Each kind is read by its section (studies.report.sections)."""
+"""Results in files, the parts of a report. Each kind is read by its section (studies.report.sections)."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Results:
 
     @property
     def names(self) -> dict[str, str]:
-        """The short name of every file whose provenance the page tells."""
+        """The short name of every file whose provenance is on the page."""
         return short_names(file for file, result in self.by_file.items() if result.provenance is not None)
 
     def parts(self, file: str) -> list[str]:
@@ -121,12 +121,12 @@ def collect(paths: Sequence[str | Path]) -> Results:
 
 
 def _endings(kinds: Iterable[str]) -> list[str]:
-    """Kinds that are endings of files; all others are attributes of HDF5 files."""
+    """Return the kinds that are endings of files; all others are attributes of HDF5 files."""
     return [kind for kind in kinds if kind.startswith(".")]
 
 
 def _candidates(folder: Path, kinds: Iterable[str]) -> list[Path]:
-    """Files of a folder that may be results; what a killed command has left half written is hidden."""
+    """Return the files of a folder that may be results; half-written ones of killed commands are hidden."""
     files = [file for ending in (".h5", *_endings(kinds)) for file in sorted(folder.glob(f"*{ending}"))]
     return [file for file in files if not file.name.startswith(".")]
 

@@ -28,7 +28,7 @@ class History:
     time          (n,) s, as sampled; displacement (n,) m at excitation.at
     bodies        (n, dampers) m, relative to their cavities
     impacts       (m,) s; struck: (m,) number of the body of each, -1: the structure's on a stop
-    measures      plain figures and energies of the run, as `vanedamp run --json` tells them
+    measures      plain figures and energies of the run, as `vanedamp run --json` has them
     scene         what was run; None if the file does not say
     """
 
@@ -75,12 +75,12 @@ class History:
         )  # fmt: skip
 
     def rows(self) -> Iterator[list[float]]:
-        """time, displacement and those of the bodies."""
+        """Yield time, displacement and those of the bodies."""
         yield from np.column_stack([self.time, self.displacement, self.bodies]).tolist()
 
 
 def history_figure(history: History) -> go.Figure:
-    """Displacement with a mark at every impact, above the bodies' places between the walls."""
+    """Draw the displacement with a mark at every impact, above the bodies' places between the walls."""
     rows = 2 if history.bodies.shape[1] else 1
     figure = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     milliseconds = 1e3 * history.time
@@ -129,7 +129,7 @@ def _stops(scene: Scene | None) -> list[float]:
 
 
 def _walls(scene: Scene | None) -> list[float]:
-    """Return where bodies that are alone in their cavities end, m."""
+    """Return where the only bodies of their cavities end, m."""
     if scene is None:
         return []
     alone = [cavity.gap for cavity in scene.cavity if sum(damper.cavity == cavity.name for damper in scene.damper) == 1]

@@ -14,7 +14,7 @@ from vanedamp.studies.figures import BLUE, GOLD, GREEN, GREY, RED, draw_grid, sa
 
 
 def one_mode_figure(result: Mapping[str, Any], path: Path) -> None:
-    """Error of the state against time per period: engine, hand-written loops, solve_ivp."""
+    """Draw the error of the state against time per period: engine, hand-written loops, solve_ivp."""
     one = result["one_mode"]
     figure, axes = subplots(size=(7.5, 5))
     looks = {
@@ -48,7 +48,7 @@ def one_mode_figure(result: Mapping[str, Any], path: Path) -> None:
 
 
 def scaling_figure(result: Mapping[str, Any], path: Path) -> None:
-    """Time against modes and bodies, and what a period consists of."""
+    """Draw time against modes and bodies, and the parts of a period."""
     figure, (left, middle, right) = subplots(1, 3, size=(14, 4.6), width_ratios=[1.2, 1, 0.8])
     modes = result["modes"]
     for (use, entry), colour in zip(modes["uses"].items(), (GREEN, BLUE, GOLD, RED), strict=True):
@@ -78,7 +78,7 @@ def scaling_figure(result: Mapping[str, Any], path: Path) -> None:
 
 
 def _parts(axes: Axes, costs: Mapping[str, Any]) -> None:
-    """Bars: what a period of the one-mode scene consists of, by count and by part of the engine."""
+    """Draw bars: the parts of a period of the one-mode scene, by count and by part of the engine."""
     counted = {"period": "fitted: end of period", "event": "events", "evaluation": "evaluations"}
     timed = {"search": "timed: search", "account": "account", "rest": "the rest"}
     names = [*counted.values(), *timed.values()]

@@ -1,6 +1,6 @@
 """One mode, one frictionless body between two walls: the loop that an expert would write by hand for just that.
 
-What the exact engine is measured against. Written for speed: the closed form of the oscillator at 16 points of every
+The reference of the exact engine, written for speed: the closed form of the oscillator at 16 points of every
 period, a sign test of the gap there, safeguarded Newton, the impact law. Unlike the engine it misses what comes and
 goes between two points, such as a grazing impact.
 """
@@ -43,7 +43,7 @@ class ImpactOscillator(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene) -> ImpactOscillator:
-        """The oscillator of a scene with a rigid structure and one body without friction and gravity."""
+        """Return the oscillator of a scene with a rigid structure and one body without friction and gravity."""
         structure, (damper,), (cavity,) = scene.structure, scene.damper, scene.cavity
         along = scene.gravity.acceleration * scene.gravity.orientation_deg
         assert isinstance(structure, Rigid) and damper.friction == 0 and along == 0 and not scene.excitation.harmonic
@@ -55,7 +55,7 @@ class ImpactOscillator(NamedTuple):
 
 
 def plain_loop(case: ImpactOscillator, periods: int) -> tuple[np.ndarray, np.ndarray]:
-    """States (periods + 1, 4) x, x', r, r' at the periods' starts and largest |x| (periods,) at the brackets.
+    """Return states (periods + 1, 4) x, x', r, r' at the periods' starts and largest |x| (periods,) at the brackets.
 
     Exponential, sine and cosine are evaluated again at every bracket.
     """
@@ -72,7 +72,7 @@ def lean_loop(case: ImpactOscillator, periods: int) -> tuple[np.ndarray, np.ndar
 
 
 def complete_loop(case: ImpactOscillator, periods: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States and refined peaks as of the lean loop, and (periods, 8) what the engine accounts for, see ACCOUNT."""
+    """Return states and refined peaks as the lean loop does, and the engine's account (periods, 8), see ACCOUNT."""
     section, peak, account = np.empty((periods + 1, 4)), np.zeros(periods), np.zeros((periods, len(ACCOUNT)))
     _march(case, periods, _COMPLETE, section, peak, account)
     return section, peak, account
@@ -161,7 +161,7 @@ def _root(
     phase: complex, free: complex, body: float, speed: float, side: float, half: float, rate: complex, omega: float,
     left: float, beyond: float, period: float,
 ) -> float:  # fmt: skip
-    """Time in (0, left] at which the body reaches the wall on that side, from which it is `beyond` away at `left`."""
+    """Return the time in (0, left] at which the body reaches that wall, which it has passed by `beyond` at `left`."""
     low, high = 0.0, left
     inside = half - side * (body - phase.real - free.real)
     t = left * inside / (inside + beyond) if inside > 0.0 else left
@@ -185,7 +185,7 @@ def _refined(
     largest: float, x0: float, v0: float, x1: float, v1: float, phase: complex, free: complex, rate: complex,
     omega: float, span: float,
 ) -> float:  # fmt: skip
-    """Largest |x| over a bracket of length `span` that ends with forced and free part as given."""
+    """Return the largest |x| over a bracket of length `span` that ends with forced and free part as given."""
     largest = max(largest, abs(x1))
     if v0 * v1 >= 0.0 or max(abs(x0) + abs(v0) * span, abs(x1) + abs(v1) * span) <= largest:
         return largest
@@ -203,7 +203,7 @@ def _refined(
 
 @njit(cache=True, error_model="numpy")
 def _integral(rate: complex, tau: float) -> complex:
-    """Integral of exp(rate t) over [0, tau] without cancellation."""
+    """Return the integral of exp(rate t) over [0, tau] without cancellation."""
     z = rate * tau
     if abs(z.real) + abs(z.imag) < 1e-3:
         return tau * (1.0 + z * (0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z / 120.0))))
@@ -215,7 +215,7 @@ def _add(
     case: ImpactOscillator, account: np.ndarray, forced: complex, free: complex, rate: complex, drive: complex,
     speed: float, start: float, tau: float,
 ) -> None:  # fmt: skip
-    """Work, viscous loss, mean square, harmonic and momentum of a flight, by closed-form integrals."""
+    """Add work, viscous loss, mean square, harmonic and momentum of a flight, by closed-form integrals."""
     both, beat = _integral(rate + drive, tau), _integral(rate - drive, tau)
     twice, ringing, driven = _integral(2.0 * rate, tau), _integral(2.0 * rate.real + 0.0j, tau).real, tau
     second = _integral(2.0 * drive, tau)

@@ -22,7 +22,7 @@ _REPEATS = 20_000
 
 
 def awake_modes(scene: Scene, first: int, last: int) -> float:
-    """Mean number of the structure's modes that are awake at the starts of the periods first ... last - 1."""
+    """Return the mean number of the structure's modes awake at the starts of the periods first ... last - 1."""
     run = _begun(scene, last)
     total = 0
     for period in range(first, last):
@@ -32,7 +32,7 @@ def awake_modes(scene: Scene, first: int, last: int) -> float:
 
 
 def time_of_a_period(scene: Scene, lengths: tuple[int, int]) -> float:
-    """Mean seconds of the periods from the first to the second of two, in one run of the scene's method."""
+    """Return the mean seconds of the periods from the first to the second of two, in one run of the scene's method."""
     first, last = lengths
     run = run_of(scene.replace({"time.periods": last, "time.transient": 0}))
     run.advance_to(first)
@@ -40,7 +40,7 @@ def time_of_a_period(scene: Scene, lengths: tuple[int, int]) -> float:
 
 
 def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
-    """Seconds that the search and the account take in all segments of one period, medians over the rounds.
+    """Return the seconds that the search and the account take in all segments of one period, medians over the rounds.
 
     Each is repeated on the same state, so that its data and branches are warm: a lower bound.
     """

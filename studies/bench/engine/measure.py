@@ -104,7 +104,7 @@ def print_summary(result: Mapping[str, Any]) -> None:
 
 
 def _one_mode(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
-    """The engine, the loops and solve_ivp on two impacts a period: times, ratios, errors of the state."""
+    """Measure the engine, the loops and solve_ivp on two impacts a period: times, ratios, errors of the state."""
     scene = scenes.settled(scenes.one_mode(), effort.settle)
     case = ImpactOscillator.of(scene)
     loops = {"plain loop": plain_loop, "lean loop": lean_loop, "complete loop": complete_loop}
@@ -134,7 +134,7 @@ def _one_mode(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _modes(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
-    """Time against the number of modes, for bodies that do not, seldom and often wake them."""
+    """Measure time against the number of modes, for bodies that do not, seldom and often wake them."""
     uses: dict[str, dict[str, Any]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for use in scenes.USES:
@@ -163,7 +163,7 @@ def _modes(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _bodies(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
-    """Time against the number of bodies in cavities of their own."""
+    """Measure time against the number of bodies in cavities of their own."""
     varied = {str(count): scenes.bodies(count) for count in _COUNTS}
     lengths = (effort.engine[0], sum(effort.engine) // 2)
     times = in_turns(
@@ -210,7 +210,7 @@ def _costs(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _counts(scene: Scene, lengths: tuple[int, int]) -> tuple[float, float, float]:
-    """Periods (1), events and evaluations per period between the two lengths of a run."""
+    """Return the periods (1), events and evaluations per period between the two lengths of a run."""
     short, long = (simulate(scene.replace({"time.periods": periods})) for periods in lengths)
     span = lengths[1] - lengths[0]
     evaluations = long.counters["evaluations"] - short.counters["evaluations"]
@@ -222,12 +222,12 @@ def _clock(method: Callable[..., Any], case: ImpactOscillator, periods: int) -> 
 
 
 def _error(states: np.ndarray, exact: np.ndarray) -> float:
-    """Largest deviation of x, x', r, r', each relative to its largest value."""
+    """Return the largest deviation of x, x', r, r', each relative to its largest value."""
     return float((np.abs(states - exact) / np.abs(exact).max(axis=0)).max())
 
 
 def _write_csv(result: Mapping[str, Any], path: Path) -> None:
-    """One line a number: part, case, quantity, unit, median and quartiles."""
+    """Write one line a number: part, case, quantity, unit, median and quartiles."""
     one, modes, bodies = result["one_mode"], result["modes"], result["bodies"]
     lines = [("one mode", name, "time per period", "s", times) for name, times in one["time"].items()]
     lines += [("one mode", name, "ratio of times", "1", ratio) for name, ratio in one["ratio"].items()]

@@ -12,7 +12,7 @@ from vanedamp.studies.bench.engine.hand_written_loop import ImpactOscillator
 
 
 def solve_with_events(case: ImpactOscillator, periods: int, rtol: float) -> np.ndarray:
-    """States (periods + 1, 4) like the loop's by scipy's DOP853, stopped at each impact by an event function."""
+    """Return states (periods + 1, 4) like the loop's by scipy's DOP853, stopped at each impact by an event function."""
     omega, half = case.omega, 0.5 * case.gap
     c, d, force = case.stiffness / case.mass, case.damping / case.mass, case.force / case.mass
 
@@ -50,7 +50,7 @@ def solve_with_events(case: ImpactOscillator, periods: int, rtol: float) -> np.n
 
 
 def truth(case: ImpactOscillator, periods: int, digits: int = 40) -> np.ndarray:
-    """States (periods + 1, 4) like the loop's, to double precision: closed forms and bisected Newton in mpmath.
+    """Return states (periods + 1, 4) like the loop's, to double precision: closed forms and bisected Newton in mpmath.
 
     The method is plain on purpose: 32 sign tests a period, each from the last impact. Raises InputError without mpmath.
     """

@@ -31,12 +31,12 @@ USES: dict[str, tuple[dict[str, float], dict[str, float]]] = {
 
 
 def one_mode(frequency: float = 1.0, gap: float = 1.0) -> Scene:
-    """One mode, one body without friction, from rest; frequency and gap as factors of those of two impacts a period."""
+    """Return a scene of one mode and one body without friction; factors: of the values for two impacts a period."""
     return _rigid([{"name": "c", "gap": gap * _GAP}], [_body()], frequency * _FREQUENCY)
 
 
 def settled(scene: Scene, periods: int) -> Scene:
-    """The scene of one body with the state that it has after a number of periods as its initial state."""
+    """Return the scene of one body with the state that it has after a number of periods as its initial state."""
     response = simulate(scene.replace({"time.periods": periods}))
     state = {
         "initial.displacement": response.section[-1, 0],
@@ -48,13 +48,13 @@ def settled(scene: Scene, periods: int) -> Scene:
 
 
 def bodies(count: int) -> Scene:
-    """So many bodies of the same total mass, each in a cavity of its own; gaps differ, so that they hit one by one."""
+    """Return bodies of one total mass, each in a cavity of its own; gaps differ, so that they hit one by one."""
     cavities = [{"name": f"c{i}", "gap": _GAP * (1 + 0.02 * i)} for i in range(count)]
     return _rigid(cavities, [_body() | {"cavity": f"c{i}", "mass": _BODY / count} for i in range(count)], _FREQUENCY)
 
 
 def reduced(folder: Path, modes: int, use: str) -> Scene:
-    """The one-mode structure with further modes up to 30 times its frequency, as a reduced model in that folder.
+    """Return the one-mode structure with further modes up to 30 times its frequency, as a reduced model in that folder.
 
     Damping is proportional to stiffness; the interface is a patch, whose share of a mode falls with its frequency.
     """

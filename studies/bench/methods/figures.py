@@ -19,7 +19,7 @@ _COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#65a30d", "#0e7490", "#7e22ce", "#
 
 
 def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
-    """A panel a scene: error against CPU time per period, and the model ladder if there is one."""
+    """Draw a panel a scene: error against CPU time per period, and the model ladder if there is one."""
     charts, drawn, styles = result["charts"], [], _styles()
     figure, axes = subplots(2, 4, size=(21, 10))
     panels = list(axes.flat)
@@ -42,7 +42,7 @@ def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
 
 
 def _styles() -> dict[str, tuple[str, str]]:
-    """Colour and marker of every method and peer, by its label: the same in all panels."""
+    """Return the colour and marker of every method and peer, by its label: the same in all panels."""
     ours = {label: (variant.colour, variant.marker) for label, (_, variant) in charted().items()}
     return ours | {name: (peer.colour, peer.marker) for name, peer in PEERS.items()}
 
@@ -64,7 +64,7 @@ def _chart(axes: Axes, name: str, chart: Mapping[str, Any], styles: Mapping[str,
         floor = chart["points"][0]["floor"]
         axes.axhspan(1e-14, floor, color="#e2e8f0", zorder=0)
         axes.set_ylim(bottom=max(floor / 100, 1e-12))
-        note += ("; " if note else "") + "grey: not to be told from zero (95 %)"
+        note += ("; " if note else "") + "grey: not distinct from zero (95 %)"
     front = "exact on the Pareto front" if not chart["dominated_by"] else "exact NOT on the Pareto front"
     absent = "".join(f"\n{wrap(reason)}" for reason in chart["absent"].values())
     axes.set_title(f"{name}\n{front}" + (f"\n{note}" if note else "") + absent, fontsize=9)
@@ -96,12 +96,12 @@ def _ladder(axes: Axes, ladder: Mapping[str, Any]) -> None:
 
 
 def wrap(reason: str) -> str:
-    """A reason in lines as wide as a panel."""
+    """Return a reason in lines as wide as a panel."""
     return textwrap.fill(reason, 70)
 
 
 def _curve(axes: Axes, curve: Mapping[str, Any]) -> None:
-    """Mean amplitudes around the peak of the damped curve, with fixed frequency and onset."""
+    """Draw mean amplitudes around the peak of the damped curve, with fixed frequency and onset."""
     axes.plot(curve["at_hz"], [1e6 * value for value in curve["amplitude"]], "o-", color=_COLOURS[0], markersize=4,
               label=f"exact engine, {curve['modes']} modes")  # fmt: skip
     axes.plot(curve["peak_hz"], [1e6 * value for value in curve["mesh_peak"]], "s", color=_COLOURS[1],
@@ -123,7 +123,7 @@ def _curve(axes: Axes, curve: Mapping[str, Any]) -> None:
 
 
 def stability_figure(result: Mapping[str, Any], path: Path) -> None:
-    """A panel a part: measured edges of failure as points, analytic limits as lines."""
+    """Draw a panel a part: measured edges of failure as points, analytic limits as lines."""
     figure, axes = subplots(2, 4, size=(19, 9))
     for panel, (name, part) in zip(axes.flat, result["parts"].items(), strict=True):
         for (curve, values), colour in zip(part["curves"].items(), _COLOURS, strict=False):

@@ -2,7 +2,7 @@
 
 Ladder: the shipped cluster over its first periods, before chaos parts the models. Curve: a coarser mesh of the same
 cluster, whose periods are cheap enough for steady states; its reduced model has the same lumped mass, so that
-reduction alone lies between the two.
+reduction only lies between the two.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class CurveEffort:
 
 
 def ladder(folder: Path, counts: tuple[int, ...], rounds: int, rng: np.random.Generator) -> dict[str, Any]:
-    """Reduced models by the exact engine, the whole mesh by central differences.
+    """Measure reduced models by the exact engine, and the whole mesh by central differences.
 
     Error: largest of the first periods' peaks against the finest reduced model, relative.
     """
@@ -77,7 +77,7 @@ def ladder(folder: Path, counts: tuple[int, ...], rounds: int, rng: np.random.Ge
 
 
 def curve(folder: Path, effort: CurveEffort = CurveEffort()) -> dict[str, Any]:
-    """Fixed frequency, onset and peak of the damped curve: reduced model by the exact engine, and the whole mesh."""
+    """Measure fixed frequency, onset and damped peak: reduced model by the exact engine, and whole mesh."""
     cluster = Cluster(folder / "coarse", effort.size, lumped=True)
     scene = cluster.scene(effort.modes)
     gap = 0.5 * _amplitude(scene)  # half the peak, with an onset well below the resonance
@@ -118,13 +118,13 @@ def _amplitude(scene: Scene) -> float:
 
 
 def _peak_of(scene: Scene, fixed: bool) -> float:
-    """Frequency of the first resonance, Hz, by a fine grid around the model's own."""
+    """Return the frequency of the first resonance, Hz, by a fine grid around the model's own."""
     grid = scene.excitation.frequency * np.linspace(0.93, 1.03, 20_001)
     return float(grid[np.abs(receptance(scene, grid, fixed)).argmax()])
 
 
 def _onset(scene: Scene, low: float, high: float) -> float:
-    """Lowest frequency (Hz) between two with impacts in the steady state, by bisection."""
+    """Return the lowest frequency (Hz) between two with impacts in the steady state, by bisection."""
     low *= 0.98
     while high - low > 1e-5 * high:
         middle = 0.5 * (low + high)
@@ -134,7 +134,7 @@ def _onset(scene: Scene, low: float, high: float) -> float:
 
 
 def _damped(scene: Scene, low: float, high: float, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (points,) and mean amplitudes of the damped curve."""
+    """Return the frequencies (points,) and mean amplitudes of the damped curve."""
     at = np.linspace(0.985 * low, 1.01 * high, points)
     amplitudes = [simulate(scene.replace({"excitation.frequency": float(f)})).amplitude_mean for f in at]
     return at, np.array(amplitudes)

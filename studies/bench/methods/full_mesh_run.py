@@ -38,7 +38,7 @@ class ExplicitRun:
     highest: float
 
     def curve_seconds(self, periods: int, frequencies: int) -> float:
-        """Extrapolated CPU seconds of a forced response of so many frequencies with so many periods each."""
+        """Return the extrapolated CPU seconds of a forced response: frequencies, with periods each."""
         return self.seconds_per_step * self.steps * periods * frequencies
 
 
@@ -81,7 +81,7 @@ def explicit_run(
 
 
 def lumped(matrices: SystemMatrices) -> SystemMatrices:
-    """The same mesh with the row sums of its mass: its reduced model differs from the whole mesh by reduction alone.
+    """Return the mesh with the row sums of its mass: its reduced model differs from it by the reduction only.
 
     Raises InputError where a sum is not positive.
     """
@@ -89,7 +89,7 @@ def lumped(matrices: SystemMatrices) -> SystemMatrices:
 
 
 def glued_frequencies_hz(matrices: SystemMatrices, interface: Interface, scene: Scene) -> tuple[float, float]:
-    """First natural frequency of the mesh with lumped mass, without bodies and with all of them glued in, Hz."""
+    """Return first natural frequency of the mesh with lumped mass, without bodies and with all of them glued in, Hz."""
     free = matrices.free
     stiffness = sparse.csr_matrix(matrices.stiffness)[free][:, free].tocsc()
     mass = sparse.diags(_row_sums(matrices)[free]).tocsc()
@@ -162,6 +162,6 @@ def _march(
 
 
 def _highest(stiffness: sparse.csr_matrix, mass: np.ndarray) -> float:
-    """Highest angular frequency of the mesh with lumped mass, rad/s."""
+    """Return the highest angular frequency of the mesh with lumped mass, rad/s."""
     root = sparse.diags(1 / np.sqrt(mass))
     return float(np.sqrt(eigsh(root @ stiffness @ root, 1, which="LA", tol=1e-6, return_eigenvectors=False)[0]))

@@ -109,7 +109,7 @@ def print_summary(result: Mapping[str, Any]) -> None:
 
 
 def _scenes(effort: Effort, folder: Path) -> dict[str, tuple[Scene, bool]]:
-    """Scenes by name, and whether they repeat."""
+    """Return the scenes by name, and whether they repeat."""
     checked = {"time.periods": effort.checked, "time.transient": 0}
     by_name = {
         "periodic 1:1 impact": (scenes.periodic(3000).replace(checked), True),
@@ -123,7 +123,7 @@ def _scenes(effort: Effort, folder: Path) -> dict[str, tuple[Scene, bool]]:
 
 
 def _chart(scene: Scene, repeats: bool, effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
-    """Times and errors of every method on a scene."""
+    """Return the times and errors of every method on a scene."""
     periods = effort.checked if repeats else effort.reference
     reference = _run(scene, periods, repeats)
     variants = _variants(scene, repeats, effort)
@@ -161,7 +161,7 @@ def _chart(scene: Scene, repeats: bool, effort: Effort, rng: np.random.Generator
 
 
 def _variants(scene: Scene, repeats: bool, effort: Effort) -> dict[tuple[str, float], Scene]:
-    """The scene by every method, under its label and setting; the exact engine is the first."""
+    """Return the scene by every method, under its label and setting; the exact engine is the first."""
     made = {}
     for label, (method, variant) in scenes.charted().items():
         options = dict(variant.options)
@@ -182,7 +182,7 @@ def _by_tolerance(label: str) -> bool:
 def _peers(
     scene: Scene, reference: Response, repeats: bool, effort: Effort
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
-    """Points of the peers, and why others have none."""
+    """Return the points of the peers, and why others have none."""
     points, absent = [], {}
     for name, peer in PEERS.items():
         settings = effort.tolerances if peer.tolerance else tuple(float(count) for count in effort.peers)
@@ -215,7 +215,7 @@ def _peer_time(scene: Scene, key: tuple[str, float], periods: int) -> float:
 
 
 def _dropped(periods: int) -> int:
-    """Periods of a transient before a mean."""
+    """Return the periods of a transient before a mean."""
     return max(periods // 4, min(500, periods // 2))
 
 
@@ -227,7 +227,7 @@ def _run(scene: Scene, periods: int, repeats: bool) -> Response:
 
 
 def _new_point(key: tuple[str, float], status: str) -> dict[str, Any]:
-    """A point without figures; `floor` is the error below which the comparison cannot tell."""
+    """Return a point without figures; `floor`: the error below which the comparison is undecided."""
     return {
         "method": key[0], "setting": key[1], "status": status, "error": None, "interval": None, "floor": 0.0,
         "energy_residual": 0.0, "penetration": 0.0, "time": None,
@@ -235,7 +235,7 @@ def _new_point(key: tuple[str, float], status: str) -> dict[str, Any]:
 
 
 def _point(key: tuple[str, float], scene: Scene, reference: Response, repeats: bool, effort: Effort) -> dict[str, Any]:
-    """Status and error of one run."""
+    """Return the status and error of one run."""
     method, setting = key
     by_tolerance = _by_tolerance(method)
     periods = effort.checked if repeats else (effort.ivp if by_tolerance else effort.means)
@@ -254,7 +254,7 @@ def _point(key: tuple[str, float], scene: Scene, reference: Response, repeats: b
 
 
 def _own_error(scene: Scene, periods: int) -> float:
-    """Error of the exact engine at the periods' ends, relative to the ranges of x, x', r, r', against 40 digits."""
+    """Return the error of the exact engine at the periods' ends over the ranges of x, x', r, r', against 40 digits."""
     exact = truth(ImpactOscillator.of(scene), periods)
     response = _run(scene, periods, True)
     ours = np.column_stack([response.section, response.slip, response.slip_velocity])
@@ -262,7 +262,7 @@ def _own_error(scene: Scene, periods: int) -> float:
 
 
 def _state_error(samples: np.ndarray, reference: Response) -> float:
-    """Largest deviation of samples (k, 1 + b) relative to the ranges."""
+    """Return the largest deviation of samples (k, 1 + b) relative to the ranges."""
     exact = np.column_stack([reference.displacement, reference.body_displacement])
     size = np.ptp(exact, axis=0)
     return float((np.abs(samples - exact)[:, size > 0] / size[size > 0]).max())
@@ -276,7 +276,7 @@ def _mean_error(mean: float, confidence: float | None, reference: Response) -> d
 
 
 def _lengths(point: Mapping[str, Any], effort: Effort) -> tuple[int, int]:
-    """Two lengths of a run in periods, so that the longer takes some tenths of a second."""
+    """Return two lengths of a run in periods, so that the longer takes some tenths of a second."""
     if _by_tolerance(point["method"]):
         return 1, 3
     long = effort.timed / (point["setting"] or 25)
@@ -287,7 +287,7 @@ def _lengths(point: Mapping[str, Any], effort: Effort) -> tuple[int, int]:
 
 
 def _write_csv(result: Mapping[str, Any], path: Path) -> None:
-    """One line a point."""
+    """Write one line a point."""
     names = ("method", "setting", "status", "error", "interval", "floor", "energy_residual", "penetration")
     rows = []
     for scene, chart in result["charts"].items():

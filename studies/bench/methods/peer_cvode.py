@@ -1,6 +1,6 @@
 """SUNDIALS CVODE with root finding, through scikit-sundae: Adams formulas of up to 12th order, restarted at events.
 
-States of contacts and friction are those of coupling.methods.scipy_ivp.run, as CVODE knows equations and roots alone;
+States of contacts and friction are those of coupling.methods.scipy_ivp.run, as CVODE knows only equations and roots;
 the right-hand side is the same as scipy's. Hindmarsh and others (2005).
 """
 

@@ -68,7 +68,7 @@ class _Units:
 
 
 def _coordinates(equations: Coupled) -> np.ndarray:
-    """Matrix (N, N) from Exudyn's coordinates to ours: the floor's displacement replaces the mode with most of it."""
+    """Return the matrix (N, N) from Exudyn's coordinates: the floor's displacement replaces its main mode."""
     system, n = equations.system, equations.system.modes
     back = np.eye(len(system.mass))
     moved = system.J[:, :n][np.abs(system.J[:, :n]).max(axis=1, initial=0.0) > 0]
@@ -127,7 +127,7 @@ def _model(world: Any, equations: Coupled, turn: np.ndarray, units: _Units) -> t
 
 
 def _load(load: np.ndarray, order: np.ndarray) -> Any:
-    """A sum of harmonic loads (e,), as source that Exudyn turns into an expression of its own."""
+    """Return a sum of harmonic loads (e,), as source that Exudyn turns into an expression of its own."""
     import exudyn
 
     names: dict[str, Any] = {"exudyn": exudyn}
@@ -184,7 +184,7 @@ def _sensor(node: Any) -> Any:
 
 
 def _settings(periods: int, steps: int) -> Any:
-    """Equal steps, no files, one thread."""
+    """Return settings for equal steps, no files, one thread."""
     import exudyn
 
     settings: Any = exudyn.SimulationSettings()

@@ -46,7 +46,7 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
 
 
 def _model(equations: Coupled, periods: int) -> tuple[Any, Any, list[Any]]:
-    """Simulation, dynamical system, and what must live as long as they do."""
+    """Return simulation, dynamical system, and the objects that must live as long as they do."""
     import siconos.kernel as kernel
 
     system, motion = equations.system, equations.motion

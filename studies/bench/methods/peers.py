@@ -94,7 +94,7 @@ def one_restitution(name: str, scene: Scene) -> None:
 
 
 def coupled(scene: Scene, steps: int) -> Coupled:
-    """The matrices that our own stepping methods use, with so many steps a period."""
+    """Return the matrices of our own stepping methods, with the given number of steps a period."""
     system = assemble(scene)
     return Coupled(system, time_grid(system, steps), start(system, initial_motion(scene, system)))
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def charted() -> dict[str, tuple[str, Variant]]:
-    """Methods by their label in charts: the value of `solver.method`, and how it is drawn. Raises ExtensionError."""
+    """Return the methods by their label in charts: `solver.method` and its style. Raises ExtensionError."""
     found: dict[str, tuple[str, Variant]] = {}
     for name, method in METHODS.all().items():
         for variant in method.VARIANTS:
@@ -32,17 +32,17 @@ def charted() -> dict[str, tuple[str, Variant]]:
 
 
 def by(scene: Scene, **solver: Any) -> Scene:
-    """The scene with another [solver] table."""
+    """Return the scene with another [solver] table."""
     return validate(Scene, scene.to_dict() | {"solver": solver}, "scene")
 
 
 def periodic(settle: int) -> Scene:
-    """One mode, one body, two impacts a period, settled."""
+    """Return a scene of one mode and one body in its steady state of two impacts a period."""
     return bench_scenes.settled(bench_scenes.one_mode(), settle)
 
 
 def chatter() -> Scene:
-    """A ball on a shaken plate that comes to rest and is thrown up in every period."""
+    """Return a scene of a ball on a shaken plate that comes to rest and is thrown up in every period."""
     data = {
         "structure": {"model": "prescribed", "displacement_amplitude": 1e-3},
         "excitation": {"frequency": 17.0},
@@ -54,13 +54,13 @@ def chatter() -> Scene:
 
 
 def single() -> Scene:
-    """One mode, one body with friction, below resonance: a response that never repeats."""
+    """Return a scene of one mode and one body with friction, below resonance: a response that never repeats."""
     changes = {"damper.0.friction": 0.1, "gravity.acceleration": 9.81}
     return bench_scenes.one_mode(0.99, 1.0).replace(changes)
 
 
 def double() -> Scene:
-    """Two bodies in a row that share the cavity of the single one."""
+    """Return a scene of two bodies in a row that share the cavity of the single one."""
     data = single().to_dict()
     body = data["damper"][0] | {"mass": data["damper"][0]["mass"] / 2}
     data["damper"] = [body | {"position": -data["cavity"][0]["gap"] / 4}, body]
@@ -79,7 +79,7 @@ class Cluster:
     lumped: bool = False
 
     def scene(self, modes: int) -> Scene:
-        """One body at the first natural frequency of the model with so many fixed-interface modes."""
+        """Return a scene of one body at the first natural frequency of the model with `modes` fixed-interface modes."""
         file = self.folder / f"cluster_{modes}.h5"
         if not file.is_file():
             self._reduce(file, modes)
@@ -96,7 +96,7 @@ class Cluster:
         return validate(Scene, data, "scene")
 
     def elements(self) -> tuple[SystemMatrices, Interface]:
-        """The mesh without reduction: its matrices, as they are, and the interface."""
+        """Return the mesh without reduction: its matrices, as they are, and the interface."""
         from vanedamp.studies.case.stages import assemble, interface
         from vanedamp.studies.case.tables import Case
 
@@ -105,7 +105,7 @@ class Cluster:
         return matrices, interface(case, matrices)
 
     def _case(self) -> Path:
-        """The case file, written with its mesh on the first call."""
+        """Return the case file, written with its mesh on the first call."""
         case = self.folder / "cluster.toml"
         if not case.is_file():
             from vanedamp.meshes.parameters import VaneCluster
@@ -137,7 +137,7 @@ def _first(file: Path) -> float:
 
 
 def rod(folder: Path, modes: int) -> Path:
-    """Craig-Bampton model of a clamped unit rod in closed form, interface "tip"; 1 % damping in its first mode."""
+    """Return the Craig-Bampton model of a clamped unit rod, interface "tip"; 1 % damping in its first mode."""
     from vanedamp.studies.bench.model_order.structures import rod_model
 
     file = folder / f"rod_{modes}.h5"

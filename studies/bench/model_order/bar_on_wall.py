@@ -41,7 +41,7 @@ class _Bar(NamedTuple):
     spring: float
 
     def motion(self, touching: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Squared frequencies, shapes, and the static state of flight or of contact."""
+        """Return the squared frequencies, shapes, and the static state of flight or of contact."""
         stiffness = np.diag(self.squares)
         load = np.zeros(len(self.foot))
         load[0] = -GRAVITY * np.sqrt(_MASS)
@@ -53,7 +53,7 @@ class _Bar(NamedTuple):
 
 
 def bar(modes: int, law: str) -> _Bar:
-    """The bar with its rigid mode and modes - 1 elastic ones.
+    """Return the bar with its rigid mode and modes - 1 elastic ones.
 
     massless: the wall's spring is what they lack of the foot's static flexibility, L / (3 E A) for self-equilibrated
     loads; compliant: this in series with STIFFNESS.
@@ -101,7 +101,7 @@ def _energy(structure: _Bar, state: np.ndarray, touching: bool) -> float:
 
 
 def _segment(structure: _Bar, state: np.ndarray, touching: bool) -> tuple[float, str, np.ndarray]:
-    """To the next closing, opening or apex of the mass centre: time, kind, state (2, n)."""
+    """Advance to the next closing, opening or apex of the mass centre. Returns time, kind, state (2, n)."""
     squares, shapes, load = structure.motion(touching)
     place, speed = state @ shapes
     rates = np.sqrt(squares)

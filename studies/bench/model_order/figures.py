@@ -21,7 +21,7 @@ _MARKERS = dict(zip(_COLOURS, "osDv^", strict=True))
 
 
 def bar_figure(bar: Mapping[str, Any], path: Path) -> None:
-    """Errors of the falling bar against the number of its modes."""
+    """Draw the errors of the falling bar against the number of its modes."""
     figure, axes = subplots(1, 2, size=(10.5, 4.4))
     modes = np.array(bar["modes"])
     for axis, what in zip(axes, ("time", "height"), strict=True):
@@ -39,7 +39,7 @@ def bar_figure(bar: Mapping[str, Any], path: Path) -> None:
 
 
 def cluster_figure(cluster: Mapping[str, Any], path: Path) -> None:
-    """Error of the damped response against its cost, all laws against one model, and the responses with most modes."""
+    """Draw the error of the response against its cost, all laws against one model, and responses with most modes."""
     figure, (left, right) = subplots(1, 2, size=(12.5, 5.0))
     reference = cluster["reference"]
     noise = np.linalg.norm(cluster["laws"][reference["law"]]["confidence"][-1]) / cluster["undamped"]
@@ -71,12 +71,12 @@ def cluster_figure(cluster: Mapping[str, Any], path: Path) -> None:
 
 
 def auto_figure(auto: Mapping[str, Any], path: Path) -> None:
-    """The automatic choice: true error against the tolerance, and cost against that of the cheapest model."""
+    """Draw the automatic choice: true error against the tolerance, and cost against that of the cheapest model."""
     figure, (left, right) = subplots(1, 2, size=(11.5, 4.8))
     kinds = list(dict.fromkeys(row["scene"].split()[0] for row in auto["verdicts"]))
     for kind, colour, marker in zip(kinds, _COLOURS.values(), "osD", strict=False):
         rows = [row for row in auto["verdicts"] if row["scene"].startswith(kind)]
-        # apart from each other, so that scenes of one tolerance can be told
+        # apart from each other, so that scenes of one tolerance are distinct
         apart = np.array([1.0 + 0.05 * (int(row["scene"].split()[1]) - 5) for row in rows])
         tolerances = np.array([row["tolerance"] for row in rows])
         places = apart * tolerances

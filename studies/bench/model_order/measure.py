@@ -96,7 +96,7 @@ def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
 
 
 def bar_errors(counts: tuple[int, ...]) -> dict[str, Any]:
-    """Errors of the bar's second apex, in time and height, for each law and number of modes."""
+    """Measure the errors of the bar's second apex, in time and height, for each law and number of modes."""
     runs = {law: [bounce(modes, law) for modes in counts] for law in BAR_LAWS}
     return {
         "modes": list(counts),
@@ -107,7 +107,7 @@ def bar_errors(counts: tuple[int, ...]) -> dict[str, Any]:
 
 
 def cluster_curves(file: Path, effort: Effort, report: Callable[[int, int], None]) -> dict[str, Any]:
-    """Mean amplitudes over the frequencies, their error and the cost, of each law and number of natural modes."""
+    """Measure mean amplitudes over the frequencies, their error and cost, for each law and number of natural modes."""
     model = ReducedModel.load(file)
     first = float(model.natural_frequencies_hz[0])
     mass = 1.0 / float((massless(model, 1).row("shroud") ** 2)[0])

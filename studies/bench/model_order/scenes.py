@@ -28,7 +28,7 @@ _AMPLITUDE = 3e-5
 _MASS, _GAP, _CONTACT, _RESTITUTION, _FRICTION = (0.005, 0.05), (0.2, 1.0), (3.0, 30.0), (0.5, 0.95), (0.1, 0.5)
 #: gravity in the unit of the undamped peak's acceleration: 9.81 m/s^2 on the cluster
 _GRAVITY = 1e-3
-#: a wide band, of the first frequency, and its points besides those at the damped peak
+#: a wide band, of the first frequency, and its points in addition to those at the damped peak
 _WIDE, _POINTS = (0.83, 1.04), 8
 #: places between the resonance with loose (0) and with fixed bodies (1), where the damped peak lies
 PLACES = (0.2, 0.5, 0.8)
@@ -56,7 +56,7 @@ class Trial:
 
 
 def trials(folder: Path, seed: int, counts: dict[str, int]) -> list[Trial]:
-    """So many scenes of each structure ("cluster", "rod", "beam", "span"); its reduced model is left in the folder.
+    """Return scenes of each structure ("cluster", "rod", "beam", "span"), whose reduced models are left in the folder.
 
     A second word after the structure: "pair", two bodies in the cavity; "cavities", one in each of two (the span's);
     "wide", a band far beyond the damped peak.
@@ -128,5 +128,5 @@ def _trial(name: str, file: Path, generator: np.random.Generator) -> Trial:
 
 
 def _spread(generator: np.random.Generator, limits: tuple[float, float]) -> float:
-    """Uniform in the logarithm."""
+    """Draw a number uniform in the logarithm."""
     return float(np.exp(generator.uniform(*np.log(limits))))

@@ -11,7 +11,7 @@ from vanedamp.rom.reduced import ReducedModel
 
 
 def cluster_model(degree: int, modes: int) -> ReducedModel:
-    """The shipped cluster with so many fixed-interface modes."""
+    """Return the shipped cluster with the given number of fixed-interface modes."""
     from vanedamp.meshes.vane_cluster import SHIPPED
     from vanedamp.studies.case.stages import assemble, reduction
     from vanedamp.studies.case.tables import DEMO_CASE, Case
@@ -25,7 +25,7 @@ _ROD_MODES, _BEAM_ELEMENTS, _CLUSTER_MODES = 40, 8, 12
 
 
 def rod_model(modes: int = _ROD_MODES, per_stiffness: float | None = None) -> ReducedModel:
-    """Clamped unit rod in Craig-Bampton form: constraint mode x, fixed-interface modes sqrt(2) sin(j pi x).
+    """Return a clamped unit rod in Craig-Bampton form: constraint mode x, fixed-interface modes sqrt(2) sin(j pi x).
 
     per_stiffness: s, damping in proportion to the stiffness; left out: the damping ratio 0.01 of every mode.
     """
@@ -42,7 +42,7 @@ def rod_model(modes: int = _ROD_MODES, per_stiffness: float | None = None) -> Re
 
 
 def beam_model(*others: int) -> ReducedModel:
-    """Clamped unit beam in bending, of cubic elements (Euler and Bernoulli); "tip", and "node <k>" of other nodes."""
+    """Return a clamped unit beam in bending, of cubic elements (Euler and Bernoulli); "tip", and "node <k>"."""
     h = 1.0 / _BEAM_ELEMENTS
     stiffness = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]) / h**3
     mass = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) * h / 420.0

@@ -27,7 +27,7 @@ TOLERANCES = (0.1, 0.03, 0.01)
 #: a model: number of natural modes, and whether attachment modes come with them
 Kind = tuple[int, bool]
 _STARTS = (-0.3, 0.2)
-#: numbers of modes tried, alone and with attachment modes, besides those chosen and all of them
+#: numbers of modes tried, without and with attachment modes, in addition to those chosen and all of them
 _COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 20, 25, 32)
 #: rounds of the clocks, and between which periods of a run they measure
 _ROUNDS, _LENGTHS = 3, (50, 150)
@@ -77,7 +77,7 @@ def run_trial(
 
 
 def judge(trial: Trial, name: str, periods: int) -> list[Verdict]:
-    """Verdicts of one scene, one for each tolerance."""
+    """Return the verdicts of one scene, one for each tolerance."""
     scenes = [trial.scene.replace({"excitation.frequency": frequency}) for frequency in trial.frequencies]
     chosen: dict[float, dict[str, Any]] = {}
     for tolerance in TOLERANCES:
@@ -115,7 +115,7 @@ def format_model(kind: Kind) -> str:
 
 
 def _kinds(chosen: Collection[Mapping[str, Any]]) -> list[Kind]:
-    """Models to try, the whole one last."""
+    """Return the models to try, the whole one last."""
     rungs = {(rung["modes"], rung["attached"]) for estimate in chosen for rung in estimate["ladder"]}
     whole = max(rungs)[0]
     # attachment modes make a model larger, so that many modes with them are the whole
@@ -127,7 +127,7 @@ def _kinds(chosen: Collection[Mapping[str, Any]]) -> list[Kind]:
 def errors(
     scenes: Sequence[Scene], kinds: Sequence[Kind], undamped: float, periods: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Errors (kinds,) of models against the last, and the 95 % confidence of each.
+    """Return the errors (kinds,) of models against the last, and the 95 % confidence of each.
 
     undamped: m; the scenes differ in frequency.
     """
@@ -144,7 +144,7 @@ def errors(
 
 
 def _costs(scene: Scene, kinds: Sequence[Kind]) -> np.ndarray:
-    """Seconds per period (kinds,), medians over the rounds."""
+    """Return the seconds per period (kinds,), medians over the rounds."""
     clocks = {
         format_model(kind): partial(time_of_a_period, _fixed(scene, kind, _LENGTHS[1], _STARTS[0]), _LENGTHS)
         for kind in kinds

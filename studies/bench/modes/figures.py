@@ -10,7 +10,7 @@ from vanedamp.studies.figures import BLUE, GOLD, GREEN, GREY, RED, draw_grid, sa
 
 
 def modal_figure(result: Mapping[str, Any], path: Path) -> None:
-    """Processor time and peak memory against the degrees of freedom, a line a solver."""
+    """Draw processor time and peak memory against the degrees of freedom, a line a solver."""
     from vanedamp.studies.bench.modes.solvers import COUNT, NAMES
 
     figure, panels = subplots(1, 3, size=(14, 4.6))

@@ -114,7 +114,7 @@ def _solvers() -> tuple[list[str], dict[str, str]]:
 
 
 def _rounds(name: str, matrices: Path, effort: Effort) -> dict[str, Any]:
-    """Medians over the rounds; the first trouble ends them."""
+    """Measure medians over the rounds; the first trouble ends them."""
     runs = []
     for _ in range(effort.rounds):
         runs.append(_process(effort.limit, name, str(matrices), str(COUNT)))
@@ -129,7 +129,7 @@ def _rounds(name: str, matrices: Path, effort: Effort) -> dict[str, Any]:
 
 
 def _process(limit: float, *arguments: str) -> dict[str, Any]:
-    """One measurement in a process of its own, on one thread; its trouble is a status."""
+    """Measure once in a process of its own, on one thread; trouble is a status."""
     try:
         done = run_module("vanedamp.studies.bench.modes.worker", *arguments, threads=1, timeout=limit)
     except subprocess.TimeoutExpired:
@@ -148,7 +148,7 @@ def _agree(solvers: Mapping[str, Any]) -> bool:
 
 
 def _ratios(solvers: Mapping[str, Any]) -> dict[str, Any]:
-    """Our processor time and memory over the others'."""
+    """Return our processor time and memory over the others'."""
     ours = solvers.get(OURS, {"status": "none"})
     return {
         name: {part: ours[part]["cpu_s"] / other[part]["cpu_s"] for part in ("factorisation", "modes")}
@@ -159,7 +159,7 @@ def _ratios(solvers: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _ahead(sizes: list[dict[str, Any]]) -> dict[str, Any]:
-    """Where another solver needs less processor time for the modes, by more than 5 %."""
+    """Return where another solver needs less processor time for the modes, by more than 5 %."""
     behind = [
         (name, entry["assembly"].get("dofs"))
         for entry in sizes
@@ -170,7 +170,7 @@ def _ahead(sizes: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _write_csv(result: Mapping[str, Any], path: Path) -> None:
-    """One line a size and solver."""
+    """Write one line a size and solver."""
     rows: list[tuple[Any, ...]] = []
     for entry in result["sizes"]:
         assembly = entry["assembly"]

@@ -26,7 +26,7 @@ Result = dict[str, Any]
 
 
 def assemble(mesh: str, output: str) -> Result:
-    """Matrices of the held cluster of quadratic elements; forms are compiled before the clock starts."""
+    """Return the matrices of the held cluster of quadratic elements; forms are compiled before the clock starts."""
     from vanedamp.modal.elasticity import Material, Solid
 
     solid = Solid(mesh, {"default": Material(YOUNG, POISSON, DENSITY)})
@@ -45,12 +45,12 @@ def assemble(mesh: str, output: str) -> Result:
 
 
 def slepc(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
-    """SLEPc's Krylov-Schur on CHOLMOD: what `vanedamp modal` runs on one rank."""
+    """Solve by SLEPc's Krylov-Schur on CHOLMOD, as `vanedamp modal` does on one rank."""
     return _krylov_schur("cholmod", stiffness, mass, count)
 
 
 def mumps(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
-    """SLEPc's Krylov-Schur on MUMPS: what it runs on more."""
+    """Solve by SLEPc's Krylov-Schur on MUMPS, as `vanedamp modal` does on several ranks."""
     return _krylov_schur("mumps", stiffness, mass, count)
 
 
@@ -66,18 +66,18 @@ def _krylov_schur(direct: str, stiffness: sparse.csr_array, mass: sparse.csr_arr
 
 
 def superlu(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
-    """scipy's eigsh on SuperLU, with the ordering and pivoting for symmetric matrices."""
+    """Solve by scipy's eigsh on SuperLU, with the ordering and pivoting for symmetric matrices."""
     options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
     return _arpack(lambda: splu(sparse.csc_matrix(stiffness), **options).solve, mass, count)
 
 
 def superlu_default(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
-    """scipy's eigsh with sigma alone: SuperLU with its default ordering."""
+    """Solve by scipy's eigsh with sigma only: SuperLU with its default ordering."""
     return _arpack(lambda: splu(sparse.csc_matrix(stiffness)).solve, mass, count)
 
 
 def cholmod(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
-    """scipy's eigsh on CHOLMOD by scikit-sparse, supernodal, the best of its orderings."""
+    """Solve by scipy's eigsh on CHOLMOD by scikit-sparse, supernodal, the best of its orderings."""
     from sksparse.cholmod import cholesky
 
     return _arpack(lambda: cholesky(sparse.csc_matrix(stiffness), mode="supernodal"), mass, count)
@@ -90,7 +90,7 @@ _PARTS = ("data", "indices", "indptr")
 
 
 def _arpack(factorise: Callable[[], Any], mass: sparse.csr_array, count: int) -> Result:
-    """Implicitly restarted Lanczos on a factorisation, timed alone and with the modes."""
+    """Solve by implicitly restarted Lanczos on a factorisation; both are timed."""
     result: Result = {}
     with _clock(result, "modes"):
         with _clock(result, "factorisation"):
@@ -116,7 +116,7 @@ def _clock(result: Result, name: str) -> Any:
 
 
 def _peak() -> int:
-    """Peak resident memory of this process, bytes."""
+    """Return the peak resident memory of this process, bytes."""
     used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return used if sys.platform == "darwin" else 1024 * used
 

@@ -16,7 +16,7 @@ _SHADES = LinearSegmentedColormap.from_list("failure", ["#f8fafc", "#fca5a5"])
 
 
 def maps_figure(maps: Mapping[str, Any], path: Path) -> None:
-    """A panel a map: shares of failure as shades, measured edges as points, analytic limits as lines."""
+    """Draw a panel a map: shares of failure as shades, measured edges as points, analytic limits as lines."""
     figure, axes = subplots(2, 4, size=(19, 9))
     for panel, (name, grid) in zip(axes.flat, maps.items(), strict=True):
         modes = "modes" in grid["x_label"]

@@ -99,7 +99,7 @@ def run_stability(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
 
 
 def _write_maps(maps: Mapping[str, Any], path: Path) -> None:
-    """One line a point of a map."""
+    """Write one line a point of a map."""
     rows = (
         (name, x, y, value)
         for name, mapped in maps.items()
@@ -125,7 +125,7 @@ def print_summary(result: Mapping[str, Any]) -> None:
 
 
 def explicit_limit(effort: Effort) -> dict[str, Any]:
-    """Central differences: largest stable step against the structure's frequency; limit 2 / omega."""
+    """Measure central differences: largest stable step against the structure's frequency; limit 2 / omega."""
     ratios = np.geomspace(15, 120, effort.points)
     measured = []
     for ratio in ratios:
@@ -137,7 +137,7 @@ def explicit_limit(effort: Effort) -> dict[str, Any]:
 
 
 def contact_limit(effort: Effort) -> dict[str, Any]:
-    """Central differences, a body pressed on a soft wall: limit 2 / omega_max of the pair on its spring."""
+    """Measure central differences, a body pressed on a soft wall: limit 2 / omega_max of the pair on its spring."""
     masses, measured, limits = np.geomspace(0.01, 3, effort.points), [], []
     for mass in masses:
         stiffness = (2 * math.pi * 20) ** 2
@@ -151,7 +151,7 @@ def contact_limit(effort: Effort) -> dict[str, Any]:
 
 
 def friction_limit(effort: Effort) -> dict[str, Any]:
-    """Regularised friction: least slip speed at which a body comes to rest; limit mu N dt / (2 m*)."""
+    """Measure regularised friction: least slip speed at which a body comes to rest; limit mu N dt / (2 m*)."""
     masses, measured, limits = np.geomspace(0.01, 3, effort.points), [], []
     for mass in masses:
         limits.append(0.5 / 1000 * (1 + 1 / mass))
@@ -165,7 +165,7 @@ def friction_limit(effort: Effort) -> dict[str, Any]:
 
 
 def cosimulation_limit(effort: Effort) -> dict[str, Any]:
-    """Jacobi co-simulation, forces and speeds held: largest stable macro-step against the ratio of masses.
+    """Measure Jacobi co-simulation, forces and speeds held: largest stable macro-step against the ratio of masses.
 
     The limit is where the spectral radius of the linear macro-step (a body on its spring and dashpot, a structure under
     the mean force of the last macro-step) passes one.
@@ -180,7 +180,7 @@ def cosimulation_limit(effort: Effort) -> dict[str, Any]:
 
 
 def contact_energy(effort: Effort) -> dict[str, Any]:
-    """Rebound of an elastic collision (restitution 1) by penalty methods, against steps in the contact.
+    """Measure the rebound of an elastic collision (restitution 1) by penalty methods, against steps in the contact.
 
     Largest over where in a step the contact begins; above one, contact makes energy.
     """
@@ -220,7 +220,7 @@ def _rebound(options: Mapping[str, Any], shift: float) -> float:
 
 
 def missed_impacts(effort: Effort) -> dict[str, Any]:
-    """Share of short contacts that solve_ivp steps over, against their duration in steps; none beyond one step."""
+    """Measure the share of short contacts that solve_ivp steps over, by their duration in steps; none beyond one."""
     ratios = np.linspace(0.1, 1.3, max(2 * effort.points - 1, 3))
     missed, exact = [], []
     for ratio in ratios:
@@ -243,7 +243,7 @@ def missed_impacts(effort: Effort) -> dict[str, Any]:
 
 
 def restitution_and_modes(effort: Effort) -> dict[str, Any]:
-    """A body against the tip of a clamped rod: contact mass and speed after one impact against the number of modes."""
+    """Measure contact mass and speed after one impact of a body on the tip of a clamped rod, by the number of modes."""
     from vanedamp.studies.bench.methods.scenes import rod
 
     limit: list[float] = []
@@ -269,7 +269,7 @@ def restitution_and_modes(effort: Effort) -> dict[str, Any]:
 
 
 def chatter_end(effort: Effort) -> dict[str, Any]:
-    """A ball dropped on a plate at rest: end of its chatter against restitution; limit t0 (1 + k) / (1 - k)."""
+    """Measure the end of the chatter of a ball dropped on a plate, by restitution; limit t0 (1 + k) / (1 - k)."""
     restitutions = np.linspace(0.2, 0.9, effort.points)
     measured, limits, events = [], [], []
     height, gravity = 0.01, 9.81
@@ -295,7 +295,7 @@ def _diverges(tables: Mapping[str, Any], solver: Mapping[str, Any], steps: int) 
 
 
 def _step(fails: Callable[[int], bool], guess: float) -> float:
-    """The largest step, in periods, of a whole number of which a period consists and which does not fail."""
+    """Return the largest step, in periods, that divides a period and does not fail."""
     low, high = max(int(guess / 3), 4), int(3 * guess) + 1
     while high - low > 1:
         middle = (low + high) // 2

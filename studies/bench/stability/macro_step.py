@@ -18,7 +18,7 @@ _P, _V, _BEFORE, _X, _U, _LAST, _OLDER = range(7)
 
 
 def macro_step(h: float, mass: float, stiffness: float, dashpot: float, exchange: str, hold: int) -> np.ndarray:
-    """Matrix (7, 7) of a macro-step of length h (s): unit mass on a spring of (2 pi)^2 N/m, body of `mass` (kg)."""
+    """Return the matrix (7, 7) of a macro-step h (s): unit mass on a spring of (2 pi)^2 N/m, body of `mass` (kg)."""
     slope = np.zeros(7)
     if hold == 1:
         slope[_LAST], slope[_OLDER] = 1 / h, -1 / h
@@ -26,7 +26,7 @@ def macro_step(h: float, mass: float, stiffness: float, dashpot: float, exchange
     rate = np.zeros((4, 4))
     rate[0, 1], rate[1], rate[2, 3] = 1.0, [-((2 * math.pi) ** 2), -DAMPING, 1.0, 0.0], 1.0
     place, speed = expm(rate * h)[:2] @ np.array([np.eye(7)[_P], np.eye(7)[_V], constant, slope])
-    # the wall as the body is told: its place, its speed and the change of that
+    # the wall as the body knows it: its place, its speed and the change of that
     start, now, bend = np.eye(7)[_P], np.eye(7)[_V], np.zeros(7)
     if hold == 1:
         bend = (speed - now if exchange == "gauss_seidel" else now - np.eye(7)[_BEFORE]) / h
@@ -41,7 +41,7 @@ def macro_step(h: float, mass: float, stiffness: float, dashpot: float, exchange
 
 
 def largest_stable(mass: float, stiffness: float, dashpot: float, exchange: str, hold: int) -> float:
-    """The macro-step (s) at which the spectral radius first passes one; inf where it does not below half a period."""
+    """Return the macro-step (s) at which the spectral radius first passes one; inf if not below half a period."""
     steps = np.geomspace(1e-4, 0.5, 4000)
     for h in steps:
         matrix = macro_step(float(h), mass, stiffness, dashpot, exchange, hold)

@@ -44,7 +44,7 @@ Share = Callable[[float, float], float]
 
 
 def contact_map(effort: MapEffort) -> dict[str, Any]:
-    """Central differences, step against stiffness of a contact: 2 / omega_max of the pair on its spring."""
+    """Map central differences, step against stiffness of a contact: 2 / omega_max of the pair on its spring."""
     mass, stiffnesses = 0.1, (2 * math.pi) ** 2 * np.geomspace(20, 5000, effort.across)
 
     def limit(stiffness: float) -> float:
@@ -61,7 +61,7 @@ def contact_map(effort: MapEffort) -> dict[str, Any]:
 
 
 def friction_map(effort: MapEffort) -> dict[str, Any]:
-    """Regularised friction, step against slip speed: 2 v_reg m* / (mu N)."""
+    """Map regularised friction, step against slip speed: 2 v_reg m* / (mu N)."""
     mass, speeds = 0.1, np.geomspace(1e-3, 1e-1, effort.across)
     limits = 2 * speeds * mass / (1 + mass)
 
@@ -73,7 +73,7 @@ def friction_map(effort: MapEffort) -> dict[str, Any]:
 
 
 def cosimulation_map(effort: MapEffort, exchange: str, hold: int) -> dict[str, Any]:
-    """Co-simulation, macro-step against ratio of masses: spectral radius of the linear macro-step."""
+    """Map co-simulation, macro-step against ratio of masses: spectral radius of the linear macro-step."""
     masses = np.geomspace(0.4, 4, effort.across)
     pairs = {float(mass): scenes.coupled_pair(float(mass)) for mass in masses}
     limits = np.array([largest_stable(mass, *pair[1:], exchange, hold) for mass, pair in pairs.items()])
@@ -88,7 +88,7 @@ def cosimulation_map(effort: MapEffort, exchange: str, hold: int) -> dict[str, A
 
 
 def missed_map(effort: MapEffort) -> dict[str, Any]:
-    """Share of touches that a search by signs at step ends misses, step against closing speed.
+    """Map the share of touches that a search by signs at step ends misses, step against closing speed.
 
     The wall is beyond the resting body for asin(speed) / pi periods; steps shorter than that miss nothing.
     missed_by_exact: touches that the exact engine misses.
@@ -115,7 +115,7 @@ def missed_map(effort: MapEffort) -> dict[str, Any]:
 
 
 def newton_map(effort: MapEffort) -> dict[str, Any]:
-    """Momentum of the first impact on a rod by Newton's law, relative to that of the rod without modes.
+    """Map the momentum of the first impact on a rod by Newton's law, relative to that of the rod without modes.
 
     Edge: the mass of the body from which on less than half is left; limit: the same from the contact's mass,
     1/3 - sum 2/(k pi)^2.
@@ -155,7 +155,7 @@ def _map(
     effort: MapEffort,
     value: Callable[[float, float], float] | None = None,
 ) -> dict[str, Any]:
-    """A grid from a third of the lowest limit to three times the highest, and the edge in every column."""
+    """Return a grid from a third of the lowest limit to three times the highest, and the edge in every column."""
     finite = limit[np.isfinite(limit)]
     y = np.geomspace(finite.min() / 3, min(3 * finite.max(), 0.24), effort.up)
     shade = value or fails
@@ -170,7 +170,7 @@ def _map(
 
 
 def _bisect(fails: Callable[[float], bool], low: float, high: float) -> float:
-    """Where a method begins to fail between two numbers, to 0.5 %."""
+    """Return where a method begins to fail between two numbers, to 0.5 %."""
     while high > 1.005 * low:
         middle = math.sqrt(low * high)
         low, high = (low, middle) if fails(middle) else (middle, high)

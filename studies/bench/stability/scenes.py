@@ -23,23 +23,23 @@ LONG = 40
 
 
 def data(**changes: Any) -> dict[str, Any]:
-    """Tables of a scene without excitation, with changes."""
+    """Return the tables of a scene without excitation, with changes."""
     common = {"structure": STRUCTURE, "excitation": {"frequency": 1.0}, "time": {"periods": LONG, "transient": 0}}
     return common | changes
 
 
 def scene(tables: Mapping[str, Any], solver: Mapping[str, Any]) -> Scene:
-    """The scene of such tables with a [solver]."""
+    """Return the scene of such tables with a [solver]."""
     return validate(Scene, dict(tables) | ({"solver": dict(solver)} if solver else {}), "scene")
 
 
 def contact_stiffness(mass: float) -> float:
-    """A contact with a frequency of 30 a period."""
+    """Return a contact with a frequency of 30 a period."""
     return (2 * math.pi * 30) ** 2 / (1 + 1 / mass)
 
 
 def pressed(mass: float, stiffness: float, restitution: float) -> dict[str, Any]:
-    """A body that gravity of 1 m/s^2 presses on a soft wall."""
+    """Return a body that gravity of 1 m/s^2 presses on a soft wall."""
     return data(
         gravity={"acceleration": 1.0, "orientation_deg": 90.0}, cavity=[{"name": "c", "gap": 1e3}],
         contact={"law": "compliant", "stiffness": stiffness},
@@ -56,7 +56,7 @@ def bounces(tables: Mapping[str, Any], solver: Mapping[str, Any], static: float,
 
 
 def coupled_pair(mass: float) -> tuple[dict[str, Any], float, float]:
-    """Tables of a damped structure and a body pressed on it; stiffness (N/m) and dashpot (N s/m) of their contact."""
+    """Return tables of a structure and a body pressed on it; stiffness (N/m) and dashpot (N s/m) of their contact."""
     stiffness = contact_stiffness(mass)
     tables = pressed(mass, stiffness, restitution=0.7)
     tables["structure"] = STRUCTURE | {"damping": DAMPING}
@@ -85,7 +85,7 @@ def unsteady(mass: float, slow: float, steps: int) -> bool:
 
 
 def touching(touch: float) -> Scene:
-    """A wall that is beyond a resting body for the share `touch` of a period."""
+    """Return a wall that is beyond a resting body for the share `touch` of a period."""
     depth = 1 - math.cos(math.pi * touch)
     tables = data(
         structure={"model": "prescribed", "displacement_amplitude": 1.0}, gravity={"acceleration": 0.0},
@@ -113,7 +113,7 @@ def steps_over(touch: Scene, step: float, start: float = 0.0) -> bool:
 
 
 def against_rod(file: str, mass: float, law: str) -> Scene:
-    """A body of 1 m/s against the tip of a rod, a reduced model's file."""
+    """Return a body of 1 m/s against the tip of a rod, a reduced model's file."""
     return scene(data(
         structure={"model": "rom", "file": file}, excitation={"frequency": 1.0, "at": "tip"},
         gravity={"acceleration": 0.0}, cavity=[{"name": "c", "gap": 0.2, "floor": "tip"}],
@@ -124,6 +124,6 @@ def against_rod(file: str, mass: float, law: str) -> Scene:
 
 
 def first_impulse(struck: Scene) -> float:
-    """Momentum given in the first impact, N s."""
+    """Return the momentum given in the first impact, N s."""
     response = simulate(struck, events=True)
     return abs(next(event.impulse for event in response.event_list if event.kind == "impact"))

@@ -12,7 +12,7 @@ from vanedamp.studies.figures import BLUE, GREEN, GREY, RED, draw_grid, save, su
 
 
 def sweep_figure(result: Mapping[str, Any], path: Path) -> None:
-    """Time, memory and efficiency of sweeps against the number of scenes."""
+    """Draw time, memory and efficiency of sweeps against the number of scenes."""
     figure, (left, middle, right) = subplots(1, 3, size=(14, 4.6), width_ratios=[1.2, 1.2, 0.8])
     sizes = result["sizes"]
     points = np.array([entry["points"] for entry in sizes])

@@ -115,7 +115,7 @@ def _overhead(many: Mapping[str, Any]) -> float:
 
 
 def _process(points: int, workers: int) -> dict[str, Any]:
-    """One sweep in a process of its own, one thread a process."""
+    """Run one sweep in a process of its own, one thread a process."""
     with tempfile.TemporaryDirectory() as folder:
         done = run_module("vanedamp.studies.bench.sweep.worker", str(points), str(workers), folder, threads=1)
     done.check_returncode()

@@ -37,7 +37,7 @@ class _Use(NamedTuple):
 
 
 def scene(points: int) -> Scene:
-    """A rigid model with one body: gaps times frequencies around the resonance, `points` in all."""
+    """Return a rigid model with one body: gaps times frequencies around the resonance, `points` in all."""
     frequencies = max(count for count in range(1, math.isqrt(points) + 1) if points % count == 0)
     first = math.sqrt(_STIFFNESS / _MASS) / (2 * math.pi)
     data: dict[str, Any] = {
@@ -55,7 +55,7 @@ def scene(points: int) -> Scene:
 
 
 def measure(points: int, count: int, folder: Path) -> dict[str, Any]:
-    """A sweep with its checkpoint and its result, as the command runs it; workers have started before the clock."""
+    """Run a sweep with its checkpoint and its result, as the command does; workers have started before the clock."""
     grid = scene(points)
     with workers(count) as pool:
         warm_up()

@@ -55,7 +55,7 @@ def check_optimise(study: Study, workers: int | None) -> None:
 
 
 def _seconds(scene: Scene) -> float:
-    """Processor time of a run."""
+    """Return the processor time of a run."""
     return _RUN + scene.time.simulated * scene.solver.seconds_per_period
 
 

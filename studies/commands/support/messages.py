@@ -20,7 +20,7 @@ def write_result(target: str | None, result: Mapping[str, Any]) -> None:
 
 
 def print_note(source: str, message: str) -> None:
-    """Print what a user should know wherever the results go, with the file that it is about."""
+    """Print a note for the user, wherever the results go, with the file that it is about."""
     print(f"vanedamp: {source}: {message}", file=sys.stderr)
 
 

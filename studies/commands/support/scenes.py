@@ -1,4 +1,4 @@
-"""Scenes of a command: loaded and checked, and what was chosen for them."""
+"""Scenes of a command, loaded and checked, and the choices made for them."""
 
 from __future__ import annotations
 
