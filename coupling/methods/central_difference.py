@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, TimeGrid
+from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load, row_force
 from vanedamp.coupling.methods.step_records import (
     close_step,
@@ -22,6 +22,7 @@ from vanedamp.coupling.methods.step_records import (
     row_speed,
     solve_inverse,
 )
+from vanedamp.coupling.numerics.codes import DONE, PERIOD
 from vanedamp.coupling.numerics.jit import entry
 from vanedamp.coupling.system.system import System
 

@@ -16,10 +16,11 @@ from pydantic import Field
 from scipy.linalg import expm
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, STEPS, Motion, TimeGrid, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, time_grid
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, net_load, row_force, with_penalty
 from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
 from vanedamp.coupling.methods.time_stepping import SteppedRun
+from vanedamp.coupling.numerics.codes import DONE, PERIOD, STEPS
 from vanedamp.coupling.numerics.jit import entry, kernel
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, Motion, TimeGrid, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, time_grid
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
     close_step,
@@ -28,6 +28,7 @@ from vanedamp.coupling.methods.step_records import (
     solve_inverse,
 )
 from vanedamp.coupling.methods.time_stepping import SteppedRun
+from vanedamp.coupling.numerics.codes import DONE, PERIOD, SOLVES, UNDECIDED
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.response.evaluation import Run

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, TimeGrid
+from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
@@ -26,6 +26,7 @@ from vanedamp.coupling.methods.step_records import (
     row_speed,
     solve_inverse,
 )
+from vanedamp.coupling.numerics.codes import DONE, PERIOD, SOLVES, UNDECIDED
 from vanedamp.coupling.numerics.jit import entry, kernel
 from vanedamp.coupling.system.system import System
 

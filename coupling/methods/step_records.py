@@ -4,16 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.methods.equations_of_motion import (
-    DIVERGED,
-    DONE,
-    EVENT_BUDGET,
-    IMPACTS,
-    LOGGED,
-    PENETRATION,
-    PERIOD,
-    STEPS,
-)
+from vanedamp.coupling.numerics.codes import DIVERGED, DONE, EVENT_BUDGET, IMPACTS, LOGGED, PENETRATION, PERIOD, STEPS
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.response.recorder import cubic_peak, put_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS

@@ -23,7 +23,8 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
     Contacts,
     Unforced,
 )
-from vanedamp.coupling.numerics.complementarity import AT_HIGH, AT_LOW, new_problem, solve_box
+from vanedamp.coupling.numerics.codes import AT_HIGH, AT_LOW
+from vanedamp.coupling.numerics.complementarity import new_problem, solve_box
 
 #: derivatives that are looked at
 _LEVELS = 6

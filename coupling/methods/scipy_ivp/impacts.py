@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.motion import Unforced
-from vanedamp.coupling.numerics.complementarity import AT_LOW, DEPENDENT, Problem, solve_box
+from vanedamp.coupling.numerics.codes import AT_LOW, DEPENDENT
+from vanedamp.coupling.numerics.complementarity import Problem, solve_box
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 

@@ -6,8 +6,17 @@ import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
 from vanedamp.coupling.methods.scipy_ivp.motion import LOOSE, SLIDE, SPRUNG, Unforced
-from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.recorder import cubic_peak, record_section
+from vanedamp.coupling.response.records import (
+    CONTACT,
+    ENERGIES,
+    EXCITATION,
+    FRICTION,
+    IMPACT,
+    IMPACT_LOSS,
+    VISCOUS,
+    Records,
+)
 
 #: the integrals; behind them the impulses of all rows
 _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN, _PUSH = range(10)
@@ -20,7 +29,7 @@ class Recorder:
     bodies' momentum, on the extended state; states: of the rows.
     """
 
-    def __init__(self, unforced: Unforced, records: recs.Records, steps: int, events: bool) -> None:
+    def __init__(self, unforced: Unforced, records: Records, steps: int, events: bool) -> None:
         u, system = unforced, unforced.system
         self.unforced, self.system, self.records, self.keep = u, system, records, events
         self.each, self.steps = records.samples_per_period, steps
@@ -117,7 +126,7 @@ class Recorder:
         self.impacts += 1
         self.records.impacts[self.period] += 1
         self.records.collided[self.period] += 0.5 * before**2 / self.system.delassus[r, r]
-        entry = [self.period * self.system.period + t, recs.IMPACT, r, before, after, impulse]
+        entry = [self.period * self.system.period + t, IMPACT, r, before, after, impulse]
         if self.keep:
             self.log.append(entry)
         return entry
@@ -155,9 +164,9 @@ class Recorder:
         z, integrals = y[: u.size], y[u.size :]
         holds = (self.states == SPRUNG) | (u.slider & (u.limit > 0))
         springs = 0.5 * float(system.spring[holds] @ z[u.d][holds] ** 2)
-        ledger = np.zeros(len(recs.ENERGIES))
-        ledger[[recs.EXCITATION, recs.VISCOUS, recs.FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
-        ledger[recs.CONTACT], ledger[recs.IMPACT_LOSS] = integrals[_CONTACT] + self.spring_loss, self.impact_loss
+        ledger = np.zeros(len(ENERGIES))
+        ledger[[EXCITATION, VISCOUS, FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
+        ledger[CONTACT], ledger[IMPACT_LOSS] = integrals[_CONTACT] + self.spring_loss, self.impact_loss
         record_section(system, self.records, self.period, z[u.p], z[u.p_rate], z[u.d][:b], z[u.s][:b], springs, ledger)
         x, rate, _ = self.records.section[self.period, :3]
         self.last = (0.0, float(x), float(rate))

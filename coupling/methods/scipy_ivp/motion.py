@@ -21,7 +21,7 @@ from vanedamp.coupling.system.system import System
 UNFORCED, REST, HELD, SLIDE, SPRUNG, LOOSE = range(6)
 # what an event function stands for: a gap closes; a slip stops; a force reaches its low or high bound; a gap that was
 # left under compression opens; its spring would push again
-GAP, SLIP, LOW, HIGH, OPENS, PUSHES = range(6)
+GAP, SLIP, LOW, HIGH, OPENS, PUSHES = range(10, 16)
 #: order of a zero whose derivatives all vanish: the function is not watched
 NEVER = 99
 
