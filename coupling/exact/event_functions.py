@@ -34,7 +34,7 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.exponentials import secular_bound
 from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
 
-#: shortest step in periods: what a double can resolve within a period
+#: shortest step in periods: the resolution of a double within a period
 RESOLUTION = 1e-15
 #: a compliant contact ends when its spring is pulled by this share of the free travel
 ADHESION = 1e-13
@@ -67,7 +67,7 @@ def next_event(system, flows, st, watched):
             return left, -1
         if watched.status[k] == ROOT:
             st.counters[CARRIED] = 0
-            # what a double cannot tell from the segment's start happens at its start
+            # a root that a double cannot separate from the segment's start is at its start
             return (tau if tau > shortest else 0.0), k
         if watched.status[k] == BOUNDED:
             tau = 0.0  # where exponentials cost nothing

@@ -116,7 +116,7 @@ def simultaneous_impacts(system, st, rec, scratch):
 def _flight_share(restitution):
     """Return the share of the rest of a chatter that its next flight takes.
 
-    An elastic contact has no chatter of its own, but what other contacts lose may shorten its flights without end.
+    An elastic contact has no chatter of its own, but the losses of other contacts may shorten its flights without end.
     """
     return max(1.0 - restitution, 0.1)
 
@@ -141,7 +141,7 @@ def _complete_chatter(system, st, scratch, k):
     A chatter that is over within CHATTER leaves its contacts closed without speed. Its impacts and the pressing forces
     in between have then handed over impulses that only push: those of one step of Moreau's scheme of that length
     (Moreau 1988), left in scratch.reaction. Contacts that keep an impulse in it are closed from now on; others leave.
-    What the forces press in that time is then still to come: the jump itself, which ties the contacts, is less by it.
+    The impulse of the pressing forces in that time is still to come: the jump, which ties the contacts, leaves it out.
     Returns False if the problem cannot be solved.
     """
     problem = scratch.problem

@@ -29,6 +29,7 @@ class State(NamedTuple):
     low_word: np.ndarray  # (r,) of slips, sums of two doubles: the part beyond the last digit of `displacement`, m
     velocity: np.ndarray  # (r,) of each row, m/s
     contact_impulse: np.ndarray  # (r,) impulse of a compliant contact since it began, N s
+    capture_speed: np.ndarray  # (r,) rebounds slower than this are completed as a plastic impact, m/s
     ledger: np.ndarray  # (6,) energies since the start, J
 
     # changes at impacts and at the start of a period
@@ -42,7 +43,6 @@ class State(NamedTuple):
     released: np.ndarray  # (r,) int: bound at which a row's force was when it let go at this instant, otherwise 0;
     # -bound: a spring that starts to carry load at that bound
     applied_force: np.ndarray  # (r,) constant force of rows that are not closed, N
-    capture_speed: np.ndarray  # (r,) rebounds slower than this are completed as a plastic impact, m/s
 
     # set when a subsystem begins
     coordinates: np.ndarray  # (2n,) p and p' of the structure at that time
@@ -62,7 +62,7 @@ class EventFunctions(NamedTuple):
     # set at the start of a segment
     row: np.ndarray  # (k,) int: the row that it belongs to
     order: np.ndarray  # (k,) int: POSITION, VELOCITY or FORCE
-    meaning: np.ndarray  # (k,) int: what its root is, AT_LOW, AT_HIGH, STOPS, CLOSES, OPENS or RECLOSES
+    meaning: np.ndarray  # (k,) int: event at its root, AT_LOW, AT_HIGH, STOPS, CLOSES, OPENS or RECLOSES
     k0: np.ndarray  # (k,) constant
     k1: np.ndarray  # (k,) slope of its polynomial
     k2: np.ndarray  # (k,) second derivative of its polynomial
@@ -71,7 +71,7 @@ class EventFunctions(NamedTuple):
     drive: np.ndarray  # (k, m) complex rates of growth of the driven modes
 
     # changes in the search
-    status: np.ndarray  # (k,) int: what is known of it, BOUNDED, EXPANDED or ROOT
+    status: np.ndarray  # (k,) int: knowledge of its roots, BOUNDED, EXPANDED or ROOT
     no_root_before: np.ndarray  # (k,) time before which no root can lie; its first root once that is known, s
 
     # scratch
@@ -133,6 +133,7 @@ def new_state(system: System, modes: int, initial: InitialMotion) -> State:
         low_word=np.zeros(r),
         velocity=np.array(initial.velocity),
         contact_impulse=np.zeros(r),
+        capture_speed=np.zeros(r),
         ledger=np.zeros(len(ENERGIES)),
         awake=np.zeros(modes, np.int64),
         largest_speed=np.zeros(1),
@@ -141,7 +142,6 @@ def new_state(system: System, modes: int, initial: InitialMotion) -> State:
         active_set=np.zeros(r, np.bool_),
         released=np.zeros(r, np.int64),
         applied_force=np.zeros(r),
-        capture_speed=np.zeros(r),
         coordinates=np.r_[initial.p, initial.p_rate],
         constant=np.zeros(n),
         slip_constant=np.zeros(b),

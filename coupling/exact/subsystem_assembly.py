@@ -35,11 +35,11 @@ HELD_STILL = 1e-14
 ROOM = 2**29
 #: share of a gap or a period that round-off may be where modes swing far out: a heavy body on a spring, weight
 FAR = 1e-6
-#: what rows feel of a mode counts at least as this share of what they feel of the others
+#: least share of a coordinate in the rows, relative to the largest, that the check of cancellation assumes
 _UNFELT = 1e-8
 #: modes with |i omega_h - lambda| times the period below this are driven. Beyond, the response in step with the
-#: excitation is at most 1/NEAR times what one period adds: less than two digits cancel. Driven modes cost time, so that
-#: a wider bound would slow down scenes more than 0.3 % beside their resonance. exact.root_search.secular relies on it
+#: excitation is at most 1/NEAR times the growth in one period: less than two digits cancel. Driven modes cost time: a
+#: wider bound would slow down scenes more than 0.3 % off their resonance. numerics.exponentials.secular relies on it
 NEAR = 2e-2
 
 #: eigenvalues (2k,) of k coordinates, vectors of them and their rates (2k, 2k) and their inverse
@@ -180,7 +180,7 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
     springs = _sprung_bodies(system, cluster, sprung)
     carrier[springs.anchored] = system.floor[springs.anchored]
     free = (cluster >= 0) & ~springs.anchored
-    # coordinates z = (p, xi): bodies are at x = carrier p + xi, besides the parabolas of free ones; z = lift eta
+    # coordinates z = (p, xi): bodies are at x = carrier p + xi, free ones with parabolas added; z = lift eta
     basis = null_space(inner) if len(inner) else np.eye(n)
     lift, drop = block_diag(basis, springs.lift), block_diag(basis.T, springs.drop)
     spread = np.vstack([np.hstack([np.eye(n), carrier.T]), np.hstack([np.zeros((b, n)), np.eye(b)])])
@@ -258,7 +258,7 @@ def _check_split(
 ) -> None:
     """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
 
-    Each coordinate counts by what the rows and the response feel of it (felt (n,)), its rate by its own frequency or
+    Each coordinate counts by its share in the rows and the response (felt (n,)), its rate by its own frequency or
     that of the excitation.
     """
     n, b = system.modes, system.bodies
@@ -307,8 +307,8 @@ def _fill_forces(flows: Flows, system: System, s: int, full: np.ndarray, rigid: 
 def _excite(
     system: System, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
 ) -> tuple[_Modes, np.ndarray, np.ndarray, np.ndarray]:
-    """The modes, driven ones first, in order of the harmonics that drive them; eta (k, e) in step with the harmonics of
-    a load (k, e), without the share of the modes that they drive; harmonic and growth (d,) of each driven mode.
+    """Return the modes, driven ones first, in order of the harmonics that drive them; eta (k, e) in step with the
+    harmonics of a load (k, e), without the share of driven modes; harmonic and growth (d,) of each driven mode.
     """
     eigenvalue, shape, project = modes
     k, e = load.shape
@@ -324,7 +324,7 @@ def _excite(
         push = project[:, k:] @ load[:, h]
         harmonic[:, h] = shape[:k] @ np.where(driven, 0, push / np.where(driven, 1, apart))
         driver[driven] = h
-        # a real load is half of what turns with the harmonic, half of what turns against it, in step with the conjugate
+        # a real load turns half with the harmonic, half against it, in step with the conjugate
         growth[driven] = push[driven] / 2
     if np.all(driver == e):
         return modes, harmonic, driver[:0], growth[:0]
@@ -335,7 +335,7 @@ def _excite(
 
 
 def _growth(flows: Flows, s: int) -> np.ndarray:
-    """Rates (m, e) at which each harmonic makes the modes grow that it drives."""
+    """Return the rates (m, e) at which each harmonic makes the modes grow that it drives."""
     m, driven = flows.modes[s], flows.driven[s]
     growth = np.zeros((m, len(driven) - 1), complex)
     for h in range(len(driven) - 1):
@@ -345,7 +345,7 @@ def _growth(flows: Flows, s: int) -> np.ndarray:
 
 
 def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
-    """Time derivative of functionals (..., m) of the amplitudes."""
+    """Return the time derivative of functionals (..., m) of the amplitudes."""
     m, growth = flows.modes[s], _growth(flows, s)
     rate: np.ndarray = functional * flows.eigenvalue[s, :m]
     rate[..., : growth.shape[1]] += functional @ growth
@@ -368,8 +368,8 @@ def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: n
     along, _ = _reciprocal(rate + rate[:e, None], system.period)
     against, _ = _reciprocal(rate - rate[:e, None], system.period, together[:e])
     back, _ = _reciprocal(rate.conj() - rate[0], system.period)
-    alone, slow_alone = _reciprocal(rate, system.period)
-    mean = 2 * _antiderivative(response, alone, load)
+    single, slow_single = _reciprocal(rate, system.period)
+    mean = 2 * _antiderivative(response, single, load)
     free_momentum = free @ flows.velocity[s, : len(free), :m]
     response_back, momentum_back = (_antiderivative(part.conj(), back, load.conj()) for part in (response, momentum))
     flows.work[s, :, :m], flows.momentum[s, :m] = work_back, momentum
@@ -415,21 +415,21 @@ def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: n
         half = 0.5 if j == k else 1.0
         for form, product in zip(forms[1], products, strict=True):
             form[s, i] = half * product[kind][j, k]
-    listed += [(j, 0, SINGLE, -1) for j in np.flatnonzero(slow_alone)]
-    flows.slow_square[s, count : len(listed)] = 2 * np.where(calm, 0, response)[slow_alone]
+    listed += [(j, 0, SINGLE, -1) for j in np.flatnonzero(slow_single)]
+    flows.slow_square[s, count : len(listed)] = 2 * np.where(calm, 0, response)[slow_single]
     listed += [(j, 0, CALM, -1) for j in np.flatnonzero(calm)]
     flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 4)
     flows.slow_count[s] = len(listed)
 
 
 def _reciprocal(rate: np.ndarray, period: float, together: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """1/rate, 0 where a product with this rate hardly changes over a period or is said to, and whether that is so."""
+    """Return 1/rate, 0 where a product with this rate hardly changes over a period or is in `together`; and where."""
     slow = (np.abs(rate) * period < SLOW) | together
     return np.where(slow, 0, 1 / np.where(slow, 1, rate)), slow
 
 
 def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Functional (..., m) of the amplitudes whose rate is the one given; `reciprocal` of the rates of its terms.
+    """Return the functional (..., m) of the amplitudes with a given rate; `reciprocal` of the rates of its terms.
 
     By parts: a driven mode's rate has a term in its harmonic, by `load` (m, e).
     """
@@ -441,7 +441,7 @@ def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.nda
 def _antiderivatives(
     product: np.ndarray, reciprocal: np.ndarray, left: np.ndarray, right: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same for a form (m, m), with the loads on its two factors: what is left to slow pairs, and the form."""
+    """Return the same for a form (m, m), with the loads on its two factors: the part of slow pairs, and the form."""
     rest, integral, e = product, product * reciprocal, left.shape[1]
     for _ in range(2 if left.any() else 0):  # the second time for pairs of harmonics
         rest = product.copy()
@@ -452,19 +452,20 @@ def _antiderivatives(
 
 
 def _real_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Coefficients (..., 4) of the real map a c + b conj(c): real part by Re c and Im c, imaginary part by these."""
+    """Return coefficients (..., 4) of the map a c + b conj(c): its real part by Re c and Im c, its imaginary part."""
     return np.stack([(a + b).real, (b - a).imag, (a + b).imag, (a - b).real], axis=-1)
 
 
 def _real_form(both: np.ndarray, mixed: np.ndarray) -> np.ndarray:
-    """Coefficients (m, m, 4) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts."""
+    """Return coefficients (m, m, 4) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts."""
     return 0.5 * _real_map(both, mixed) * [1, 1, -1, -1]
 
 
 def _attachment(system: System, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Who moves with whom: (functional each body rides on, its free cluster or -1 if it rides, inner constraints).
+    """Return the functional (b, n) of each body that moves with the structure, free clusters and inner constraints.
 
-    An inner constraint is a combination of closed rows that ties two functionals of the structure to each other.
+    Cluster (b,): number of the bodies that move freely together, -1 for one that moves with the structure. An inner
+    constraint is a combination of closed rows that ties two functionals of the structure to each other.
     """
     n, b = system.of_structure.J.shape[1], system.bodies
     carrier, known = np.zeros((b, n)), np.zeros(b, bool)
@@ -489,7 +490,7 @@ def _attachment(system: System, closed: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _connected(links: list[np.ndarray], count: int) -> np.ndarray:
-    """Number of the connected part of each of `count` nodes."""
+    """Return the number of the connected part of each of `count` nodes."""
     if not links:  # the usual case, and the library takes its time
         return np.arange(count)
     graph = coo_matrix((np.ones(len(links)), np.array(links, int).T), (count, count))
@@ -497,14 +498,14 @@ def _connected(links: list[np.ndarray], count: int) -> np.ndarray:
 
 
 def _decided(system: System, r: int, known: np.ndarray) -> bool:
-    """Whether all but one of the bodies of a closed row are known to ride on the structure."""
+    """Whether all but one of the bodies of a closed row are known to move with the structure."""
     bodies = system.of_bodies.J[r] != 0
     free = np.count_nonzero(bodies & ~known)
     return free == 0 or (free == 1 and (np.count_nonzero(bodies) == 1 or bool(known[bodies].any())))
 
 
 def _functional(system: System, carrier: np.ndarray) -> np.ndarray:
-    """Functional of p in each row (r, n); exactly zero where the row's two sides ride on one functional."""
+    """Return the functional of p in each row (r, n); exactly zero where both sides of the row move alike."""
     functional: np.ndarray = system.of_structure.J + system.of_bodies.J @ carrier
     scale = (np.abs(system.of_structure.J) + np.abs(system.of_bodies.J) @ np.abs(carrier)).max(axis=1, initial=0)
     functional[np.abs(functional).max(axis=1, initial=0) <= 1e-12 * scale] = 0
@@ -521,7 +522,7 @@ class _SprungBodies(NamedTuple):
 
 
 def _sprung_bodies(system: System, cluster: np.ndarray, sprung: np.ndarray) -> _SprungBodies:
-    """Bodies that springs tie to the structure move with it; others vibrate about their common centre of mass."""
+    """Return coordinates of bodies on springs: some move with the structure, others about a common centre of mass."""
     b, groups = len(cluster), cluster.max(initial=-1) + 1
     if not len(sprung):
         return _SprungBodies(np.zeros((b, 0)), np.zeros((0, b)), np.zeros(b, bool), cluster)
@@ -546,9 +547,9 @@ def _sprung_bodies(system: System, cluster: np.ndarray, sprung: np.ndarray) -> _
 
 
 def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(k, k-1) and (k-1, k): displacements of k masses about their centre from coordinates, and these from those.
+    """Return displacements of k masses about their centre from coordinates (k, k-1), and these from those (k-1, k).
 
-    Each mass moves against all that are heavier: products of masses alone, so that a light one beside a heavy one keeps
+    Each mass moves against all that are heavier: products of masses only, so that a light one beside a heavy one keeps
     its digits (Helmert's orthogonal contrasts).
     """
     order = np.argsort(mass, kind="stable")
@@ -565,6 +566,6 @@ def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _one_of_each_pair(
     values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each conjugate pair the upper one, with twice its vector: displacement = Re(vector c)."""
+    """Return the upper one of each conjugate pair, with twice its vector: displacement = Re(vector c)."""
     keep = values.imag >= 0
     return values[keep], vectors[:, keep] * np.where(values.imag > 0, 2.0, 1.0)[keep], inverse[keep]

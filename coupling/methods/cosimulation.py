@@ -1,7 +1,7 @@
 """Co-simulation: structure and bodies are separate units that exchange motion and forces once a macro-step.
 
 The structure's unit is exact between two exchanges (matrix exponential); the bodies' unit takes smaller steps of
-central differences with penalty contacts. Each extrapolates what it got from the other by a constant (hold 0) or a line
+central differences with penalty contacts. Each extrapolates the values of the other by a constant (hold 0) or a line
 (hold 1); the structure gets the mean force of a macro-step, so that no impulse is lost. Jacobi: both units start from
 the last exchange; Gauss-Seidel: the bodies already know the structure's new motion. Kuebler and Schiehlen (2000);
 Gomes and others, Co-simulation: a survey (2018).
@@ -71,8 +71,8 @@ def begin(system: System, options: Options, initial: InitialMotion, records: Rec
 
 
 def cosimulation_matrices(system: System, times: TimeGrid, substeps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, and (steps, 2n) what the
-    excitation adds at each step of a period; loads (steps * substeps + 1, N) of the excitation on the bodies' grid.
+    """Return the exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, (steps, 2n) shares of
+    the excitation at each step of a period; loads (steps * substeps + 1, N) of the excitation on the bodies' grid.
     """
     n, e, steps = system.modes, len(system.frequency), len(times.phase) - 1
     rate = np.zeros((4 * n + 2 * e, 4 * n + 2 * e))
@@ -98,7 +98,7 @@ def march_cosimulation(
     system, times, motion, records, log, matrix, excited, loads, memory, slow, gauss_seidel, hold, substeps, periods,
     budget, deepest,
 ):  # fmt: skip
-    """Step to the end of `periods`. memory (3, 4n + r): last velocities and mean forces; those before; scratch."""
+    """Step to the end of `periods`. memory (3, 4n + r): last velocities and mean forces; earlier ones; scratch."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
     h, steps = times.step, len(times.phase) - 1
     q, v, known = motion.coordinates[0], motion.coordinates[1], memory[2]
@@ -147,7 +147,7 @@ def march_cosimulation(
 
 @kernel
 def _structure(system, times, motion, matrix, excited, known, force, older, hold, k, q, v):
-    """The structure's macro-step under the forces that it was given."""
+    """Advance the structure by a macro-step under the forces of the bodies' last ones."""
     n, h = system.modes, times.step
     for i in range(n):
         known[i], known[n + i] = q[i], v[i]
@@ -168,7 +168,7 @@ def _structure(system, times, motion, matrix, excited, known, force, older, hold
 
 @kernel
 def _bodies(system, times, motion, loads, slow, substeps, k, place, rate, bend, mean):
-    """The bodies' macro-step on walls that move as they were told; adds up the mean forces of the rows."""
+    """Advance the bodies by a macro-step on walls of known motion; add up the mean forces of the rows."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
     small = times.step / substeps
     for j in range(substeps):

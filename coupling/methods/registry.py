@@ -27,7 +27,7 @@ def respond(
     start: Handover | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Response:
-    """The response of a scene without open choices (coupling.engine.simulate says the rest)."""
+    """Return the response of a scene without open choices. Arguments as in coupling.engine.simulate."""
     started = time.perf_counter()
     run = run_of(scene, events, samples_per_period, start)
     status, transient = run_scene(run, scene, progress)
@@ -37,7 +37,7 @@ def respond(
 
 
 def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:
-    """A run of the engine whose response is another functional (n,) of the structure's modes; of all periods.
+    """Run the engine with another functional (n,) of the structure's modes as the response; of all periods.
 
     `scene` has no open choices. Raises InputError for a scene that the model does not allow.
     """
@@ -51,9 +51,9 @@ def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: 
 
 
 def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, start: Handover | None = None) -> Run:
-    """A run of the scene's method at time zero.
+    """Return a run of the scene's method at time zero.
 
-    Raises InputError for what the method cannot do, such as to begin with the state of another run.
+    Raises InputError for a scene that the method cannot run, such as one that begins with the state of another run.
     """
     method: Method = METHODS.part(scene.solver.method)
     if start is not None and (reason := why_no_restart(scene)):
@@ -66,7 +66,7 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
 
 
 def why_no_restart(scene: Scene) -> str | None:
-    """Why runs of the scene's method cannot begin with the state of another; None if they can."""
+    """Return why runs of the scene's method cannot begin with the state of another; None if they can."""
     if _restarts(METHODS.part(scene.solver.method)):
         return None
     able = [name for name, method in METHODS.all().items() if _restarts(method)]

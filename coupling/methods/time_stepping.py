@@ -1,4 +1,4 @@
-"""Runs of methods that take time steps: the same system in, the same records out as of the exact engine."""
+"""Runs of methods that take time steps, from the same system to the same records as those of the exact engine."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class SteppedRun:
         self.chunks: list[np.ndarray] = []
 
     def advance_to(self, periods: int) -> Status:
-        """Continue to the end of `periods`, or to what ends the run."""
+        """Continue to the end of `periods`, unless the run ends before."""
         counters = self.motion.counters
         while True:
             # with a log, period by period, so that it can be emptied

@@ -28,7 +28,7 @@ _DEPENDENCE = 1e-9
 def solve_box(problem, k, scale):
     """Solve the first k rows in place: forces, accelerations, and states FREE, AT_LOW, AT_HIGH or DEPENDENT.
 
-    scale: size of the terms that b is the sum of, which sets what counts as round-off.
+    scale: size of the terms that b is the sum of, which sets the round-off.
     problem.forced: 0, or AT_LOW / AT_HIGH for a row whose force has just reached that bound on its way out: it stays
     there unless its acceleration then contradicts (forced becomes 0). Rows found at a bound without acceleration are
     marked in the same way.
@@ -60,7 +60,7 @@ def solve_box(problem, k, scale):
             if not _drive(problem, k, i, tolerance):
                 return False
     for i in range(k):
-        # what held a row may have gone to its bound since
+        # the rows that held it may have gone to their bounds
         if state[i] == DEPENDENT and not _dependent(problem, k, i):
             state[i] = FREE
     for i in range(k):

@@ -42,18 +42,18 @@ class Run(Protocol):
     """A run of any method that can be continued."""
 
     def advance_to(self, periods: int) -> Status:
-        """Continue to the end of so many periods, or to what ends the run."""
+        """Continue to the end of `periods`, unless the run ends before."""
 
     def outcome(self) -> Outcome:
-        """What the run leaves behind."""
+        """Return the results of the run."""
 
     def final(self) -> InitialMotion | None:
-        """The motion that another run can begin with; None for one that ended within a period, or leaves none."""
+        """Return the motion that another run can begin with; None if the run ended within a period, or leaves none."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run leaves behind: records of `periods` periods, counters, chunks of its log.
+    """The results of a run: records of `periods` periods, counters, chunks of its log.
 
     open_ledger: energy residual above which the method's figures are not to be used; penetration: relative to the
     free travel.

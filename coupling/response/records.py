@@ -1,4 +1,4 @@
-"""What a run of any method records: sections, energies, samples, events, and the codes of these."""
+"""The records of a run of any method: sections, energies, samples, events, and the codes of these."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES
 
 
 class Records(NamedTuple):
-    """What a run leaves behind. One entry a period unless said otherwise."""
+    """The records of a run, one entry a period unless stated otherwise."""
 
     peak: np.ndarray  # largest |x|, m
     harmonic: np.ndarray  # complex integral of x exp(-i omega t), m s

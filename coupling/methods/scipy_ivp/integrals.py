@@ -1,4 +1,4 @@
-"""What an integrator leaves in the records: integrals that go along with its state, peaks, impacts, energies."""
+"""The records of an integrator: integrals that it computes with its state, peaks, impacts, energies."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Recorder:
         self.before = np.zeros(self.count)
 
     def sizes(self, reach: float) -> np.ndarray:
-        """Typical sizes of state and integrals (size + count,), for a displacement `reach` (m)."""
+        """Return typical sizes of state and integrals (size + count,), for a displacement `reach` (m)."""
         u, system = self.unforced, self.system
         largest = np.abs(system.of_structure.J).max(axis=0, initial=0.0)
         largest = np.where(largest > 0, largest, np.abs(system.of_structure.response))
@@ -58,7 +58,7 @@ class Recorder:
         return np.concatenate([place, system.omega * place, integrals])
 
     def rates(self, extended: np.ndarray, found: np.ndarray) -> np.ndarray:
-        """Rates of the integrals; found: the forces of the rows and the functionals on the extended state."""
+        """Return the rates of the integrals; found: forces of the rows and the functionals on the extended state."""
         u, system = self.unforced, self.system
         force, (loads, speeds, (x, _, momentum)) = found[: u.r], self._parts(found[u.r :])
         s, friction = extended[u.s], system.friction_rows
@@ -79,13 +79,13 @@ class Recorder:
         return found[:size], found[size : 2 * size], found[2 * size :]
 
     def start(self, y: np.ndarray) -> None:
-        """The state at time zero."""
+        """Record the state at time zero."""
         self._section(y)
         if self.each:
             self._sample(0, y)
 
     def points(self, times: np.ndarray, y: np.ndarray) -> None:
-        """Peaks, samples and penetration at points of the grid."""
+        """Record peaks, samples and penetration at points of the grid."""
         u, system, friction = self.unforced, self.system, self.system.friction_rows
         gaps = y[u.d][friction:] / system.free_travel[friction:, None]
         self.deep = max(self.deep, float((-gaps[u.rigid_contact[friction:]]).max(initial=0.0)))
@@ -96,7 +96,7 @@ class Recorder:
                 self._sample(self.period * self.each + index // (self.steps // self.each), state)
 
     def turning(self, t: float, y: np.ndarray) -> None:
-        """The state right before or after an event."""
+        """Record the state right before or after an event."""
         if t > 0:
             self._peak(t, y)
 
@@ -116,7 +116,7 @@ class Recorder:
             self.records.samples[index] = [self._parts(self.functionals @ u.extended(phase, y[: u.size]))[2][0], *slips]
 
     def impact(self, t: float, impact: Impact) -> None:
-        """Count and log what has collided."""
+        """Count and log impacts."""
         self.impact_loss += impact.loss
         for r, before, after, impulse in zip(impact.row, impact.before, impact.after, impact.impulse, strict=True):
             if before < 0:
@@ -132,7 +132,7 @@ class Recorder:
         return entry
 
     def springs(self, t: float, y: np.ndarray, old: np.ndarray, new: np.ndarray) -> None:
-        """Soft contacts that begin or end to push: impacts, and the energy that a wall keeps which is left pressed."""
+        """Record soft contacts that begin or end: impacts, and the energy in a spring that is left compressed."""
         u, system = self.unforced, self.system
         for r in np.flatnonzero(u.soft_contact & ((old == SPRUNG) != (new == SPRUNG))):
             d, s = y[u.d.start + r], y[u.s.start + r]
@@ -159,7 +159,7 @@ class Recorder:
         self._section(y)
 
     def _section(self, y: np.ndarray) -> None:
-        """Section and ledger at the start of a period."""
+        """Record section and ledger at the start of a period."""
         u, system, b = self.unforced, self.system, self.system.bodies
         z, integrals = y[: u.size], y[u.size :]
         holds = (self.states == SPRUNG) | (u.slider & (u.limit > 0))
