@@ -1,6 +1,6 @@
 """The values of `solver.method`, each a way to run a scene; coupling.scene.solver_options names their modules.
 
-A method is a module, or any object, with the attributes of the protocol `Method`; it is loaded for a scene that names it.
+A method is a module, or any object, with the attributes of the protocol `Method`, loaded for a scene that names it.
 Another package adds one by an entry point, whose name is the value of `solver.method`:
 
     [project.entry-points."vanedamp.methods"]

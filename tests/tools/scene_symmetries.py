@@ -14,7 +14,7 @@ import numpy as np
 
 from tests.tools.scene_strategies import scene_of
 from tests.tools.segment_stepper import Segment, Stepper
-from vanedamp.coupling.numerics.codes import OPEN, PERIOD
+from vanedamp.coupling.numerics.codes import DONE, OPEN, PERIOD
 from vanedamp.coupling.response.evaluation import events_of
 from vanedamp.coupling.system.system import System
 
@@ -53,7 +53,7 @@ def record(data: dict, change=None) -> Record:
     """Run the scene of some tables to its end."""
     stepper = Stepper(scene_of(data), change)
     run, code = stepper.run, stepper.code
-    code = code or run.advance(stepper.periods, stepper.budget)
+    code = run.advance(stepper.periods, stepper.budget) if code == DONE else code
     cavities = [damper["cavity"] for damper in data["damper"]]
     hits: dict = defaultdict(list)
     before, together = {}, np.inf
@@ -74,7 +74,7 @@ def compare(one: Record, other: Record, apart: list[Record], shift: float = 0.0,
 
     apart: perturbed runs of `one`.
     """
-    assert not other.code, f"the image ended with code {other.code}"
+    assert other.code == DONE, f"the image ended with code {other.code}"
     end, spread = one.together, ROUND_OFF
     for near in apart:
         part, difference, _ = _difference(one, near, 0.0, np.inf)
