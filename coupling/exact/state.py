@@ -29,7 +29,6 @@ class State(NamedTuple):
     low_word: np.ndarray  # (r,) of slips, sums of two doubles: the part beyond the last digit of `displacement`, m
     velocity: np.ndarray  # (r,) of each row, m/s
     contact_impulse: np.ndarray  # (r,) impulse of a compliant contact since it began, N s
-    capture_speed: np.ndarray  # (r,) rebounds slower than this are completed as a plastic impact, m/s
     ledger: np.ndarray  # (6,) energies since the start, J
 
     # changes at impacts and at the start of a period
@@ -37,12 +36,13 @@ class State(NamedTuple):
     largest_speed: np.ndarray  # (1,) bound of the speeds in the structure, m/s: round-off of a speed is relative to it
     last_impact: np.ndarray  # (r,) time of the last impact, counted from the period's start, s
 
-    # changes with the contact states
+    # changes with the contact states, or is set with their event functions
     state: np.ndarray  # (r,) int: state of each row
     active_set: np.ndarray  # (r,) closed rows, counters[CLOSED_ROWS] of them: the set names the linear subsystem
     released: np.ndarray  # (r,) int: bound at which a row's force was when it let go at this instant, otherwise 0;
     # -bound: a spring that starts to carry load at that bound
     applied_force: np.ndarray  # (r,) constant force of rows that are not closed, N
+    capture_speed: np.ndarray  # (r,) rebounds slower than this are completed as a plastic impact, m/s
 
     # set when a subsystem begins
     coordinates: np.ndarray  # (2n,) p and p' of the structure at that time
@@ -133,7 +133,6 @@ def new_state(system: System, modes: int, initial: InitialMotion) -> State:
         low_word=np.zeros(r),
         velocity=np.array(initial.velocity),
         contact_impulse=np.zeros(r),
-        capture_speed=np.zeros(r),
         ledger=np.zeros(len(ENERGIES)),
         awake=np.zeros(modes, np.int64),
         largest_speed=np.zeros(1),
@@ -142,6 +141,7 @@ def new_state(system: System, modes: int, initial: InitialMotion) -> State:
         active_set=np.zeros(r, np.bool_),
         released=np.zeros(r, np.int64),
         applied_force=np.zeros(r),
+        capture_speed=np.zeros(r),
         coordinates=np.r_[initial.p, initial.p_rate],
         constant=np.zeros(n),
         slip_constant=np.zeros(b),
