@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from vanedamp.coupling.numerics.complementarity import AT_HIGH, AT_LOW, DEPENDENT, FREE, new_problem, solve_box
+from vanedamp.coupling.numerics.codes import AT_HIGH, AT_LOW, DEPENDENT, FREE
+from vanedamp.coupling.numerics.complementarity import new_problem, solve_box
 
 
 def solve(a_matrix, b, lo, hi, forced=None):

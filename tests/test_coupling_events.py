@@ -5,7 +5,8 @@ import pytest
 from numba import njit
 
 from vanedamp.coupling.exact.event_functions import advance_or_stop
-from vanedamp.coupling.exact.root_search import DEGREE, FORCE, POSITION, VELOCITY, expand
+from vanedamp.coupling.exact.root_search import DEGREE, expand
+from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 
 

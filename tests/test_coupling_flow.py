@@ -86,7 +86,7 @@ def by_flow(system, closed, flows, loads, q, qd, times):
     """The same from the records of one subsystem, as coupling.exact.subsystem_assembly documents them."""
     n, m = system.modes, flows.modes[0]
     p, rate = np.r_[q[:n], qd[:n]], flows.eigenvalue[0, :m]
-    constant = (flows.static[0] @ loads + flows.held[0] @ q[:n])[:n]
+    constant = (flows.static[0] @ loads + flows.constrained[0] @ q[:n])[:n]
     shape = flows.shape[0, :, :m]
     amplitude = np.r_[1.0, flows.project[0, 1:m] @ (p - np.r_[constant, np.zeros(n)] - shape[:, 0].real)]
     coordinates, displacement, force = [], [], []

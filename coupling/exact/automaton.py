@@ -10,53 +10,63 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.compliant_contacts import begin_push, change_push, spring_force
-from vanedamp.coupling.exact.contact_states import add_force, constant_loads, keep_released, settle, stop_riders
+from vanedamp.coupling.exact.compliant_contacts import begin_contact, change_contact, spring_force
+from vanedamp.coupling.exact.contact_states import (
+    add_force,
+    constant_loads,
+    keep_released,
+    resolve_contact_states,
+    stop_attached_bodies,
+)
 from vanedamp.coupling.exact.energy_balance import account
-from vanedamp.coupling.exact.event_functions import carry, longest_hop, next_event
+from vanedamp.coupling.exact.event_functions import carry_over_period, hop_speed, next_event
 from vanedamp.coupling.exact.gap_kinematics import (
     SIMULTANEOUS,
     align_gaps,
-    close,
-    join,
+    close_gaps,
+    join_places,
     join_speeds,
+    mark_only,
     measure_gaps,
-    only,
     rigid,
     shift_slip,
 )
-from vanedamp.coupling.exact.impacts import all_move, bounce, collide
-from vanedamp.coupling.exact.root_search import POSITION, VELOCITY
-from vanedamp.coupling.exact.section import _coordinates, record_start
-from vanedamp.coupling.exact.state import (
+from vanedamp.coupling.exact.impacts import all_in_flight, simultaneous_impacts, single_impact
+from vanedamp.coupling.exact.section import record_start, structure_state
+from vanedamp.coupling.numerics.codes import (
+    ACCURACY_LOST,
     AWAKE,
     CLOSED,
     CLOSED_ROWS,
     CLOSES,
+    DONE,
+    EVENT_BUDGET,
     EVENTS,
     FLOW,
     HELD,
     LEAVING,
+    LOG_FULL,
     LOGGED,
+    NEEDS_FLOW,
+    NO_SOLUTION,
     OPEN,
     PERIOD,
+    POSITION,
     RECLOSES,
     SEARCHING,
     SLIP_LEFT,
     SLIP_RIGHT,
     SPRUNG,
+    STATES_GO_ON,
+    STATES_OPEN,
     STICK,
     TOUCHING,
+    UNDECIDED,
+    VELOCITY,
 )
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.response.records import FRICTION
-
-# what advance() returns, and ILL_CONDITIONED: the flow that it needs cannot be had
-DONE, NEEDS_FLOW, LOG_FULL, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED, ILL_CONDITIONED = range(7)
-
-# what an event leads to: the same contact states go on, they must be decided, or its impact has no solution
-_STAYS, _DECIDE, _FAILED = range(3)
 
 #: differences below this share of their terms are round-off
 _EQUAL = 1e-14
@@ -65,91 +75,93 @@ _ASLEEP = 1e-14
 
 
 @entry
-def advance(system, flows, st, ch, rec, work, periods, max_events):
-    """Run until all periods are done or something is needed. Returns one of the codes above."""
+def advance(system, flows, st, watched, rec, scratch, periods, max_events):
+    """Run until all periods are done or something is needed. Return the code (numerics.codes) of why it returns."""
     deciding = False
     while True:
         if deciding:
-            # decided at one place only: that much code is compiled into the loop, as a call costs more than it does
-            if not settle(system, st, rec, work):
+            # one place only: its code is compiled into the loop, as a call costs more than it does
+            if not resolve_contact_states(system, st, rec, scratch):
                 return UNDECIDED
             if not _within_walls(system, st):
                 return ACCURACY_LOST
             deciding = False
         if st.counters[SEARCHING] == 1:
-            s = _find_flow(flows, st.key)
+            s = _find_flow(flows, st.active_set)
             if s < 0:
                 return NEEDS_FLOW
-            _enter(system, flows, st, work, s)
-            if stop_riders(system, flows, st):
-                keep_released(st, work)
+            _begin_subsystem(system, flows, st, scratch, s)
+            if stop_attached_bodies(system, flows, st):
+                keep_released(st, scratch)
                 deciding = True
                 continue
             if st.counters[EVENTS] == 0 and st.counters[PERIOD] == 0:
-                record_start(system, flows, st, rec, work)
+                record_start(system, flows, st, rec, scratch)
         if st.counters[PERIOD] >= periods:
             return DONE
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
         if st.counters[LOGGED] + 2 * len(system.delassus) >= len(rec.log):
             return LOG_FULL
-        tau, who = next_event(system, flows, st, ch)
-        _amplitudes(flows, st, work, tau)
-        account(system, flows, st, rec, work, tau)
-        _move(system, flows, st, work, tau)
-        if who < 0:
-            carry(st, ch, tau)
+        tau, event = next_event(system, flows, st, watched)
+        amplitude_changes(flows, st, scratch, tau)
+        account(system, flows, st, rec, scratch, tau)
+        _advance_motion(system, flows, st, scratch, tau)
+        if event < 0:
+            carry_over_period(st, watched, tau)
             st.counters[PERIOD] += 1
             st.time[0] = 0.0
             for r in range(len(st.last_impact)):
                 st.last_impact[r] -= system.period
-            _phase(system, st)
-            _wake(flows, st)
-            record_start(system, flows, st, rec, work)
-            align_gaps(system, st, work.coordinates)
+            _set_phases(system, st)
+            _select_awake_modes(flows, st)
+            record_start(system, flows, st, rec, scratch)
+            align_gaps(system, st, scratch.coordinates)
             continue
         st.counters[EVENTS] += 1
         st.time[0] += tau
-        _phase(system, st)
-        outcome = _happen(system, flows, st, rec, work, ch.row[who], ch.order[who], ch.side[who])
-        if outcome == _FAILED:
+        _set_phases(system, st)
+        outcome = _handle_event(
+            system, flows, st, rec, scratch, watched.row[event], watched.order[event], watched.meaning[event]
+        )
+        if outcome == NO_SOLUTION:
             return UNDECIDED
-        deciding = outcome == _DECIDE
+        deciding = outcome == STATES_OPEN
         if not deciding and not _within_walls(system, st):
             return ACCURACY_LOST
 
 
 @entry
-def begin(system, st, rec, work):
-    """Decide the contact states of the initial state. Returns False if that fails."""
+def begin(system, st, rec, scratch):
+    """Decide the contact states of the initial state. Return False if that fails."""
     n, hit = len(st.constant), False
     for r in range(system.friction_rows):
         if not rigid(system, r) and system.limit[r] > 0.0:
-            st.state[r] = _stretched(system, st, r)
+            st.state[r] = _jenkins_state(system, st, r)
     for r in range(len(st.state)):
-        work.forced[r] = 0
+        scratch.forced[r] = 0
         if r >= system.friction_rows and st.displacement[r] <= SIMULTANEOUS * system.free_travel[r]:
             if not rigid(system, r) and st.displacement[r] < -SIMULTANEOUS * system.free_travel[r]:
-                # pressed already: its impact belongs to the run before
+                # compressed from the start: its impact was before the run
                 st.state[r] = SPRUNG if spring_force(system, st, r) > 0.0 else LEAVING
                 continue
-            _touch(system, st, work, r)
+            _close_gap(system, st, scratch, r)
             if st.velocity[r] < 0.0 and rigid(system, r):
                 hit = True
             elif st.velocity[r] < 0.0:
-                begin_push(system, st, rec, r)
+                begin_contact(system, st, rec, r)
     if hit:
-        if not collide(system, st, rec, work):
+        if not simultaneous_impacts(system, st, rec, scratch):
             return False
-        _structure_jump(system, work)
+        _structure_jump(system, scratch)
         for i in range(n):
-            st.coordinates[n + i] += work.jump[i]
-    return settle(system, st, rec, work)
+            st.coordinates[n + i] += scratch.velocity_jump[i]
+    return resolve_contact_states(system, st, rec, scratch)
 
 
 @inlined
-def _stretched(system, st, r):
-    """State of a Jenkins element with a given elongation: its spring holds, or it slides on at its bound."""
+def _jenkins_state(system, st, r):
+    """Return the state of a Jenkins element with its elongation: its spring holds, or it slides on at its bound."""
     at_bound = abs(system.spring[r] * st.displacement[r]) >= (1.0 - SIMULTANEOUS) * system.limit[r]
     if at_bound and st.displacement[r] * st.velocity[r] > 0.0:
         return SLIP_RIGHT if st.velocity[r] > 0.0 else SLIP_LEFT
@@ -157,87 +169,89 @@ def _stretched(system, st, r):
 
 
 @inlined
-def _touch(system, st, work, r):
-    """The gap of row r is zero, exactly, and so are those that close with it."""
-    only(work, r)
-    join(system, st, work)
+def _close_gap(system, st, scratch, r):
+    """Set the gap of row r to zero exactly, and those that close with it."""
+    mark_only(scratch, r)
+    join_places(system, st, scratch)
     st.displacement[r] = 0.0
     measure_gaps(system, st)
     if rigid(system, r):
-        close(system, st, work)
+        close_gaps(system, st, scratch)
 
 
 @kernel
-def _find_flow(flows, key):
+def _find_flow(flows, active_set):
+    """Return the place of the subsystem of these closed rows, -1 if there is none yet."""
     for s in range(len(flows.modes)):
         same = flows.modes[s] > 0
-        for r in range(len(key)):
+        for r in range(len(active_set)):
             if not same:
                 break
-            same = flows.key[s, r] == key[r]
+            same = flows.active_set[s, r] == active_set[r]
         if same:
             return s
     return -1
 
 
 @inlined
-def _phase(system, st):
+def _set_phases(system, st):
+    """Set the phases of the harmonics exactly from the time."""
     for h in range(len(system.frequency)):
         angle = system.frequency[h] * st.time[0]
         st.amplitude[h] = complex(math.cos(angle), math.sin(angle))
 
 
 @inlined
-def _enter(system, flows, st, work, s):
+def _begin_subsystem(system, flows, st, scratch, s):
     """Begin subsystem s with the structure at st.coordinates and the row states as they are."""
     n, b, e, y = len(st.constant), system.bodies, len(system.frequency), st.coordinates
     st.counters[FLOW], st.counters[SEARCHING] = s, 0
     sprung = flows.sprung[s]
-    constant_loads(system, st, work)
+    constant_loads(system, st, scratch)
     if sprung:
-        _preload(system, flows, st, work, s, y)
+        _preload(system, flows, st, scratch, s, y)
     for i in range(n + b if sprung else n):
         total = 0.0
         for k in range(n + b):
-            total += flows.static[s, i, k] * work.loads[k]
+            total += flows.static[s, i, k] * scratch.loads[k]
         for k in range(n):
-            total += flows.held[s, i, k] * y[k]
+            total += flows.constrained[s, i, k] * y[k]
         if i < n:
             st.constant[i] = total
         else:
             st.slip_constant[i - n] = total
     for i in range(b):
-        st.drifts[n + i] = 0.0
+        st.coordinate_acceleration[n + i] = 0.0
         for k in range(b):
-            st.drifts[n + i] += flows.body_acceleration[s, i, k] * work.loads[n + k]
-    _phase(system, st)
+            st.coordinate_acceleration[n + i] += flows.body_acceleration[s, i, k] * scratch.loads[n + k]
+    _set_phases(system, st)
     for i in range(2 * n):
-        work.coordinates[i] = y[i]
+        scratch.coordinates[i] = y[i]
         for h in range(e):
-            work.coordinates[i] -= (flows.shape[s, i, h] * st.amplitude[h]).real
+            scratch.coordinates[i] -= (flows.shape[s, i, h] * st.amplitude[h]).real
         if i < n:
-            work.coordinates[i] -= st.constant[i]
+            scratch.coordinates[i] -= st.constant[i]
     if sprung:
         for i in range(b):
-            work.slips[i], work.slips[b + i] = st.displacement[i], st.velocity[i]
+            scratch.slips[i], scratch.slips[b + i] = st.displacement[i], st.velocity[i]
             for h in range(e):
-                work.slips[i] -= (flows.excited[s, i, h] * st.amplitude[h]).real
-                work.slips[b + i] -= (flows.excited[s, b + i, h] * st.amplitude[h]).real
-            work.slips[i] -= st.slip_constant[i]
+                scratch.slips[i] -= (flows.excited[s, i, h] * st.amplitude[h]).real
+                scratch.slips[b + i] -= (flows.excited[s, b + i, h] * st.amplitude[h]).real
+            scratch.slips[i] -= st.slip_constant[i]
     for j in range(e, flows.modes[s]):
         total = 0.0j
         for i in range(2 * n):
-            total += flows.project[s, j, i] * work.coordinates[i]
+            total += flows.project[s, j, i] * scratch.coordinates[i]
         if sprung:
             for i in range(2 * b):
-                total += flows.project_slip[s, j, i] * work.slips[i]
+                total += flows.project_slip[s, j, i] * scratch.slips[i]
         st.amplitude[j] = total
-    _constant_forces(system, flows, st, work, s)
-    _wake(flows, st)
+    _constant_forces(system, flows, st, scratch, s)
+    _select_awake_modes(flows, st)
 
 
 @kernel
-def _preload(system, flows, st, work, s, y):
+def _preload(system, flows, st, scratch, s, y):
     """Add the forces that closed springs have at p = 0 and xi = 0: of a wall's gap, an anchor, bodies that stick."""
     for r in range(len(st.state)):
         if st.state[r] == SPRUNG:
@@ -251,63 +265,63 @@ def _preload(system, flows, st, work, s, y):
                 for b in range(system.bodies):
                     if flows.attached[s, b]:
                         offset += system.J[r, system.modes + b] * st.displacement[b]
-            add_force(system, work, r, -system.spring[r] * offset)
+            add_force(system, scratch, r, -system.spring[r] * offset)
 
 
 @kernel
-def _constant_forces(system, flows, st, work, s):
-    """Constant parts of the rows' accelerations and of the closed rows' forces."""
+def _constant_forces(system, flows, st, scratch, s):
+    """Set the constant parts of the rows' accelerations and of the closed rows' forces."""
     n, b, r_count = len(st.constant), system.bodies, len(st.state)
     sprung = flows.sprung[s]
     if sprung:
-        constant_loads(system, st, work)  # without the preload: springs are in the levels
+        constant_loads(system, st, scratch)  # without the preload: springs are in the constant forces
     for r in range(r_count):
-        st.drift[r], st.level[r] = 0.0, 0.0
+        st.free_acceleration[r], st.constant_force[r] = 0.0, 0.0
         if sprung and st.state[r] == SPRUNG:
-            st.level[r] = spring_force(system, st, r)
+            st.constant_force[r] = spring_force(system, st, r)
             for j in range(flows.modes[s]):
-                st.level[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
+                st.constant_force[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
         size = 0.0
         for i in range(n + b):
-            part = system.J[r, i] * st.drifts[i]
-            st.drift[r] += part
+            part = system.J[r, i] * st.coordinate_acceleration[i]
+            st.free_acceleration[r] += part
             size += abs(part)
-        if abs(st.drift[r]) <= _EQUAL * size:
-            st.drift[r] = 0.0  # bodies that fall together
+        if abs(st.free_acceleration[r]) <= _EQUAL * size:
+            st.free_acceleration[r] = 0.0  # bodies that fall together
     for i in range(n):
-        work.loads[i] -= system.stiffness[i] * st.constant[i]
+        scratch.loads[i] -= system.stiffness[i] * st.constant[i]
     for i in range(n, n + b):
-        work.loads[i] /= system.mass[i]
+        scratch.loads[i] /= system.mass[i]
     for r in range(r_count):
-        work.acceleration[r], work.jerk[r] = 0.0, 0.0
+        scratch.acceleration[r], scratch.jerk[r] = 0.0, 0.0
         for i in range(n + b):
-            part = system.J[r, i] * work.loads[i]
-            work.acceleration[r] += part
-            work.jerk[r] += abs(part)
+            part = system.J[r, i] * scratch.loads[i]
+            scratch.acceleration[r] += part
+            scratch.jerk[r] += abs(part)
         if sprung:
             for k in range(r_count):
-                work.acceleration[r] += system.delassus[r, k] * st.level[k]
-                work.jerk[r] += abs(system.delassus[r, k] * st.level[k])
+                scratch.acceleration[r] += system.delassus[r, k] * st.constant_force[k]
+                scratch.jerk[r] += abs(system.delassus[r, k] * st.constant_force[k])
     for r in range(r_count):
         if flows.closed_inverse[s, r, r] == 0.0:
             continue
-        level, size = 0.0, 0.0
+        force, size = 0.0, 0.0
         for k in range(r_count):
-            level -= flows.closed_inverse[s, r, k] * work.acceleration[k]
-            size += abs(flows.closed_inverse[s, r, k]) * work.jerk[k]
-        st.level[r] = level if abs(level) > _EQUAL * size else 0.0
+            force -= flows.closed_inverse[s, r, k] * scratch.acceleration[k]
+            size += abs(flows.closed_inverse[s, r, k]) * scratch.jerk[k]
+        st.constant_force[r] = force if abs(force) > _EQUAL * size else 0.0
 
 
 @inlined
-def _wake(flows, st):
-    """Put modes to sleep whose acceleration is negligible beside the largest, but none that the excitation drives."""
+def _select_awake_modes(flows, st):
+    """Set modes to zero whose acceleration is negligible beside the largest, but none that the excitation drives."""
     s, e, largest, fastest = st.counters[FLOW], flows.driven.shape[1] - 1, 0.0, 0.0
     for j in range(flows.modes[s]):
         c = st.amplitude[j]
         size = abs(c.real) + abs(c.imag)
         largest = max(largest, size * flows.acceleration[s, j])
         fastest = max(fastest, size * flows.speed[s, j])
-    st.fastest[0] = fastest
+    st.largest_speed[0] = fastest
     for h in range(e):
         st.awake[h] = h
     count, last = e, flows.driven[s, e]
@@ -322,22 +336,24 @@ def _wake(flows, st):
 
 
 @inlined
-def _amplitudes(flows, st, work, tau):
-    """Changes of the awake modes' amplitudes over the segment."""
+def amplitude_changes(flows, st, scratch, tau):
+    """Set the changes of the awake modes' amplitudes over the segment."""
     s, e = st.counters[FLOW], flows.driven.shape[1] - 1
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
         z = flows.eigenvalue[s, j] * tau
         first = exp_minus_one(z)
-        work.gain[a] = st.amplitude[j] * first
-        work.bend[a] = st.amplitude[j] * exp_minus_line(z, first)
+        scratch.gain[a] = st.amplitude[j] * first
+        scratch.bend[a] = st.amplitude[j] * exp_minus_line(z, first)
     if flows.driven[s, e] > e:
-        _grow(flows.eigenvalue[s], flows.driven[s], flows.load[s], st.amplitude, work.gain, work.bend, tau)
+        _add_driven_growth(
+            flows.eigenvalue[s], flows.driven[s], flows.load[s], st.amplitude, scratch.gain, scratch.bend, tau
+        )
 
 
 @kernel
-def _grow(eigenvalue, driven, load, phase, gain, bend, tau):
-    """What the harmonics add to the modes that they drive: the first ones, always awake."""
+def _add_driven_growth(eigenvalue, driven, load, phase, gain, bend, tau):
+    """Add the growth of the modes that the harmonics drive: the first ones, always awake."""
     for h in range(len(driven) - 1):
         for j in range(driven[h], driven[h + 1]):
             growth, beyond = secular(eigenvalue[j], eigenvalue[h], tau)
@@ -346,8 +362,8 @@ def _grow(eigenvalue, driven, load, phase, gain, bend, tau):
 
 
 @inlined
-def _move(system, flows, st, work, tau):
-    """Carry rows and amplitudes over tau."""
+def _advance_motion(system, flows, st, scratch, tau):
+    """Advance rows and amplitudes by tau."""
     s, count, friction = st.counters[FLOW], st.counters[AWAKE], system.friction_rows
     for r in range(len(st.state)):
         state = st.state[r]
@@ -355,49 +371,49 @@ def _move(system, flows, st, work, tau):
             r < friction and (state == STICK or state == HELD)
         ):
             continue
-        shift, speed = tau * (st.velocity[r] + 0.5 * st.drift[r] * tau), st.drift[r] * tau
+        shift, speed = tau * (st.velocity[r] + 0.5 * st.free_acceleration[r] * tau), st.free_acceleration[r] * tau
         for a in range(count):
             j = st.awake[a]
-            shift += (flows.motion[s, r, j] * work.bend[a]).real
-            speed += (flows.velocity[s, r, j] * work.gain[a]).real
+            shift += (flows.motion[s, r, j] * scratch.bend[a]).real
+            speed += (flows.velocity[s, r, j] * scratch.gain[a]).real
         st.velocity[r] += speed
         if r < friction:
-            st.ledger[FRICTION] -= st.held[r] * shift
+            st.ledger[FRICTION] -= st.applied_force[r] * shift
         if r >= friction or rigid(system, r) or state == SPRUNG:  # a Jenkins element slides with its spring as it is
             shift_slip(st, r, shift)
     if flows.sprung[s]:
-        _push(system, flows, st, work, tau)
+        _add_contact_impulses(system, flows, st, scratch, tau)
     if st.counters[CLOSED_ROWS] > 0:
-        _stay_together(system, st, work)
+        _stay_together(system, st, scratch)
     measure_gaps(system, st)
     for a in range(count):
-        st.amplitude[st.awake[a]] += work.gain[a]
+        st.amplitude[st.awake[a]] += scratch.gain[a]
     if tau > 0.0:
         for r in range(len(st.released)):
             st.released[r] = 0
 
 
 @inlined
-def _stay_together(system, st, work):
-    """Bodies that move as one keep to each other exactly."""
+def _stay_together(system, st, scratch):
+    """Keep bodies that move as one exactly together."""
     closed = False
     for r in range(system.friction_rows, len(st.state)):
-        work.shut[r] = rigid(system, r) and st.state[r] != OPEN
-        closed = closed or work.shut[r]
+        scratch.touching[r] = rigid(system, r) and st.state[r] != OPEN
+        closed = closed or scratch.touching[r]
     if closed:
-        join(system, st, work)
-        join_speeds(system, st, work)
+        join_places(system, st, scratch)
+        join_speeds(system, st, scratch)
 
 
 @kernel
-def _push(system, flows, st, work, tau):
-    """Add up the impulses of compliant contacts."""
+def _add_contact_impulses(system, flows, st, scratch, tau):
+    """Add the segment to the impulses of compliant contacts."""
     s = st.counters[FLOW]
     for r in range(system.friction_rows, len(st.state)):
         if st.state[r] == SPRUNG:
-            st.push[r] += st.level[r] * tau
+            st.contact_impulse[r] += st.constant_force[r] * tau
             for a in range(st.counters[AWAKE]):
-                st.push[r] += (flows.impulse[s, r, st.awake[a]] * work.gain[a]).real
+                st.contact_impulse[r] += (flows.impulse[s, r, st.awake[a]] * scratch.gain[a]).real
 
 
 @inlined
@@ -412,65 +428,68 @@ def _within_walls(system, st):
 
 
 @inlined
-def _happen(system, flows, st, rec, work, r, order, side):
-    """The event of row r: jump of velocities. Returns whether contact states must be decided anew, or _FAILED."""
+def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
+    """Apply the event of row r, a jump of velocities or a change at a row.
+
+    Returns STATES_GO_ON, STATES_OPEN where contact states must be decided again, or NO_SOLUTION.
+    """
     n = len(st.constant)
-    if order == POSITION and side == CLOSES and bounce(system, st, rec, work, r):
-        _kick(flows, st, work)
-        return _STAYS
-    keep_released(st, work)
-    if order == POSITION and side != RECLOSES:
+    if order == POSITION and meaning == CLOSES and single_impact(system, st, rec, scratch, r):
+        _change_amplitudes(flows, st, scratch)
+        return STATES_GO_ON
+    keep_released(st, scratch)
+    if order == POSITION and meaning != RECLOSES:
         # a gap that closes while it still widens, to round-off, is a touch without speed
-        if side == CLOSES and st.velocity[r] > 0.0:
+        if meaning == CLOSES and st.velocity[r] > 0.0:
             st.velocity[r] = 0.0
-            only(work, r)
-            join_speeds(system, st, work)
-        _touch(system, st, work, r)
-    if order == POSITION and side == CLOSES and rigid(system, r):
+            mark_only(scratch, r)
+            join_speeds(system, st, scratch)
+        _close_gap(system, st, scratch, r)
+    if order == POSITION and meaning == CLOSES and rigid(system, r):
         for i in range(system.friction_rows, len(st.state)):
             if st.state[i] == CLOSED:
-                st.settling[i] = longest_hop(system, flows, st, i)
+                st.capture_speed[i] = hop_speed(system, flows, st, i)
             elif st.state[i] == TOUCHING:
-                st.settling[i] = 0.0
-        if not collide(system, st, rec, work):
-            return _FAILED
-        if all_move(system, st):
-            _kick(flows, st, work)
-            return _STAYS
-        _coordinates(flows, st, st.coordinates)
-        _structure_jump(system, work)
+                st.capture_speed[i] = 0.0
+        if not simultaneous_impacts(system, st, rec, scratch):
+            return NO_SOLUTION
+        if all_in_flight(system, st):
+            _change_amplitudes(flows, st, scratch)
+            return STATES_GO_ON
+        structure_state(flows, st, st.coordinates)
+        _structure_jump(system, scratch)
         for i in range(n):
-            st.coordinates[n + i] += work.jump[i]
-        return _DECIDE
+            st.coordinates[n + i] += scratch.velocity_jump[i]
+        return STATES_OPEN
     if order == VELOCITY:
         st.velocity[r] = 0.0
     elif r < system.friction_rows or rigid(system, r):
-        work.forced[r] = side
-    elif side != CLOSES:
-        change_push(system, st, rec, work, r, side)
+        scratch.forced[r] = meaning
+    elif meaning != CLOSES:
+        change_contact(system, st, rec, scratch, r, meaning)
     elif st.velocity[r] < 0.0:
-        begin_push(system, st, rec, r)
-    _coordinates(flows, st, st.coordinates)
-    if side == CLOSES:
+        begin_contact(system, st, rec, r)
+    structure_state(flows, st, st.coordinates)
+    if meaning == CLOSES:
         align_gaps(system, st, st.coordinates)  # a motion in step with the excitation may touch at every period's start
-    return _DECIDE
+    return STATES_OPEN
 
 
 @inlined
-def _kick(flows, st, work):
-    """Impulses on the rows, within the same subsystem."""
+def _change_amplitudes(flows, st, scratch):
+    """Apply the impulses of the rows to the amplitudes, within the same subsystem."""
     s = st.counters[FLOW]
     for r in range(len(st.state)):
-        if work.impulse[r] != 0.0:
+        if scratch.impulse[r] != 0.0:
             for j in range(flows.driven[s, 0], flows.modes[s]):
-                st.amplitude[j] += flows.kick[s, r, j] * work.impulse[r]
-    _wake(flows, st)
+                st.amplitude[j] += flows.impulse_response[s, r, j] * scratch.impulse[r]
+    _select_awake_modes(flows, st)
 
 
 @inlined
-def _structure_jump(system, work):
-    """Jump of the structure's modal velocities under the impulses."""
-    for i in range(len(work.jump)):
-        work.jump[i] = 0.0
-        for r in range(len(work.impulse)):
-            work.jump[i] += system.J[r, i] * work.impulse[r]
+def _structure_jump(system, scratch):
+    """Set the jump of the structure's modal velocities under the impulses."""
+    for i in range(len(scratch.velocity_jump)):
+        scratch.velocity_jump[i] = 0.0
+        for r in range(len(scratch.impulse)):
+            scratch.velocity_jump[i] += system.J[r, i] * scratch.impulse[r]

@@ -32,7 +32,7 @@ _BATCH = 1 << 20
 
 
 class IllConditioned(ArithmeticError):
-    """Doubles cannot tell the modes of a subsystem apart, or have lost too many digits in them."""
+    """Doubles cannot separate the modes of a subsystem, or have lost too many digits in them."""
 
 
 class RealModes(NamedTuple):
@@ -45,7 +45,7 @@ class RealModes(NamedTuple):
 
 
 def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> RealModes:
-    """Modes of q coordinates eta whose kinetic energy is |inertia eta'|^2 / 2 and potential energy |elastic eta|^2 / 2.
+    """Return the modes of q coordinates eta with kinetic energy |inertia eta'|^2 / 2, potential |elastic eta|^2 / 2.
 
     inertia: (k, q) and elastic: (e, q), both of rank q; loss: (e, e), s, such that the damping matrix is
     elastic^T loss elastic. The singular values of one factor over the other are the frequencies, by Jacobi's rotations,
@@ -75,9 +75,9 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
 
 
 def _inverse(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(r, r^-1, factor^-1) of factor (k, q) = orthonormal times r; r need not be triangular.
+    """Return (r, r^-1, factor^-1) of factor (k, q) = orthonormal times r; r need not be triangular.
 
-    Rows in the order of their sizes and columns in that of what is left of them: rows may differ by any factor.
+    Rows in the order of their sizes and columns in that of their remainders: rows may differ by any factor.
     """
     order = np.argsort(-np.abs(factor).max(axis=1), kind="stable")
     q, r, pivot = qr(factor[order], mode="economic", pivoting=True)
@@ -90,12 +90,12 @@ def _inverse(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _reach(matrix: np.ndarray) -> np.ndarray:
-    """How far an error of one in all inputs reaches each output of a matrix, (rows, 1)."""
+    """Return the error (rows, 1) of the outputs of a matrix by an error of one in all inputs."""
     return np.abs(matrix).sum(axis=1, keepdims=True)
 
 
 def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Eigenvalues (2q,), vectors of (a, a') (2q, 2q) and their inverse: a'' + damping a' + frequency^2 a = 0.
+    """Return eigenvalues (2q,), vectors of (a, a') (2q, 2q) and their inverse: a'' + damping a' + frequency^2 a = 0.
 
     damping: (q, q) symmetric. Conjugate pairs are exactly so. Raises IllConditioned where modes coalesce to round-off
     (critical damping) or do not satisfy the equation.
@@ -104,9 +104,9 @@ def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> tuple[np.ndarra
     number, block = connected_components(damping != 0, directed=False) if q else (0, np.zeros(0, int))
     values, shapes, left = np.zeros(2 * q, complex), np.zeros((2 * q, q), complex), np.zeros((2 * q, 2 * q), complex)
     done = 0
-    alone = np.flatnonzero(np.bincount(block, minlength=number)[block] == 1)
-    for b in [-1, *np.unique(np.delete(block, alone))]:
-        members = np.flatnonzero(block == b) if b >= 0 else alone
+    single = np.flatnonzero(np.bincount(block, minlength=number)[block] == 1)
+    for b in [-1, *np.unique(np.delete(block, single))]:
+        members = np.flatnonzero(block == b) if b >= 0 else single
         members = members[np.argsort(-frequency[members], kind="stable")]  # from quick to slow, as QR steps like it
         inside = damping[np.ix_(members, members)]
         solve = _coupled if b >= 0 else _single
@@ -119,7 +119,7 @@ def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> tuple[np.ndarra
 
 
 def _single(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Modes that damping does not couple: oscillators of one degree of freedom."""
+    """Return the modes that damping does not couple: oscillators of one degree of freedom."""
     half = np.diag(damping) / 2
     root = np.sqrt(((half - w) * (half + w)).astype(complex))
     if np.any(np.abs(root) * DEFECTIVE < w):
@@ -134,7 +134,7 @@ def _single(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 
 
 def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Modes that damping couples, w descending."""
+    """Return the modes that damping couples, w descending."""
     k = len(w)
     linear = np.zeros((2 * k, 2 * k))  # of (w a, a'): skew but for the damping
     linear[::2, 1::2], linear[1::2, ::2], linear[1::2, 1::2] = np.diag(w), -np.diag(w), -damping
@@ -155,7 +155,7 @@ def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray
     condition = np.linalg.cond(right * np.r_[w, np.ones(k)] / length[:, None])
     if not condition < DEFECTIVE:
         raise IllConditioned("a mode is critically damped to round-off")
-    # left vectors are what symmetry says, up to combinations of those with the same eigenvalue
+    # left vectors follow from symmetry, up to combinations of those with the same eigenvalue
     left, norm = _left(values, shapes, w)
     length *= np.linalg.norm(left / np.r_[w, np.ones(k)], axis=1)
     left /= np.where(np.abs(norm) > _MIXED * length, norm, length)[:, None]
@@ -164,12 +164,12 @@ def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray
     if np.any(np.abs(product - np.eye(len(left))) > 8 * _EPS * noise):
         left = np.linalg.solve(product, left)
     if condition > _NEAR:
-        left += left @ (np.eye(2 * k) - right.T @ left)  # what modes that nearly coalesce make of a state must cancel
+        left += left @ (np.eye(2 * k) - right.T @ left)  # the shares of modes that nearly coalesce must cancel
     return values, shapes, left
 
 
 def _left(values: np.ndarray, shapes: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Left vectors (m, 2k) on (a, a') by symmetry, and their products with the right ones (m,).
+    """Return left vectors (m, 2k) on (a, a') by symmetry, and their products with the right ones (m,).
 
     Springs stand for inertia and damping, so that no small difference of these two is left to round-off.
     """
@@ -181,7 +181,7 @@ def _left(values: np.ndarray, shapes: np.ndarray, w: np.ndarray) -> tuple[np.nda
 def _polish(
     values: np.ndarray, shapes: np.ndarray, w: np.ndarray, damping: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A step of inverse iteration and of Rayleigh's quotient on the quadratic problem; values (m,), shapes (m, k)."""
+    """Take a step of inverse iteration and Rayleigh's quotient on the quadratic problem; values (m,), shapes (m, k)."""
     real, scale = values.imag == 0, 1 / np.maximum(w, np.abs(values)[:, None])
     slope = 2 * values[:, None] * shapes + shapes @ damping
     better = _inverse_step(values, scale, w, damping, scale * slope)
@@ -205,7 +205,7 @@ def _polish(
 def _inverse_step(
     values: np.ndarray, scale: np.ndarray, w: np.ndarray, damping: np.ndarray, right: np.ndarray
 ) -> np.ndarray:
-    """Solutions of the scaled quadratic problem beside each eigenvalue for right sides (m, k).
+    """Solve the scaled quadratic problem beside each eigenvalue for right sides (m, k).
 
     Off it by round-off: the matrix must not be singular to the last bit, as it can be beside two that nearly coalesce.
     """

@@ -1,19 +1,13 @@
-"""Which event functions a state calls for, and the first of their roots."""
+"""Set up the event functions of a state and find the first of their roots."""
 
 from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.root_search import (
-    FORCE,
-    POSITION,
-    VELOCITY,
-    add_secular,
-    expand,
-    first_root_of_parabola,
-    safe_step,
-)
-from vanedamp.coupling.exact.state import (
+from vanedamp.coupling.exact.root_search import add_secular, expand, first_root_of_parabola, safe_step
+from vanedamp.coupling.numerics.codes import (
+    AT_HIGH,
+    AT_LOW,
     AWAKE,
     BOUNDED,
     CARRIED,
@@ -22,9 +16,11 @@ from vanedamp.coupling.exact.state import (
     EVALUATIONS,
     EXPANDED,
     FLOW,
+    FORCE,
     LEAVING,
     OPEN,
     OPENS,
+    POSITION,
     RECLOSES,
     ROOT,
     SEGMENTS,
@@ -32,78 +28,82 @@ from vanedamp.coupling.exact.state import (
     SLIP_RIGHT,
     SPRUNG,
     STICK,
+    STOPS,
+    VELOCITY,
 )
-from vanedamp.coupling.numerics.complementarity import AT_HIGH, AT_LOW
 from vanedamp.coupling.numerics.exponentials import secular_bound
 from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
 
-#: shortest step in periods: what a double can resolve within a period
+#: shortest step in periods: the resolution of a double within a period
 RESOLUTION = 1e-15
 #: a compliant contact ends when its spring is pulled by this share of the free travel
 ADHESION = 1e-13
-#: what is left of a chatter, in periods, when it is completed by a plastic impact; a body at rest does not leave for
-#: less. Relative displacement and speed are zero at its end either way: the motion of the structure is changed by no
-#: more than the order of (2 pi CHATTER)^3 of it
+#: rest of a chatter, in periods, that is completed by a plastic impact; a body at rest does not leave for less.
+#: Relative displacement and speed are zero at its end either way: the structure's motion is changed by the order of
+#: (2 pi CHATTER)^3 of it
 CHATTER = 3e-7
 
 
 @inlined
-def next_event(system, flows, st, ch):
-    """Time to the next event and its channel, or to the period's end and -1.
+def next_event(system, flows, st, watched):
+    """Return the time to the next event and its event function, or to the period's end and -1.
 
-    What is known beyond the period's end stays known in the next segment (`carry`).
+    Results beyond the period's end are kept for the next segment (`carry_over_period`).
     """
     s = st.counters[FLOW]
-    driven = _drives(flows, s)
+    driven = _is_driven(flows, s)
     left = max(system.period - st.time[0], 0.0)
     shortest = RESOLUTION * system.period
     eigenvalue, awake = flows.eigenvalue[s], st.awake[: st.counters[AWAKE]]
-    count = _watch(system, flows, st, ch, s)
+    count = _list_functions(system, flows, st, watched, s)
     st.counters[SEGMENTS] += 1
     while True:
         k, tau = -1, left
         for i in range(count):
-            if ch.safe[i] < tau:
-                k, tau = i, ch.safe[i]
+            if watched.no_root_before[i] < tau:
+                k, tau = i, watched.no_root_before[i]
         if k < 0:
             st.counters[CARRIED] = count
             return left, -1
-        if ch.known[k] == ROOT:
+        if watched.status[k] == ROOT:
             st.counters[CARRIED] = 0
-            # what a double cannot tell from the segment's start happens at its start
+            # a root that a double cannot separate from the segment's start is at its start
             return (tau if tau > shortest else 0.0), k
-        if ch.known[k] == BOUNDED:
+        if watched.status[k] == BOUNDED:
             tau = 0.0  # where exponentials cost nothing
         else:
             st.counters[EVALUATIONS] += 1
         noise, second, calm = expand(
-            ch.order[k], ch.k0[k], ch.k1[k], ch.k2[k], ch.g[k], eigenvalue, awake, tau, ch.lower
-        )
+            watched.order[k], watched.k0[k], watched.k1[k], watched.k2[k], watched.g[k], eigenvalue, awake, tau,
+            watched.lower,
+        )  # fmt: skip
         if driven:
             more, bound = add_secular(
-                ch.order[k], ch.drive[k], flows.driven[s], eigenvalue, tau, system.period, ch.lower
+                watched.order[k], watched.drive[k], flows.driven[s], eigenvalue, tau, system.period, watched.lower
             )
             noise, second = noise + more, second + bound
             calm = calm + bound if calm >= 0.0 else calm
-        step, found = advance_or_stop(ch.lower, max(noise, ch.noise[k]), second, calm, system.period, shortest)
-        ch.known[k] = ROOT if found else EXPANDED
-        ch.safe[k] = tau + step if found else max(ch.safe[k], tau + step)
+        step, found = advance_or_stop(
+            watched.lower, max(noise, watched.noise[k]), second, calm, system.period, shortest
+        )
+        watched.status[k] = ROOT if found else EXPANDED
+        watched.no_root_before[k] = tau + step if found else max(watched.no_root_before[k], tau + step)
 
 
 @inlined
-def carry(st, ch, tau):
-    """Take what is known of the event functions over the end of a period, tau from the segment's start."""
+def carry_over_period(st, watched, tau):
+    """Keep the results on the event functions over the end of a period, tau from the segment's start."""
     for k in range(st.counters[CARRIED]):
-        ch.safe[k] = max(ch.safe[k] - tau, 0.0)
-        if ch.known[k] == EXPANDED:
-            ch.known[k] = BOUNDED
+        watched.no_root_before[k] = max(watched.no_root_before[k] - tau, 0.0)
+        if watched.status[k] == EXPANDED:
+            watched.status[k] = BOUNDED
 
 
 @inlined
 def advance_or_stop(lower, noise, second, calm, longest, shortest):
-    """Safe step from a point of an event function, and whether its root is at the end.
+    """Return a safe step from a point of an event function, and whether its root is at the end.
 
-    lower, second, calm: lower polynomials and bounds of second derivatives as of exact.root_search.expand.
+    lower, second, calm: lower polynomials and bounds of second derivatives as returned by exact.root_search.expand.
     """
     a, slow = lower[0], lower[1]
     f = a[0]
@@ -127,31 +127,31 @@ def advance_or_stop(lower, noise, second, calm, longest, shortest):
 
 
 @inlined
-def _watch(system, flows, st, ch, s):
-    """Set up the event functions of the segment. Returns how many."""
+def _list_functions(system, flows, st, watched, s):
+    """Set up the event functions of the segment. Return their number."""
     count = ZERO
     for r in range(system.friction_rows):
         state = st.state[r]
         if state == STICK or state == SPRUNG:
             for side in (AT_LOW, AT_HIGH):
-                count = _watch_force(system, flows, st, ch, s, r, side, system.limit[r], count)
+                count = _add_force_bound(system, flows, st, watched, s, r, side, system.limit[r], count)
         elif state == SLIP_LEFT or state == SLIP_RIGHT:
-            count = _watch_motion(system, flows, st, ch, s, r, VELOCITY, float(state), 0, count)
+            count = _add_motion(system, flows, st, watched, s, r, VELOCITY, float(state), STOPS, count)
     for r in range(system.friction_rows, len(st.state)):
         state = st.state[r]
         if state == CLOSED or state == SPRUNG:
-            count = _watch_force(system, flows, st, ch, s, r, AT_LOW, 0.0, count)
+            count = _add_force_bound(system, flows, st, watched, s, r, AT_LOW, 0.0, count)
         elif state == OPEN and not _surely_opens(system, st, r):
-            count = _watch_motion(system, flows, st, ch, s, r, POSITION, 1.0, CLOSES, count)
+            count = _add_motion(system, flows, st, watched, s, r, POSITION, 1.0, CLOSES, count)
         elif state == LEAVING:
-            count = _watch_motion(system, flows, st, ch, s, r, POSITION, -1.0, OPENS, count)
-            count = _watch_spring(system, flows, st, ch, s, r, count)
+            count = _add_motion(system, flows, st, watched, s, r, POSITION, -1.0, OPENS, count)
+            count = _add_reclosing(system, flows, st, watched, s, r, count)
     return count
 
 
 @inlined
 def _surely_opens(system, st, r):
-    """Whether a gap can only widen in this segment: the body slides away from a wall that rides on its floor."""
+    """Whether a gap can only widen in this segment: the body slides away from a wall that moves with its floor."""
     if not system.moves_with_floor[r]:
         return False
     if system.left_body[r] < 0:
@@ -160,64 +160,64 @@ def _surely_opens(system, st, r):
 
 
 @inlined
-def _watch_motion(system, flows, st, ch, s, r, order, sign, what, k):
-    """Watch a gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign, for its first root."""
+def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, k):
+    """Add the gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign."""
     if order == POSITION:
-        value, slope, ch.k2[k] = sign * st.displacement[r], sign * st.velocity[r], sign * st.drift[r]
-        ch.k0[k], ch.k1[k] = value, slope
+        value, slope, watched.k2[k] = sign * st.displacement[r], sign * st.velocity[r], sign * st.free_acceleration[r]
+        watched.k0[k], watched.k1[k] = value, slope
     else:
-        value, slope, ch.k2[k] = sign * st.velocity[r], sign * st.drift[r], 0.0
-        ch.k0[k], ch.k1[k] = value, slope
-    bound, curvature = 0.0, ch.k2[k]
+        value, slope, watched.k2[k] = sign * st.velocity[r], sign * st.free_acceleration[r], 0.0
+        watched.k0[k], watched.k1[k] = value, slope
+    bound, curvature = 0.0, watched.k2[k]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
         rate, g = flows.eigenvalue[s, j], flows.velocity[s, r, j] if order == VELOCITY else flows.motion[s, r, j]
         g *= sign * st.amplitude[j]
         once = rate * g
-        ch.g[k, j] = g
+        watched.g[k, j] = g
         if order == VELOCITY:
             slope += once.real
         else:
             curvature += rate.real * once.real - rate.imag * once.imag
         bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
-    if _drives(flows, s):
+    if _is_driven(flows, s):
         on_motion, on_velocity = (0.0, sign) if order == VELOCITY else (sign, 0.0)
-        first, second, largest, _ = _watch_drive(system, flows, st, ch, s, r, on_motion, on_velocity, 0.0, k)
+        first, second, largest, _ = _add_drive(system, flows, st, watched, s, r, on_motion, on_velocity, 0.0, k)
         if order == VELOCITY:
             slope += first
         curvature += second
         bound += largest
-    _know(st, ch, r, order, what, value, slope, bound - ch.k2[k], k)
-    if _drives(flows, s):
-        ch.safe[k] = min(ch.safe[k], 2.0 * system.period)  # as far as the bounds hold
-    if what == CLOSES or what == OPENS:
-        st.settling[r] = max(0.0, -curvature) * 0.5 * CHATTER * system.period
+    _begin_function(st, watched, r, order, meaning, value, slope, bound - watched.k2[k], k)
+    if _is_driven(flows, s):
+        watched.no_root_before[k] = min(watched.no_root_before[k], 2.0 * system.period)  # as far as the bounds hold
+    if meaning == CLOSES or meaning == OPENS:
+        st.capture_speed[r] = max(0.0, -curvature) * 0.5 * CHATTER * system.period
     if st.released[r] != 0:
-        _leave(system, flows, st, ch, s, r, order, sign, k)
+        _skip_root_at_start(system, flows, st, watched, s, r, order, sign, k)
     return k + 1
 
 
 @inlined
-def _drives(flows, s):
+def _is_driven(flows, s):
     """Whether the excitation drives modes of subsystem s."""
     e = flows.driven.shape[1] - 1
     return flows.driven[s, e] > e
 
 
 @inlined
-def _watch_drive(system, flows, st, ch, s, r, on_motion, on_velocity, on_force, k):
-    """Watch what the excitation adds to driven modes (`_watch_growth`)."""
-    return _watch_growth(
+def _add_drive(system, flows, st, watched, s, r, on_motion, on_velocity, on_force, k):
+    """Set the growth of the driven modes in event function k (`_set_growth`)."""
+    return _set_growth(
         flows.eigenvalue[s], flows.motion[s, r], flows.velocity[s, r], flows.force[s, r], on_motion, on_velocity,
-        on_force, flows.driven[s], flows.load[s], st.amplitude, system.period, ch.drive[k],
+        on_force, flows.driven[s], flows.load[s], st.amplitude, system.period, watched.drive[k],
     )  # fmt: skip
 
 
 @kernel
-def _watch_growth(
+def _set_growth(
     eigenvalue, motion, velocity, force, on_motion, on_velocity, on_force, driven, load, phase, period, drive
 ):
-    """Growth of driven modes in an event function, a sum of a row's motion, velocity and force times these factors.
+    """Set the growth of driven modes in an event function: a row's motion, velocity and force times these factors.
 
     Returns its first two derivatives at the segment's start, and bounds of the second and third.
     """
@@ -236,19 +236,20 @@ def _watch_growth(
 
 
 @inlined
-def _know(st, ch, r, order, what, value, slope, bound, k):
-    """Begin event function k: its second derivative nowhere lies below -bound. What was carried over stays known."""
+def _begin_function(st, watched, r, order, meaning, value, slope, bound, k):
+    """Begin event function k: -bound bounds its second derivative from below. Results carried over are kept."""
     carried = k < st.counters[CARRIED]
-    if carried and ch.row[k] == r and ch.order[k] == order and ch.side[k] == what:
+    if carried and watched.row[k] == r and watched.order[k] == order and watched.meaning[k] == meaning:
         return
-    ch.row[k], ch.order[k], ch.side[k], ch.noise[k], ch.known[k], ch.safe[k] = r, order, what, 0.0, BOUNDED, 0.0
+    watched.row[k], watched.order[k], watched.meaning[k], watched.noise[k] = r, order, meaning, 0.0
+    watched.status[k], watched.no_root_before[k] = BOUNDED, 0.0
     if value > 0.0 or (value == 0.0 and slope > 0.0):
-        ch.safe[k] = first_root_of_parabola(value, slope, -bound)
+        watched.no_root_before[k] = first_root_of_parabola(value, slope, -bound)
 
 
 @kernel
-def _leave(system, flows, st, ch, s, r, order, sign, k):
-    """First safe step of a row whose force was at its bound: from rest, no acceleration, and its jerk decides."""
+def _skip_root_at_start(system, flows, st, watched, s, r, order, sign, k):
+    """Set the first safe step of a row whose force was at its bound: at rest without acceleration, its jerk decides."""
     jerk, snap = 0.0, 0.0
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
@@ -265,14 +266,14 @@ def _leave(system, flows, st, ch, s, r, order, sign, k):
             snap += secular_bound(drive, rate, excitation, system.period, 4)
     quick = (2.0 if order == POSITION else 1.5) * jerk / snap
     shortest = 1e3 * RESOLUTION * system.period
-    ch.safe[k], ch.known[k] = max(quick if quick == quick else system.period, shortest), EXPANDED
+    watched.no_root_before[k], watched.status[k] = max(quick if quick == quick else system.period, shortest), EXPANDED
 
 
 @kernel
-def longest_hop(system, flows, st, r):
-    """Speed (m/s) with which a contact at rest would leave for a flight of CHATTER, from its force now."""
+def hop_speed(system, flows, st, r):
+    """Return the speed (m/s) with which a contact at rest would leave for a flight of CHATTER, from its force now."""
     s = st.counters[FLOW]
-    force = st.level[r]
+    force = st.constant_force[r]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
         force += (flows.force[s, r, j] * st.amplitude[j]).real
@@ -280,46 +281,47 @@ def longest_hop(system, flows, st, r):
 
 
 @kernel
-def _watch_spring(system, flows, st, ch, s, r, k):
-    """Watch a compliant contact that has ended for the spring's wish to push again: spring gap + dashpot rate > 0."""
+def _add_reclosing(system, flows, st, watched, s, r, k):
+    """Add the spring force that a compliant contact that has ended would have: it closes again where that pushes."""
     spring, dashpot = system.spring[r], system.dashpot[r]
-    ch.row[k], ch.order[k], ch.side[k], ch.known[k], ch.safe[k] = r, POSITION, RECLOSES, BOUNDED, 0.0
-    acceleration = st.drift[r]
+    watched.row[k], watched.order[k], watched.meaning[k] = r, POSITION, RECLOSES
+    watched.status[k], watched.no_root_before[k] = BOUNDED, 0.0
+    acceleration = st.free_acceleration[r]
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
         velocity = flows.velocity[s, r, j] * st.amplitude[j]
-        ch.g[k, j] = spring * flows.motion[s, r, j] * st.amplitude[j] + dashpot * velocity
+        watched.g[k, j] = spring * flows.motion[s, r, j] * st.amplitude[j] + dashpot * velocity
         acceleration += (flows.eigenvalue[s, j] * velocity).real
-    ch.k0[k] = spring * st.displacement[r] + dashpot * st.velocity[r]
-    ch.k1[k] = spring * st.velocity[r] + dashpot * acceleration
-    ch.k2[k] = spring * st.drift[r]
-    if _drives(flows, s):
+    watched.k0[k] = spring * st.displacement[r] + dashpot * st.velocity[r]
+    watched.k1[k] = spring * st.velocity[r] + dashpot * acceleration
+    watched.k2[k] = spring * st.free_acceleration[r]
+    if _is_driven(flows, s):
         # the row's velocity has its share of the growth already, its acceleration has not
-        acceleration, _, _, _ = _watch_drive(system, flows, st, ch, s, r, 0.0, 1.0, 0.0, k)
-        ch.k1[k] += dashpot * acceleration
-        _watch_drive(system, flows, st, ch, s, r, spring, dashpot, 0.0, k)
+        acceleration, _, _, _ = _add_drive(system, flows, st, watched, s, r, 0.0, 1.0, 0.0, k)
+        watched.k1[k] += dashpot * acceleration
+        _add_drive(system, flows, st, watched, s, r, spring, dashpot, 0.0, k)
     # the contact ended at zero force
-    ch.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
+    watched.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
     return k + 1
 
 
 @inlined
-def _watch_force(system, flows, st, ch, s, r, side, limit, k):
-    """Watch the force of a closed row for reaching its low (AT_LOW) or high (AT_HIGH) bound."""
+def _add_force_bound(system, flows, st, watched, s, r, side, limit, k):
+    """Add the distance of a closed row's force from its low (AT_LOW) or high (AT_HIGH) bound, unless it stays away."""
     sign = 1.0 if side == AT_LOW else -1.0
-    constant, swing, value, slope, bound = sign * st.level[r] + limit, 0.0, 0.0, 0.0, 0.0
+    constant, swing, value, slope, bound = sign * st.constant_force[r] + limit, 0.0, 0.0, 0.0, 0.0
     for a in range(st.counters[AWAKE]):
         j = st.awake[a]
         rate, g = flows.eigenvalue[s, j], sign * flows.force[s, r, j] * st.amplitude[j]
-        ch.g[k, j] = g
+        watched.g[k, j] = g
         size = math.sqrt(g.real * g.real + g.imag * g.imag)
         swing += size
         value += g.real
         slope += rate.real * g.real - rate.imag * g.imag
         bound += size * (rate.real * rate.real + rate.imag * rate.imag)
     curvature, third = 0.0, 0.0
-    if _drives(flows, s):  # a force that grows is always watched
-        first, curvature, second_bound, third = _watch_drive(system, flows, st, ch, s, r, 0.0, 0.0, sign, k)
+    if _is_driven(flows, s):  # a force that grows is always watched
+        first, curvature, second_bound, third = _add_drive(system, flows, st, watched, s, r, 0.0, 0.0, sign, k)
         slope += first
         bound += second_bound
     elif constant > swing:
@@ -327,18 +329,18 @@ def _watch_force(system, flows, st, ch, s, r, side, limit, k):
     if st.state[r] == SPRUNG and r >= system.friction_rows:
         # bodies that touch without force, as in a free flight side by side, are not parted by round-off
         constant += ADHESION * system.spring[r] * system.free_travel[r]
-    ch.k0[k], ch.k1[k], ch.k2[k] = constant, 0.0, 0.0
-    _know(st, ch, r, FORCE, side, constant + value, slope, bound, k)
-    if _drives(flows, s):
-        ch.safe[k] = min(ch.safe[k], 2.0 * system.period)  # as far as the bounds hold
+    watched.k0[k], watched.k1[k], watched.k2[k] = constant, 0.0, 0.0
+    _begin_function(st, watched, r, FORCE, side, constant + value, slope, bound, k)
+    if _is_driven(flows, s):
+        watched.no_root_before[k] = min(watched.no_root_before[k], 2.0 * system.period)  # as far as the bounds hold
     if st.released[r] == -side:
         for a in range(st.counters[AWAKE]):
             j = st.awake[a]
             rate = flows.eigenvalue[s, j]
-            second = ch.g[k, j] * rate * rate
+            second = watched.g[k, j] * rate * rate
             curvature += second.real
             third += (abs(second.real) + abs(second.imag)) * abs(rate)
         quick = 2.9 * curvature / third if third > 0.0 else system.period
-        ch.safe[k] = max(quick, 1e3 * RESOLUTION * system.period)
-        ch.known[k] = EXPANDED
+        watched.no_root_before[k] = max(quick, 1e3 * RESOLUTION * system.period)
+        watched.status[k] = EXPANDED
     return k + 1

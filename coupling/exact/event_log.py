@@ -1,15 +1,15 @@
-"""The log of events as the compiled engine writes it; coupling.engine turns it into events by name."""
+"""The log of events as the compiled engine writes it; response.evaluation turns it into events by name."""
 
 from __future__ import annotations
 
-from vanedamp.coupling.exact.state import IMPACTS, LOGGED, OPEN, PERIOD, SPRUNG, STICK
+from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD, SPRUNG, STICK
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.response.records import DETACHES, IMPACT, RESTS, SLIPS, STICKS
 
 
 @kernel
 def log_event(period, counters, time, log, kind, r, before, after, impulse):
-    """One entry: kind and row, relative velocities (m/s), impulse (N s)."""
+    """Add an entry: kind and row, relative velocities (m/s), impulse (N s)."""
     entry = log[counters[LOGGED]]
     counters[LOGGED] += 1
     entry[0] = counters[PERIOD] * period + time[0]
@@ -32,17 +32,17 @@ def _count(counters, impacts, collided, energy):
 
 
 @kernel
-def log_changes(system, st, rec, work):
-    """Log what changed. A body that rests at a wall is at rest on the floor too, and only the wall is named."""
+def log_changes(system, st, rec, scratch):
+    """Log the changes of state. A body that rests at a wall is at rest on the floor too, and only the wall is named."""
     for r in range(len(st.state)):
-        was, now = work.before[r], st.state[r]
+        was, now = scratch.old_state[r], st.state[r]
         if r < system.friction_rows:
             if now >= STICK > was and not _at_wall(system, st.state, r):
                 log_event(system.period, st.counters, st.time, rec.log, STICKS, r, 0.0, 0.0, 0.0)
-            elif was >= STICK > now and not _at_wall(system, work.before, r):
+            elif was >= STICK > now and not _at_wall(system, scratch.old_state, r):
                 log_event(system.period, st.counters, st.time, rec.log, SLIPS, r, 0.0, st.velocity[r], 0.0)
         elif now == SPRUNG or was == SPRUNG:
-            continue  # logged where a spring begins and ends to push
+            continue  # logged where a compliant contact begins and ends
         elif now != OPEN and was == OPEN:
             log_event(system.period, st.counters, st.time, rec.log, RESTS, r, 0.0, 0.0, 0.0)
         elif now == OPEN and was != OPEN:

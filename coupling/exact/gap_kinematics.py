@@ -1,4 +1,4 @@
-"""Gaps that ride are differences of slips: slips are the state, and bodies that touch have the same to the last bit.
+"""Gaps at walls that move with the floor are computed from slips: bodies that touch have the same slip exactly.
 
 A slip is the sum of two doubles, so that a rebound of a billionth of a billionth of the gap is still resolved.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.state import OPEN
+from vanedamp.coupling.numerics.codes import OPEN
 from vanedamp.coupling.numerics.jit import inlined, kernel
 
 #: gaps closed to this share of the free travel are closed at the same instant
@@ -20,25 +20,25 @@ _NEAR = 1e-6
 
 @inlined
 def measure_gaps(system, st):
-    """Displacement and velocity of the gaps that ride, from the slips."""
+    """Set displacement and velocity of the gaps that move with the floor, from the slips."""
     for r in range(system.friction_rows, len(st.state)):
         if system.moves_with_floor[r]:
             half = system.rest[r]
-            before, after = system.left_body[r], system.right_body[r]
+            left_body, right_body = system.left_body[r], system.right_body[r]
             right, far, faster = half, 0.0, 0.0
-            if after >= 0:
-                right, far, faster = st.displacement[after], st.low[after], st.velocity[after]
+            if right_body >= 0:
+                right, far, faster = st.displacement[right_body], st.low_word[right_body], st.velocity[right_body]
             left, near, slower = -half, 0.0, 0.0
-            if before >= 0:
-                left, near, slower = st.displacement[before], st.low[before], st.velocity[before]
+            if left_body >= 0:
+                left, near, slower = st.displacement[left_body], st.low_word[left_body], st.velocity[left_body]
             st.displacement[r], st.velocity[r] = (right - left) + (far - near), faster - slower
 
 
 @inlined
 def align_gaps(system, st, y):
-    """Take open gaps to walls that move apart from the floor anew from slips and structure: round-off would add up.
+    """Compute open gaps to walls that move apart from the floor from slips and structure: round-off would add up.
 
-    y: (2n,) p and p' of the structure. A gap about to close is left alone: it must not change sides.
+    y: (2n,) p and p' of the structure. A gap about to close is not changed: it must not change sides.
     """
     n = len(st.constant)
     for r in range(system.friction_rows, len(st.state)):
@@ -48,7 +48,7 @@ def align_gaps(system, st, y):
         k, sign = (system.left_body[r], -1.0) if system.left_body[r] >= 0 else (system.right_body[r], 1.0)
         place, speed = 0.0, 0.0
         if k >= 0:  # a stop has no body
-            place, speed = sign * (st.displacement[k] + st.low[k]), sign * st.velocity[k]
+            place, speed = sign * (st.displacement[k] + st.low_word[k]), sign * st.velocity[k]
         for i in range(n):
             apart = system.J[r, i]
             if k >= 0:
@@ -64,77 +64,79 @@ def shift_slip(st, r, shift):
     old = st.displacement[r]
     new = old + shift
     part = new - old
-    low = st.low[r] + ((old - (new - part)) + (shift - part))
+    low = st.low_word[r] + ((old - (new - part)) + (shift - part))
     st.displacement[r] = new + low
-    st.low[r] = low - (st.displacement[r] - new)
+    st.low_word[r] = low - (st.displacement[r] - new)
 
 
 @inlined
-def only(work, r):
-    """Mark contact r alone for join and join_speeds."""
-    for i in range(len(work.shut)):
-        work.shut[i] = i == r
+def mark_only(scratch, r):
+    """Mark contact r as the only one for join_places and join_speeds."""
+    for i in range(len(scratch.touching)):
+        scratch.touching[i] = i == r
 
 
 @inlined
-def join(system, st, work):
-    """Put bodies that touch (work.shut of their contacts) exactly where they touch, from the walls inwards."""
-    slip, low, friction = st.displacement, st.low, system.friction_rows
+def join_places(system, st, scratch):
+    """Put bodies whose contacts are marked (scratch.touching) exactly where they touch, from the walls inwards."""
+    slip, low, friction = st.displacement, st.low_word, system.friction_rows
     for r in range(friction, len(st.state)):
-        before, after = system.left_body[r], system.right_body[r]
-        if work.shut[r] and system.moves_with_floor[r] and after >= 0:
-            slip[after] = slip[before] if before >= 0 else -system.rest[r]
-            low[after] = low[before] if before >= 0 else 0.0
+        left_body, right_body = system.left_body[r], system.right_body[r]
+        if scratch.touching[r] and system.moves_with_floor[r] and right_body >= 0:
+            slip[right_body] = slip[left_body] if left_body >= 0 else -system.rest[r]
+            low[right_body] = low[left_body] if left_body >= 0 else 0.0
     anchored = False
     for r in range(len(st.state) - 1, friction - 1, -1):
-        before, after = system.left_body[r], system.right_body[r]
-        anchored = work.shut[r] and system.moves_with_floor[r] and before >= 0 and (anchored or after < 0)
+        left_body, right_body = system.left_body[r], system.right_body[r]
+        anchored = (
+            scratch.touching[r] and system.moves_with_floor[r] and left_body >= 0 and (anchored or right_body < 0)
+        )
         if anchored:
-            slip[before] = slip[after] if after >= 0 else system.rest[r]
-            low[before] = low[after] if after >= 0 else 0.0
+            slip[left_body] = slip[right_body] if right_body >= 0 else system.rest[r]
+            low[left_body] = low[right_body] if right_body >= 0 else 0.0
 
 
 @kernel
-def join_speeds(system, st, work):
-    """Give bodies that rest against each other or at a wall (work.shut of their contacts) exactly the same speed."""
+def join_speeds(system, st, scratch):
+    """Give bodies whose contacts are marked (scratch.touching) exactly the same speed, that of a wall if it is one."""
     speed, friction = st.velocity, system.friction_rows
     for r in range(friction, len(st.state)):
-        if work.shut[r] and system.moves_with_floor[r]:
-            before, after = system.left_body[r], system.right_body[r]
-            if before < 0 or after < 0 or speed[before] == 0.0 or speed[after] == 0.0:
-                if before >= 0:
-                    speed[before] = 0.0
-                if after >= 0:
-                    speed[after] = 0.0
+        if scratch.touching[r] and system.moves_with_floor[r]:
+            left_body, right_body = system.left_body[r], system.right_body[r]
+            if left_body < 0 or right_body < 0 or speed[left_body] == 0.0 or speed[right_body] == 0.0:
+                if left_body >= 0:
+                    speed[left_body] = 0.0
+                if right_body >= 0:
+                    speed[right_body] = 0.0
             else:
-                speed[after] = speed[before]
+                speed[right_body] = speed[left_body]
     for r in range(len(st.state) - 1, friction - 1, -1):
-        before, after = system.left_body[r], system.right_body[r]
-        if work.shut[r] and system.moves_with_floor[r] and before >= 0 and after >= 0:
-            speed[before] = speed[after]
+        left_body, right_body = system.left_body[r], system.right_body[r]
+        if scratch.touching[r] and system.moves_with_floor[r] and left_body >= 0 and right_body >= 0:
+            speed[left_body] = speed[right_body]
 
 
 @inlined
-def close(system, st, work):
-    """Put the bodies of all rigid contacts that touch, to round-off, exactly there. Lists them; returns how many."""
+def close_gaps(system, st, scratch):
+    """Close the rigid contacts that touch to round-off exactly, and list them. Return their number."""
     count, tiny, friction = 0, slowest(system, st), system.friction_rows
     for r in range(friction, len(st.state)):
         near = st.displacement[r] <= SIMULTANEOUS * system.free_travel[r] and st.velocity[r] <= tiny
-        work.shut[r] = rigid(system, r) and (st.displacement[r] == 0.0 or near)
-        if work.shut[r]:
-            work.listed[count] = r
+        scratch.touching[r] = rigid(system, r) and (st.displacement[r] == 0.0 or near)
+        if scratch.touching[r]:
+            scratch.listed[count] = r
             count += 1
             if not system.moves_with_floor[r]:
                 st.displacement[r] = 0.0
-    join(system, st, work)
+    join_places(system, st, scratch)
     measure_gaps(system, st)
     return count
 
 
 @inlined
 def slowest(system, st):
-    """Speed below which a relative motion is round-off, m/s."""
-    fastest = st.fastest[0]
+    """Return the speed below which a relative motion is round-off, m/s."""
+    fastest = st.largest_speed[0]
     for r in range(system.friction_rows):
         fastest = max(fastest, abs(st.velocity[r]))
     return ROUND_OFF * fastest

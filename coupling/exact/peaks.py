@@ -1,20 +1,20 @@
-"""The largest response of a segment: a grid finds its maxima with a guarantee, Newton's method polishes them."""
+"""The largest response of a segment: a grid finds its maxima with a guarantee, Newton's method refines them."""
 
 from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.state import AWAKE
+from vanedamp.coupling.numerics.codes import AWAKE
 from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound
 from vanedamp.coupling.numerics.jit import inlined, kernel
 
 
 @inlined
-def highest(system, flows, st, work, s, tau, constant, peak):
-    """Largest |response| on [0, tau] and before.
+def highest(system, flows, st, scratch, s, tau, constant, peak):
+    """Return the largest |response| on [0, tau] and before.
 
     Between points of a grid the response differs from its cubic Hermite interpolant by at most (bound of the fourth
-    derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is polished by Newton.
+    derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is refined by Newton.
     Where interpolant and bound stay below the peak so far there is nothing to find.
     """
     fourth, size = 0.0, abs(constant)
@@ -24,21 +24,21 @@ def highest(system, flows, st, work, s, tau, constant, peak):
         j = st.awake[a]
         rate = flows.eigenvalue[s, j]
         wave = flows.response[s, j] * st.amplitude[j]
-        work.wave[a], work.rate[a] = wave, rate
+        scratch.wave[a], scratch.rate[a] = wave, rate
         square = rate.real * rate.real + rate.imag * rate.imag
         part = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
         fourth += part * square * square
         size += part
         x0 += wave.real
         v0 += rate.real * wave.real - rate.imag * wave.imag
-        wave += flows.response[s, j] * work.gain[a]
+        wave += flows.response[s, j] * scratch.gain[a]
         x1 += wave.real
         v1 += rate.real * wave.real - rate.imag * wave.imag
     e = flows.driven.shape[1] - 1
     if flows.driven[s, e] > e:
-        more = _drive(
-            flows.eigenvalue[s], flows.response[s], flows.driven[s], flows.load[s], st.amplitude, work.gain,
-            system.period, work.drive,
+        more = _set_drive(
+            flows.eigenvalue[s], flows.response[s], flows.driven[s], flows.load[s], st.amplitude, scratch.gain,
+            system.period, scratch.drive,
         )  # fmt: skip
         v0, v1, size, fourth = v0 + more[0], v1 + more[1], size + more[2] * tau, fourth + more[3]
     if size <= peak or tau <= 0.0:
@@ -50,23 +50,23 @@ def highest(system, flows, st, work, s, tau, constant, peak):
     if fourth * min(h, tau) ** 4 <= 0.384 * size:
         pieces = math.ceil(tau / h)
         for a in range(count):
-            work.turn[a] = flows.turn[s, st.awake[a]]
+            scratch.step_factor[a] = flows.eighth_factor[s, st.awake[a]]
     else:
         pieces = min(math.ceil(tau * math.sqrt(math.sqrt(fourth / (0.384 * size)))), 4096)
         h = tau / pieces
         for a in range(count):
-            work.turn[a] = exp_minus_one(work.rate[a] * h) + 1.0
-    return _climb(
-        work.rate[:count], work.wave, work.turn, flows.driven[s], work.drive, work.growth, constant, x0, v0, x1, v1,
-        tau, h, pieces, fourth, peak,
+            scratch.step_factor[a] = exp_minus_one(scratch.rate[a] * h) + 1.0
+    return _search_grid(
+        scratch.rate[:count], scratch.wave, scratch.step_factor, flows.driven[s], scratch.drive, scratch.growth,
+        constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak,
     )  # fmt: skip
 
 
 @kernel
-def _drive(eigenvalue, response, driven, load, phase, change, period, drive):
-    """Share of the response in the growth of driven modes: sets drive, 1/s.
+def _set_drive(eigenvalue, response, driven, load, phase, change, period, drive):
+    """Set the share of the response in the growth of driven modes, drive, 1/s.
 
-    Returns what it adds to the speed at both ends and to the bounds of the response, by time, and fourth derivative.
+    Returns its terms in the speed at both ends and in the bounds of the response, by time, and fourth derivative.
     """
     v0, v1, size, fourth = 0.0, 0.0, 0.0, 0.0
     for h in range(len(driven) - 1):
@@ -80,8 +80,8 @@ def _drive(eigenvalue, response, driven, load, phase, change, period, drive):
 
 
 @inlined
-def _climb(rates, waves, turns, driven, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak):
-    """The largest |response| on a grid of so many pieces of length h, the last one shorter, and before."""
+def _search_grid(rates, waves, turns, driven, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak):
+    """Return the largest |response| on a grid of `pieces` steps of length h, the last one shorter, and before."""
     count, e = len(rates), len(driven) - 1
     for k in range(e):
         for j in range(driven[k], driven[k + 1]):
@@ -116,7 +116,7 @@ def _climb(rates, waves, turns, driven, drives, growths, constant, x0, v0, x1, v
 
 @inlined
 def _may_exceed(peak, x0, v0, x1, v1, h, fourth):
-    """Whether |x| may exceed peak within [0, h]: cubic interpolant of the ends, and what it may be wrong by."""
+    """Whether |x| may exceed peak within [0, h]: cubic interpolant of the ends and bound of its error."""
     room = peak - fourth * h * h * h * h / 384.0
     # the interpolant's basis functions of the slopes stay below 4/27 h
     rise = max(x0, x1) + (4 / 27) * h * (max(v0, 0.0) + max(-v1, 0.0))
@@ -126,7 +126,7 @@ def _may_exceed(peak, x0, v0, x1, v1, h, fourth):
 
 @kernel
 def _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h):
-    """|x| where its slope vanishes within [0, h], v0 and v1 of opposite sign: Newton from the cubic interpolant."""
+    """Return |x| where its slope vanishes within [0, h], v0 and v1 of opposite sign: Newton from the interpolant."""
     # slope v0 + b u + c u^2, u = t/h; the root on [0, 1] by the formula that does not cancel
     b = 6.0 * (x1 - x0) / h - 4.0 * v0 - 2.0 * v1
     c = 3.0 * (v0 + v1) - 6.0 * (x1 - x0) / h

@@ -2,9 +2,9 @@
 
 Event functions are  k0 + k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t)  with Re lambda_j <= 0, and positive until the
 event. With the exponentials at a point come all derivatives there, and bounds of the derivatives at all later times:
-the sums of |g_j exp(lambda_j t)| |lambda_j|^p. The function stays above its Taylor polynomial less the bound of what is
-left out: a step that ends before the first root of this lower polynomial provably holds no root. Steps are as long as a
-few radians of the fastest motion, and where what is left out is round-off the polynomial's root is the function's. No
+the sums of |g_j exp(lambda_j t)| |lambda_j|^p. The function stays above its Taylor polynomial less the bound of its
+remainder: a step that ends before the first root of this lower polynomial provably holds no root. Steps are as long as
+a few radians of the fastest motion, and where the remainder is round-off the polynomial's root is the function's. No
 event can be missed, and none is found twice. A double root is approached at a geometric rate.
 
 Modes that the excitation drives at their own frequency add terms in D(t) (exact.subsystem_assembly), bounded over two
@@ -15,13 +15,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular, secular_bound
 from vanedamp.coupling.numerics.jit import inlined, kernel
-
-# how often the exponentials of a function are differentiated: what is left of exp(z) at t = 0
-POSITION, VELOCITY, FORCE = np.array([2, 1, 0])
 
 #: degree of the lower polynomial; its last coefficient is that of the bound
 DEGREE = 10
@@ -75,7 +71,7 @@ def add_secular(order, drive, driven, eigenvalue, t, period, lower):
 
 @inlined
 def first_root_of_parabola(f, slope, curvature):
-    """Smallest s >= 0 with f + slope s + curvature s^2/2 = 0 for f >= 0; inf if there is none."""
+    """Return the smallest s >= 0 with f + slope s + curvature s^2/2 = 0 for f >= 0; inf if there is none."""
     if f == 0.0 and slope < 0.0:
         return 0.0
     square = slope * slope - 2.0 * curvature * f
@@ -88,13 +84,13 @@ def first_root_of_parabola(f, slope, curvature):
 
 @inlined
 def expand(order, k0, k1, k2, g, eigenvalue, awake, t, lower):
-    """Lower polynomials (2, DEGREE + 1) of an event function from time t on, by powers of the time since.
+    """Set the lower polynomials (2, DEGREE + 1) of an event function from time t on, by powers of the time since.
 
     The first is that of all modes; in the second, those much faster than the first mode count as if they were at their
     lowest all the time: less sharp close to a root, but good for long steps far from it.
     Returns the round-off of the value, a bound of the second derivative, and that of the slow modes (-1: all are).
     order POSITION: exponentials as exp(z) - 1 - z, so that k0 and k1 are value and slope at zero exactly; VELOCITY:
-    exp(z) - 1 with k0 the value and k1 the constant slope; FORCE: exp(z), k0 alone.
+    exp(z) - 1 with k0 the value and k1 the constant slope; FORCE: exp(z), k0 only.
     """
     value, slope, noise = k0, k1, abs(k0)
     whole, slow = lower[0], lower[1]
@@ -186,7 +182,7 @@ def _stays_above(a, f, h):
 
 @inlined
 def _step_by_parabola(a, f, h):
-    """A step of at most h without root: no coefficient behind the second is better than negative."""
+    """Return a step of at most h without root, with positive coefficients after the second taken as zero."""
     lowest = 0.0
     for p in range(DEGREE, 2, -1):
         lowest = (lowest + min(a[p], 0.0)) * h
@@ -195,9 +191,9 @@ def _step_by_parabola(a, f, h):
 
 @kernel
 def safe_step(a, f, noise, second, longest):
-    """A step without root from where the lower polynomial begins, its value taken as f >= 0; whether a root follows.
+    """Return a step without root from the start of a lower polynomial of value f >= 0, and whether a root follows.
 
-    A root follows at the end of the step if what the polynomial leaves out there is less than the round-off.
+    A root follows at the end of the step if the remainder of the polynomial there is below the round-off.
     """
     if f + longest * (a[1] - 0.5 * second * longest) > 0.0:
         return longest, False
@@ -239,7 +235,7 @@ def safe_step(a, f, noise, second, longest):
     value, _ = _value_and_slope(a, h)
     if value + f - a[0] >= 0.0 and _stays_above(a, f, h):
         return h, False
-    # the best of the parabolas below it: over what is left of the reach, and up to behind its own minimum
+    # the best of the parabolas below it: over the rest of the reach, and beyond its own minimum
     best, h = 0.0, reach
     if a[1] < 0.0 < a[2] and -2.0 * a[1] < a[2] * reach:
         best = _step_by_parabola(a, f, -2.0 * a[1] / a[2])

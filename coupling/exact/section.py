@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from vanedamp.coupling.exact.compliant_contacts import spring_energy
 from vanedamp.coupling.exact.gap_kinematics import rigid
-from vanedamp.coupling.exact.state import AWAKE, FLOW, PERIOD, SPRUNG
+from vanedamp.coupling.numerics.codes import AWAKE, FLOW, PERIOD, SPRUNG
 from vanedamp.coupling.numerics.jit import inlined
 from vanedamp.coupling.response.recorder import put_section
 
 
 @inlined
-def record_start(system, flows, st, rec, work):
+def record_start(system, flows, st, rec, scratch):
     """Record section and ledger at the start of a period."""
-    n, b, y, springs = len(st.constant), system.bodies, work.coordinates, 0.0
-    _coordinates(flows, st, y)
+    n, b, y, springs = len(st.constant), system.bodies, scratch.coordinates, 0.0
+    structure_state(flows, st, y)
     for r in range(len(st.state)):
         # a Jenkins element keeps its spring's energy while it slides
         if st.state[r] == SPRUNG or (r < system.friction_rows and not rigid(system, r) and system.limit[r] > 0.0):
@@ -24,8 +24,8 @@ def record_start(system, flows, st, rec, work):
 
 
 @inlined
-def _coordinates(flows, st, y):
-    """(p, p') at the segment's start."""
+def structure_state(flows, st, y):
+    """Set y to (p, p') at the segment's start."""
     s, n = st.counters[FLOW], len(st.constant)
     for i in range(2 * n):
         y[i] = st.constant[i] if i < n else 0.0

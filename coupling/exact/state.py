@@ -1,7 +1,7 @@
-"""What changes during a run: the automaton's state, its event functions, its records and its scratch space.
+"""The records that change during a run: the automaton's state, its event functions and its scratch space.
 
 Sizes: r rows (friction rows first, then contacts), m complex modes, e of them harmonics of the excitation, n modes of
-the structure, b bodies, k channels.
+the structure, b bodies, N = n + b coordinates, k event functions.
 """
 
 from __future__ import annotations
@@ -11,149 +11,197 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.exact.root_search import DEGREE
+from vanedamp.coupling.numerics.codes import COAST, COUNTERS, OPEN
 from vanedamp.coupling.numerics.complementarity import Problem, new_problem
 from vanedamp.coupling.response.records import ENERGIES
 from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
 
-# names that functions are called with are numbers of numpy: numba would compile once for every literal
-
-# state of a friction row; a row that slips is known by its direction, one without friction coasts; HELD: at rest, but
-# another row carries its force
-SLIP_LEFT, COAST, SLIP_RIGHT, STICK, HELD = np.arange(-1, 4)
-# state of a contact row; TOUCHING: closed, but another row carries its force; LEAVING: a compliant contact that has
-# ended at zero force, before its gap is open again
-OPEN, CLOSED, TOUCHING, LEAVING = np.array([0, 1, 2, 5])
-# state of a row, friction or contact, whose spring is closed
-SPRUNG = np.int64(4)
-
-# what an event function of a contact stands for, besides the bounds of a force: the gap closes, a gap that was left
-# under compression opens, or closes again because its spring would push
-CLOSES, OPENS, RECLOSES = np.arange(10, 13)
-
-# a pair of modes whose product hardly changes over a period: what vanishes is the sum of their eigenvalues, the same
-# with one conjugate, or one alone
-SUM, DIFFERENCE, ALONE, CALM = range(4)
-
-# what is known of an event function: a bound of its second derivative; expansions; `safe` is its first root
-BOUNDED, EXPANDED, ROOT = range(3)
-
-COUNTERS = (
-    "period", "flow", "searching", "logged", "events", "impacts", "evaluations", "segments", "awake", "carried",
-    "closed",
-)  # fmt: skip
-(
-    PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE, CARRIED, CLOSED_ROWS,
-) = range(len(COUNTERS))  # fmt: skip
-
 
 class State(NamedTuple):
     """The state at the start of a segment."""
 
-    counters: np.ndarray  # int, by the names above
+    # changes in every segment
+    counters: np.ndarray  # (COUNTERS,) int
     time: np.ndarray  # (1,) within the period, s
-    key: np.ndarray  # (r,) whether a row is closed: the set names the linear subsystem; counters[CLOSED_ROWS] of them
     amplitude: np.ndarray  # (m,) complex modal amplitudes; the first e are the phases of the excitation's harmonics
-    awake: np.ndarray  # (m,) the modes that are awake are the first counters[AWAKE] of these
-    coordinates: np.ndarray  # (2n,) p and p' of the structure where a new subsystem begins
-    constant: np.ndarray  # (n,) constant part of p
-    slip_constant: np.ndarray  # (b,) constant part of the displacements of bodies on springs
     displacement: np.ndarray  # (r,) of each row, m; of a friction row's spring: its elongation
-    low: np.ndarray  # (r,) of slips: what is beyond the last digit of `displacement`, m
-    velocity: np.ndarray  # (r,)
-    drift: np.ndarray  # (r,) constant acceleration of each row's free bodies
-    drifts: np.ndarray  # (N,) constant acceleration of the free bodies, 0 for modes
-    held: np.ndarray  # (r,) constant force of rows that are not closed, N
-    level: np.ndarray  # (r,) constant part of a closed row's force, N
-    state: np.ndarray  # (r,) int
-    released: np.ndarray  # (r,) the bound at which a row's force was when it let go at this very instant, otherwise 0;
-    # minus that bound for a spring that takes over from sliding there
-    settling: np.ndarray  # (r,) speed of a flight that takes as long as a chatter may be cut short, m/s
+    low_word: np.ndarray  # (r,) of slips, sums of two doubles: the part beyond the last digit of `displacement`, m
+    velocity: np.ndarray  # (r,) of each row, m/s
+    contact_impulse: np.ndarray  # (r,) impulse of a compliant contact since it began, N s
+    ledger: np.ndarray  # (6,) energies since the start, J
+
+    # changes at impacts and at the start of a period
+    awake: np.ndarray  # (m,) int: the first counters[AWAKE] are the places of the modes that are awake
+    largest_speed: np.ndarray  # (1,) bound of the speeds in the structure, m/s: round-off of a speed is relative to it
     last_impact: np.ndarray  # (r,) time of the last impact, counted from the period's start, s
-    push: np.ndarray  # (r,) impulse of a compliant contact since it began, N s
-    fastest: np.ndarray  # (1,) bound of the speeds in the structure, m/s: round-off of a speed is relative to it
-    ledger: np.ndarray  # (6,) J
+
+    # changes with the contact states, or is set with their event functions
+    state: np.ndarray  # (r,) int: state of each row
+    active_set: np.ndarray  # (r,) closed rows, counters[CLOSED_ROWS] of them: the set names the linear subsystem
+    released: np.ndarray  # (r,) int: bound at which a row's force was when it let go at this instant, otherwise 0;
+    # -bound: a spring that starts to carry load at that bound
+    applied_force: np.ndarray  # (r,) constant force of rows that are not closed, N
+    capture_speed: np.ndarray  # (r,) rebounds slower than this are completed as a plastic impact, m/s
+
+    # set when a subsystem begins
+    coordinates: np.ndarray  # (2n,) p and p' of the structure at that time
+    constant: np.ndarray  # (n,) constant part of p
+    slip_constant: np.ndarray  # (b,) constant part of the displacements of bodies on springs, m
+    constant_force: np.ndarray  # (r,) constant part of a closed row's force, N
+    free_acceleration: np.ndarray  # (r,) constant acceleration of each row by its free bodies, m/s^2
+    coordinate_acceleration: np.ndarray  # (N,) constant acceleration of the free bodies, m/s^2; 0 for modes
 
 
-class Channels(NamedTuple):
-    """The event functions watched in a segment."""
+class EventFunctions(NamedTuple):
+    """The event functions that are watched in a segment.
 
-    row: np.ndarray
-    order: np.ndarray
-    side: np.ndarray
-    known: np.ndarray  # how: BOUNDED, EXPANDED or ROOT
-    k0: np.ndarray
-    k1: np.ndarray
-    k2: np.ndarray
-    noise: np.ndarray  # round-off of its value at the start, besides that of k0
-    safe: np.ndarray  # time before which no root can lie
-    g: np.ndarray  # (k, m)
-    drive: np.ndarray  # (k, m): of the driven modes
-    lower: np.ndarray  # (2, DEGREE + 1) scratch space: lower polynomials of one of them (exact.root_search)
+    Each is k0 + k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t) and the growth of driven modes (exact.root_search).
+    """
+
+    # set at the start of a segment
+    row: np.ndarray  # (k,) int: the row that it belongs to
+    order: np.ndarray  # (k,) int: POSITION, VELOCITY or FORCE
+    meaning: np.ndarray  # (k,) int: event at its root, AT_LOW, AT_HIGH, STOPS, CLOSES, OPENS or RECLOSES
+    k0: np.ndarray  # (k,) constant
+    k1: np.ndarray  # (k,) slope of its polynomial
+    k2: np.ndarray  # (k,) second derivative of its polynomial
+    noise: np.ndarray  # (k,) round-off of its value at the start, apart from that of k0
+    g: np.ndarray  # (k, m) complex amplitudes of its exponentials
+    drive: np.ndarray  # (k, m) complex rates of growth of the driven modes
+
+    # changes in the search
+    status: np.ndarray  # (k,) int: knowledge of its roots, BOUNDED, EXPANDED or ROOT
+    no_root_before: np.ndarray  # (k,) time before which no root can lie; its first root once that is known, s
+
+    # scratch
+    lower: np.ndarray  # (2, DEGREE + 1) lower polynomials of one of them
 
 
 class Scratch(NamedTuple):
-    """Space for intermediate results."""
+    """Space for intermediate results: nothing in it outlives the handling of a segment or an event."""
 
-    gain: np.ndarray  # (m,) change of the awake modes' amplitudes over the segment
-    bend: np.ndarray  # (m,) what exceeds the tangent in displacements, as amplitudes
-    drive: np.ndarray  # (m,) share of the response in the growth of driven modes, 1/s
-    coordinates: np.ndarray  # (2n,)
-    slips: np.ndarray  # (2b,)
-    loads: np.ndarray  # (N,) on the coordinates, or their accelerations
-    rates: np.ndarray  # (N,) of these
-    sizes: np.ndarray  # (N,) of the terms that they are sums of
-    jump: np.ndarray  # (n,) of the modal velocities
-    acceleration: np.ndarray  # (r,)
-    jerk: np.ndarray  # (r,)
-    impulse: np.ndarray  # (r,)
-    reaction: np.ndarray  # (r,) of the listed rows
-    before: np.ndarray  # (r,) int, row states
-    forced: np.ndarray  # (r,) int: the bound that a row's force has just reached
-    shut: np.ndarray  # (r,) int: contacts whose bodies are together
-    listed: np.ndarray  # (r,) int: the listed rows
-    verdict: np.ndarray  # (r,) int, of the listed rows
-    side: np.ndarray  # (r,) int, of the listed rows
-    members: np.ndarray  # (r,) int: places in that list
-    problem: Problem
-    order: np.ndarray  # (m,) int: places of the awake modes, those first that the response feels
-    change: np.ndarray  # (m,) of the amplitudes over the segment, in that order
-    total: np.ndarray  # (m,) sum of the amplitudes at its start and end
-    wave: np.ndarray  # (m,) share of the response
-    rate: np.ndarray  # (m,) its eigenvalue
-    turn: np.ndarray  # (m,) exp(rate t) for one step of a grid
+    # a segment: changes of the amplitudes
+    gain: np.ndarray  # (m,) change of the awake modes' amplitudes
+    bend: np.ndarray  # (m,) the same less its tangent, for displacements
+
+    # a segment: energy balance and peak
+    mode_order: np.ndarray  # (m,) int: places of the awake modes, those first that the response feels
+    change: np.ndarray  # (m,) changes of the amplitudes, in that order
+    total: np.ndarray  # (m,) sums of the amplitudes at both ends, in that order
+    wave: np.ndarray  # (m,) share of each awake mode in the response
+    rate: np.ndarray  # (m,) its eigenvalue, 1/s
+    step_factor: np.ndarray  # (m,) exp(rate t) for one step of a grid
     growth: np.ndarray  # (m,) of driven modes over that step
+    drive: np.ndarray  # (m,) share of the response in the growth of driven modes, 1/s
+
+    # a change of subsystem
+    coordinates: np.ndarray  # (2n,) p and p'
+    slips: np.ndarray  # (2b,) displacements of bodies on springs and their rates
+
+    # forces and accelerations
+    loads: np.ndarray  # (N,) on the coordinates, or their accelerations
+    rates: np.ndarray  # (N,) time derivatives of these
+    sizes: np.ndarray  # (N,) sizes of the terms that they are sums of
+    acceleration: np.ndarray  # (r,) of each row, m/s^2
+    jerk: np.ndarray  # (r,) of each row, m/s^3
+
+    # impacts
+    impulse: np.ndarray  # (r,) of each row, N s
+    velocity_jump: np.ndarray  # (n,) of the modal velocities
+    touching: np.ndarray  # (r,) int: contacts whose bodies are together
+
+    # contact states: the listed rows may be at rest
+    old_state: np.ndarray  # (r,) int: states of the rows before the event
+    forced: np.ndarray  # (r,) int: the bound that a row's force has just reached, otherwise 0
+    listed: np.ndarray  # (r,) int: the listed rows
+    decision: np.ndarray  # (r,) int: state of each listed row in the complementarity problem
+    bound: np.ndarray  # (r,) int: bound at which its force is, 0 between both; a mark of contacts in impacts
+    reaction: np.ndarray  # (r,) force of each listed row, N; in impacts its impulse, N s
+    members: np.ndarray  # (r,) int: places in the list of the rows in the second problem, that of the rates
+    problem: Problem
 
 
 def new_state(system: System, modes: int, initial: InitialMotion) -> State:
-    """The state at time zero; `modes` is the room for complex modes."""
+    """Return the state at time zero; `modes` is the room for complex modes."""
     r, n, b = len(system.delassus), system.modes, system.bodies
     state = State(
-        counters=np.zeros(len(COUNTERS), np.int64), time=np.zeros(1), key=np.zeros(r, np.bool_),
-        amplitude=np.zeros(modes, complex), awake=np.zeros(modes, np.int64),
-        coordinates=np.r_[initial.p, initial.p_rate], constant=np.zeros(n), slip_constant=np.zeros(b),
-        displacement=np.array(initial.displacement), low=np.zeros(r), velocity=np.array(initial.velocity),
-        drift=np.zeros(r), drifts=np.zeros(n + b), held=np.zeros(r), level=np.zeros(r), state=np.zeros(r, np.int64),
-        released=np.zeros(r, np.int64), settling=np.zeros(r), last_impact=np.full(r, -np.inf), push=np.zeros(r),
-        fastest=np.zeros(1), ledger=np.zeros(len(ENERGIES)),
-    )  # fmt: skip
+        counters=np.zeros(COUNTERS, np.int64),
+        time=np.zeros(1),
+        amplitude=np.zeros(modes, complex),
+        displacement=np.array(initial.displacement),
+        low_word=np.zeros(r),
+        velocity=np.array(initial.velocity),
+        contact_impulse=np.zeros(r),
+        ledger=np.zeros(len(ENERGIES)),
+        awake=np.zeros(modes, np.int64),
+        largest_speed=np.zeros(1),
+        last_impact=np.full(r, -np.inf),
+        state=np.where(np.arange(r) < system.friction_rows, COAST, OPEN),
+        active_set=np.zeros(r, np.bool_),
+        released=np.zeros(r, np.int64),
+        applied_force=np.zeros(r),
+        capture_speed=np.zeros(r),
+        coordinates=np.r_[initial.p, initial.p_rate],
+        constant=np.zeros(n),
+        slip_constant=np.zeros(b),
+        constant_force=np.zeros(r),
+        free_acceleration=np.zeros(r),
+        coordinate_acceleration=np.zeros(n + b),
+    )
     state.amplitude[: len(system.frequency)] = 1.0
     return state
 
 
-def new_channels(system: System, modes: int) -> Channels:
-    """Room for two event functions a row."""
+def new_event_functions(system: System, modes: int) -> EventFunctions:
+    """Return room for two event functions a row."""
     k = 2 * len(system.delassus)
-    integers, reals = np.zeros((4, k), np.int64), np.zeros((5, k))
-    return Channels._make([*integers, *reals, *np.zeros((2, k, modes), complex), np.zeros((2, DEGREE + 1))])
+    return EventFunctions(
+        row=np.zeros(k, np.int64),
+        order=np.zeros(k, np.int64),
+        meaning=np.zeros(k, np.int64),
+        k0=np.zeros(k),
+        k1=np.zeros(k),
+        k2=np.zeros(k),
+        noise=np.zeros(k),
+        g=np.zeros((k, modes), complex),
+        drive=np.zeros((k, modes), complex),
+        status=np.zeros(k, np.int64),
+        no_root_before=np.zeros(k),
+        lower=np.zeros((2, DEGREE + 1)),
+    )
 
 
 def new_scratch(system: System, modes: int) -> Scratch:
-    """Scratch space for a scene."""
+    """Return scratch space for a scene."""
     r, n, b = len(system.delassus), system.modes, system.bodies
-    complexes, reals, integers = np.zeros((9, modes), complex), np.zeros((4, r)), np.zeros((7, r), np.int64)
-    sizes = (2 * n, 2 * b, n + b, n + b, n + b, n)
-    return Scratch._make(
-        [*complexes[:3], *(np.zeros(size) for size in sizes), *reals, *integers, new_problem(r),
-         np.zeros(modes, np.int64), *complexes[3:]]
-    )  # fmt: skip
+    return Scratch(
+        gain=np.zeros(modes, complex),
+        bend=np.zeros(modes, complex),
+        mode_order=np.zeros(modes, np.int64),
+        change=np.zeros(modes, complex),
+        total=np.zeros(modes, complex),
+        wave=np.zeros(modes, complex),
+        rate=np.zeros(modes, complex),
+        step_factor=np.zeros(modes, complex),
+        growth=np.zeros(modes, complex),
+        drive=np.zeros(modes, complex),
+        coordinates=np.zeros(2 * n),
+        slips=np.zeros(2 * b),
+        loads=np.zeros(n + b),
+        rates=np.zeros(n + b),
+        sizes=np.zeros(n + b),
+        acceleration=np.zeros(r),
+        jerk=np.zeros(r),
+        impulse=np.zeros(r),
+        velocity_jump=np.zeros(n),
+        touching=np.zeros(r, np.int64),
+        old_state=np.zeros(r, np.int64),
+        forced=np.zeros(r, np.int64),
+        listed=np.zeros(r, np.int64),
+        decision=np.zeros(r, np.int64),
+        bound=np.zeros(r, np.int64),
+        reaction=np.zeros(r),
+        members=np.zeros(r, np.int64),
+        problem=new_problem(r),
+    )

@@ -24,7 +24,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.exact.complex_modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
-from vanedamp.coupling.exact.state import ALONE, CALM, DIFFERENCE, SUM
+from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
 from vanedamp.coupling.system.system import System
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
@@ -35,11 +35,11 @@ HELD_STILL = 1e-14
 ROOM = 2**29
 #: share of a gap or a period that round-off may be where modes swing far out: a heavy body on a spring, weight
 FAR = 1e-6
-#: what rows feel of a mode counts at least as this share of what they feel of the others
+#: least share of a coordinate in the rows, relative to the largest, that the check of cancellation assumes
 _UNFELT = 1e-8
 #: modes with |i omega_h - lambda| times the period below this are driven. Beyond, the response in step with the
-#: excitation is at most 1/NEAR times what one period adds: less than two digits cancel. Driven modes cost time, so that
-#: a wider bound would slow down scenes more than 0.3 % beside their resonance. exact.root_search.secular relies on it
+#: excitation is at most 1/NEAR times the growth in one period: less than two digits cancel. Driven modes cost time: a
+#: wider bound would slow down scenes more than 0.3 % off their resonance. numerics.exponentials.secular relies on it
 NEAR = 2e-2
 
 #: eigenvalues (2k,) of k coordinates, vectors of them and their rates (2k, 2k) and their inverse
@@ -47,75 +47,113 @@ _Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Flows(NamedTuple):
-    """Stack of the subsystems met so far, first axis s. m is the largest number of complex modes.
+    """Stack of the subsystems met so far, first axis s, filled once a subsystem.
 
-    Compiled functions hand over every array of it in each call: one more has cost half the engine's speed.
+    m is the largest number of complex modes, the excitation's e harmonics included. Compiled functions hand over every
+    array of it in each call: one more has cost half the engine's speed.
     """
 
-    key: np.ndarray  # (s, r) which rows are closed
-    modes: np.ndarray  # (s,) number of complex modes, the excitation's e harmonics included
-    eigenvalue: np.ndarray  # (s, m)
-    shape: np.ndarray  # (s, 2n, m): (p, p') = constant + Re(shape c)
-    excited: np.ndarray  # (s, 2b, e): share of the excitation in the displacements xi of sprung bodies and their rates
-    project: np.ndarray  # (s, m, 2n): c = project ((p, p') - constant - excitation) + ...
-    project_slip: np.ndarray  # (s, m, 2b): ... project_slip ((slips, rates) - constant - excitation)
+    # the subsystem
+    active_set: np.ndarray  # (s, r) which rows are closed
+    modes: np.ndarray  # (s,) number of its complex modes; 0: a free place
+    eigenvalue: np.ndarray  # (s, m) of the modes, 1/s
     sprung: np.ndarray  # (s,) whether springs are closed
     attached: np.ndarray  # (s, b) whether rigid rows hold a body to the structure
-    kick: np.ndarray  # (s, r, m): change of c by a unit impulse on a row
+
+    # functionals of the amplitudes c
+    shape: np.ndarray  # (s, 2n, m): (p, p') = constant + Re(shape c)
     motion: np.ndarray  # (s, r, m): displacement of each row
     velocity: np.ndarray  # (s, r, m): its rate
     force: np.ndarray  # (s, r, m): force of each closed row
     impulse: np.ndarray  # (s, r, m): its antiderivative, for rows with springs
-    closed_inverse: np.ndarray  # (s, r, r): inverse Delassus matrix of the rigid closed rows
+    response: np.ndarray  # (s, m): displacement of the response
+    momentum: np.ndarray  # (s, m): momentum of all bodies
+    work: np.ndarray  # (s, e, m): power of the conjugate loads of each harmonic
+
+    # growth of the modes that the excitation drives
+    driven: np.ndarray  # (s, e + 1): harmonic h drives the modes from driven[h] to driven[h + 1]; the first is mode e
+    load: np.ndarray  # (s, m): rate at which a unit phase of their harmonic makes them grow
+
+    # how it begins: c = project ((p, p') - constant - excitation) + project_slip ((slips, rates) - ...)
+    project: np.ndarray  # (s, m, 2n)
+    project_slip: np.ndarray  # (s, m, 2b)
+    excited: np.ndarray  # (s, 2b, e): share of the excitation in the displacements xi of sprung bodies and their rates
     static: np.ndarray  # (s, n + b, n + b): constant (p, xi) under constant loads on (p, x)
-    held: np.ndarray  # (s, n + b, n): constant (p, xi) kept by constraints inside the structure
+    constrained: np.ndarray  # (s, n + b, n): constant (p, xi) kept by constraints inside the structure
     body_acceleration: np.ndarray  # (s, b, b): of free bodies under constant loads
-    body: np.ndarray  # (s, b, m): displacement of each body
-    response: np.ndarray  # (s, m)
+    closed_inverse: np.ndarray  # (s, r, r): inverse Delassus matrix of the rigid closed rows
+    impulse_response: np.ndarray  # (s, r, m): change of c by a unit impulse on a row
+
+    # sizes of modes, and a step of the search for the peak
     speed: np.ndarray  # (s, m): largest speed of a mode over all rows and the response
     acceleration: np.ndarray  # (s, m): largest acceleration of its terms, whether closed rows hold them or not
-    turn: np.ndarray  # (s, m): change of its amplitude over an eighth of a period, as a factor
-    driven: np.ndarray  # (s, e + 1): harmonic h drives the modes from driven[h] to driven[h + 1]; the first is mode e
-    load: np.ndarray  # (s, m): rate at which the excitation makes them grow
-    # Antiderivatives of what the ledger integrates, as forms of the complex modal amplitudes: an integral over a
-    # segment is the form at its end minus the form at its start. Where the rate by which a product of two modes
-    # changes vanishes beside the frequency the form would cancel: such pairs are left out of the forms, and listed.
-    work: np.ndarray  # (s, e, m) complex: velocity under the conjugate loads of each harmonic
-    momentum: np.ndarray  # (s, m) complex: momentum of all bodies
-    linear: np.ndarray  # (s, m, 12 + 4e): maps for harmonic and momentum; mean of x; momentum of the free bodies; work
+    eighth_factor: np.ndarray  # (s, m): factor of its amplitude over an eighth of a period
+
+    # Antiderivatives of the terms of the ledger, as forms of c: an integral over a segment is the form at its end minus
+    # the form at its start. Where the rate by which a product of two modes changes vanishes beside the frequency, the
+    # form would cancel: such pairs are left out of the forms, and listed.
+    linear: np.ndarray  # (s, m, WORK_MAP + 4 e): linear maps, by the columns of numerics.codes
     loss: np.ndarray  # (s, m, m, 4): viscous loss of two modes, by their real and imaginary parts
     dashpot: np.ndarray  # (s, m, m, 4): loss in the dashpots of contacts
     square: np.ndarray  # (s, m, m, 4): squared response of two modes
     damped: np.ndarray  # (s,) whether contacts with dashpots are closed
     uncoupled: np.ndarray  # (s,) whether damping couples no two free modes
-    slow: np.ndarray  # (s, p, 4): pairs left out (j, k, kind, harmonic that both turn with or -1), SUM, DIFFERENCE or
-    # ALONE; then modes (j, 0, CALM, -1)
+    slow_count: np.ndarray  # (s,) number of entries in these lists
+    slow: np.ndarray  # (s, p, 4) int: pairs left out (j, k, SUM or DIFFERENCE, harmonic that both turn with or -1),
+    # modes left out of means (j, 0, SINGLE, -1), modes whose square is integrated at once (j, 0, CALM, -1)
     slow_loss: np.ndarray  # (s, p) complex: viscous power of such a pair
     slow_dashpot: np.ndarray  # (s, p) complex: power in the dashpots
     slow_square: np.ndarray  # (s, p) complex: its share of the squared response
-    slow_count: np.ndarray  # (s,)
 
 
 def empty_flows(system: System, capacity: int = 4) -> Flows:
-    """Room for `capacity` subsystems, none of them filled (modes 0)."""
-    n, b, r, e = system.modes, system.bodies, len(system.delassus), len(system.frequency)
+    """Return room for `capacity` subsystems, none of them filled (modes 0)."""
+    s, n, b, r, e = capacity, system.modes, system.bodies, len(system.delassus), len(system.frequency)
     m = 2 * n + e + 2 * b * bool(np.isfinite(system.spring[system.friction_rows :]).any())
     pairs = m * (m + 3)
-    z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
-    f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
     return Flows(
-        np.zeros((capacity, r), np.bool_), np.zeros(capacity, np.int64), z(m), z(2 * n, m), z(2 * b, e), z(m, 2 * n),
-        z(m, 2 * b), np.zeros(capacity, np.bool_), np.zeros((capacity, b), np.bool_),
-        z(r, m), z(r, m), z(r, m), z(r, m), z(r, m), f(r, r), f(n + b, n + b), f(n + b, n),
-        f(b, b), z(b, m), z(m), f(m), f(m), z(m), np.zeros((capacity, e + 1), np.int64), z(m),
-        z(e, m), z(m), f(m, 12 + 4 * e), f(m, m, 4), f(m, m, 4), f(m, m, 4),
-        np.zeros(capacity, np.bool_), np.zeros(capacity, np.bool_), np.zeros((capacity, pairs, 4), np.int64),
-        z(pairs), z(pairs), z(pairs), np.zeros(capacity, np.int64),
-    )  # fmt: skip
+        active_set=np.zeros((s, r), np.bool_),
+        modes=np.zeros(s, np.int64),
+        eigenvalue=np.zeros((s, m), complex),
+        sprung=np.zeros(s, np.bool_),
+        attached=np.zeros((s, b), np.bool_),
+        shape=np.zeros((s, 2 * n, m), complex),
+        motion=np.zeros((s, r, m), complex),
+        velocity=np.zeros((s, r, m), complex),
+        force=np.zeros((s, r, m), complex),
+        impulse=np.zeros((s, r, m), complex),
+        response=np.zeros((s, m), complex),
+        momentum=np.zeros((s, m), complex),
+        work=np.zeros((s, e, m), complex),
+        driven=np.zeros((s, e + 1), np.int64),
+        load=np.zeros((s, m), complex),
+        project=np.zeros((s, m, 2 * n), complex),
+        project_slip=np.zeros((s, m, 2 * b), complex),
+        excited=np.zeros((s, 2 * b, e), complex),
+        static=np.zeros((s, n + b, n + b)),
+        constrained=np.zeros((s, n + b, n)),
+        body_acceleration=np.zeros((s, b, b)),
+        closed_inverse=np.zeros((s, r, r)),
+        impulse_response=np.zeros((s, r, m), complex),
+        speed=np.zeros((s, m)),
+        acceleration=np.zeros((s, m)),
+        eighth_factor=np.zeros((s, m), complex),
+        linear=np.zeros((s, m, WORK_MAP + 4 * e)),
+        loss=np.zeros((s, m, m, 4)),
+        dashpot=np.zeros((s, m, m, 4)),
+        square=np.zeros((s, m, m, 4)),
+        damped=np.zeros(s, np.bool_),
+        uncoupled=np.zeros(s, np.bool_),
+        slow_count=np.zeros(s, np.int64),
+        slow=np.zeros((s, pairs, 4), np.int64),
+        slow_loss=np.zeros((s, pairs), complex),
+        slow_dashpot=np.zeros((s, pairs), complex),
+        slow_square=np.zeros((s, pairs), complex),
+    )
 
 
 def add_flow(flows: Flows, system: System, closed: np.ndarray) -> Flows:
-    """The stack with the subsystem of the closed rows (r,) in its first free place.
+    """Return the stack with the subsystem of the closed rows (r,) in its first free place.
 
     Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
     Raises IllConditioned (exact.complex_modes) for one that doubles cannot resolve.
@@ -127,11 +165,11 @@ def add_flow(flows: Flows, system: System, closed: np.ndarray) -> Flows:
             flows = empty_flows(system, size)
         else:
             more = empty_flows(system, size)
-            flows = Flows(*(np.concatenate([old, new]) for old, new in zip(flows, more, strict=True)))
+            flows = Flows._make(np.concatenate(pair) for pair in zip(flows, more, strict=True))
         free = np.flatnonzero(flows.modes == 0)
     place = free[0]
     _fill(flows, system, place, np.flatnonzero(closed))
-    flows.key[place] = closed
+    flows.active_set[place] = closed
     return flows
 
 
@@ -142,7 +180,7 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
     springs = _sprung_bodies(system, cluster, sprung)
     carrier[springs.anchored] = system.floor[springs.anchored]
     free = (cluster >= 0) & ~springs.anchored
-    # coordinates z = (p, xi): bodies are at x = carrier p + xi, besides the parabolas of free ones; z = lift eta
+    # coordinates z = (p, xi): bodies are at x = carrier p + xi, free ones with parabolas added; z = lift eta
     basis = null_space(inner) if len(inner) else np.eye(n)
     lift, drop = block_diag(basis, springs.lift), block_diag(basis.T, springs.drop)
     spread = np.vstack([np.hstack([np.eye(n), carrier.T]), np.hstack([np.zeros((b, n)), np.eye(b)])])
@@ -185,14 +223,13 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
     flows.shape[s, :, :m] = full[structure]
     flows.excited[s] = full[xi, :e]
     flows.project[s, e:m], flows.project_slip[s, e:m] = project[:, structure], project[:, xi]
-    flows.kick[s, :, e:m] = system.of_structure.J @ project[:, n + b : 2 * n + b].T
+    flows.impulse_response[s, :, e:m] = system.of_structure.J @ project[:, n + b : 2 * n + b].T
     own = full[n : n + b].copy()
     own[free, :e] -= (system.of_bodies.load / system.of_bodies.mass).T[free] / system.frequency**2
     body = carrier @ full[:n] + own
     for c in np.unique(springs.cluster[free]):
         members = free & (springs.cluster == c)
         flows.body_acceleration[s][np.ix_(members, members)] = 1 / system.of_bodies.mass[members].sum()
-    flows.body[s, :, :m] = body
     motion = functional @ full[:n] + system.of_bodies.J @ own
     terms = np.abs(functional) @ np.abs(full[:n]) + np.abs(system.of_bodies.J) @ np.abs(own)
     # a row that others hold is at rest: round-off would make a Jenkins element there stick and slip without end
@@ -201,7 +238,7 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
     flows.static[s] = flexibility @ loads
     if len(inner):
         kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
-        flows.held[s] = kept - flexibility @ (elastic @ lift).T @ elastic @ kept
+        flows.constrained[s] = kept - flexibility @ (elastic @ lift).T @ elastic @ kept
     flows.response[s, :m] = system.of_structure.response @ full[:n]
     flows.response[s, :e] += system.table
     rate = np.abs(flows.eigenvalue[s, :m])
@@ -211,7 +248,7 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
         [np.abs(functional) @ np.abs(full[:n]), np.abs(system.of_structure.response) @ np.abs(full[:n])]
     ).max(axis=0)
     flows.speed[s, :m], flows.acceleration[s, :m] = size * rate, np.maximum(size, held) * rate**2
-    flows.turn[s, :m] = np.exp(flows.eigenvalue[s, :m] * system.period / 8)
+    flows.eighth_factor[s, :m] = np.exp(flows.eigenvalue[s, :m] * system.period / 8)
     _fill_forces(flows, system, s, full[structure], rigid, sprung)
     _fill_energy(flows, system, s, full[structure], body)
 
@@ -221,7 +258,7 @@ def _check_split(
 ) -> None:
     """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
 
-    Each coordinate counts by what the rows and the response feel of it (felt (n,)), its rate by its own frequency or
+    Each coordinate counts by its share in the rows and the response (felt (n,)), its rate by its own frequency or
     that of the excitation.
     """
     n, b = system.modes, system.bodies
@@ -270,8 +307,8 @@ def _fill_forces(flows: Flows, system: System, s: int, full: np.ndarray, rigid: 
 def _excite(
     system: System, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
 ) -> tuple[_Modes, np.ndarray, np.ndarray, np.ndarray]:
-    """The modes, driven ones first, in order of the harmonics that drive them; eta (k, e) in step with the harmonics of
-    a load (k, e), without the share of the modes that they drive; harmonic and growth (d,) of each driven mode.
+    """Return the modes, driven ones first, in order of the harmonics that drive them; eta (k, e) in step with the
+    harmonics of a load (k, e), without the share of driven modes; harmonic and growth (d,) of each driven mode.
     """
     eigenvalue, shape, project = modes
     k, e = load.shape
@@ -287,7 +324,7 @@ def _excite(
         push = project[:, k:] @ load[:, h]
         harmonic[:, h] = shape[:k] @ np.where(driven, 0, push / np.where(driven, 1, apart))
         driver[driven] = h
-        # a real load is half of what turns with the harmonic, half of what turns against it, in step with the conjugate
+        # a real load turns half with the harmonic, half against it, in step with the conjugate
         growth[driven] = push[driven] / 2
     if np.all(driver == e):
         return modes, harmonic, driver[:0], growth[:0]
@@ -298,7 +335,7 @@ def _excite(
 
 
 def _growth(flows: Flows, s: int) -> np.ndarray:
-    """Rates (m, e) at which each harmonic makes the modes grow that it drives."""
+    """Return the rates (m, e) at which each harmonic makes the modes grow that it drives."""
     m, driven = flows.modes[s], flows.driven[s]
     growth = np.zeros((m, len(driven) - 1), complex)
     for h in range(len(driven) - 1):
@@ -308,7 +345,7 @@ def _growth(flows: Flows, s: int) -> np.ndarray:
 
 
 def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
-    """Time derivative of functionals (..., m) of the amplitudes."""
+    """Return the time derivative of functionals (..., m) of the amplitudes."""
     m, growth = flows.modes[s], _growth(flows, s)
     rate: np.ndarray = functional * flows.eigenvalue[s, :m]
     rate[..., : growth.shape[1]] += functional @ growth
@@ -331,12 +368,12 @@ def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: n
     along, _ = _reciprocal(rate + rate[:e, None], system.period)
     against, _ = _reciprocal(rate - rate[:e, None], system.period, together[:e])
     back, _ = _reciprocal(rate.conj() - rate[0], system.period)
-    alone, slow_alone = _reciprocal(rate, system.period)
-    mean = 2 * _antiderivative(response, alone, load)
+    single, slow_single = _reciprocal(rate, system.period)
+    mean = 2 * _antiderivative(response, single, load)
     free_momentum = free @ flows.velocity[s, : len(free), :m]
     response_back, momentum_back = (_antiderivative(part.conj(), back, load.conj()) for part in (response, momentum))
     flows.work[s, :, :m], flows.momentum[s, :m] = work_back, momentum
-    flows.linear[s, :m, :12] = np.hstack([
+    flows.linear[s, :m, :WORK_MAP] = np.hstack([  # in the order of numerics.codes
         _real_map(0.5 * _antiderivative(response, against[0], load), 0.5 * response_back),
         _real_map(0.5 * _antiderivative(momentum, against[0], load), 0.5 * momentum_back),
         np.column_stack([mean.real, -mean.imag, free_momentum.real, -free_momentum.imag]),
@@ -345,7 +382,8 @@ def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: n
         with_load = _antiderivative(work[h], along[h], load)
         with_conjugate = _antiderivative(work_back[h], against[h], load)
         on_x, on_y = 0.5 * (with_load + with_conjugate), 0.5j * (with_load - with_conjugate)
-        flows.linear[s, :m, 12 + 4 * h : 16 + 4 * h] = np.column_stack([on_x.real, -on_x.imag, on_y.real, -on_y.imag])
+        of_harmonic = slice(WORK_MAP + 4 * h, WORK_MAP + 4 * (h + 1))
+        flows.linear[s, :m, of_harmonic] = np.column_stack([on_x.real, -on_x.imag, on_y.real, -on_y.imag])
     sprung = np.isfinite(system.spring) & flows.force[s].any(axis=1)
     push, damper = flows.velocity[s, sprung, :m], np.diag(system.dashpot[sprung])
     reciprocal, slow = zip(
@@ -377,21 +415,21 @@ def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: n
         half = 0.5 if j == k else 1.0
         for form, product in zip(forms[1], products, strict=True):
             form[s, i] = half * product[kind][j, k]
-    listed += [(j, 0, ALONE, -1) for j in np.flatnonzero(slow_alone)]
-    flows.slow_square[s, count : len(listed)] = 2 * np.where(calm, 0, response)[slow_alone]
+    listed += [(j, 0, SINGLE, -1) for j in np.flatnonzero(slow_single)]
+    flows.slow_square[s, count : len(listed)] = 2 * np.where(calm, 0, response)[slow_single]
     listed += [(j, 0, CALM, -1) for j in np.flatnonzero(calm)]
     flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 4)
     flows.slow_count[s] = len(listed)
 
 
 def _reciprocal(rate: np.ndarray, period: float, together: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """1/rate, 0 where a product with this rate hardly changes over a period or is said to, and whether that is so."""
+    """Return 1/rate, 0 where a product with this rate hardly changes over a period or is in `together`; and where."""
     slow = (np.abs(rate) * period < SLOW) | together
     return np.where(slow, 0, 1 / np.where(slow, 1, rate)), slow
 
 
 def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Functional (..., m) of the amplitudes whose rate is the one given; `reciprocal` of the rates of its terms.
+    """Return the functional (..., m) of the amplitudes with a given rate; `reciprocal` of the rates of its terms.
 
     By parts: a driven mode's rate has a term in its harmonic, by `load` (m, e).
     """
@@ -403,7 +441,7 @@ def _antiderivative(functional: np.ndarray, reciprocal: np.ndarray, load: np.nda
 def _antiderivatives(
     product: np.ndarray, reciprocal: np.ndarray, left: np.ndarray, right: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same for a form (m, m), with the loads on its two factors: what is left to slow pairs, and the form."""
+    """Return the same for a form (m, m), with the loads on its two factors: the part of slow pairs, and the form."""
     rest, integral, e = product, product * reciprocal, left.shape[1]
     for _ in range(2 if left.any() else 0):  # the second time for pairs of harmonics
         rest = product.copy()
@@ -414,19 +452,20 @@ def _antiderivatives(
 
 
 def _real_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Coefficients (..., 4) of the real map a c + b conj(c): real part by Re c and Im c, imaginary part by these."""
+    """Return coefficients (..., 4) of the map a c + b conj(c): its real part by Re c and Im c, its imaginary part."""
     return np.stack([(a + b).real, (b - a).imag, (a + b).imag, (a - b).real], axis=-1)
 
 
 def _real_form(both: np.ndarray, mixed: np.ndarray) -> np.ndarray:
-    """Coefficients (m, m, 4) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts."""
+    """Return coefficients (m, m, 4) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts."""
     return 0.5 * _real_map(both, mixed) * [1, 1, -1, -1]
 
 
 def _attachment(system: System, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Who moves with whom: (functional each body rides on, its free cluster or -1 if it rides, inner constraints).
+    """Return the functional (b, n) of each body that moves with the structure, free clusters and inner constraints.
 
-    An inner constraint is a combination of closed rows that ties two functionals of the structure to each other.
+    Cluster (b,): number of the bodies that move freely together, -1 for one that moves with the structure. An inner
+    constraint is a combination of closed rows that ties two functionals of the structure to each other.
     """
     n, b = system.of_structure.J.shape[1], system.bodies
     carrier, known = np.zeros((b, n)), np.zeros(b, bool)
@@ -451,7 +490,7 @@ def _attachment(system: System, closed: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _connected(links: list[np.ndarray], count: int) -> np.ndarray:
-    """Number of the connected part of each of `count` nodes."""
+    """Return the number of the connected part of each of `count` nodes."""
     if not links:  # the usual case, and the library takes its time
         return np.arange(count)
     graph = coo_matrix((np.ones(len(links)), np.array(links, int).T), (count, count))
@@ -459,14 +498,14 @@ def _connected(links: list[np.ndarray], count: int) -> np.ndarray:
 
 
 def _decided(system: System, r: int, known: np.ndarray) -> bool:
-    """Whether all but one of the bodies of a closed row are known to ride on the structure."""
+    """Whether all but one of the bodies of a closed row are known to move with the structure."""
     bodies = system.of_bodies.J[r] != 0
     free = np.count_nonzero(bodies & ~known)
     return free == 0 or (free == 1 and (np.count_nonzero(bodies) == 1 or bool(known[bodies].any())))
 
 
 def _functional(system: System, carrier: np.ndarray) -> np.ndarray:
-    """Functional of p in each row (r, n); exactly zero where the row's two sides ride on one functional."""
+    """Return the functional of p in each row (r, n); exactly zero where both sides of the row move alike."""
     functional: np.ndarray = system.of_structure.J + system.of_bodies.J @ carrier
     scale = (np.abs(system.of_structure.J) + np.abs(system.of_bodies.J) @ np.abs(carrier)).max(axis=1, initial=0)
     functional[np.abs(functional).max(axis=1, initial=0) <= 1e-12 * scale] = 0
@@ -483,7 +522,7 @@ class _SprungBodies(NamedTuple):
 
 
 def _sprung_bodies(system: System, cluster: np.ndarray, sprung: np.ndarray) -> _SprungBodies:
-    """Bodies that springs tie to the structure move with it; others vibrate about their common centre of mass."""
+    """Return coordinates of bodies on springs: some move with the structure, others about a common centre of mass."""
     b, groups = len(cluster), cluster.max(initial=-1) + 1
     if not len(sprung):
         return _SprungBodies(np.zeros((b, 0)), np.zeros((0, b)), np.zeros(b, bool), cluster)
@@ -508,9 +547,9 @@ def _sprung_bodies(system: System, cluster: np.ndarray, sprung: np.ndarray) -> _
 
 
 def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(k, k-1) and (k-1, k): displacements of k masses about their centre from coordinates, and these from those.
+    """Return displacements of k masses about their centre from coordinates (k, k-1), and these from those (k-1, k).
 
-    Each mass moves against all that are heavier: products of masses alone, so that a light one beside a heavy one keeps
+    Each mass moves against all that are heavier: products of masses only, so that a light one beside a heavy one keeps
     its digits (Helmert's orthogonal contrasts).
     """
     order = np.argsort(mass, kind="stable")
@@ -527,6 +566,6 @@ def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _one_of_each_pair(
     values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each conjugate pair the upper one, with twice its vector: displacement = Re(vector c)."""
+    """Return the upper one of each conjugate pair, with twice its vector: displacement = Re(vector c)."""
     keep = values.imag >= 0
     return values[keep], vectors[:, keep] * np.where(values.imag > 0, 2.0, 1.0)[keep], inverse[keep]

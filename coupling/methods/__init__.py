@@ -1,6 +1,6 @@
 """The values of `solver.method`, each a way to run a scene; coupling.scene.solver_options names their modules.
 
-A method is a module, or any object, with what the protocol `Method` says, and is loaded when a scene asks for it.
+A method is a module, or any object, with the attributes of the protocol `Method`, loaded for a scene that names it.
 Another package adds one by an entry point, whose name is the value of `solver.method`:
 
     [project.entry-points."vanedamp.methods"]
@@ -51,5 +51,5 @@ class Method(Protocol):
         """Return a run of a system at time zero.
 
         options: an instance of Options; initial: the motion at time zero; records: room for all periods, to be filled
-        (response.recorder); events: whether to keep a log of them. Raises InputError for what the method cannot do.
+        (response.recorder); events: whether to keep a log of them. Raises InputError for an impossible scene.
         """

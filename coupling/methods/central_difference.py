@@ -9,31 +9,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, TimeGrid
+from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load, row_force
 from vanedamp.coupling.methods.step_records import (
+    apply_inverse,
     close_step,
     copy,
-    damped,
+    damping_force,
     end_period,
     load_at,
     open_step,
     record_start,
     row_speed,
-    solve_inverse,
 )
+from vanedamp.coupling.numerics.codes import DONE, PERIOD
 from vanedamp.coupling.numerics.jit import entry
 from vanedamp.coupling.system.system import System
 
 
-def explicit_matrix(system: System, times: TimeGrid) -> np.ndarray:
-    """Inverse (N, N) of the mass with half a step of damping."""
+def central_difference_matrix(system: System, times: TimeGrid) -> np.ndarray:
+    """Return the inverse (N, N) of the mass with half a step of damping."""
     inverse: np.ndarray = np.linalg.inv(np.diag(system.mass) + 0.5 * times.step * system.damping)
     return inverse
 
 
 @entry
-def march_explicit(system, times, motion, records, log, inverse, slow, periods, budget, deepest):
+def march_central_difference(system, times, motion, records, log, inverse, slow, periods, budget, deepest):
     """Step to the end of `periods`. slow: (friction rows,) speed below which friction is viscous, m/s."""
     size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
     q, v, rhs, change = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
@@ -56,13 +57,13 @@ def march_explicit(system, times, motion, records, log, inverse, slow, periods, 
                 row_force(system, motion, r, row_speed(system, r, motion.q), speed[r], slow, h * speed[r])
                 impulse[r] = 0.5 * h * (old[r] + motion.force[r])
             for i in range(size):
-                rhs[i] = load_at(system, times, k + 1, i) - damped(system, motion.half, i)
+                rhs[i] = load_at(system, times, k + 1, i) - damping_force(system, motion.half, i)
                 rhs[i] -= system.stiffness[i] * motion.q[i]
             for r in range(rows):
                 if motion.force[r] != 0.0:
                     for i in range(size):
                         rhs[i] += system.J[r, i] * motion.force[r]
-            solve_inverse(inverse, system.proportional, rhs, change)
+            apply_inverse(inverse, system.proportional, rhs, change)
             for i in range(size):
                 motion.v[i] = motion.half[i] + 0.5 * h * change[i]
                 motion.half[i] += h * change[i]

@@ -1,7 +1,7 @@
 """Co-simulation: structure and bodies are separate units that exchange motion and forces once a macro-step.
 
 The structure's unit is exact between two exchanges (matrix exponential); the bodies' unit takes smaller steps of
-central differences with penalty contacts. Each extrapolates what it got from the other by a constant (hold 0) or a line
+central differences with penalty contacts. Each extrapolates the values of the other by a constant (hold 0) or a line
 (hold 1); the structure gets the mean force of a macro-step, so that no impulse is lost. Jacobi: both units start from
 the last exchange; Gauss-Seidel: the bodies already know the structure's new motion. Kuebler and Schiehlen (2000);
 Gomes and others, Co-simulation: a survey (2018).
@@ -16,10 +16,11 @@ from pydantic import Field
 from scipy.linalg import expm
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, STEPS, Motion, TimeGrid, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, time_grid
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, net_load, row_force, with_penalty
 from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
 from vanedamp.coupling.methods.time_stepping import SteppedRun
+from vanedamp.coupling.numerics.codes import DONE, PERIOD, STEPS
 from vanedamp.coupling.numerics.jit import entry, kernel
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
@@ -75,8 +76,8 @@ def begin(
 def cosimulation_matrices(
     system: System, times: TimeGrid, substeps: int, loads: Loads | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, and (steps, 2n) what the
-    excitation adds at each step of a period; loads (steps * substeps + 1, N) of the excitation on the bodies' grid.
+    """Return the exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, (steps, 2n) shares of
+    the excitation at each step of a period; loads (steps * substeps + 1, N) of the excitation on the bodies' grid.
     Loads that are no harmonics (`loads`) are linear over a macro-step.
     """
     n, e, steps = system.modes, 0 if loads else len(system.frequency), len(times.phase) - 1
@@ -107,7 +108,7 @@ def march_cosimulation(
     system, times, motion, records, log, matrix, excited, loads, memory, slow, gauss_seidel, hold, substeps, periods,
     budget, deepest,
 ):  # fmt: skip
-    """Step to the end of `periods`. memory (3, 4n + r): last velocities and mean forces; those before; scratch."""
+    """Step to the end of `periods`. memory (3, 4n + r): last velocities and mean forces; earlier ones; scratch."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
     h, steps = times.step, len(times.phase) - 1
     q, v, known = motion.coordinates[0], motion.coordinates[1], memory[2]
@@ -156,7 +157,7 @@ def march_cosimulation(
 
 @kernel
 def _structure(system, times, motion, matrix, excited, known, force, older, hold, k, q, v):
-    """The structure's macro-step under the forces that it was given."""
+    """Advance the structure by a macro-step under the forces of the bodies' last ones."""
     n, h = system.modes, times.step
     for i in range(n):
         known[i], known[n + i] = q[i], v[i]
@@ -177,7 +178,7 @@ def _structure(system, times, motion, matrix, excited, known, force, older, hold
 
 @kernel
 def _bodies(system, times, motion, loads, slow, substeps, k, place, rate, bend, mean):
-    """The bodies' macro-step on walls that move as they were told; adds up the mean forces of the rows."""
+    """Advance the bodies by a macro-step on walls of known motion; add up the mean forces of the rows."""
     n, size, rows = system.modes, len(motion.q), len(system.J)
     small = times.step / substeps
     for j in range(substeps):

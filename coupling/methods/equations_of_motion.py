@@ -1,4 +1,4 @@
-"""What methods that take time steps add to a system: their grid and their motion."""
+"""The time grid and the motion of methods that take time steps."""
 
 from __future__ import annotations
 
@@ -6,13 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.numerics.codes import COUNTERS
 from vanedamp.coupling.system.assembly import InitialMotion, Loads
 from vanedamp.coupling.system.system import System
-
-# counters of a run
-PERIOD, STEPS, IMPACTS, SOLVES, LOGGED = range(5)
-# what stepping kernels return
-DONE, DIVERGED, UNDECIDED, PENETRATION, EVENT_BUDGET = range(5)
 
 
 class TimeGrid(NamedTuple):
@@ -28,25 +24,30 @@ class TimeGrid(NamedTuple):
 class Motion(NamedTuple):
     """The state of a run, advanced in place."""
 
-    q: np.ndarray  # (N,)
-    v: np.ndarray  # (N,)
-    half: np.ndarray  # (N,) velocity half a step later (explicit), or acceleration (Newmark)
-    force: np.ndarray  # (r,) of rows, N, at the last step; impulses over it (Moreau)
+    # changes in every step
+    q: np.ndarray  # (N,) coordinates
+    v: np.ndarray  # (N,) their velocities
+    half: np.ndarray  # (N,) velocity half a step later (central differences), or acceleration (Newmark)
+    force: np.ndarray  # (r,) of rows, N
     elongation: np.ndarray  # (friction rows,) of Jenkins elements' springs, m
+    deepest: np.ndarray  # (1,) largest penetration relative to the free travel
+    losses: np.ndarray  # (6,) energies since the start, J
+    counters: np.ndarray  # (COUNTERS,) int
+
+    # changes with the contacts
     active: np.ndarray  # (r,) int: contacts that carry force
-    speed: np.ndarray  # (r,) at the beginning of the contact that is going on, m/s
+    speed: np.ndarray  # (r,) at the beginning of the present contact, m/s
     begun: np.ndarray  # (r,) time of that, s
     impulse: np.ndarray  # (r,) since then, N s
-    deepest: np.ndarray  # (1,) penetration relative to the free travel
-    losses: np.ndarray  # (6,) cumulative ledger, J
-    counters: np.ndarray  # int
-    coordinates: np.ndarray  # (6, N) scratch space
-    rows: np.ndarray  # (8, r) scratch space
-    listed: np.ndarray  # (r,) int, scratch space
+
+    # scratch, named where each method takes it
+    coordinates: np.ndarray  # (6, N)
+    rows: np.ndarray  # (8, r)
+    listed: np.ndarray  # (r,) int: rows in the problem of a step
 
 
 def time_grid(system: System, steps: int, loads: Loads | None = None) -> TimeGrid:
-    """The grid of `steps` steps a period. loads: of an excitation that is no sum of the system's harmonics."""
+    """Return the grid of `steps` steps a period. loads: of an excitation that is no sum of the system's harmonics."""
     angle = 2 * np.pi * np.arange(steps + 1) / steps
     phases = system.phases(angle)
     table = np.column_stack([system.table, 1j * system.frequency * system.table])
@@ -60,13 +61,13 @@ def time_grid(system: System, steps: int, loads: Loads | None = None) -> TimeGri
 
 
 def start(system: System, initial: InitialMotion) -> Motion:
-    """The motion at time zero."""
+    """Return the motion at time zero."""
     size, r, b = len(system.mass), len(system.J), system.bodies
     q = np.concatenate([initial.p, initial.displacement[:b] + system.floor @ initial.p])
     v = np.concatenate([initial.p_rate, initial.velocity[:b] + system.floor @ initial.p_rate])
     return Motion(
         q=q, v=v, half=np.zeros(size), force=np.zeros(r), elongation=np.zeros(system.friction_rows),
         active=np.zeros(r, np.int64), speed=np.zeros(r), begun=np.zeros(r), impulse=np.zeros(r), deepest=np.zeros(1),
-        losses=np.zeros(6), counters=np.zeros(5, np.int64),
+        losses=np.zeros(6), counters=np.zeros(COUNTERS, np.int64),
         coordinates=np.zeros((6, size)), rows=np.zeros((8, r)), listed=np.zeros(r, np.int64),
     )  # fmt: skip

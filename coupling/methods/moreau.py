@@ -15,19 +15,20 @@ import numpy as np
 from pydantic import Field
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, Motion, TimeGrid, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, time_grid
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
+    apply_inverse,
     close_step,
-    damped,
+    damping_force,
     end_period,
     load_at,
     open_step,
     record_start,
     row_speed,
-    solve_inverse,
 )
 from vanedamp.coupling.methods.time_stepping import SteppedRun
+from vanedamp.coupling.numerics.codes import DONE, PERIOD, SOLVES, UNDECIDED
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.response.evaluation import Run
@@ -43,6 +44,8 @@ WAVEFORMS = True
 
 #: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
 _TURNS, _ROUND_OFF = 20, 1e-12
+#: row of Motion.rows: whether a rigid contact is closed
+_CLOSED = 4
 
 
 class Options(SteppingOptions):
@@ -71,7 +74,7 @@ def begin(
 
 
 def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Inverse of the iteration matrix (N, N), its product with J^T (N, r), and the rows' mobility (r, r)."""
+    """Return the inverse of the iteration matrix (N, N), its product with J^T (N, r), and the rows' mobility (r, r)."""
     h = times.step
     matrix = np.diag(system.mass + (h * theta) ** 2 * system.stiffness) + h * theta * system.damping
     inverse = np.linalg.inv(matrix)
@@ -83,7 +86,7 @@ def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.n
 def march_moreau(
     system, times, motion, records, log, problem, inverse, turned, mobility, theta, periods, budget, deepest
 ):
-    """Step to the end of `periods`. Returns one of the codes of methods.equations_of_motion."""
+    """Step to the end of `periods`. Return the code of numerics.codes."""
     size, rows, h, steps = len(motion.q), len(system.J), times.step, len(times.phase) - 1
     q, v, rhs, free = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2], motion.coordinates[3]
     impulse, speed, before = motion.rows[0], motion.rows[1], motion.rows[2, : system.friction_rows]
@@ -94,8 +97,8 @@ def march_moreau(
             open_step(system, times, motion, records, k, q, v, before)
             for i in range(size):
                 load = theta * load_at(system, times, k + 1, i) + (1.0 - theta) * load_at(system, times, k, i)
-                rhs[i] = h * (load - damped(system, v, i) - system.stiffness[i] * (q[i] + h * theta * v[i]))
-            solve_inverse(inverse, system.proportional, rhs, free)
+                rhs[i] = h * (load - damping_force(system, v, i) - system.stiffness[i] * (q[i] + h * theta * v[i]))
+            apply_inverse(inverse, system.proportional, rhs, free)
             for i in range(size):
                 free[i] += v[i]
             for r in range(rows):
@@ -150,15 +153,15 @@ def _impulses(system, times, motion, problem, mobility, turned, free, speed, imp
 def _approaching(system, motion, free, slowest):
     """Whether a closed rigid contact still approaches."""
     for r in range(system.friction_rows, len(system.J)):
-        if motion.rows[4, r] > 0.0 and row_speed(system, r, free) < -slowest:
+        if motion.rows[_CLOSED, r] > 0.0 and row_speed(system, r, free) < -slowest:
             return True
     return False
 
 
 @kernel
 def _list_rows(system, times, motion, problem, mobility, free, speed, impulse, theta, turn, slowest, last):
-    """Set up the problem of the rows that take part in a turn. Returns how many they are."""
-    h, count, closed = times.step, 0, motion.rows[4]
+    """Set up the problem of the rows that take part in a turn. Return their number."""
+    h, count, closed = times.step, 0, motion.rows[_CLOSED]
     for r in range(len(system.J)):
         low, high, shift, soft = 0.0, np.inf, 0.0, 0.0
         now = row_speed(system, r, free)

@@ -12,20 +12,21 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import DONE, PERIOD, SOLVES, UNDECIDED, TimeGrid
+from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
+    apply_inverse,
     close_step,
     copy,
-    damped,
+    damping_force,
     end_period,
     load_at,
     open_step,
     record_start,
     row_speed,
-    solve_inverse,
 )
+from vanedamp.coupling.numerics.codes import DONE, PERIOD, SOLVES, UNDECIDED
 from vanedamp.coupling.numerics.jit import entry, kernel
 from vanedamp.coupling.system.system import System
 
@@ -33,7 +34,7 @@ from vanedamp.coupling.system.system import System
 def newmark_matrices(
     system: System, times: TimeGrid, alpha: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Parameters alpha, beta, gamma; inverse iteration matrix, (1 + alpha) times its product with J^T, mobility."""
+    """Return alpha, beta, gamma; inverse iteration matrix, (1 + alpha) times its product with J^T, mobility."""
     h, beta, gamma = times.step, (1 - alpha) ** 2 / 4, 0.5 - alpha
     matrix = np.diag(system.mass + (1 + alpha) * beta * h**2 * system.stiffness)
     inverse = np.linalg.inv(matrix + (1 + alpha) * gamma * h * system.damping)
@@ -65,11 +66,11 @@ def march_newmark(
                 ahead[i] = q[i] + h * v[i] + h * h * (0.5 - beta) * a
                 fast[i] = v[i] + h * (1.0 - gamma) * a
             for i in range(size):
-                new = load_at(system, times, k + 1, i) - damped(system, fast, i) - system.stiffness[i] * ahead[i]
+                new = load_at(system, times, k + 1, i) - damping_force(system, fast, i) - system.stiffness[i] * ahead[i]
                 rhs[i] = (1.0 + alpha) * new
                 if alpha != 0.0:
                     rhs[i] -= alpha * net_load(system, times, motion, q, v, k, i)
-            solve_inverse(inverse, system.proportional, rhs, accel)
+            apply_inverse(inverse, system.proportional, rhs, accel)
             for i in range(size):
                 ahead[i] += beta * h * h * accel[i]
                 fast[i] += gamma * h * accel[i]
@@ -105,7 +106,7 @@ def march_newmark(
 
 @kernel
 def _list_rows(system, times, motion, problem, listed, mobility, ahead, fast, q, slow, beta, gamma):
-    """Set up the problem of the rows that may carry force. Returns how many they are."""
+    """Set up the problem of the rows that may carry force. Return their number."""
     h, count = times.step, 0
     for r in range(len(system.J)):
         speed, displacement = row_speed(system, r, fast), row_speed(system, r, ahead)

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.central_difference import explicit_matrix, march_explicit
+from vanedamp.coupling.methods.central_difference import central_difference_matrix, march_central_difference
 from vanedamp.coupling.methods.equations_of_motion import Motion, time_grid
 from vanedamp.coupling.methods.newmark import march_newmark, newmark_matrices
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, with_penalty
@@ -50,10 +50,10 @@ def begin(
     soft, slow = with_penalty(system, times, options)
     budget, deepest = options.max_events, options.penetration
     if options.scheme == "central_difference":
-        inverse = explicit_matrix(soft, times)
+        inverse = central_difference_matrix(soft, times)
 
         def march(motion: Motion, log: np.ndarray, periods: int) -> int:
-            return march_explicit(soft, times, motion, records, log, inverse, slow, periods, budget, deepest)
+            return march_central_difference(soft, times, motion, records, log, inverse, slow, periods, budget, deepest)
 
     else:
         problem = new_problem(len(soft.J))

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid
-from vanedamp.coupling.methods.step_records import damped, load_at, row_speed
+from vanedamp.coupling.methods.step_records import damping_force, load_at, row_speed
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.solver_options import SteppingOptions
@@ -36,7 +36,7 @@ class PenaltyOptions(SteppingOptions):
 
 
 def with_penalty(system: System, times: TimeGrid, options: PenaltyOptions) -> tuple[System, np.ndarray]:
-    """Rigid contacts as springs and dashpots, and the slip speed (friction rows,) below which friction is viscous.
+    """Return rigid contacts as springs and dashpots, and the slip speed (friction rows,) of regularised friction.
 
     The spring makes a contact last `contact_steps` steps: unless given, 2 steps^(1/3) of them, which makes the error of
     a contact that is too soft and that of one resolved by too few steps fall alike. The dashpot gives an isolated
@@ -65,7 +65,7 @@ def with_penalty(system: System, times: TimeGrid, options: PenaltyOptions) -> tu
 
 @kernel
 def first_forces(system, times, motion, slow):
-    """Forces of the rows by their laws (penalty contacts, regularised friction) at motion.q, motion.v."""
+    """Set the forces of the rows by their laws (penalty contacts, regularised friction) at motion.q, motion.v."""
     for r in range(len(system.J)):
         row_force(system, motion, r, row_speed(system, r, motion.q), row_speed(system, r, motion.v), slow, 0.0)
 
@@ -91,8 +91,8 @@ def row_force(system, motion, r, displacement, speed, slow, moved):
 
 @inlined
 def net_load(system, times, motion, q, v, k, i):
-    """Sum of the forces on coordinate i at step k of the period."""
-    force = load_at(system, times, k, i) - damped(system, v, i) - system.stiffness[i] * q[i]
+    """Return the sum of the forces on coordinate i at step k of the period."""
+    force = load_at(system, times, k, i) - damping_force(system, v, i) - system.stiffness[i] * q[i]
     for r in range(len(system.J)):
         if motion.force[r] != 0.0:
             force += system.J[r, i] * motion.force[r]

@@ -54,7 +54,7 @@ def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: 
 def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, start: RestartState | None = None) -> Run:
     """Return a run of the scene's method at time zero.
 
-    Raises InputError for what the method cannot do, such as to begin with the state of another run.
+    Raises InputError for a scene that the method cannot run, such as one that begins with the state of another run.
     """
     method: Method = METHODS.part(scene.solver.method)
     if start is not None and (reason := why_no_restart(scene)):

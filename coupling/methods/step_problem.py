@@ -20,7 +20,7 @@ def list_row(problem, listed, mobility, count, r, free, low, high, soft):
 
 @kernel
 def solve_rows(problem, count):
-    """Solve the problem; one row alone in closed form. Returns whether there is a solution."""
+    """Solve the problem, of a single row in closed form. Return whether there is a solution."""
     if count > 1:
         return solve_box(problem, count, 0.0)
     problem.force[0] = min(max(-problem.b[0] / problem.matrix[0, 0], problem.low[0]), problem.high[0])

@@ -1,19 +1,10 @@
-"""What every step of a stepping method leaves in the records: energies, harmonic, peaks, impacts, penetration."""
+"""The records of a step of any stepping method: energies, harmonic, peaks, impacts, penetration."""
 
 from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.methods.equations_of_motion import (
-    DIVERGED,
-    DONE,
-    EVENT_BUDGET,
-    IMPACTS,
-    LOGGED,
-    PENETRATION,
-    PERIOD,
-    STEPS,
-)
+from vanedamp.coupling.numerics.codes import DIVERGED, DONE, EVENT_BUDGET, IMPACTS, LOGGED, PENETRATION, PERIOD, STEPS
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.response.recorder import cubic_peak, put_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
@@ -24,7 +15,7 @@ _BOUND = 1e30
 
 @inlined
 def response_of(system, times, k, q):
-    """Displacement at the response, at step k of the period."""
+    """Return the displacement at the response, at step k of the period."""
     x = times.table[k, 0]
     for i in range(system.modes):
         x += system.response[i] * q[i]
@@ -33,7 +24,7 @@ def response_of(system, times, k, q):
 
 @inlined
 def rate_of(system, times, k, v):
-    """Velocity at the response, at step k of the period."""
+    """Return the velocity at the response, at step k of the period."""
     rate = times.table[k, 1]
     for i in range(system.modes):
         rate += system.response[i] * v[i]
@@ -42,7 +33,7 @@ def rate_of(system, times, k, v):
 
 @inlined
 def row_speed(system, r, v):
-    """Velocity of row r."""
+    """Return the velocity of row r."""
     speed = 0.0
     for i in range(len(v)):
         speed += system.J[r, i] * v[i]
@@ -67,31 +58,31 @@ def record_start(system, motion, records):
 
 @inlined
 def row_gap(system, r, q):
-    """Displacement of row r."""
+    """Return the displacement of row r."""
     return system.rest[r] + row_speed(system, r, q)
 
 
 @inlined
 def open_step(system, times, motion, records, k, q, v, before):
-    """Keep the state that step k of the period begins with in q, v (N,) and before (friction rows,); take a sample."""
+    """Keep the state at the start of step k of the period in q, v (N,) and before (friction rows,); take a sample."""
     copy(motion.q, q)
     copy(motion.v, v)
     copy(motion.elongation, before)
-    sample(system, times, motion, records, k, q)
+    record_sample(system, times, motion, records, k, q)
 
 
 @inlined
 def close_step(system, times, motion, records, log, k, q, v, speed, impulse, before, deepest):
-    """Follow contacts and account for step k from what `open_step` kept; speed (r,) of the rows at its start.
+    """Follow contacts and account for step k from the state that `open_step` kept; speed (r,) of the rows then.
 
     Returns DONE, DIVERGED or PENETRATION.
     """
     follow_contacts(system, times, motion, records, log, k, speed, impulse)
-    return tally(system, times, motion, records, k, q, v, impulse, before, deepest)
+    return account_step(system, times, motion, records, k, q, v, impulse, before, deepest)
 
 
 @inlined
-def tally(system, times, motion, records, k, q, v, impulse, before, deepest):
+def account_step(system, times, motion, records, k, q, v, impulse, before, deepest):
     """Account for step k of the period, from q, v to motion.q, motion.v, with the impulses (r,) of the rows.
 
     before: (friction rows,) elongations of Jenkins springs. Returns DONE, DIVERGED or PENETRATION.
@@ -100,7 +91,7 @@ def tally(system, times, motion, records, k, q, v, impulse, before, deepest):
     c0, s0, c1, s1 = times.phase[k, 0], times.phase[k, 1], times.phase[k + 1, 0], times.phase[k + 1, 1]
     x0, x1 = response_of(system, times, k, q), response_of(system, times, k + 1, motion.q)
     rate0, rate1 = rate_of(system, times, k, v), rate_of(system, times, k + 1, motion.v)
-    _waves(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, motion.v)
+    _record_response(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, motion.v)
     size = abs(x1)
     for i in range(len(q)):
         moved = motion.q[i] - q[i]
@@ -139,8 +130,8 @@ def tally(system, times, motion, records, k, q, v, impulse, before, deepest):
 
 
 @inlined
-def _waves(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after):
-    """Peak, mean square, harmonic and momentum of a step."""
+def _record_response(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after):
+    """Record peak, mean square, harmonic and momentum of a step."""
     records.peak[p] = max(records.peak[p], abs(x1), cubic_peak(h, x0, x1, rate0, rate1))
     records.square[p] += h * (x0 * x0 + x1 * x1) / 2.0
     records.harmonic[p] += h / 2.0 * complex(x0 * c0 + x1 * c1, -x0 * s0 - x1 * s1)
@@ -180,7 +171,7 @@ def follow_contacts(system, times, motion, records, log, k, speed, impulse):
 
 
 @inlined
-def sample(system, times, motion, records, k, q):
+def record_sample(system, times, motion, records, k, q):
     """Keep a sample if step k of the period begins at one."""
     steps, b = len(times.phase) - 1, system.bodies
     each = len(records.samples) // max(len(records.peak) - 1, 1)
@@ -195,8 +186,8 @@ def sample(system, times, motion, records, k, q):
 
 
 @inlined
-def solve_inverse(inverse, diagonal, vector, result):
-    """result = inverse vector; a diagonal inverse is used as such."""
+def apply_inverse(inverse, diagonal, vector, result):
+    """Set result = inverse vector; a diagonal inverse is used as such."""
     for i in range(len(vector)):
         if diagonal:
             result[i] = inverse[i, i] * vector[i]
@@ -207,8 +198,8 @@ def solve_inverse(inverse, diagonal, vector, result):
 
 
 @inlined
-def damped(system, v, i):
-    """Viscous force on coordinate i."""
+def damping_force(system, v, i):
+    """Return the viscous force on coordinate i."""
     if i >= system.modes:
         return 0.0
     force = 0.0
@@ -219,7 +210,7 @@ def damped(system, v, i):
 
 @inlined
 def load_at(system, times, k, i):
-    """Load on coordinate i at step k of the period, weight included, N."""
+    """Return the load on coordinate i at step k of the period, weight included, N."""
     return times.load[k, i] + system.weight[i]
 
 

@@ -1,1 +1,1 @@
-"""Numerical methods without physics."""
+"""Numerical methods without physics, and the table of codes."""

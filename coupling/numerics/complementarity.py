@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.numerics.codes import AT_HIGH, AT_LOW, DEPENDENT, FREE, OUT
 from vanedamp.coupling.numerics.jit import entry, kernel
 
-OUT, FREE, AT_LOW, AT_HIGH, DEPENDENT = np.arange(5)
 NONE = np.int64(-1)
 _ROUND_OFF = 1e-12
 _DEPENDENCE = 1e-9
@@ -28,12 +28,12 @@ _DEPENDENCE = 1e-9
 def solve_box(problem, k, scale):
     """Solve the first k rows in place: forces, accelerations, and states FREE, AT_LOW, AT_HIGH or DEPENDENT.
 
-    scale: size of the terms that b is the sum of, which sets what counts as round-off.
+    scale: size of the terms that b is the sum of, which sets the round-off.
     problem.forced: 0, or AT_LOW / AT_HIGH for a row whose force has just reached that bound on its way out: it stays
     there unless its acceleration then contradicts (forced becomes 0). Rows found at a bound without acceleration are
     marked in the same way.
     DEPENDENT rows are at rest because FREE rows hold them; their force keeps a value within its bounds.
-    Returns False if the budget of pivots is spent (a guard: positive semidefinite problems end).
+    Returns False if the budget of pivots is spent (a safeguard: positive semidefinite problems end).
     """
     f, a, state, forced = problem.force, problem.acceleration, problem.state, problem.forced
     for i in range(k):
@@ -60,7 +60,7 @@ def solve_box(problem, k, scale):
             if not _drive(problem, k, i, tolerance):
                 return False
     for i in range(k):
-        # what held a row may have gone to its bound since
+        # the rows that held it may have gone to their bounds
         if state[i] == DEPENDENT and not _dependent(problem, k, i):
             state[i] = FREE
     for i in range(k):
@@ -88,7 +88,7 @@ def _drive(problem, k, i, tolerance):
             state[i] = AT_HIGH if way > 0.0 else AT_LOW
             return True
         _respond(problem, k, i, way)
-        step, who, at_bound = (bound - f[i]) * way, i, True
+        step, stops, at_bound = (bound - f[i]) * way, i, True
         if da[i] * way > 0.0 and -a[i] / da[i] <= step:
             step, at_bound = -a[i] / da[i], False
         for j in range(k):
@@ -98,36 +98,36 @@ def _drive(problem, k, i, tolerance):
                 if df[j] != 0.0:
                     room = ((problem.high[j] if df[j] > 0.0 else problem.low[j]) - f[j]) / df[j]
                     if room < step:
-                        step, who, at_bound = max(room, 0.0), j, True
+                        step, stops, at_bound = max(room, 0.0), j, True
             elif state[j] == DEPENDENT:
                 # a row that FREE rows held takes over at once when they no longer do
                 if abs(da[j]) > _DEPENDENCE * np.sqrt(problem.matrix[i, i] * problem.matrix[j, j]):
-                    step, who, at_bound = 0.0, j, False
+                    step, stops, at_bound = 0.0, j, False
             elif problem.forced[j] == 0 and (
                 (state[j] == AT_LOW and da[j] < 0.0) or (state[j] == AT_HIGH and da[j] > 0.0)
             ):
                 room = max(-a[j] / da[j], 0.0)
                 if room < step and not _dependent_beside(problem, k, j, i):
-                    step, who, at_bound = room, j, False
+                    step, stops, at_bound = room, j, False
         if step == np.inf:
             return False
         for j in range(k):
             f[j] += step * df[j]
             a[j] += step * da[j]
         if not at_bound:
-            state[who], a[who] = FREE, 0.0
+            state[stops], a[stops] = FREE, 0.0
         else:
-            high = df[who] > 0.0
-            state[who] = AT_HIGH if high else AT_LOW
-            f[who] = problem.high[who] if high else problem.low[who]
-        if who == i:
+            high = df[stops] > 0.0
+            state[stops] = AT_HIGH if high else AT_LOW
+            f[stops] = problem.high[stops] if high else problem.low[stops]
+        if stops == i:
             return True
     return False
 
 
 @kernel
 def _respond(problem, k, i, way):
-    """Change of all forces and accelerations as f_i moves by `way` and the FREE rows keep their acceleration."""
+    """Set the change of all forces and accelerations as f_i changes by `way` and FREE rows keep their acceleration."""
     df, da = problem.d_force, problem.d_acceleration
     for j in range(k):
         df[j] = 0.0
@@ -142,7 +142,7 @@ def _respond(problem, k, i, way):
             da[j] += problem.matrix[j, l] * df[l]
             size += abs(problem.matrix[j, l] * df[l])
         if abs(da[j]) <= _ROUND_OFF * size:
-            da[j] = 0.0  # a row that FREE rows hold: it would come in and go out for ever
+            da[j] = 0.0  # a row that FREE rows hold would come in and go out for ever
     for p in range(count):
         da[problem.free[p]] = 0.0
     if da[i] * way <= _DEPENDENCE * problem.matrix[i, i]:
@@ -151,7 +151,7 @@ def _respond(problem, k, i, way):
 
 @kernel
 def _free_rows(problem, k, but, also):
-    """List the FREE rows except `but`, and the row `also` (NONE: none). Returns how many."""
+    """List the FREE rows except `but`, and the row `also` (NONE: none). Return their number."""
     count = 0
     for j in range(k):
         if j != but and (problem.state[j] == FREE or j == also):
@@ -175,7 +175,7 @@ def _dependent_beside(problem, k, j, i):
 
 @kernel
 def _rest(problem, count, i):
-    """Schur complement of row i after the `count` listed free rows."""
+    """Return the Schur complement of row i after the `count` listed free rows."""
     _solve(problem, count, i)
     rest = problem.matrix[i, i]
     for p in range(count):
@@ -205,30 +205,44 @@ def _solve(problem, count, i):
 
 
 class Problem(NamedTuple):
-    """A complementarity problem of up to r rows with the space to solve it (numerics.complementarity)."""
+    """A complementarity problem of up to r rows with the space to solve it."""
 
-    matrix: np.ndarray  # (r, r)
-    b: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    forced: np.ndarray
-    force: np.ndarray
-    acceleration: np.ndarray
-    state: np.ndarray
-    restitution: np.ndarray
-    d_force: np.ndarray
-    d_acceleration: np.ndarray
-    free: np.ndarray
-    factor: np.ndarray  # (r, r)
-    solution: np.ndarray
+    # the problem
+    matrix: np.ndarray  # (r, r) A
+    b: np.ndarray  # (r,) accelerations without forces
+    low: np.ndarray  # (r,) bounds of the forces
+    high: np.ndarray  # (r,)
+    forced: np.ndarray  # (r,) int: the bound that a force has just reached, otherwise 0 (changed by the solution)
+    restitution: np.ndarray  # (r,) of the contacts in an impact; the solution does not use it
+
+    # its solution
+    force: np.ndarray  # (r,) f
+    acceleration: np.ndarray  # (r,) a
+    state: np.ndarray  # (r,) int: FREE, AT_LOW, AT_HIGH or DEPENDENT
+
+    # scratch
+    d_force: np.ndarray  # (r,) change of the forces in a pivot step
+    d_acceleration: np.ndarray  # (r,) change of the accelerations
+    free: np.ndarray  # (r,) int: list of FREE rows
+    factor: np.ndarray  # (r, r) Cholesky factor of their part of A
+    solution: np.ndarray  # (r,) of a system of equations with it
 
 
 def new_problem(r: int) -> Problem:
-    """Room for a complementarity problem of r rows."""
-    reals, integers = iter(np.zeros((9, r))), iter(np.zeros((3, r), np.int64))
+    """Return room for a complementarity problem of r rows."""
     return Problem(
-        matrix=np.zeros((r, r)), b=next(reals), low=next(reals), high=next(reals), forced=next(integers),
-        force=next(reals), acceleration=next(reals), state=next(integers), restitution=next(reals),
-        d_force=next(reals), d_acceleration=next(reals), free=next(integers), factor=np.zeros((r, r)),
-        solution=next(reals),
-    )  # fmt: skip
+        matrix=np.zeros((r, r)),
+        b=np.zeros(r),
+        low=np.zeros(r),
+        high=np.zeros(r),
+        forced=np.zeros(r, np.int64),
+        restitution=np.zeros(r),
+        force=np.zeros(r),
+        acceleration=np.zeros(r),
+        state=np.zeros(r, np.int64),
+        d_force=np.zeros(r),
+        d_acceleration=np.zeros(r),
+        free=np.zeros(r, np.int64),
+        factor=np.zeros((r, r)),
+        solution=np.zeros(r),
+    )

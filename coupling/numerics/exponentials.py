@@ -1,4 +1,4 @@
-"""Exponentials less what cancels: exp(z) - 1, exp(z) - 1 - z, and the growth of a mode that the excitation drives."""
+"""Exponentials without cancellation: exp(z) - 1, exp(z) - 1 - z, and the growth of a driven mode."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vanedamp.coupling.numerics.jit import inlined, kernel
 
 @inlined
 def exp_minus_one(z):
-    """exp(z) - 1 of a complex number with full relative accuracy, Re z <= 0."""
+    """Return exp(z) - 1 of a complex number with full relative accuracy, Re z <= 0."""
     sine, cosine = math.sin(0.5 * z.imag), math.cos(0.5 * z.imag)
     turn = 2.0 * sine * sine
     if z.real == 0.0:
@@ -20,11 +20,11 @@ def exp_minus_one(z):
 
 @inlined
 def exp_minus_line(z, first):
-    """exp(z) - 1 - z given first = exp(z) - 1, with full relative accuracy."""
+    """Return exp(z) - 1 - z given first = exp(z) - 1, with full relative accuracy."""
     x, y = z.real, z.imag
     if abs(x) + abs(y) > 0.25:
         return first - z
-    # Taylor series of 1 - cos y, sin y - y and e^x - 1 - x; what is left out is below 1e-16 of them
+    # Taylor series of 1 - cos y, sin y - y and e^x - 1 - x; the remainder is below 1e-16 of them
     u = y * y
     sine = 1.0 - u * (1 / 72) * (1.0 - u * (1 / 110) * (1.0 - u * (1 / 156)))
     sine = -(1 / 6) * y * u * (1.0 - u * (1 / 20) * (1.0 - u * (1 / 42) * sine))
@@ -41,8 +41,8 @@ def exp_minus_line(z, first):
 
 @kernel
 def secular(rate, excitation, t):
-    """Growth D(t) = (exp(excitation t) - exp(rate t))/(excitation - rate) of a driven mode and D(t) - t, accurately."""
-    # D = t exp(excitation t) (1 + w), 1 + w = (exp(z) - 1)/z; |z| < 0.02: what the series leaves out is below 1e-16
+    """Return the growth D(t) = (exp(excitation t) - exp(rate t))/(excitation - rate) of a driven mode, and D(t) - t."""
+    # D = t exp(excitation t) (1 + w), 1 + w = (exp(z) - 1)/z; |z| < 0.02: the remainder of the series is below 1e-16
     z = (rate - excitation) * t
     w = 1.0 + z * (1 / 4) * (1.0 + z * (1 / 5) * (1.0 + z * (1 / 6) * (1.0 + z * (1 / 7))))
     w = z * (1 / 2) * (1.0 + z * (1 / 3) * w)
@@ -52,7 +52,7 @@ def secular(rate, excitation, t):
 
 @kernel
 def secular_bound(drive, rate, excitation, period, p):
-    """Bound of derivative p of drive D(t) over two periods: a step ends within a period from the end of this one."""
+    """Return a bound of derivative p of drive D(t) over two periods: a step ends before the end of the next one."""
     fastest = math.sqrt(max(rate.real * rate.real + rate.imag * rate.imag, excitation.imag * excitation.imag))
     size = abs(drive.real) + abs(drive.imag)
     for _ in range(p - 1):

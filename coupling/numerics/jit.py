@@ -19,10 +19,10 @@ from numba import config, njit
 
 from vanedamp.files.errors import VanedampError
 
-#: start of a counter: a literal 0 has a type of its own, for which numba would compile all that it is handed to again
+#: start of a counter: numba would compile the callees of a literal 0 again
 ZERO = np.int64(0)
 
-# what a file holds that enters compiled code: functions, and records, whose fields have their places there
+# marks of files that enter compiled code: functions, and records, whose fields have their places there
 _MARKS = ("@entry", "@kernel", "@inlined", "@intrinsic", "(NamedTuple)")
 _PACKAGE = Path(__file__).parents[2]
 
@@ -37,7 +37,7 @@ def entry(function: Callable[..., Any]) -> Any:
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function of the engine that compiled functions alone may call.
+    """Compile a function of the engine that only compiled functions may call.
 
     Unpacking the records' arrays for Python would take longer to compile than most functions themselves.
     """
@@ -45,9 +45,9 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a function of the engine into its callers, compiled ones: for what every segment runs.
+    """Compile a function of the engine into its callers, compiled ones: for functions that every segment runs.
 
-    A call hands over every array of its records, some 5 kB: it costs as much as a handful of exponentials.
+    A call hands over every array of its records, some 5 kB: it costs as much as a few exponentials.
     """
     return _compile(function, no_cfunc_wrapper=True, no_cpython_wrapper=True, forceinline=True)
 
@@ -64,7 +64,7 @@ def _compile(function: Callable[..., Any], **options: bool) -> Any:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
         return compiled
     kept = compiled._cache._cache_file
-    # numba dates a cached function by its own file alone, but it holds the code of the functions that it calls
+    # numba dates a cached function by its own file only, but it holds the code of the functions that it calls
     kept._source_stamp = _sources(Path(function.__code__.co_filename))
     kept._load_index = _forgiving(kept._load_index)
     return compiled
@@ -84,9 +84,9 @@ def _forgiving(load: Callable[[], dict[Any, Any]]) -> Callable[[], dict[Any, Any
 
 @cache
 def _sources(file: Path) -> str:
-    """Digest of a file of compiled functions and of those that it imports, through files of functions and records only.
+    """Return the digest of a file of compiled functions and of its imports, through files of functions and records.
 
-    What the others import is data: it does not enter the code.
+    The imports of other files are data: they do not enter the code.
     """
     texts: dict[Path, str] = {}
     waiting = [file]

@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from vanedamp.coupling.response import records as recs
-from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.response.records import DETACHES, ENERGIES, EXCITATION, IMPACT, KINDS, STORED, VISCOUS, Records
 from vanedamp.coupling.response.response import Event, Response, Status, classify
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
 from vanedamp.coupling.scene.scene import Scene
@@ -25,6 +25,17 @@ from vanedamp.coupling.system.transient import outlasted
 _CHUNK = 100
 #: share of the energy there is that counts as flow in any case
 _CARRIED = 1e-3
+
+#: status of a run whose compiled part has ended with a code
+STATUS_OF = {
+    codes.DONE: Status.OK,
+    codes.EVENT_BUDGET: Status.EVENT_BUDGET,
+    codes.ACCURACY_LOST: Status.ACCURACY_LOST,
+    codes.UNDECIDED: Status.UNDECIDED,
+    codes.ILL_CONDITIONED: Status.ILL_CONDITIONED,
+    codes.DIVERGED: Status.DIVERGED,
+    codes.PENETRATION: Status.PENETRATION,
+}
 
 
 class Run(Protocol):
@@ -100,7 +111,7 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     b = system.bodies
     section = records.section[: done + 1]
     harmonic = 2 / span * records.harmonic[window].sum()
-    evaluated = {name: float(value) for name, value in zip(recs.ENERGIES, ledger[-1], strict=True)}
+    evaluated = {name: float(value) for name, value in zip(ENERGIES, ledger[-1], strict=True)}
     peaks = records.peak[window]
     balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(system, records))
     if not balance <= run.open_ledger and status in (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN):
@@ -150,9 +161,9 @@ def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> f
     counts: below it the ledger would be judged by the round-off of energy that is only carried along.
     """
     change = ledger - ledger[0]
-    imbalance = change[-1, recs.EXCITATION] - change[-1, recs.VISCOUS :].sum()
+    imbalance = change[-1, EXCITATION] - change[-1, VISCOUS:].sum()
     swing = np.ptp(parts, axis=0).sum()
-    flowed = max(np.abs(change[:, : recs.STORED]).max(), swing, exchanged, _CARRIED * np.abs(parts).sum(axis=1).max())
+    flowed = max(np.abs(change[:, :STORED]).max(), swing, exchanged, _CARRIED * np.abs(parts).sum(axis=1).max())
     return 0.0 if flowed == 0.0 else float(abs(imbalance) / flowed)
 
 
@@ -204,7 +215,7 @@ def events_of(system: System, chunks: Sequence[np.ndarray]) -> list[Event]:
         # speeds of the gap, turned into speeds of the body relative to the wall or body that it meets
         sign = -1.0 if side in ("right", "body") else 1.0
         before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
-        events.append(Event(float(entry[0]), recs.KINDS[int(entry[1])], body, side, before, after, impulse))
+        events.append(Event(float(entry[0]), KINDS[int(entry[1])], body, side, before, after, impulse))
     return events
 
 
@@ -215,9 +226,9 @@ def _complete(system: System, entries: np.ndarray) -> None:
         kind, row = int(entry[1]), int(entry[2])
         if not np.isfinite(system.spring[row]):
             continue
-        if kind == recs.IMPACT:
+        if kind == IMPACT:
             begun[row] = entry
-        elif kind == recs.DETACHES and row in begun:
+        elif kind == DETACHES and row in begun:
             begun[row][4:6] = entry[4:6]
 
 

@@ -8,11 +8,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tests.tools.segment_stepper import SLIDES, Moment, Segment, Step, Stepper
-from vanedamp.coupling.exact import automaton as auto
-from vanedamp.coupling.exact import state as st
 from vanedamp.coupling.exact.event_functions import ADHESION, CHATTER, RESOLUTION
 from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF, SIMULTANEOUS
 from vanedamp.coupling.exact.impacts import COLLAPSE
+from vanedamp.coupling.numerics.codes import CLOSED, DONE, LEAVING, OPEN, STICK, TOUCHING
 from vanedamp.coupling.scene.scene import Scene
 
 #: points at which the motion between two events is looked at
@@ -60,7 +59,7 @@ def check_events(scene: Scene, longest: int | None = None) -> Worst:
     system = stepper.run.system
     widest = system.free_travel[_contacts(system)].max()
     fastest, last = SLOW * system.omega * widest, np.full(len(system.delassus), -np.inf)
-    if stepper.code == auto.DONE:
+    if stepper.code == DONE:
         first = stepper.segment()
         _check_state(worst, first, first.at(0.0), None)
     for step in itertools.islice(stepper.steps(), longest):
@@ -73,7 +72,7 @@ def check_events(scene: Scene, longest: int | None = None) -> Worst:
         _check_state(worst, step.after, now, step)
         worst.steps += 1
         worst.impacts += step.impacts
-    assert stepper.code == auto.DONE or worst.steps == longest, f"ended with code {stepper.code}"
+    assert stepper.code == DONE or worst.steps == longest, f"ended with code {stepper.code}"
     return worst
 
 
@@ -108,7 +107,7 @@ def _check_bounds(worst: Worst, segment: Segment, path: Moment, step: Step | Non
     # a slip ends where its speed vanishes, which is known to the resolution of the time
     tick = RESOLUTION * system.period * np.abs(segment.kinematic()).max() / SPEED
     worst.note("bound", against.max(initial=0.0) / (segment.speed_size() + tick + 1e-300), SPEED, step)
-    assert np.array_equal(segment.held[:k][slides], -segment.state[:k][slides] * system.limit[:k][slides])
+    assert np.array_equal(segment.applied_force[:k][slides], -segment.state[:k][slides] * system.limit[:k][slides])
 
 
 def _force_sizes(segment: Segment) -> np.ndarray:
@@ -127,11 +126,11 @@ def _check_state(worst: Worst, segment: Segment, now: Moment, step: Step | None)
     worst.note("balance", error.max(initial=0.0) / scale, BALANCE, step)
     friction = ~_contacts(system)
     solid, state = np.isinf(system.spring), segment.state
-    still = solid & np.where(friction, state >= st.STICK, (state == st.CLOSED) | (state == st.TOUCHING))
+    still = solid & np.where(friction, state >= STICK, (state == CLOSED) | (state == TOUCHING))
     worst.note("balance", np.abs(acceleration[still]).max(initial=0.0) / scale, BALANCE, step)
     assert np.all(segment.velocity[still & (friction | system.moves_with_floor)] == 0.0), "a row at rest moves"
     assert np.all(segment.displacement[still & ~friction] == 0.0), "a closed contact is open"
-    open_ = ~friction & (state == st.OPEN)
+    open_ = ~friction & (state == OPEN)
     gap = system.free_travel[open_]
     if np.any(open_ & solid):
         assert np.all(now.force[open_] == 0.0), "an open contact pushes"
@@ -140,7 +139,7 @@ def _check_state(worst: Worst, segment: Segment, now: Moment, step: Step | None)
     worst.note("balance", (-acceleration[rests]).max(initial=0.0) / scale, BALANCE, step)
     starts = solid & friction & np.isin(state, SLIDES) & (segment.velocity == 0.0)
     worst.note("balance", (-state * acceleration)[starts].max(initial=0.0) / scale, BALANCE, step)
-    left = ~friction & (state == st.LEAVING)
+    left = ~friction & (state == LEAVING)
     travel = system.spring[left] * system.free_travel[left]
     pushes = -(system.spring[left] * segment.displacement[left] + system.dashpot[left] * segment.velocity[left])
     worst.note("bound", (pushes / travel).max(initial=0.0), BALANCE, step)

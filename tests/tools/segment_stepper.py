@@ -11,13 +11,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vanedamp.coupling.exact import automaton as auto
-from vanedamp.coupling.exact import state as st
 from vanedamp.coupling.methods.registry import run_of
+from vanedamp.coupling.numerics.codes import (
+    AWAKE,
+    CLOSED,
+    DONE,
+    EVENT_BUDGET,
+    EVENTS,
+    FLOW,
+    IMPACTS,
+    PERIOD,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    SPRUNG,
+    STICK,
+    TOUCHING,
+)
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
-SLIDES = (st.SLIP_LEFT, st.SLIP_RIGHT)
+SLIDES = (SLIP_LEFT, SLIP_RIGHT)
 
 
 @dataclass(frozen=True)
@@ -50,9 +63,9 @@ class Segment:
     state: np.ndarray  # (r,)
     displacement: np.ndarray
     velocity: np.ndarray
-    drift: np.ndarray
-    held: np.ndarray
-    level: np.ndarray
+    free_acceleration: np.ndarray
+    applied_force: np.ndarray
+    constant_force: np.ndarray
     constant: np.ndarray
     amplitude: np.ndarray
     eigenvalue: np.ndarray
@@ -80,10 +93,12 @@ class Segment:
         speed = np.repeat(self.velocity[:, None], len(tau), 1)
         moves = self.moves
         gap[moves] += (
-            self.velocity[moves, None] * tau + 0.5 * self.drift[moves, None] * tau**2 + (self.motion[moves] @ line).real
+            self.velocity[moves, None] * tau
+            + 0.5 * self.free_acceleration[moves, None] * tau**2
+            + (self.motion[moves] @ line).real
         )
-        speed[moves] += self.drift[moves, None] * tau + (self.velocity_row[moves] @ first).real
-        springs = np.isfinite(system.spring) & (np.arange(len(gap)) < system.friction_rows) & (self.state != st.SPRUNG)
+        speed[moves] += self.free_acceleration[moves, None] * tau + (self.velocity_row[moves] @ first).real
+        springs = np.isfinite(system.spring) & (np.arange(len(gap)) < system.friction_rows) & (self.state != SPRUNG)
         gap[springs] = self.displacement[springs, None]  # a Jenkins element slides with its spring as it is
         _ride(system, gap, speed)
         y = (self.shape @ now).real
@@ -96,23 +111,23 @@ class Segment:
     def moves(self) -> np.ndarray:
         """(r,) rows with a motion of their own."""
         friction = np.arange(len(self.state)) < self.system.friction_rows
-        held = np.where(friction, self.state >= st.STICK, (self.state == st.CLOSED) | (self.state == st.TOUCHING))
-        return ~(held & (self.state != st.SPRUNG)) & ~self.system.moves_with_floor
+        held = np.where(friction, self.state >= STICK, (self.state == CLOSED) | (self.state == TOUCHING))
+        return ~(held & (self.state != SPRUNG)) & ~self.system.moves_with_floor
 
     @property
     def closed(self) -> np.ndarray:
         """(r,) rows whose force belongs to the linear subsystem."""
         friction = np.arange(len(self.state)) < self.system.friction_rows
-        return np.where(friction, self.state == st.STICK, self.state == st.CLOSED) | (self.state == st.SPRUNG)
+        return np.where(friction, self.state == STICK, self.state == CLOSED) | (self.state == SPRUNG)
 
     def _forces(self, now: np.ndarray) -> np.ndarray:
-        closed = self.level[:, None] + (self.force @ now).real
-        return np.where(self.closed[:, None], closed, self.held[:, None])
+        closed = self.constant_force[:, None] + (self.force @ now).real
+        return np.where(self.closed[:, None], closed, self.applied_force[:, None])
 
     def kinematic(self) -> np.ndarray:
         """(r,) accelerations at the beginning as the motion has them (rows that move)."""
         change = self.eigenvalue * self.amplitude + self.load * self.amplitude[self.harmonic]
-        return self.drift + (self.velocity_row @ change).real
+        return self.free_acceleration + (self.velocity_row @ change).real
 
     def dynamic(self, moment: Moment) -> np.ndarray:
         """(r,) accelerations by Newton's second law under the forces of a moment."""
@@ -133,7 +148,7 @@ class Segment:
 
     def force_size(self) -> np.ndarray:
         """(r,) amplitudes of the terms that the force of each row is a sum of."""
-        return np.abs(self.held) + np.abs(self.level) + np.abs(self.force) @ np.abs(self.amplitude)
+        return np.abs(self.applied_force) + np.abs(self.constant_force) + np.abs(self.force) @ np.abs(self.amplitude)
 
     def dynamic_size(self) -> np.ndarray:
         """(r,) amplitudes of the terms that the acceleration of each row is a sum of."""
@@ -171,26 +186,27 @@ class Stepper:
     def steps(self) -> Iterator[Step]:
         """All segments up to the end; self.code says how it came."""
         counters, state = self.run.state.counters, self.run.state
-        before = self.segment() if self.code == auto.DONE else None
-        while self.code in (auto.DONE, auto.EVENT_BUDGET) and counters[st.PERIOD] < self.periods:
-            impacts, period, time = counters[st.IMPACTS], counters[st.PERIOD], state.time[0]
-            self.code = self.run.advance(int(period) + 1, int(counters[st.EVENTS]) + 1)
+        before = self.segment() if self.code == DONE else None
+        while self.code in (DONE, EVENT_BUDGET) and counters[PERIOD] < self.periods:
+            impacts, period, time = counters[IMPACTS], counters[PERIOD], state.time[0]
+            self.code = self.run.advance(int(period) + 1, int(counters[EVENTS]) + 1)
             after = self.segment()
-            span = (counters[st.PERIOD] - period) * self.run.system.period + state.time[0] - time
-            yield Step(before, float(span), after, int(counters[st.IMPACTS] - impacts))
+            span = (counters[PERIOD] - period) * self.run.system.period + state.time[0] - time
+            yield Step(before, float(span), after, int(counters[IMPACTS] - impacts))
             before = after
-            if counters[st.EVENTS] >= self.budget:
+            if counters[EVENTS] >= self.budget:
                 return
 
     def segment(self) -> Segment:
         """The segment that begins now."""
         run, state = self.run, self.run.state
-        s, awake = state.counters[st.FLOW], state.awake[: state.counters[st.AWAKE]]
+        s, awake = state.counters[FLOW], state.awake[: state.counters[AWAKE]]
         flows, n = run.flows, len(state.constant)
         return Segment(
-            system=run.system, begun=float(state.counters[st.PERIOD] * run.system.period + state.time[0]),
+            system=run.system, begun=float(state.counters[PERIOD] * run.system.period + state.time[0]),
             state=state.state.copy(), displacement=state.displacement.copy(), velocity=state.velocity.copy(),
-            drift=state.drift.copy(), held=state.held.copy(), level=state.level.copy(),
+            free_acceleration=state.free_acceleration.copy(), applied_force=state.applied_force.copy(),
+            constant_force=state.constant_force.copy(),
             constant=state.constant.copy(), amplitude=state.amplitude[awake], eigenvalue=flows.eigenvalue[s, awake],
             harmonic=np.clip(np.searchsorted(flows.driven[s], awake, "right") - 1, 0, len(flows.driven[s]) - 2),
             load=flows.load[s, awake],

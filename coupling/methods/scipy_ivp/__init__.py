@@ -33,7 +33,7 @@ class Options(SteppingOptions):
 
     @property
     def seconds_per_period(self) -> float:
-        """Processor time of an excitation period, s."""
+        """Return the processor time of an excitation period, s."""
         return PERIOD_SECONDS + _STEP_SECONDS * self.steps_per_period
 
 

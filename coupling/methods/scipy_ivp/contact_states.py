@@ -3,7 +3,7 @@
 Forces and accelerations of the rows at rest complement each other (Pfeiffer and Glocker, 1996, chapter 5). Where a
 force is at its bound and its row does not accelerate, as at the instant at which bodies let go, their rates obey the
 same complementarity, and so on up to the first derivatives that do not vanish: the motion is analytic between events.
-What springs do where their force, or their gap, is zero follows from its first derivative that is not.
+Where the force or the gap of a spring is zero, its first derivative that is not zero decides.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
     Contacts,
     Unforced,
 )
-from vanedamp.coupling.numerics.complementarity import AT_HIGH, AT_LOW, new_problem, solve_box
+from vanedamp.coupling.numerics.codes import AT_HIGH, AT_LOW
+from vanedamp.coupling.numerics.complementarity import new_problem, solve_box
 
 #: derivatives that are looked at
 _LEVELS = 6
@@ -34,7 +35,7 @@ _DEPENDENCE = 1e-9
 
 
 def decide(unforced: Unforced, t: float, z: np.ndarray) -> Contacts | None:
-    """States of all rows at a state z (size,) in which what has come to zero is zero exactly.
+    """Return the states of all rows at a state z (size,) whose zeros are exact.
 
     None if a complementarity problem has no solution.
     """
@@ -73,7 +74,7 @@ class _Decision:
             self._give_up_springs()
         return Contacts(self.state, self.held, self.order, np.maximum(self.side, self.bound))
 
-    # -- what displacements and velocities alone tell
+    # -- by displacements and velocities only
 
     def _classify(self) -> None:
         u, (d, s) = self.unforced, self.d
@@ -108,7 +109,7 @@ class _Decision:
             if s[r] == 0:
                 self.open_springs.add(r)
             else:
-                self._settle_gap(r, 1, s[r])
+                self._decide_gap(r, 1, s[r])
         elif d[r] < 0:
             push = terms.sum()
             if abs(push) <= _ROUND_OFF * np.abs(terms).max():
@@ -119,8 +120,8 @@ class _Decision:
     def _slide(self, r: int, sign: float, order: int = 0) -> None:
         self.state[r], self.held[r], self.order[r] = SLIDE, -sign * self.unforced.limit[r], order
 
-    def _settle_gap(self, r: int, order: int, value: float) -> None:
-        """A soft contact at zero gap, whose first derivative that is not zero has this order and value."""
+    def _decide_gap(self, r: int, order: int, value: float) -> None:
+        """Decide a soft contact at zero gap, whose first derivative that is not zero has this order and value."""
         self.open_springs.discard(r)
         dashpot = self.unforced.system.dashpot[r] > 0
         self.state[r] = SPRUNG if value < 0 else UNFORCED
@@ -130,7 +131,7 @@ class _Decision:
     # -- one derivative after the other
 
     def _level(self, k: int) -> bool:
-        """Forces and accelerations, k times derived. Returns False if the problem has no solution."""
+        """Add k-th derivatives of forces and accelerations. Returns False if the problem has no solution."""
         u, system = self.unforced, self.unforced.system
         known = self._known(k)
         turn = (1j * system.frequency) ** k * self.turn
@@ -157,7 +158,7 @@ class _Decision:
         return True
 
     def _known(self, k: int) -> np.ndarray:
-        """k-th derivatives of the forces of rows that are not at rest."""
+        """Return k-th derivatives of the forces of rows that are not at rest."""
         u = self.unforced
         known = np.where(self.state == SLIDE, self.held, 0.0) if k == 0 else np.zeros(u.r)
         for r in np.flatnonzero(self.state == SPRUNG):
@@ -165,7 +166,7 @@ class _Decision:
         return known
 
     def _sizes(self, k: int, known: np.ndarray) -> np.ndarray:
-        """Sizes of the terms that accelerations are sums of: by amplitude, as zero has its round-off."""
+        """Return sizes of the terms that accelerations are sums of: by amplitude, as zero has its round-off."""
         system, u = self.unforced.system, self.unforced
         modes, loose = system.of_structure, system.of_bodies
         own = np.sqrt(modes.stiffness)
@@ -187,7 +188,7 @@ class _Decision:
         return bool(solve_box(problem, count, scale))
 
     def _leave(self, k: int, members: np.ndarray, scale: float) -> np.ndarray:
-        """Release the rows that accelerate; tell for the others whether their force is at a bound, and which."""
+        """Release the rows that accelerate; note for the others at which bound their force is, if any."""
         problem, u = self.problem, self.unforced
         left, values = [], []
         for i, r in enumerate(members):
@@ -213,8 +214,8 @@ class _Decision:
     def _hold(self) -> np.ndarray:
         """Choose independent rows whose forces hold all that is at rest: REST; the forces of the others stay: HELD.
 
-        First those whose force has room on both sides, as these hold what depends on them. Returns which rows (r,) that
-        they do not hold rest with a force at its bound, so that the next derivative has to tell.
+        First those whose force has room on both sides, as these hold the rows that depend on them. Returns the rows
+        (r,) at rest with a force at its bound, on which the next derivative decides.
         """
         rank = np.where(self.side >= 0, 2, np.where(self.moving, 0, 1))
         chosen: list[int] = []
@@ -245,7 +246,7 @@ class _Decision:
     # -- springs at a bound
 
     def _decide_springs(self, k: int, tolerance: float) -> None:
-        """The sign of the first derivative that does not vanish: of a gap, of a force, of a slip."""
+        """Decide springs by the sign of the first derivative that does not vanish: of a gap, of a force, of a slip."""
         u = self.unforced
         for r in sorted(self.open_springs):
             a = self.d[k + 2][r]
@@ -259,7 +260,7 @@ class _Decision:
                         self.order[r] = k + 2
             elif self.d[0][r] == 0:
                 if abs(a) > tolerance:
-                    self._settle_gap(r, k + 2, a)
+                    self._decide_gap(r, k + 2, a)
             else:
                 push = -u.system.spring[r] * self.d[k + 1][r] - u.system.dashpot[r] * a
                 if abs(push) > tolerance * u.system.dashpot[r]:

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.motion import Unforced
-from vanedamp.coupling.numerics.complementarity import AT_LOW, DEPENDENT, Problem, solve_box
+from vanedamp.coupling.numerics.codes import AT_LOW, DEPENDENT
+from vanedamp.coupling.numerics.complementarity import Problem, solve_box
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 
@@ -26,7 +27,7 @@ STILL = 1e-12
 
 
 class Impact(NamedTuple):
-    """What the contacts `row` did: speeds before and after, impulses, and what was lost, J."""
+    """Impacts of the contacts `row`: speeds before and after, impulses, and the lost energy, J."""
 
     row: np.ndarray
     before: np.ndarray
@@ -35,7 +36,7 @@ class Impact(NamedTuple):
     loss: float
 
 
-def collide(
+def simultaneous_impacts(
     u: Unforced, z: np.ndarray, pressing: np.ndarray, resting: np.ndarray, collapsed: np.ndarray, problem: Problem
 ) -> Impact | None:
     """Let the touching contacts of state z (size,) collide, in place. None without a solution.
@@ -80,8 +81,8 @@ def _solve(system: System, touching: np.ndarray, excess: np.ndarray, tied: np.nd
     return bool(solve_box(problem, k, 0.0))
 
 
-def calm(u: Unforced, z: np.ndarray, fastest: float, touch: np.ndarray) -> None:
-    """Make zero exactly, in place, what is zero to round-off: gaps about to close, speeds of what touches, slips.
+def zero_round_off(u: Unforced, z: np.ndarray, fastest: float, touch: np.ndarray) -> None:
+    """Set to zero, in place, values that are zero to round-off: gaps about to close, speeds of closed ones, slips.
 
     touch: (r,) time (s) within which a gap closes that is closed now.
     """

@@ -1,4 +1,4 @@
-"""What an integrator leaves in the records: integrals that go along with its state, peaks, impacts, energies."""
+"""The records of an integrator: integrals that it computes with its state, peaks, impacts, energies."""
 
 from __future__ import annotations
 
@@ -6,8 +6,17 @@ import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
 from vanedamp.coupling.methods.scipy_ivp.motion import LOOSE, SLIDE, SPRUNG, Unforced
-from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.recorder import cubic_peak, record_section
+from vanedamp.coupling.response.records import (
+    CONTACT,
+    ENERGIES,
+    EXCITATION,
+    FRICTION,
+    IMPACT,
+    IMPACT_LOSS,
+    VISCOUS,
+    Records,
+)
 
 #: the integrals; behind them the impulses of all rows
 _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN, _PUSH = range(10)
@@ -20,7 +29,7 @@ class Recorder:
     bodies' momentum, on the extended state; states: of the rows.
     """
 
-    def __init__(self, unforced: Unforced, records: recs.Records, steps: int, events: bool) -> None:
+    def __init__(self, unforced: Unforced, records: Records, steps: int, events: bool) -> None:
         u, system = unforced, unforced.system
         self.unforced, self.system, self.records, self.keep = u, system, records, events
         self.each, self.steps = records.samples_per_period, steps
@@ -35,7 +44,7 @@ class Recorder:
         self.before = np.zeros(self.count)
 
     def sizes(self, reach: float) -> np.ndarray:
-        """Typical sizes of state and integrals (size + count,), for a displacement `reach` (m)."""
+        """Return typical sizes of state and integrals (size + count,), for a displacement `reach` (m)."""
         u, system = self.unforced, self.system
         largest = np.abs(system.of_structure.J).max(axis=0, initial=0.0)
         largest = np.where(largest > 0, largest, np.abs(system.of_structure.response))
@@ -49,7 +58,7 @@ class Recorder:
         return np.concatenate([place, system.omega * place, integrals])
 
     def rates(self, extended: np.ndarray, found: np.ndarray) -> np.ndarray:
-        """Rates of the integrals; found: the forces of the rows and the functionals on the extended state."""
+        """Return the rates of the integrals; found: forces of the rows and the functionals on the extended state."""
         u, system = self.unforced, self.system
         force, (loads, speeds, (x, _, momentum)) = found[: u.r], self._parts(found[u.r :])
         s, friction = extended[u.s], system.friction_rows
@@ -70,13 +79,13 @@ class Recorder:
         return found[:size], found[size : 2 * size], found[2 * size :]
 
     def start(self, y: np.ndarray) -> None:
-        """The state at time zero."""
+        """Record the state at time zero."""
         self._section(y)
         if self.each:
             self._sample(0, y)
 
     def points(self, times: np.ndarray, y: np.ndarray) -> None:
-        """Peaks, samples and penetration at points of the grid."""
+        """Record peaks, samples and penetration at points of the grid."""
         u, system, friction = self.unforced, self.system, self.system.friction_rows
         gaps = y[u.d][friction:] / system.free_travel[friction:, None]
         self.deep = max(self.deep, float((-gaps[u.rigid_contact[friction:]]).max(initial=0.0)))
@@ -87,7 +96,7 @@ class Recorder:
                 self._sample(self.period * self.each + index // (self.steps // self.each), state)
 
     def turning(self, t: float, y: np.ndarray) -> None:
-        """The state right before or after an event."""
+        """Record the state right before or after an event."""
         if t > 0:
             self._peak(t, y)
 
@@ -107,7 +116,7 @@ class Recorder:
             self.records.samples[index] = [self._parts(self.functionals @ u.extended(phase, y[: u.size]))[2][0], *slips]
 
     def impact(self, t: float, impact: Impact) -> None:
-        """Count and log what has collided."""
+        """Count and log impacts."""
         self.impact_loss += impact.loss
         for r, before, after, impulse in zip(impact.row, impact.before, impact.after, impact.impulse, strict=True):
             if before < 0:
@@ -117,13 +126,13 @@ class Recorder:
         self.impacts += 1
         self.records.impacts[self.period] += 1
         self.records.collided[self.period] += 0.5 * before**2 / self.system.delassus[r, r]
-        entry = [self.period * self.system.period + t, recs.IMPACT, r, before, after, impulse]
+        entry = [self.period * self.system.period + t, IMPACT, r, before, after, impulse]
         if self.keep:
             self.log.append(entry)
         return entry
 
     def springs(self, t: float, y: np.ndarray, old: np.ndarray, new: np.ndarray) -> None:
-        """Soft contacts that begin or end to push: impacts, and the energy that a wall keeps which is left pressed."""
+        """Record soft contacts that begin or end: impacts, and the energy in a spring that is left compressed."""
         u, system = self.unforced, self.system
         for r in np.flatnonzero(u.soft_contact & ((old == SPRUNG) != (new == SPRUNG))):
             d, s = y[u.d.start + r], y[u.s.start + r]
@@ -150,14 +159,14 @@ class Recorder:
         self._section(y)
 
     def _section(self, y: np.ndarray) -> None:
-        """Section and ledger at the start of a period."""
+        """Record section and ledger at the start of a period."""
         u, system, b = self.unforced, self.system, self.system.bodies
         z, integrals = y[: u.size], y[u.size :]
         holds = (self.states == SPRUNG) | (u.slider & (u.limit > 0))
         springs = 0.5 * float(system.spring[holds] @ z[u.d][holds] ** 2)
-        ledger = np.zeros(len(recs.ENERGIES))
-        ledger[[recs.EXCITATION, recs.VISCOUS, recs.FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
-        ledger[recs.CONTACT], ledger[recs.IMPACT_LOSS] = integrals[_CONTACT] + self.spring_loss, self.impact_loss
+        ledger = np.zeros(len(ENERGIES))
+        ledger[[EXCITATION, VISCOUS, FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
+        ledger[CONTACT], ledger[IMPACT_LOSS] = integrals[_CONTACT] + self.spring_loss, self.impact_loss
         record_section(system, self.records, self.period, z[u.p], z[u.p_rate], z[u.d][:b], z[u.s][:b], springs, ledger)
         x, rate, _ = self.records.section[self.period, :3]
         self.last = (0.0, float(x), float(rate))

@@ -19,9 +19,9 @@ from vanedamp.coupling.system.system import System
 # states of a row: no force; at rest by an unknown force; at rest while other rows carry its force, which is constant;
 # sliding; a spring that holds or presses; a soft contact that has ended at zero force, before its gap is open
 UNFORCED, REST, HELD, SLIDE, SPRUNG, LOOSE = range(6)
-# what an event function stands for: a gap closes; a slip stops; a force reaches its low or high bound; a gap that was
+# meaning of an event function: a gap closes; a slip stops; a force reaches its low or high bound; a gap that was
 # left under compression opens; its spring would push again
-GAP, SLIP, LOW, HIGH, OPENS, PUSHES = range(6)
+GAP, SLIP, LOW, HIGH, OPENS, PUSHES = range(10, 16)
 #: order of a zero whose derivatives all vanish: the function is not watched
 NEVER = 99
 
@@ -76,12 +76,12 @@ class Unforced:
         self.accelerations[:, self.sine] -= self.by_mass @ bodies.load.imag.T
 
     def extended(self, t: float | np.ndarray, z: np.ndarray) -> np.ndarray:
-        """The states (size, ...) at times t (...) with 1, cos and sin below them."""
+        """Return the states (size, ...) at times t (...) with 1, cos and sin below them."""
         phase = np.multiply.outer(self.system.frequency, np.asarray(t, float))
         return np.concatenate([z, np.ones((1, *phase.shape[1:])), np.cos(phase), np.sin(phase)])
 
     def rates(self, motion: Motion, extended: np.ndarray) -> np.ndarray:
-        """The rates (size + 3,) of an extended state, or of its rates."""
+        """Return the rates (size + 3,) of an extended state, or of its rates."""
         frequency = self.system.frequency
         turn = -frequency * extended[self.sine], frequency * extended[self.cosine]
         return np.concatenate([motion.rate @ extended, [0.0], *turn])
@@ -114,7 +114,7 @@ class Motion:
         self.rate[u.s] = accelerations
 
     def guards(self) -> Guards:
-        """The event functions."""
+        """Return the event functions."""
         found: list[tuple[np.ndarray, int, int, int]] = []
         for r in range(self.unforced.r):
             found += self._guards_of(r)

@@ -24,7 +24,7 @@ _ROUND_OFF = 1e-14
 
 
 def _from_samples(nodes: np.ndarray) -> np.ndarray:
-    """The matrix that turns samples at the nodes into Bernstein coefficients."""
+    """Return the matrix that turns samples at the nodes into Bernstein coefficients."""
     n = len(nodes) - 1
     basis = [[comb(n, k) * x**k * (1 - x) ** (n - k) for k in range(n + 1)] for x in nodes]
     return np.linalg.inv(np.array(basis))
@@ -34,7 +34,7 @@ _WHOLE, _DEFLATED = _from_samples(NODES), _from_samples(NODES[1:])
 
 
 def first_root(samples: np.ndarray, order: np.ndarray) -> tuple[float, int] | None:
-    """The first place in 0 < x <= 1 at which one of several functions turns negative, and which one; None without.
+    """Return the first place in 0 < x <= 1 at which one of several functions turns negative, and which; None without.
 
     samples: (functions, nodes) at NODES; order: (functions,) of the zero at x = 0 that a function leaves upwards; it is
     taken out of the function, so that round-off cannot find it again.
@@ -55,7 +55,7 @@ def first_root(samples: np.ndarray, order: np.ndarray) -> tuple[float, int] | No
 
 
 def _first(b: np.ndarray, start: float, end: float, limit: float, noise: float) -> float | None:
-    """First root, before `limit`, of the polynomial with Bernstein coefficients b between start and end."""
+    """Return the first root, before `limit`, of the polynomial with Bernstein coefficients b between start and end."""
     if b.min() > 0 or start > limit:
         return None
     if b[0] <= 0:
@@ -83,7 +83,7 @@ def _polynomial(b: np.ndarray) -> Callable[[float], float]:
 
 
 def _halves(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients of both halves (de Casteljau)."""
+    """Return the coefficients of both halves (de Casteljau)."""
     left, right, row = np.empty_like(b), np.empty_like(b), b
     for k in range(len(b)):
         left[k], right[-1 - k] = row[0], row[-1]

@@ -16,7 +16,7 @@ from scipy.integrate import DOP853
 
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
-from vanedamp.coupling.methods.scipy_ivp.impacts import COLLAPSE, FRESH, TOUCH, calm, collide
+from vanedamp.coupling.methods.scipy_ivp.impacts import COLLAPSE, FRESH, TOUCH, simultaneous_impacts, zero_round_off
 from vanedamp.coupling.methods.scipy_ivp.integrals import Recorder
 from vanedamp.coupling.methods.scipy_ivp.motion import (
     GAP,
@@ -49,7 +49,7 @@ _STANDING = 100
 
 
 class Arc(NamedTuple):
-    """Motion between two events: states (size, k) at the points t (k,) of the grid, and what has ended it.
+    """Motion between two events: states (size, k) at the points t (k,) of the grid, and its end.
 
     event: index of the event function, None at the end of the grid; duration, last: time since the start, state there.
     """
@@ -86,7 +86,7 @@ class IvpRun:
         self.absolute = self.tolerance * self.record.sizes(_reach(u))
 
     def advance_to(self, periods: int) -> Status:
-        """Continue to the end of `periods`, or to what ends the run."""
+        """Continue to the end of `periods`, unless the run ends before."""
         if not self.begun and not self._begin():
             return Status.UNDECIDED
         with np.errstate(all="ignore"):
@@ -99,7 +99,7 @@ class IvpRun:
         return Status.OK
 
     def outcome(self) -> Outcome:
-        """What the run leaves behind."""
+        """Return the results of the run."""
         record = self.record
         numbers = {"impacts": record.impacts, "evaluations": self.evaluations}
         log = [np.array(record.log)] if record.log else []
@@ -109,7 +109,7 @@ class IvpRun:
         )
 
     def final(self) -> None:
-        """None: the states of contacts are no part of a motion that another run could begin with."""
+        """Return None: the states of contacts are no part of a motion that another run could begin with."""
 
     def _begin(self) -> bool:
         self.begun, place = True, self.y[self.unforced.d]
@@ -153,7 +153,7 @@ class IvpRun:
         return Status.OK
 
     def _integrate(self, grid: np.ndarray) -> Arc:
-        """The motion from now to the first event, or to the end of the grid."""
+        """Return the motion from now to the first event, or to the end of the grid."""
         u, far = self.unforced, grid - self.time
         solver = DOP853(
             lambda tau, y: self.rate(self.time + tau, y), 0.0, self.y, far[-1], max_step=self.step,
@@ -178,7 +178,7 @@ class IvpRun:
         return Arc(grid[:reached], points, None if root is None else root[1], now, last, solver.nfev)
 
     def _first_step(self) -> float:
-        """Twice the time to the first event by the functions' parabolas, so that round-off is that of the flight."""
+        """Return twice the time to the first event by the functions' parabolas: round-off is that of the flight."""
         u, guards = self.unforced, self.guards
         now = u.extended(self.time, self.y[: u.size])
         rate = u.rates(self.motion, now)
@@ -191,7 +191,7 @@ class IvpRun:
         return float(np.clip(2 * times.min(initial=np.inf), _SHORTEST * self.system.period, self.step))
 
     def rate(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Rates of the state and of the integrals."""
+        """Return the rates of the state and of the integrals."""
         u, phase = self.unforced, self.system.frequency * t
         self._extended[: u.size] = y[: u.size]
         self._extended[u.cosine], self._extended[u.sine] = np.cos(phase), np.sin(phase)
@@ -201,18 +201,18 @@ class IvpRun:
     # -- events
 
     def _decide(self, row: int, kind: int) -> bool:
-        """Impacts, then new contact states. Returns False if a complementarity problem has no solution."""
+        """Apply impacts, then decide the contact states. Returns False if a complementarity problem has no solution."""
         u, z = self.unforced, self.y[: self.unforced.size]
         self._arrive(row, kind, z)
         self.record.turning(self.time, self.y)
-        self._calm(z)
+        self._zero_round_off(z)
         for _ in range(_STANDING):
             # an impact may close gaps that are about to
             if not np.any(u.rigid_contact & (z[u.d] == 0) & (z[u.s] < 0)):
                 break
             if not self._impact(z):
                 return False
-            self._calm(z)
+            self._zero_round_off(z)
         else:
             return False
         self.record.turning(self.time, self.y)
@@ -232,7 +232,7 @@ class IvpRun:
         self.record.states = contacts.state
 
     def _arrive(self, row: int, kind: int, z: np.ndarray) -> None:
-        """What the event has brought to zero, or to its bound, is there exactly."""
+        """Set the value that the event has brought to zero, or to its bound, exactly."""
         u, system = self.unforced, self.system
         if kind in (GAP, OPENS) or (kind == LOW and u.soft_contact[row] and system.dashpot[row] == 0):
             z[u.d.start + row] = 0.0
@@ -241,12 +241,12 @@ class IvpRun:
         elif kind in (LOW, HIGH) and u.slider[row]:
             z[u.d.start + row] = (1 if kind == LOW else -1) * u.limit[row] / system.spring[row]
 
-    def _calm(self, z: np.ndarray) -> None:
+    def _zero_round_off(self, z: np.ndarray) -> None:
         """Zero to the round-off of the run's largest speed is zero: two slips may come to rest together."""
         self.fastest = max(self.fastest, float(np.abs(z[self.unforced.s]).max(initial=0.0)))
         # gaps of contacts that have just collided are known beyond the round-off of places
         touch = np.where(self.since > FRESH * self.system.period, TOUCH * self.system.period, 0.0)
-        calm(self.unforced, z, self.fastest, touch)
+        zero_round_off(self.unforced, z, self.fastest, touch)
 
     def _impact(self, z: np.ndarray) -> bool:
         u, system, complete = self.unforced, self.system, self.options.complete_chatter
@@ -257,7 +257,7 @@ class IvpRun:
             push = np.diag(system.delassus) * (self.motion.force @ extended)
             pressing = np.where(resting, push, -(self.motion.rate[u.s] @ extended))
             collapsed = self.since < COLLAPSE * system.period
-        impact = collide(u, z, pressing, resting, collapsed, self.problem)
+        impact = simultaneous_impacts(u, z, pressing, resting, collapsed, self.problem)
         if impact is None:
             return False
         self.since[impact.row[impact.before < 0]] = 0.0
@@ -266,7 +266,7 @@ class IvpRun:
 
 
 def _reach(u: Unforced) -> float:
-    """A typical displacement, m: the narrowest gap, the least elongation at which a spring slides, the static one."""
+    """Return a typical displacement, m: narrowest gap, least elongation at which a spring slides, or the static one."""
     system = u.system
     contacts = slice(system.friction_rows, None)
     stops = (system.left_body[contacts] < 0) & (system.right_body[contacts] < 0)

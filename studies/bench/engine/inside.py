@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from vanedamp.coupling.exact import automaton, state
+from vanedamp.coupling.exact.automaton import amplitude_changes
 from vanedamp.coupling.exact.energy_balance import account
 from vanedamp.coupling.exact.event_driven import EngineRun
 from vanedamp.coupling.exact.event_functions import next_event
 from vanedamp.coupling.methods.registry import run_of
+from vanedamp.coupling.numerics.codes import AWAKE, CARRIED, EVENT_BUDGET, EVENTS, PERIOD
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.bench.timing import seconds
 
@@ -27,7 +28,7 @@ def awake_modes(scene: Scene, first: int, last: int) -> float:
     total = 0
     for period in range(first, last):
         run.advance(period, scene.solver.max_events)
-        total += int(run.state.counters[state.AWAKE]) - 1  # the first is the excitation
+        total += int(run.state.counters[AWAKE]) - 1  # the first is the excitation
     return total / (last - first)
 
 
@@ -48,16 +49,16 @@ def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
     code = run.advance(period, scene.solver.max_events)
     search, accounting = np.zeros(rounds), np.zeros(rounds)
     while True:
-        tau = _search(run.system, run.flows, run.state, run.channels, 1)
+        tau = _search(run.system, run.flows, run.state, run.event_functions, 1)
         _amplitudes(run.flows, run.state, run.scratch, tau)
         for turn in range(-1, rounds):  # the first compiles
-            one = seconds(_search, run.system, run.flows, run.state, run.channels, _REPEATS)
+            one = seconds(_search, run.system, run.flows, run.state, run.event_functions, _REPEATS)
             two = seconds(_account, run.system, run.flows, run.state, run.records, run.scratch, tau, _REPEATS)
             if turn >= 0:
                 search[turn] += one / _REPEATS
                 accounting[turn] += two / _REPEATS
-        code = run.advance(period + 1, int(run.state.counters[state.EVENTS]) + 1)
-        if code != automaton.EVENT_BUDGET:
+        code = run.advance(period + 1, int(run.state.counters[EVENTS]) + 1)
+        if code != EVENT_BUDGET:
             return {"search": float(np.median(search)), "account": float(np.median(accounting))}
 
 
@@ -69,23 +70,23 @@ def _begun(scene: Scene, periods: int) -> EngineRun:
 
 
 @njit(error_model="numpy")
-def _search(rows: Any, flows: Any, st: Any, channels: Any, times: int) -> float:
+def _search(system: Any, flows: Any, st: Any, functions: Any, times: int) -> float:
     tau = 0.0
     for _ in range(times):
-        st.counters[state.CARRIED] = 0  # what is known from the period before would save it
-        tau, _ = next_event(rows, flows, st, channels)
+        st.counters[CARRIED] = 0  # what is known from the period before would save it
+        tau, _ = next_event(system, flows, st, functions)
     return tau
 
 
 @njit(error_model="numpy")
 def _amplitudes(flows: Any, st: Any, scratch: Any, tau: float) -> None:
-    automaton._amplitudes(flows, st, scratch, tau)
+    amplitude_changes(flows, st, scratch, tau)
 
 
 @njit(error_model="numpy")
-def _account(rows: Any, flows: Any, st: Any, records: Any, scratch: Any, tau: float, times: int) -> None:
-    period = st.counters[state.PERIOD]
+def _account(system: Any, flows: Any, st: Any, records: Any, scratch: Any, tau: float, times: int) -> None:
+    period = st.counters[PERIOD]
     peak = records.peak[period]
     for _ in range(times):
         records.peak[period] = peak  # or the search for the peak would be needless the second time
-        account(rows, flows, st, records, scratch, tau)
+        account(system, flows, st, records, scratch, tau)

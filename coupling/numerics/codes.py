@@ -1,0 +1,55 @@
+"""The table of codes: numbers that stand for a meaning in compiled functions.
+
+Values are distinct wherever codes of several kinds share an array or an argument. All that functions are called with
+are numbers of numpy: numba compiles a function once for int64, but again for every literal and for every IntEnum, whose
+members it cannot add to a number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# state of a friction row; a row that slips is known by its direction, which is a factor in sums; COAST: without
+# friction; HELD: at rest, but another row carries its force
+SLIP_LEFT, COAST, SLIP_RIGHT, STICK, HELD = np.arange(-1, 4)
+# state of a row, friction or contact, whose spring is closed
+SPRUNG = np.int64(4)
+# state of a contact row; TOUCHING: closed, but another row carries its force; LEAVING: a compliant contact that has
+# ended at zero force, before its gap is open again
+OPEN, CLOSED, TOUCHING, LEAVING = np.arange(5, 9)
+
+# order of an event function: how often its exponentials are differentiated, from exp(z) - 1 - z to exp(z)
+FORCE, VELOCITY, POSITION = np.arange(3)
+
+# state of a row of a complementarity problem: not in yet; force between its bounds, or at one; at rest because FREE
+# rows hold it
+OUT, FREE, AT_LOW, AT_HIGH, DEPENDENT = np.arange(5)
+# meaning of an event function: a force reaches its bound (AT_LOW, AT_HIGH); a slip stops; a gap closes; a gap that was
+# left under compression opens, or closes again because its spring would push
+STOPS, CLOSES, OPENS, RECLOSES = np.arange(10, 14)
+
+# status of an event function: a bound of its second derivative is known; its expansion; its first root
+BOUNDED, EXPANDED, ROOT = np.arange(20, 23)
+
+# a pair of modes whose product hardly changes over a period, by the rate that vanishes: the sum of their eigenvalues,
+# the sum with one conjugate, or that of one mode only; CALM: a mode whose square is integrated with others
+SUM, DIFFERENCE, SINGLE, CALM = range(4)
+
+# first columns of the linear maps of the amplitudes (exact.subsystem_assembly.Flows.linear): real maps of two numbers
+# have four columns, of one number two; WORK_MAP: of harmonic h from WORK_MAP + 4 h on
+HARMONIC_MAP, MOMENTUM_MAP, MEAN_MAP, FREE_MOMENTUM_MAP, WORK_MAP = 0, 4, 8, 10, 12
+
+# outcome of an event: the contact states go on, they must be decided, or its impact has no solution
+STATES_GO_ON, STATES_OPEN, NO_SOLUTION = range(30, 33)
+
+# why a compiled run returns: all periods are done, it needs something, or it has ended (response.evaluation.STATUS_OF)
+(
+    DONE, NEEDS_FLOW, LOG_FULL, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED, ILL_CONDITIONED, DIVERGED, PENETRATION,
+) = range(40, 49)  # fmt: skip
+
+# counters of a run, of any method
+(
+    PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE, CARRIED, CLOSED_ROWS, STEPS,
+    SOLVES,
+) = range(13)  # fmt: skip
+COUNTERS = 13
