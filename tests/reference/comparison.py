@@ -52,7 +52,8 @@ def compare_motion(
 ) -> None:
     """Assert that samples before `end` agree. structure, bodies: shares of the amplitude and of the gap."""
     time = response.time[response.time < end]
-    assert len(time) > 2 * SAMPLES
+    given_up = reference.time * scene.excitation.frequency < scene.time.simulated - 1e-9  # its events have no end
+    assert len(time) > (0 if given_up else 2 * SAMPLES)
     apart = response.displacement[: len(time)] - reference.x(time)
     assert np.abs(apart).max() <= structure * np.abs(response.displacement).max()
     for body, damper in enumerate(scene.damper):

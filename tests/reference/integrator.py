@@ -23,7 +23,7 @@ from vanedamp.rom.reduced import ReducedModel
 #: a few units in the last place
 _ULPS = 2.0**-49
 #: steps after which a run is given up, as one whose events have no end
-_MOST = 20_000
+_MOST = 60_000
 
 
 class Event(NamedTuple):

@@ -41,7 +41,7 @@ class Record:
     hits: Hits
     sections: np.ndarray
     code: int
-    together: float  # when two contacts of one cavity are first hit at once: round-off decides between them
+    together: float  # when two contacts are first hit at once: round-off decides which of them moves the other
 
     @property
     def fastest(self) -> float:
@@ -54,17 +54,16 @@ def record(data: dict, change=None) -> Record:
     stepper = Stepper(scene_of(data), change)
     run, code = stepper.run, stepper.code
     code = run.advance(stepper.periods, stepper.budget) if code == DONE else code
-    cavities = [damper["cavity"] for damper in data["damper"]]
     hits: dict = defaultdict(list)
-    before, together = {}, np.inf
+    before, together = (-np.inf, (-1, "")), np.inf
     for event in events_of(run.system, run.log.chunks):
         if event.kind == "impact":
             time, contact = event.time / run.system.period, (event.damper, event.side)
             hits[contact].append((time, event.relative_velocity_before))
-            last, other = before.get(cavities[event.damper], (-np.inf, contact))
+            last, other = before
             if contact != other and time - last < AT_ONCE:
                 together = min(together, last)
-            before[cavities[event.damper]] = time, contact
+            before = time, contact
     done = int(run.state.counters[PERIOD])
     return Record({key: np.array(hit) for key, hit in hits.items()}, run.records.section[: done + 1], code, together)
 
