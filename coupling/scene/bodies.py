@@ -12,20 +12,28 @@ from vanedamp.files.toml_input import STRICT, Fraction, NonNegative, Positive, R
 
 def _addressable(name: str) -> str:
     """Return a name that a dotted path such as cavity.c1.gap can hold, distinct from an index and from a key."""
-    if not name or "." in name or name.isdecimal() or name in ("name", "gap", "left", "right", "floor"):
+    if not name or "." in name or name.isdecimal() or name in Cavity.__dataclass_fields__:
         raise ValueError("expected a word that is no number and no key and has no dot, such as 'c1'")
     return name
 
 
 @dataclass(frozen=True, config=STRICT)
 class Cavity:
-    """A cavity with total free travel `gap` (m). On a reduced model left, right and floor name interface labels."""
+    """A cavity with total free travel `gap` (m) along it and, for bodies with extent, `play` (m) across it.
+
+    On a reduced model left, right, floor and ceiling name interface labels. normal_motion, rotation: motion across and
+    rotation (rad/m) per unit of the floor's motion along the cavity, where the structure has no coordinates for them.
+    """
 
     name: Annotated[str, AfterValidator(_addressable)]
     gap: Positive
     left: str | None = None
     right: str | None = None
     floor: str | None = None
+    ceiling: str | None = None
+    play: Positive | None = None
+    normal_motion: Real = 0.0
+    rotation: Real = 0.0
 
     def labels(self) -> tuple[str | None, str | None, str | None]:
         """Return the labels of left wall, right wall and floor; a single one serves all three."""
@@ -35,7 +43,12 @@ class Cavity:
 
 @dataclass(frozen=True, config=STRICT)
 class Damper:
-    """A loose body: mass (kg), Coulomb friction and restitution coefficients, state relative to the cavity."""
+    """A loose body: mass (kg), Coulomb friction and restitution coefficients, state relative to the cavity.
+
+    shape: "slider", one coordinate along the cavity; "block" (length, height, m) and "disc" (radius, m) move in the
+    plane of the cavity. inertia: kg m^2 about the centre, that of the homogeneous body unless given. lift: height of
+    its lowest point above the floor, m; tilt: rad. stiffness, dashpot: of a spring between body and floor, along it.
+    """
 
     cavity: str
     mass: Positive
@@ -44,6 +57,45 @@ class Damper:
     position: Real = 0.0
     velocity: Real = 0.0
     normal_load: NonNegative | None = None
+    shape: Literal["slider", "block", "disc"] = "slider"
+    length: Positive | None = None
+    height: Positive | None = None
+    radius: Positive | None = None
+    inertia: Positive | None = None
+    lift: NonNegative = 0.0
+    tilt: Real = 0.0
+    lift_velocity: Real = 0.0
+    tilt_rate: Real = 0.0
+    stiffness: Positive | None = None
+    dashpot: NonNegative | None = None
+
+    def __post_init__(self) -> None:
+        wanted = {"slider": (), "block": ("length", "height"), "disc": ("radius",)}[self.shape]
+        for key in ("length", "height", "radius"):
+            if (getattr(self, key) is not None) != (key in wanted):
+                raise ValueError(f'{key}: {"missing" if key in wanted else "not a measure"} of shape = "{self.shape}"')
+        if self.shape == "slider":
+            for key in ("inertia", "lift", "tilt", "lift_velocity", "tilt_rate"):
+                if getattr(self, key):
+                    raise ValueError(f'{key}: a slider only moves along its cavity; take shape = "block" or "disc"')
+        elif self.normal_load is not None:
+            raise ValueError(f"normal_load: a {self.shape} is pressed by its contacts; leave it out")
+
+    @property
+    def half_extent(self) -> tuple[float, float]:
+        """Half the length and half the height, m; 0 for a slider."""
+        if self.shape == "disc":
+            assert self.radius is not None
+            return self.radius, self.radius
+        return (self.length or 0.0) / 2, (self.height or 0.0) / 2
+
+    @property
+    def moment_of_inertia(self) -> float:
+        """Moment of inertia about the centre, kg m^2."""
+        if self.inertia is not None:
+            return self.inertia
+        a, b = self.half_extent
+        return self.mass * (a * a / 2 if self.shape == "disc" else (a * a + b * b) / 3)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -1,0 +1,105 @@
+"""The linear complementarity problem w = M z + q, w >= 0, z >= 0, w z = 0, for any square matrix M.
+
+Lemke's method by complementary pivots (Cottle, Pang and Stone, The Linear Complementarity Problem, 1992, section 4.4).
+Ties are broken lexicographically, so that it ends: contacts that depend on each other, as both corners of a block that
+lies flat, are ties. For contact with Coulomb friction it finds a solution if there is one in all but paradoxical cases
+(Glocker and Pfeiffer 1996; Stewart and Trinkle 1996).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.numerics.jit import entry, kernel
+
+#: entries of the tableau below this are round-off, for problems scaled to numbers of size one
+_PIVOT = 1e-11
+
+
+class Lemke(NamedTuple):
+    """Room for a problem of up to k unknowns."""
+
+    matrix: np.ndarray  # (k, k) M
+    q: np.ndarray  # (k,)
+    z: np.ndarray  # (k,) the solution
+    w: np.ndarray  # (k,)
+    tableau: np.ndarray  # (k, 2k + 2) scratch: columns of w, z, the covering variable, and q
+    basis: np.ndarray  # (k,) int, scratch: basic variable of each row
+
+
+def new_lemke(k: int) -> Lemke:
+    """Room for a problem of up to k unknowns."""
+    return Lemke(
+        matrix=np.zeros((k, k)), q=np.zeros(k), z=np.zeros(k), w=np.zeros(k), tableau=np.zeros((k, 2 * k + 2)),
+        basis=np.zeros(k, np.int64),
+    )  # fmt: skip
+
+
+@entry
+def solve_lemke(problem, k):
+    """Solve the problem of the first k unknowns in place (z, w). Returns False if the method finds no solution.
+
+    M and q should have numbers of size one: round-off is judged by that.
+    """
+    t, basis, cover, last = problem.tableau, problem.basis, 2 * k, 2 * k + 1
+    lowest, leaving = -_PIVOT, -1
+    for i in range(k):
+        for j in range(2 * k + 1):
+            t[i, j] = 0.0
+        t[i, i] = 1.0
+        for j in range(k):
+            t[i, k + j] = -problem.matrix[i, j]
+        t[i, cover], t[i, last] = -1.0, problem.q[i]
+        basis[i] = i
+        if problem.q[i] < lowest:
+            lowest, leaving = problem.q[i], i
+        problem.z[i], problem.w[i] = 0.0, max(problem.q[i], 0.0)
+    if leaving < 0:
+        return True
+    entering = cover
+    for _ in range(50 + 20 * k):
+        pivot = t[leaving, entering]
+        for j in range(2 * k + 2):
+            t[leaving, j] /= pivot
+        for i in range(k):
+            factor = t[i, entering]
+            if i != leaving and factor != 0.0:
+                for j in range(2 * k + 2):
+                    t[i, j] -= factor * t[leaving, j]
+                t[i, entering] = 0.0
+        left, basis[leaving] = basis[leaving], entering
+        if left == cover:
+            for i in range(k):
+                problem.w[i] = 0.0
+            for i in range(k):
+                if basis[i] < k:
+                    problem.w[basis[i]] = max(t[i, last], 0.0)
+                else:
+                    problem.z[basis[i] - k] = max(t[i, last], 0.0)
+            return True
+        entering = left + k if left < k else left - k
+        leaving = -1
+        for i in range(k):
+            if t[i, entering] > _PIVOT and (leaving < 0 or _before(t, basis, i, leaving, entering, k)):
+                leaving = i
+        if leaving < 0:
+            return False
+    return False
+
+
+@kernel
+def _before(t, basis, i, other, entering, k):
+    """Whether row i leaves the basis before another one: smaller ratio, covering variable, lexicographic order."""
+    last, a, b = 2 * k + 1, t[i, entering], t[other, entering]
+    difference = t[i, last] * b - t[other, last] * a
+    if abs(difference) > _PIVOT * a * b:
+        return difference < 0.0
+    if basis[i] == 2 * k or basis[other] == 2 * k:
+        return basis[i] == 2 * k
+    for j in range(k):
+        difference = t[i, j] * b - t[other, j] * a
+        if abs(difference) > _PIVOT * a * b:
+            return difference < 0.0
+    return False

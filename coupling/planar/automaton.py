@@ -1,0 +1,302 @@
+"""The loop from event to event of bodies with extent: flow, first event, impact, decision; energies of all of it."""
+
+from __future__ import annotations
+
+import math
+
+from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.planar.contact_decisions import decide, gap, is_shut, row_speed, speed_scale
+from vanedamp.coupling.planar.event_functions import next_event
+from vanedamp.coupling.planar.impacts import collide, log_event
+from vanedamp.coupling.planar.quadrature import add_up, motion_at
+from vanedamp.coupling.planar.state import (
+    AT_ONCE,
+    CLOSES,
+    EVENTS,
+    FLOW,
+    LOGGED,
+    OPEN,
+    PERIOD,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    STICK,
+    TOUCHING,
+)
+from vanedamp.coupling.response.records import DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS, STORED
+
+# what `advance` returns
+DONE, NEEDS_FLOW, EVENT_BUDGET, LOG_FULL, ACCURACY_LOST, UNDECIDED = range(6)
+#: overlap, as a share of the play, beyond which round-off has lost a contact
+_LOST = 1e-7
+#: events at one instant after which contacts are said to be undecided, for each unit
+_AT_ONCE = 20
+
+
+@entry
+def begin(system, st, rec, log, work):
+    """Let contacts collide that are closed and approach at time zero, and decide their states. False if that fails."""
+    _phase(system, st)
+    st.scale[0] = speed_scale(system, st.v)
+    for r in range(system.contacts):
+        if is_shut(system, st, r) and row_speed(system, r, st.v) < 0.0:
+            if not collide(system, st, rec, log, work):
+                return False
+            break
+    if not decide(system, st, work, st.scale[0]):
+        return False
+    st.counters[FLOW] = -1
+    return True
+
+
+@entry
+def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_events):
+    """Advance to the end of `periods`. Returns a code."""
+    while st.counters[PERIOD] < periods:
+        if st.counters[FLOW] < 0:
+            s = _find(flows, st)
+            if s < 0:
+                return NEEDS_FLOW
+            st.counters[FLOW] = s
+            _enter(system, flows, st)
+        if st.counters[EVENTS] >= max_events:
+            return EVENT_BUDGET
+        if st.counters[LOGGED] + 4 * len(system.rest) >= len(log):
+            return LOG_FULL
+        _begin_segment(system, flows, st)
+        if st.time[0] == 0.0:
+            _record(system, st, rec)
+        tau, who = next_event(system, flows, st, guards, all_modes)
+        if tau > 0.0:
+            add_up(system, flows, st, rec, work, tau)
+            _sample(system, flows, st, rec, work, tau)
+            motion_at(system, flows, st, work, tau, work.ahead[0], work.ahead[1])
+            for i in range(len(st.q)):
+                st.q[i], st.v[i] = work.ahead[0, i], work.ahead[1, i]
+            for r in range(len(st.fresh)):
+                st.fresh[r] = 0
+            st.counters[AT_ONCE] = 0
+        if who < 0:
+            st.counters[PERIOD] += 1
+            st.time[0] = 0.0
+            for r in range(len(st.last_impact)):
+                st.last_impact[r] -= system.period
+            _phase(system, st)
+            _begin_segment(system, flows, st)
+            _record(system, st, rec)
+            continue
+        st.counters[EVENTS] += 1
+        st.counters[AT_ONCE] += 1
+        st.time[0] += tau
+        _phase(system, st)
+        if st.counters[AT_ONCE] > _AT_ONCE * len(system.rest):
+            return UNDECIDED
+        if not _happen(system, st, rec, log, work, guards.unit[who], guards.what[who]):
+            return UNDECIDED
+        if not _inside(system, st):
+            return ACCURACY_LOST
+    return DONE
+
+
+@inlined
+def _happen(system, st, rec, log, work, r, what):
+    """The event of unit r. Returns False if it cannot be decided."""
+    u = len(system.rest)
+    st.scale[0] = max(st.scale[0], speed_scale(system, st.v))
+    if what == CLOSES:
+        _close(system, st, r)
+        if row_speed(system, r, st.v) < 0.0 and not collide(system, st, rec, log, work):
+            return False
+    if not decide(system, st, work, st.scale[0]):
+        return False
+    changed = False
+    for i in range(u):
+        was, now = work.before[i], st.state[i]
+        changed = changed or was != now
+        if i < system.contacts and was == OPEN and now != OPEN:
+            log_event(system, st, log, RESTS, i, 0.0, 0.0, 0.0, 0.0)
+        elif i < system.contacts and was != OPEN and now == OPEN:
+            log_event(system, st, log, DETACHES, i, 0.0, row_speed(system, i, st.v), 0.0, 0.0)
+        elif now == STICK and (was == SLIP_RIGHT or was == SLIP_LEFT):
+            log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0)
+        elif was == STICK and (now == SLIP_RIGHT or now == SLIP_LEFT):
+            log_event(system, st, log, SLIPS, i, 0.0, row_speed(system, u + i, st.v), 0.0, 0.0)
+    if changed:
+        st.counters[FLOW] = -1
+    return True
+
+
+@kernel
+def _close(system, st, r):
+    """Shift the unit's body by what round-off has left of its gap: the contact is closed, exactly."""
+    error, square = gap(system, r, st.q), 0.0
+    for i in range(len(st.q)):
+        square += system.J[r, i] * system.J[r, i] / system.mass[i]
+    for i in range(len(st.q)):
+        st.q[i] -= system.J[r, i] / system.mass[i] * error / square
+
+
+@inlined
+def _find(flows, st):
+    for s in range(len(flows.modes)):
+        same = flows.modes[s] > 0
+        for r in range(len(st.state)):
+            if not same:
+                break
+            same = flows.key[s, r] == st.state[r]
+        if same:
+            return s
+    return -1
+
+
+@kernel
+def _enter(system, flows, st):
+    """Stop what the contacts hold, and enter what that takes from the motion: the last of a chatter, and round-off."""
+    s, size, loss = st.counters[FLOW], len(st.q), 0.0
+    for i in range(size):
+        loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
+    _snap(system, flows, st, s)
+    for i in range(size):
+        loss -= 0.5 * system.mass[i] * st.v[i] * st.v[i]
+    st.ledger[IMPACT_LOSS] += loss
+    for r in range(len(st.caught)):
+        st.caught[r] = 0
+
+
+@inlined
+def _snap(system, flows, st, s):
+    """Bring back gaps, and speeds of rows at rest, from round-off to zero."""
+    u, size = len(system.rest), len(st.q)
+    for r in range(2 * u):
+        st.rate[r] = row_speed(system, r, st.v) if _at_rest(system, st, r) else 0.0
+    for r in range(2 * u):
+        if st.rate[r] != 0.0:
+            for i in range(size):
+                st.v[i] -= flows.snap_rate[s, i, r] * st.rate[r]
+    for r in range(system.contacts):
+        st.rate[r] = gap(system, r, st.q) if st.state[r] != OPEN else 0.0
+    for r in range(system.contacts):
+        if st.rate[r] != 0.0:
+            for i in range(size):
+                st.q[i] -= flows.snap[s, i, r] * st.rate[r]
+
+
+@inlined
+def _at_rest(system, st, row):
+    """Whether contacts hold a row: the gap of a closed contact, the slip of one that sticks."""
+    u = len(system.rest)
+    return st.state[row] != OPEN and row < system.contacts if row < u else st.state[row - u] == STICK
+
+
+@inlined
+def _phase(system, st):
+    for h in range(len(system.frequency)):
+        angle = system.frequency[h] * st.time[0]
+        st.amplitude[h] = complex(math.cos(angle), math.sin(angle))
+
+
+@kernel
+def _begin_segment(system, flows, st):
+    """Amplitudes of the modes, constant accelerations and forces, from the state."""
+    s, size, e = st.counters[FLOW], len(st.q), len(system.frequency)
+    _snap(system, flows, st, s)
+    for j in range(e, flows.modes[s]):
+        total = -flows.offset[s, j]
+        for i in range(size):
+            total += flows.project[s, j, i] * st.q[i] + flows.project[s, j, size + i] * st.v[i]
+        for h in range(e):
+            phase = st.amplitude[h]
+            total -= flows.in_phase[s, j, h] * phase.real + flows.in_quadrature[s, j, h] * phase.imag
+        st.amplitude[j] = total
+    for i in range(size):
+        st.bend[i] = flows.bend[s, i]
+        for k in range(size):
+            st.bend[i] += flows.bend_held[s, i, k] * st.q[k]
+    for r in range(len(st.force)):
+        st.force[r] = flows.force_constant[s, r]
+        for k in range(size):
+            st.force[r] += flows.force_held[s, r, k] * st.q[k]
+    swing = 0.0
+    for i in range(size):
+        part = abs(st.v[i])
+        for j in range(flows.modes[s]):
+            rate = flows.motion[s, i, j] * flows.eigenvalue[s, j] * st.amplitude[j]
+            part += abs(rate.real) + abs(rate.imag)
+        largest = 0.0
+        for r in range(len(system.J)):
+            largest = max(largest, abs(system.J[r, i]))
+        swing = max(swing, part * largest)
+    st.scale[0] = swing
+
+
+@inlined
+def _inside(system, st):
+    """Whether round-off has kept every body inside its cavity."""
+    for r in range(system.contacts):
+        if st.state[r] == OPEN and not gap(system, r, st.q) >= -_LOST * system.play[r]:
+            return False
+    return True
+
+
+@kernel
+def _record(system, st, rec):
+    """Record section, energies and ledger at the start of a period."""
+    size, bodies, period = len(st.q), len(system.along), st.counters[PERIOD]
+    entry, part = rec.section[period], rec.parts[period]
+    x, rate, momentum, energy = 0.0, 0.0, 0.0, 0.0
+    for h in range(len(system.table)):
+        x += system.table[h].real
+        rate -= system.frequency[h] * system.table[h].imag
+    for i in range(size):
+        x += system.response[i] * st.q[i]
+        rate += system.response[i] * st.v[i]
+        force = 0.0
+        for k in range(size):
+            force += system.stiffness[i, k] * st.q[k]
+        energy += 0.5 * st.q[i] * force
+    first = size if bodies == 0 else system.along[0]
+    for i in range(first):
+        energy += 0.5 * system.mass[i] * st.v[i] * st.v[i]
+    part[0] = energy
+    for b in range(bodies):
+        at = system.along[b]
+        part[1 + b] = 0.0
+        for i in range(at, at + (3 if system.tilt[b] >= 0 else 1)):
+            part[1 + b] += 0.5 * system.mass[i] * st.v[i] * st.v[i] - system.weight[i] * st.q[i]
+        energy += part[1 + b]
+        momentum += system.mass[at] * st.v[at]
+        slip, speed = st.q[at], st.v[at]
+        for i in range(size):
+            slip -= system.floor[b, i] * st.q[i]
+            speed -= system.floor[b, i] * st.v[i]
+        entry[3 + b], entry[3 + bodies + b] = slip, speed
+    entry[0], entry[1], entry[2] = x, rate, momentum
+    st.ledger[STORED] = energy
+    for i in range(len(st.ledger)):
+        rec.ledger[period, i] = st.ledger[i]
+
+
+@inlined
+def _sample(system, flows, st, rec, work, tau):
+    """Take the samples of the segment."""
+    periods = len(rec.peak) - 1
+    many = len(rec.samples) // periods if periods > 0 else 0
+    if many == 0:
+        return
+    step, q, v = system.period / many, work.ahead[0], work.ahead[1]
+    k = math.ceil(st.time[0] / step - 1e-9)
+    while k < many and k * step < st.time[0] + tau:
+        row = st.counters[PERIOD] * many + k
+        if row < len(rec.samples):
+            motion_at(system, flows, st, work, max(k * step - st.time[0], 0.0), q, v)
+            rec.samples[row, 0] = 0.0
+            for h in range(len(system.table)):
+                angle = system.frequency[h] * k * step
+                rec.samples[row, 0] += (system.table[h] * complex(math.cos(angle), math.sin(angle))).real
+            for i in range(len(q)):
+                rec.samples[row, 0] += system.response[i] * q[i]
+            for b in range(len(system.along)):
+                slip = q[system.along[b]]
+                for i in range(len(q)):
+                    slip -= system.floor[b, i] * q[i]
+                rec.samples[row, 1 + b] = slip
+        k += 1

@@ -1,0 +1,346 @@
+"""From a scene to the coordinates of its bodies in the plane, and to the contacts between them and their cavities.
+
+Coordinates q = (p, bodies): modes of the structure, then of each body x along its cavity, and of one with extent y across
+it and its tilt theta, all relative to the base. x and y count from where the bodies of a cavity stand side by side on the
+floor, in the middle of the free travel. Tilts are small: a point (a, b) of a body, from its centre, moves by
+(x - theta b, y + theta a).
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.scene.bodies import Cavity, Damper
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import physical_scale
+from vanedamp.coupling.system.constraints import surface_labels
+from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, interface_row
+from vanedamp.coupling.system.system import System
+from vanedamp.files.toml_input import InputError
+
+#: coefficients of friction below this are none
+_SMOOTH = 1e-9
+
+
+class PlanarSystem(NamedTuple):
+    """Matrices of a scene: N coordinates, e harmonics, u units, b bodies. Compiled functions take it as it is.
+
+    A unit is a contact with its normal row and its slip, or, behind the contacts, a friction element with a constant
+    limit, which has only a slip. Rows (2u, N): normals first, then slips.
+    """
+
+    contacts: int
+    mass: np.ndarray  # (N,) 1 for a mode; kg; kg m^2
+    stiffness: np.ndarray  # (N, N)
+    damping: np.ndarray  # (N, N)
+    load: np.ndarray  # (e, N) complex amplitudes
+    weight: np.ndarray  # (N,)
+    response: np.ndarray  # (N,)
+    table: np.ndarray  # (e,) complex displacement of a base whose motion is the response, m
+    frequency: np.ndarray  # (e,) rad/s
+    period: float  # s
+    J: np.ndarray  # (2u, N)
+    rest: np.ndarray  # (u,) gap at q = 0, m
+    delassus: np.ndarray  # (2u, 2u) J M^-1 J^T
+    friction: np.ndarray  # (u,) coefficient of a contact
+    limit: np.ndarray  # (u,) constant limit of a friction element, N; 0 for contacts
+    restitution: np.ndarray  # (u,)
+    play: np.ndarray  # (u,) m, the scale of a contact's gap
+    body: np.ndarray  # (u,) number of the unit's body
+    surface: np.ndarray  # (u,) int: place of its name in SURFACES
+    corner: np.ndarray  # (u,) int: 0 to 3, counted from the lower left one against the tilt; -1: none
+    along: np.ndarray  # (b,) coordinate x of each body
+    tilt: np.ndarray  # (b,) coordinate theta, -1: none
+    floor: np.ndarray  # (b, N) motion of the floor along the cavity
+    turn: np.ndarray  # (b, N) rotation of the cavity
+
+
+#: names of what a unit touches
+SURFACES = ("left", "right", "floor", "ceiling", "body", "casing")
+LEFT, RIGHT, FLOOR, CEILING, BODY, CASING = range(len(SURFACES))
+
+
+class PlanarMotion(NamedTuple):
+    """Motion at time zero: coordinates (N,) and their rates."""
+
+    q: np.ndarray
+    v: np.ndarray
+
+
+class _Unit(NamedTuple):
+    normal: np.ndarray
+    slip: np.ndarray
+    rest: float
+    friction: float
+    restitution: float
+    play: float
+    body: int
+    surface: int
+    corner: int = -1
+    limit: float = 0.0
+
+
+class _Body(NamedTuple):
+    """A body: number, its coordinates in q, half length and half height (both the radius of a disc)."""
+
+    number: int
+    damper: Damper
+    x: int
+    a: float
+    b: float
+
+    @property
+    def corners(self) -> tuple[tuple[float, float], ...]:
+        """Corners of a block, against the tilt from the lower left one."""
+        return (-self.a, -self.b), (self.a, -self.b), (self.a, self.b), (-self.a, self.b)
+
+
+class _Walls(NamedTuple):
+    """Motion (n,) of a cavity's surfaces: along it of left wall, right wall, floor and ceiling; across; rotation."""
+
+    along: tuple[np.ndarray, ...]
+    across: np.ndarray
+    turn: np.ndarray
+
+
+def planar_system(scene: Scene, flat: System) -> PlanarSystem:
+    """Assemble the scene. flat: its system with every body as a slider, which has the same loads.
+
+    Raises InputError for what bodies with extent do not allow.
+    """
+    basis, n = basis_of(scene), flat.modes
+    bodies, size = [], n
+    for number, damper in enumerate(scene.damper):
+        a, b = damper.half_extent
+        bodies.append(_Body(number, damper, size, a, b))
+        size += 1 if damper.shape == "slider" else 3
+    owner = [[cavity.name for cavity in scene.cavity].index(damper.cavity) for damper in scene.damper]
+    walls = [_walls(scene, basis, index) for index in range(len(scene.cavity))]
+    mass, weight = np.ones(size), np.zeros(size)
+    load = np.zeros((len(flat.frequency), size), complex)
+    load[:, :n] = flat.load[:, :n]
+    floor, turn = np.zeros((len(bodies), size)), np.zeros((len(bodies), size))
+    for body in bodies:
+        k, x = body.number, body.x
+        mass[x], weight[x], load[:, x] = body.damper.mass, flat.weight[n + k], flat.load[:, n + k]
+        floor[k, :n], turn[k, :n] = walls[owner[k]].along[2], walls[owner[k]].turn
+        if body.damper.shape != "slider":
+            label = surface_labels(scene, owner[k])[2]
+            _, across = scene.gravity.components(basis.directions[label])
+            mass[x + 1], weight[x + 1] = body.damper.mass, -body.damper.mass * across
+            mass[x + 2] = body.damper.moment_of_inertia
+    units: list[_Unit] = []
+    for index, cavity in enumerate(scene.cavity):
+        units += _contacts(scene, cavity, walls[index], [body for body in bodies if owner[body.number] == index], size)
+    contacts = len(units)
+    for row in range(flat.friction_rows):
+        if flat.limit[row] > 0.0 and not (row < len(bodies) and bodies[row].damper.shape != "slider"):
+            functional = np.zeros(size)
+            functional[:n] = flat.J[row, :n]
+            if row < len(bodies):
+                functional[bodies[row].x] = 1.0
+            surface, number = (FLOOR, row) if row < len(bodies) else (CASING, row - len(bodies))
+            limit = float(flat.limit[row])
+            units.append(_Unit(np.zeros(size), functional, 0.0, 0.0, 0.0, np.inf, number, surface, limit=limit))
+    J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
+    stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
+    stiffness[:n, :n], damping[:n, :n] = np.diag(flat.stiffness[:n]), flat.damping[:n, :n]
+    for body in bodies:
+        if body.damper.stiffness or body.damper.dashpot:
+            own = -floor[body.number]
+            own[body.x] = 1.0
+            stiffness += (body.damper.stiffness or 0.0) * np.outer(own, own)
+            damping += (body.damper.dashpot or 0.0) * np.outer(own, own)
+    response = np.zeros(size)
+    response[:n] = flat.response[:n]
+    column = lambda name: np.array([getattr(unit, name) for unit in units])  # noqa: E731
+    return PlanarSystem(
+        contacts=contacts, mass=mass, stiffness=stiffness, damping=damping, load=load, weight=weight,
+        response=response, table=flat.table, frequency=flat.frequency, period=flat.period, J=J,
+        rest=column("rest").astype(float), delassus=(J / mass) @ J.T, friction=column("friction").astype(float),
+        limit=column("limit").astype(float), restitution=column("restitution").astype(float),
+        play=column("play").astype(float), body=column("body").astype(np.int64),
+        surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
+        along=np.array([body.x for body in bodies], np.int64),
+        tilt=np.array([-1 if body.damper.shape == "slider" else body.x + 2 for body in bodies], np.int64),
+        floor=floor, turn=turn,
+    )  # fmt: skip
+
+
+def _walls(scene: Scene, basis: ModalBasis, index: int) -> _Walls:
+    """Motion of a cavity's surfaces; a rigid structure's one mode moves it as the cavity says."""
+    cavity, labels = scene.cavity[index], surface_labels(scene, index)
+    left, right, floor = (
+        interface_row(basis, label, f"cavity[{index}].{side}")
+        for label, side in zip(labels, ("left", "right", "floor"), strict=True)
+    )
+    none = np.zeros(len(basis.stiffness))
+    across = basis.rows.get(f"{labels[2]}.normal", cavity.normal_motion * floor)
+    turn = basis.rows.get(f"{labels[2]}.rotation", cavity.rotation * floor)
+    ceiling = floor if cavity.ceiling is None else interface_row(basis, cavity.ceiling, f"cavity[{index}].ceiling")
+    return _Walls((left, right, floor, ceiling), across + none, turn + none)
+
+
+def _contacts(scene: Scene, cavity: Cavity, walls: _Walls, bodies: list[_Body], size: int) -> list[_Unit]:
+    """Contacts in a cavity, from left to right, in each body's walls, floor and ceiling."""
+    units: list[_Unit] = []
+    length, n = 2 * sum(body.a for body in bodies), len(walls.across)
+    centre = -length / 2
+    for place, body in enumerate(bodies):
+        centre += body.a
+        if place == 0:
+            units += _at_walls(cavity, walls, body, LEFT, -cavity.gap / 2 - length / 2, size, n)
+        if place == len(bodies) - 1:
+            units += _at_walls(cavity, walls, body, RIGHT, cavity.gap / 2 + length / 2, size, n)
+        if body.damper.shape != "slider":
+            for surface in (FLOOR, CEILING):
+                units += _at_floor(cavity, walls, body, surface, centre, size, n)
+        if place + 1 < len(bodies):
+            units += _between(scene, cavity, body, bodies[place + 1], size)
+        centre += body.a
+    return units
+
+
+def _point(body: _Body, a: float, b: float, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Motion (N,) along and across of point (a, b) of a body."""
+    along, across = np.zeros(size), np.zeros(size)
+    along[body.x] = 1.0
+    if body.damper.shape != "slider":
+        along[body.x + 2], across[body.x + 1], across[body.x + 2] = -b, 1.0, a
+    return along, across
+
+
+def _at_walls(cavity: Cavity, walls: _Walls, body: _Body, surface: int, wall: float, size: int, n: int) -> list[_Unit]:
+    """Contacts with the left or the right wall, at `wall` (m) along the cavity."""
+    sign = 1.0 if surface == LEFT else -1.0
+    if body.damper.shape == "slider":
+        points = [(-1, 0.0, 0.0)]
+    elif body.damper.shape == "disc":
+        points = [(-1, -sign * body.a, 0.0)]
+    else:
+        wanted = (0, 3) if surface == LEFT else (1, 2)
+        points = [(corner, *body.corners[corner]) for corner in wanted]
+    units = []
+    for corner, a, b in points:
+        along, across = _point(body, a, b, size)
+        along[:n] -= walls.along[0 if surface == LEFT else 1] - walls.turn * (body.b + b)
+        across[:n] -= walls.across + walls.turn * wall
+        extended = body.damper.shape != "slider"
+        units.append(
+            _Unit(
+                sign * along,
+                across * extended,
+                cavity.gap / 2,
+                body.damper.friction * extended,
+                body.damper.restitution,
+                cavity.gap,
+                body.number,
+                surface,
+                corner,
+            )  # fmt: skip
+        )
+    return units
+
+
+def _at_floor(
+    cavity: Cavity, walls: _Walls, body: _Body, surface: int, centre: float, size: int, n: int
+) -> list[_Unit]:
+    """Contacts with floor or ceiling of a body whose centre is at `centre` (m) along the cavity."""
+    below, play = surface == FLOOR, cavity.play or 0.0
+    sign = 1.0 if below else -1.0
+    if body.damper.shape == "disc":
+        points = [(-1, 0.0, -sign * body.b)]
+    else:
+        points = [(corner, *body.corners[corner]) for corner in ((0, 1) if below else (2, 3))]
+    units = []
+    for corner, a, b in points:
+        along, across = _point(body, a, b, size)
+        along[:n] -= walls.along[2 if below else 3] - walls.turn * (0.0 if below else 2 * body.b + play)
+        across[:n] -= walls.across + walls.turn * (centre + a)
+        units.append(
+            _Unit(
+                sign * across,
+                along,
+                0.0 if below else play,
+                body.damper.friction,
+                body.damper.restitution,
+                play,
+                body.number,
+                surface,
+                corner,
+            )  # fmt: skip
+        )
+    return units
+
+
+def _between(scene: Scene, cavity: Cavity, left: _Body, right: _Body, size: int) -> list[_Unit]:
+    """Contacts of two neighbours: blocks face to face at the ends of the common height, discs at one point."""
+    shapes = {left.damper.shape, right.damper.shape}
+    if shapes == {"slider"}:
+        heights = [0.0]
+    elif "slider" in shapes:
+        raise InputError(
+            f"damper[{right.number}].shape: a slider and a body with extent share cavity '{cavity.name}'; a slider has "
+            "no height at which they could touch: give it a shape"
+        )
+    elif shapes == {"block"}:
+        heights = [0.0, 2 * min(left.b, right.b)]
+    else:
+        round_one, other = (left, right) if left.damper.shape == "disc" else (right, left)
+        if other.damper.shape == "disc" and abs(left.b - right.b) > 1e-12 * left.b:
+            raise InputError(
+                f"damper[{right.number}].radius: discs side by side in cavity '{cavity.name}' must have one radius"
+            )
+        if round_one.b > 2 * other.b:
+            raise InputError(
+                f"damper[{round_one.number}].radius: the disc touches its neighbour in cavity '{cavity.name}' above "
+                "the neighbour's face; it must not exceed the neighbour's height"
+            )
+        heights = [round_one.b]
+    coefficients = left.damper.restitution, right.damper.restitution
+    friction = 0.0 if shapes == {"slider"} else (left.damper.friction * right.damper.friction) ** 0.5
+    units = []
+    for height in heights:
+        right_along, right_across = _point(right, -right.a, height - right.b, size)
+        left_along, left_across = _point(left, left.a, height - left.b, size)
+        units.append(
+            _Unit(
+                right_along - left_along,
+                (right_across - left_across) * (friction > 0.0),
+                0.0,
+                friction,
+                scene.contact.pair_restitution(*coefficients),
+                cavity.gap,
+                left.number,
+                BODY,
+            )  # fmt: skip
+        )
+    return units
+
+
+def planar_motion(scene: Scene, flat: System, system: PlanarSystem) -> PlanarMotion:
+    """The motion that a scene begins with. Raises InputError for bodies that would overlap a surface."""
+    n, size = flat.modes, len(system.mass)
+    q, v = np.zeros(size), np.zeros(size)
+    scale = physical_scale(scene, flat)
+    q[:n], v[:n] = scene.initial.displacement / scale, scene.initial.velocity / scale
+    for k, damper in enumerate(scene.damper):
+        x = system.along[k]
+        q[x] = damper.position + system.floor[k] @ q
+        v[x] = damper.velocity + system.floor[k] @ v
+        if damper.shape != "slider":
+            lifted = damper.half_extent[0] * abs(damper.tilt) if damper.shape == "block" else 0.0
+            # a tilted block stands on its corner unless it is lifted higher
+            q[x + 1 : x + 3] = damper.lift + lifted, damper.tilt
+            v[x + 1 : x + 3] = damper.lift_velocity, damper.tilt_rate
+    gaps = system.rest + system.J[: len(system.rest)] @ q
+    for unit in range(system.contacts):
+        if gaps[unit] < -1e-12 * system.play[unit]:
+            raise InputError(
+                f"damper[{system.body[unit]}]: begins {-gaps[unit]:.3g} m beyond the cavity's "
+                f"{SURFACES[system.surface[unit]]}; change position, lift or tilt"
+            )
+    return PlanarMotion(q, v)

@@ -1,0 +1,259 @@
+"""Which closed contacts carry a force, stick, slip or let go: Coulomb's law and complementarity on accelerations.
+
+A contact that slips has the one unknown lambda_N; one that is at rest has three: lambda_N, the share lambda_R by which
+its friction stays above -mu lambda_N, and the part a_L of its slip's acceleration to the left (Glocker and Pfeiffer
+1996). What the instant leaves open, as a force that has just vanished, is decided by the same problem a moment later.
+"""
+
+from __future__ import annotations
+
+import math
+
+from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF, SIMULTANEOUS
+from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
+from vanedamp.coupling.planar.state import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, TOUCHING
+
+#: what is small beside the largest term, now and a moment later, and that moment, in periods
+_NOTHING, _NEXT_TO_NOTHING, _MOMENT = 1e-9, 1e-12, 1e-6
+#: share of the speeds in a scene that is round-off
+_AT_REST = 10 * ROUND_OFF
+_NORMAL, _SLIP = 1, 2
+
+
+@inlined
+def row_speed(system, row, v):
+    """Speed of a row, m/s."""
+    total = 0.0
+    for i in range(len(v)):
+        total += system.J[row, i] * v[i]
+    return total
+
+
+@inlined
+def gap(system, unit, q):
+    """Gap of a contact, m."""
+    return system.rest[unit] + row_speed(system, unit, q)
+
+
+@inlined
+def speed_scale(system, v):
+    """Largest sum of the parts of a row's speed, m/s."""
+    largest = 0.0
+    for row in range(len(system.J)):
+        total = 0.0
+        for i in range(len(v)):
+            total += abs(system.J[row, i] * v[i])
+        largest = max(largest, total)
+    return largest
+
+
+@inlined
+def is_shut(system, st, unit):
+    """Whether a contact's gap is zero."""
+    return st.state[unit] != OPEN or gap(system, unit, st.q) <= SIMULTANEOUS * system.play[unit]
+
+
+@kernel
+def free_acceleration(system, work, q, v, time):
+    """Accelerations (work.free) without contact forces, friction elements included, at a time within the period."""
+    size = len(q)
+    for i in range(size):
+        total = system.weight[i]
+        for h in range(len(system.frequency)):
+            angle = system.frequency[h] * time
+            total += (system.load[h, i] * complex(math.cos(angle), math.sin(angle))).real
+        for k in range(size):
+            total -= system.stiffness[i, k] * q[k] + system.damping[i, k] * v[k]
+        work.free[i] = total / system.mass[i]
+
+
+@kernel
+def solve_rows(system, work, count, right):
+    """Solve the problem of the listed units: accelerations (or speeds) right + G forces, forces in work.impulse (2u,).
+
+    right: (2u,) without the unknown forces. Returns False if there is no solution, or none is found.
+    """
+    u, problem, size = len(system.rest), work.lemke, 0
+    scale = 0.0
+    for p in range(count):
+        r = work.listed[p]
+        work.place[p] = size
+        if r < system.contacts:
+            scale = max(scale, abs(right[r]) / math.sqrt(system.delassus[r, r]))
+            size += 3 if work.way[p] == 0 and system.friction[r] > 0.0 else 1
+        else:
+            size += 2
+        if system.delassus[u + r, u + r] > 0.0:
+            scale = max(scale, abs(right[u + r]) / math.sqrt(system.delassus[u + r, u + r]))
+            scale = max(scale, system.limit[r] * math.sqrt(system.delassus[u + r, u + r]))
+    for r in range(2 * u):
+        work.impulse[r] = 0.0
+    if size == 0:
+        return True
+    scale = scale if scale > 0.0 else 1.0
+    for i in range(size):
+        problem.q[i] = 0.0
+        for j in range(size):
+            problem.matrix[i, j] = 0.0
+    for p in range(count):
+        r, i = work.listed[p], work.place[p]
+        contact = r < system.contacts
+        at_rest = work.way[p] == 0 and (not contact or system.friction[r] > 0.0)
+        normal = 1.0 / math.sqrt(system.delassus[r, r]) if contact else 0.0
+        slip = 1.0 / math.sqrt(system.delassus[u + r, u + r]) if at_rest else 0.0
+        first = i + 1 if contact else i  # the unknown of the friction to the right
+        if contact:
+            problem.q[i] = _loaded(system, work, count, right, r) * normal / scale
+        if at_rest:
+            problem.q[first] = _loaded(system, work, count, right, u + r) * slip / scale
+            problem.matrix[first, first + 1] += 1.0
+            problem.matrix[first + 1, first] -= 1.0
+            if contact:
+                problem.matrix[first + 1, i] += 2.0 * system.friction[r] * normal / slip
+            else:
+                problem.q[first + 1] = 2.0 * system.limit[r] / (slip * scale)
+        for o in range(count):
+            c, j = work.listed[o], work.place[o]
+            other = c < system.contacts
+            free = work.way[o] == 0 and (not other or system.friction[c] > 0.0)
+            if other:
+                weight = 1.0 / math.sqrt(system.delassus[c, c])
+                drag = -system.friction[c] * (1.0 if free else float(work.way[o]))
+                if contact:
+                    part = system.delassus[r, c] + drag * system.delassus[r, u + c]
+                    problem.matrix[i, j] += normal * weight * part
+                if at_rest:
+                    part = system.delassus[u + r, c] + drag * system.delassus[u + r, u + c]
+                    problem.matrix[first, j] += slip * weight * part
+            if free:
+                k = j + 1 if other else j
+                weight = 1.0 / math.sqrt(system.delassus[u + c, u + c])
+                if contact:
+                    problem.matrix[i, k] += normal * weight * system.delassus[r, u + c]
+                if at_rest:
+                    problem.matrix[first, k] += slip * weight * system.delassus[u + r, u + c]
+    if not solve_lemke(problem, size):
+        return False
+    for p in range(count):
+        r, i = work.listed[p], work.place[p]
+        contact = r < system.contacts
+        if contact:
+            work.impulse[r] = problem.z[i] * scale / math.sqrt(system.delassus[r, r])
+            if work.way[p] != 0:
+                work.impulse[u + r] = -work.way[p] * system.friction[r] * work.impulse[r]
+        if work.way[p] == 0 and (not contact or system.friction[r] > 0.0):
+            low = system.friction[r] * work.impulse[r] if contact else system.limit[r]
+            share = problem.z[i + 1 if contact else i] * scale / math.sqrt(system.delassus[u + r, u + r])
+            work.impulse[u + r] = share - low
+    return True
+
+
+@inlined
+def _loaded(system, work, count, right, row):
+    """What a row has without the unknowns: friction elements count from their lower bound."""
+    u, total = len(system.rest), right[row]
+    for p in range(count):
+        c = work.listed[p]
+        if c >= system.contacts:
+            total -= system.delassus[row, u + c] * system.limit[c]
+    return total
+
+
+@kernel
+def _classify(system, work, count, nothing, verdict):
+    """States (verdict) of the listed units from the solution, and what it leaves open (work.doubtful)."""
+    problem = work.lemke
+    for p in range(count):
+        r, i = work.listed[p], work.place[p]
+        work.doubtful[p] = 0
+        contact = r < system.contacts
+        if contact and problem.z[i] <= nothing:
+            verdict[p] = OPEN if problem.w[i] > nothing else TOUCHING
+            work.doubtful[p] = _NORMAL if problem.w[i] <= nothing else 0
+        elif work.way[p] != 0:
+            verdict[p] = SLIP_RIGHT if work.way[p] > 0 else SLIP_LEFT
+        elif contact and system.friction[r] == 0.0:
+            verdict[p] = SLIP_RIGHT
+        else:
+            first = i + 1 if contact else i
+            if problem.z[first] <= nothing:
+                verdict[p] = SLIP_RIGHT
+                work.doubtful[p] = _SLIP if problem.w[first] <= nothing else 0
+            elif problem.w[first + 1] <= nothing:
+                verdict[p] = SLIP_LEFT
+                work.doubtful[p] = _SLIP if problem.z[first + 1] <= nothing else 0
+            else:
+                verdict[p] = STICK
+
+
+@entry
+def decide(system, st, work, scale):
+    """Decide the state of every unit at st.q, st.v. Returns False if the problem cannot be solved.
+
+    scale: the speeds in the scene, m/s, whose round-off counts as rest.
+    """
+    u, count = len(system.rest), 0
+    for r in range(u):
+        work.before[r], work.sliding[r] = st.state[r], 0
+        slip = row_speed(system, u + r, st.v)
+        way = 0 if abs(slip) <= _AT_REST * scale else (1 if slip > 0.0 else -1)
+        if r >= system.contacts:
+            if way != 0:
+                st.state[r] = SLIP_RIGHT if way > 0 else SLIP_LEFT
+                work.sliding[r] = way
+                continue
+        elif not is_shut(system, st, r) or (not st.caught[r] and row_speed(system, r, st.v) > _AT_REST * scale):
+            st.state[r] = OPEN
+            continue
+        work.listed[count], work.way[count] = r, way if system.friction[r] > 0.0 or r >= system.contacts else 0
+        count += 1
+    loaded_acceleration(system, work, st.q, st.v, st.time[0])
+    if not solve_rows(system, work, count, work.speed):
+        return False
+    _classify(system, work, count, _NOTHING, work.verdict)
+    doubts = 0
+    for p in range(count):
+        doubts += work.doubtful[p]
+    if doubts > 0 and not _look_ahead(system, st, work, count):
+        return False
+    for p in range(count):
+        st.state[work.listed[p]] = work.verdict[p]
+    for r in range(u):
+        st.fresh[r] = 1
+    return True
+
+
+@inlined
+def loaded_acceleration(system, work, q, v, time):
+    """Accelerations of the rows (work.speed) without contact forces, with those of friction elements that slide."""
+    u = len(system.rest)
+    free_acceleration(system, work, q, v, time)
+    for r in range(system.contacts, u):
+        if work.sliding[r] != 0:
+            for i in range(len(q)):
+                work.free[i] -= work.sliding[r] * system.limit[r] * system.J[u + r, i] / system.mass[i]
+    for r in range(2 * u):
+        work.speed[r] = row_speed(system, r, work.free)
+
+
+@kernel
+def _look_ahead(system, st, work, count):
+    """Decide what was left open by the accelerations a moment later. Returns False if that cannot be solved."""
+    u, size, moment = len(system.rest), len(st.q), _MOMENT * system.period
+    for i in range(size):
+        total = work.free[i]
+        for r in range(2 * u):
+            total += system.J[r, i] * work.impulse[r] / system.mass[i]
+        work.ahead[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
+        work.ahead[1, i] = st.v[i] + moment * total
+    for p in range(count):
+        work.first[p], work.doubt[p] = work.verdict[p], work.doubtful[p]
+    loaded_acceleration(system, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
+    if not solve_rows(system, work, count, work.speed):
+        return False
+    _classify(system, work, count, _NEXT_TO_NOTHING, work.verdict)
+    for p in range(count):
+        if work.doubt[p] == 0 or (work.doubt[p] == _SLIP and work.verdict[p] <= TOUCHING):
+            work.verdict[p] = work.first[p]
+    return True

@@ -1,0 +1,222 @@
+"""Exact motion while every contact keeps its state: open, sticking, or slipping one way.
+
+The forces of closed contacts keep their gaps (and the slips of those that stick) at zero: they are linear in what
+presses on them, with the friction of slipping ones in the direction of their normal forces, W_N - sigma mu W_T, so that
+the projection of the accelerations is oblique. Only what is stretched, xi = B q with B a basis of the rows of stiffness
+and damping, moves by a differential equation of its own, whose modes are complex and may grow; everything else follows
+by quadrature. Every coordinate is then  constant + linear + quadratic + Re sum_j c_j exp(lambda_j t).
+
+All is computed in coordinates sqrt(M) q, where the mass matrix is one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import eig, null_space, orth
+
+from vanedamp.coupling.exact.complex_modes import DEFECTIVE, LOST, IllConditioned
+from vanedamp.coupling.planar.constraints import PlanarSystem
+from vanedamp.coupling.planar.state import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, TOUCHING
+
+#: share of their size below which singular values are zero: rows that depend on each other
+_DEPENDENT = 1e-9
+#: frequencies below this share of the excitation's are refused: displacements would be quotients of round-off
+_SLOW = 1e-6
+
+
+class ContactFlows(NamedTuple):
+    """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included."""
+
+    key: np.ndarray  # (s, u) int: the states
+    modes: np.ndarray  # (s,) int, 0: a free place
+    eigenvalue: np.ndarray  # (s, m)
+    project: np.ndarray  # (s, m, 2N): c = project (q, q') - offset - harmonics
+    offset: np.ndarray  # (s, m)
+    in_phase: np.ndarray  # (s, m, e): share of the real part of the phase of each harmonic in c
+    in_quadrature: np.ndarray  # (s, m, e): of the imaginary part
+    motion: np.ndarray  # (s, N, m): q of each mode
+    rows: np.ndarray  # (s, 2u, m): J motion
+    bend: np.ndarray  # (s, N): constant acceleration
+    bend_held: np.ndarray  # (s, N, N): and what displacements held by constraints add
+    force: np.ndarray  # (s, 2u, m)
+    force_constant: np.ndarray  # (s, 2u)
+    force_held: np.ndarray  # (s, 2u, N)
+    snap: np.ndarray  # (s, N, u): displacement that closes gaps of closed contacts
+    snap_rate: np.ndarray  # (s, N, 2u): velocity that stops their gaps and the slips that stick
+    held: np.ndarray  # (s, u) whether constraints hold the slip of a unit that counts as slipping
+    growth: np.ndarray  # (s,) largest rate of growth, 1/s
+
+
+def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
+    """Room for `capacity` flows."""
+    size, u, e = len(system.mass), len(system.rest), len(system.frequency)
+    m = e + 2 * _rank(system)
+    z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
+    f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
+    return ContactFlows(
+        key=np.zeros((capacity, u), np.int64), modes=np.zeros(capacity, np.int64), eigenvalue=z(m),
+        project=z(m, 2 * size), offset=z(m), in_phase=z(m, e), in_quadrature=z(m, e), motion=z(size, m),
+        rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
+        force_held=f(2 * u, size), snap=f(size, u), snap_rate=f(size, 2 * u), held=np.zeros((capacity, u), np.bool_),
+        growth=f(),
+    )  # fmt: skip
+
+
+def add_flow(flows: ContactFlows, system: PlanarSystem, state: np.ndarray) -> ContactFlows:
+    """The stack with the flow of the states (u,) in its first free place.
+
+    Raises IllConditioned for one that doubles cannot resolve, or whose friction forces have no solution.
+    """
+    free = np.flatnonzero(flows.modes == 0)
+    if len(free) == 0:
+        if sum(part.nbytes for part in flows) > _ROOM:
+            flows = empty_flows(system, len(flows.modes))
+        else:
+            more = empty_flows(system, len(flows.modes))
+            flows = ContactFlows(*(np.concatenate(pair) for pair in zip(flows, more, strict=True)))
+        free = np.flatnonzero(flows.modes == 0)
+    _fill(flows, system, int(free[0]), state)
+    return flows
+
+
+#: bytes that the flows of one run may take
+_ROOM = 2**28
+
+
+def _stretched(system: PlanarSystem) -> np.ndarray:
+    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q."""
+    root = np.sqrt(system.mass)
+    matrix = system.stiffness / root / root[:, None]
+    size = np.sqrt(np.abs(np.diag(matrix)).max(initial=0.0))
+    both = np.vstack([matrix, size * system.damping / root / root[:, None]])
+    touched = np.flatnonzero(both.any(axis=0))
+    if not len(touched):
+        return np.zeros((0, len(root)))
+    if np.linalg.matrix_rank(both[:, touched]) == len(touched):
+        return np.eye(len(root))[touched]
+    basis: np.ndarray = orth(both.T, rcond=1e-12).T
+    return basis
+
+
+def _rank(system: PlanarSystem) -> int:
+    return len(_stretched(system))
+
+
+def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) -> None:
+    u, e, size = len(system.rest), len(system.frequency), len(system.mass)
+    root = np.sqrt(system.mass)
+    rows = system.J / root
+    units = np.arange(u)
+    closed = np.flatnonzero((state > TOUCHING) & (units < system.contacts))
+    stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
+    way = (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
+    kept = np.r_[closed, u + stick]
+    constraints = rows[kept]
+    drag = way * system.friction
+    wrench = np.vstack([rows[closed] - drag[closed, None] * rows[u + closed], rows[u + stick]]).T
+    slides = np.flatnonzero((units >= system.contacts) & (way != 0))
+    applied = -(way * system.limit)[slides] @ rows[u + slides]
+    carried, oblique = _forces(constraints, wrench)
+    stiffness, damping = (part / root / root[:, None] for part in (system.stiffness, system.damping))
+    basis = _stretched(system)
+    allowed = np.eye(len(basis))
+    if len(basis) and len(constraints):
+        allowed = orth(basis @ null_space(constraints, rcond=_DEPENDENT))
+    k = allowed.shape[1]
+    held = basis.T @ basis - basis.T @ allowed @ allowed.T @ basis if k < len(basis) else np.zeros((size, size))
+    held[np.abs(held) < 1e-15] = 0.0
+    inner = allowed.T @ basis  # eta = inner sqrt(M) q
+    own, loss = (inner @ oblique @ part @ inner.T for part in (stiffness, damping))
+    weight = system.weight / root + applied
+    eigenvalue, shape, project = _modes(own, loss, float(system.frequency[0]))
+    count = e + len(eigenvalue)
+    rate = np.r_[1j * system.frequency, eigenvalue]
+    # constant part, of loads and of what constraints hold
+    still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
+    rest, rest_held = still @ weight, -still @ stiffness @ held
+    load = system.load / root
+    wave = np.zeros((k, e), complex)
+    for h, omega in enumerate(system.frequency):
+        wave[:, h] = np.linalg.solve(own - omega**2 * np.eye(k) + 1j * omega * loss, inner @ oblique @ load[h])
+    eta = np.hstack([wave, shape[:k]])
+    net = -(stiffness @ inner.T @ eta + damping @ inner.T @ (eta * rate))
+    net[:, :e] += load.T
+    net_constant, net_held = weight - stiffness @ inner.T @ rest, -stiffness @ (held + inner.T @ rest_held)
+    motion = (oblique @ net) / rate**2
+    # a coordinate that constraints hold is at rest, not at round-off
+    motion[np.abs(motion) <= 1e-15 * np.abs(net / rate**2).max(axis=0, initial=0.0)] = 0.0
+    flows.key[s], flows.modes[s] = state, count
+    flows.eigenvalue[s, :count] = rate
+    both = np.hstack([inner * root, np.zeros_like(inner)]), np.hstack([np.zeros_like(inner), inner * root])
+    flows.project[s, e:count] = project @ np.vstack(both)
+    flows.project[s, e:count, :size] -= project[:, :k] @ rest_held * root
+    flows.offset[s, e:count] = project[:, :k] @ rest
+    full = np.vstack([wave, 1j * system.frequency * wave])
+    flows.in_phase[s, e:count], flows.in_quadrature[s, e:count] = project @ full.real, -(project @ full.imag)
+    flows.motion[s, :, :count] = motion / root[:, None]
+    turned = system.J @ flows.motion[s, :, :count]
+    terms = np.abs(system.J) @ np.abs(flows.motion[s, :, :count])
+    flows.rows[s, :, :count] = np.where(np.abs(turned) <= 1e-14 * terms, 0, turned)
+    flows.bend[s], flows.bend_held[s] = oblique @ net_constant / root, oblique @ net_held / root[:, None] * root
+    flows.force[s], flows.force_constant[s], flows.force_held[s] = 0.0, 0.0, 0.0
+    for part, target in ((net, flows.force[s, :, :count]), (net_constant, flows.force_constant[s])):
+        _spread(target, carried @ part, closed, stick, drag, u)
+    _spread(flows.force_held[s], carried @ net_held * root, closed, stick, drag, u)
+    flows.force_constant[s, u + slides] = -(way * system.limit)[slides]
+    touching = np.flatnonzero((state >= TOUCHING) & (units < system.contacts))
+    flows.snap[s], flows.snap_rate[s] = 0.0, 0.0
+    flows.snap[s][:, touching] = np.linalg.pinv(rows[touching], rcond=_DEPENDENT) / root[:, None]
+    still_rows = np.r_[touching, u + stick]
+    flows.snap_rate[s][:, still_rows] = np.linalg.pinv(rows[still_rows], rcond=_DEPENDENT) / root[:, None]
+    free = rows[u:] - rows[u:] @ np.linalg.pinv(constraints, rcond=_DEPENDENT) @ constraints
+    flows.held[s] = np.linalg.norm(free, axis=1) <= _DEPENDENT * np.linalg.norm(rows[u:], axis=1)
+    flows.growth[s] = max(eigenvalue.real.max(initial=0.0), 0.0)
+
+
+def _spread(
+    target: np.ndarray, forces: np.ndarray, closed: np.ndarray, stick: np.ndarray, drag: np.ndarray, u: int
+) -> None:
+    """Put the forces of the kept rows, and the friction of those that slip, into their places."""
+    normal = forces[: len(closed)]
+    target[closed] = normal
+    target[u + closed] = -(drag[closed] * normal.T).T
+    target[u + stick] = forces[len(closed) :]
+
+
+def _forces(constraints: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces of the kept rows (k, N) and accelerations (N, N) by the loads. Raises IllConditioned where there are none."""
+    size = constraints.shape[1]
+    if not len(constraints):
+        return np.zeros((0, size)), np.eye(size)
+    mobility = constraints @ wrench
+    scale = 1 / np.linalg.norm(constraints, axis=1)
+    inverse = np.linalg.pinv(mobility * scale * scale[:, None], rcond=_DEPENDENT) * scale * scale[:, None]
+    carried = -inverse @ constraints
+    oblique = np.eye(size) + wrench @ carried
+    if np.abs((constraints @ oblique) * scale[:, None]).max() > LOST:
+        raise IllConditioned("its friction forces have no solution")
+    return carried, oblique
+
+
+def _modes(stiffness: np.ndarray, damping: np.ndarray, omega: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Eigenvalues (c,), vectors (2k, c) and their inverse (c, 2k) of eta'' + damping eta' + stiffness eta = 0.
+
+    Of complex pairs one is returned, twice in the inverse: real parts count.
+    """
+    k = len(stiffness)
+    if not k:
+        return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)
+    scale = np.sqrt(np.abs(stiffness).max())
+    matrix = np.block([[np.zeros((k, k)), np.eye(k) * scale], [-stiffness / scale, -damping]])
+    values, vectors = eig(matrix)
+    vectors /= np.linalg.norm(vectors, axis=0)
+    if np.abs(values).min() < _SLOW * omega or np.linalg.cond(vectors) > DEFECTIVE:
+        raise IllConditioned("its modes are one to round-off, or it has no stiffness")
+    inverse = np.linalg.inv(vectors)
+    vectors[k:] *= scale
+    inverse[:, k:] /= scale
+    keep = values.imag >= 0.0
+    inverse[values.imag > 0.0] *= 2.0
+    return values[keep], vectors[:, keep], inverse[keep]

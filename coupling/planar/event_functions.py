@@ -1,0 +1,179 @@
+"""The event functions of bodies with extent, and the first of their roots, with the guarantee of exact.root_search."""
+
+from __future__ import annotations
+
+import math
+
+from vanedamp.coupling.exact.event_functions import RESOLUTION, advance_or_stop
+from vanedamp.coupling.exact.root_search import DEGREE, FORCE, POSITION, VELOCITY, expand, first_root_of_parabola
+from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
+from vanedamp.coupling.planar.state import (
+    CLOSES,
+    EVALUATIONS,
+    FLOW,
+    LETS_GO,
+    OPEN,
+    SEGMENTS,
+    SLIDES_DOWN,
+    SLIDES_UP,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    STICK,
+    STOPS,
+    TOUCHING,
+)
+
+# what is known of an event function: a bound of its second derivative; more; its first root
+_BOUNDED, _EXPANDED, _ROOT = range(3)
+#: round-off of a sum, relative to the sum of its terms' sizes; what is small beside the bound of a derivative
+_ROUND_OFF, _NOTHING = 4.0 * 2.0**-52, 1e-9
+#: what counts as zero where contacts have just been decided: of a gap, as a share of the play; of a speed
+_ZERO = 1e-12
+
+
+@inlined
+def next_event(system, flows, st, guards, all_modes):
+    """Time to the next event and its function, or to the period's end and -1."""
+    s = st.counters[FLOW]
+    left = max(system.period - st.time[0], 0.0)
+    shortest = RESOLUTION * system.period
+    eigenvalue, awake = flows.eigenvalue[s], all_modes[: flows.modes[s]]
+    grows = math.exp(flows.growth[s] * left)
+    count = _watch(system, flows, st, guards, s, grows)
+    st.counters[SEGMENTS] += 1
+    while True:
+        k, tau = -1, left
+        for i in range(count):
+            if guards.no_root_before[i] < tau:
+                k, tau = i, guards.no_root_before[i]
+        if k < 0:
+            return left, -1
+        if guards.known[k] == _ROOT:
+            return (tau if tau > shortest else 0.0), k
+        if guards.known[k] == _BOUNDED:
+            tau = 0.0
+        else:
+            st.counters[EVALUATIONS] += 1
+        noise, second, calm = expand(
+            guards.order[k], guards.k0[k], guards.k1[k], guards.k2[k], guards.g[k], eigenvalue, awake, tau,
+            guards.lower,
+        )  # fmt: skip
+        if grows > 1.0:  # bounds of the derivatives hold for motions that decay
+            second, calm = second * grows, -1.0
+            guards.lower[0, DEGREE] *= grows
+        step, found = advance_or_stop(guards.lower, max(noise, guards.noise[k]), second, calm, system.period, shortest)
+        guards.known[k] = _ROOT if found else _EXPANDED
+        guards.no_root_before[k] = tau + step if found else max(guards.no_root_before[k], tau + step)
+
+
+@inlined
+def _watch(system, flows, st, guards, s, grows):
+    """Set up the event functions of the segment. Returns how many."""
+    u, count = len(system.rest), ZERO
+    for r in range(u):
+        state = st.state[r]
+        if r < system.contacts:
+            if state == OPEN:
+                count = _add(system, flows, st, guards, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
+            elif state != TOUCHING:
+                count = _add(system, flows, st, guards, s, r, FORCE, LETS_GO, 1.0, 0.0, grows, count)
+        if state == STICK and (r >= system.contacts or system.friction[r] > 0.0):
+            bound = system.friction[r]
+            count = _add(system, flows, st, guards, s, r, FORCE, SLIDES_UP, bound, -1.0, grows, count)
+            count = _add(system, flows, st, guards, s, r, FORCE, SLIDES_DOWN, bound, 1.0, grows, count)
+        elif (state == SLIP_RIGHT or state == SLIP_LEFT) and not flows.held[s, r]:
+            if r >= system.contacts or system.friction[r] > 0.0:
+                way = 1.0 if state == SLIP_RIGHT else -1.0
+                count = _add(system, flows, st, guards, s, r, VELOCITY, STOPS, 0.0, way, grows, count)
+    return count
+
+
+@kernel
+def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows, k):
+    """Add an event function: a gap, a slip's speed, or forces, the normal row and the slip row times these factors.
+
+    Returns the number of functions so far. One whose force never comes near its bound is left out.
+    """
+    u, size, modes = len(system.rest), len(st.q), flows.modes[s]
+    k0, k1, k2, noise = 0.0, 0.0, 0.0, 0.0
+    if order == FORCE:
+        k0 = on_normal * st.force[r] + on_slip * st.force[u + r] + system.limit[r]
+        noise = abs(on_normal * st.force[r]) + abs(on_slip * st.force[u + r]) + system.limit[r]
+    elif order == POSITION:
+        k0, noise = system.rest[r], abs(system.rest[r])
+        for i in range(size):
+            part = system.J[r, i] * st.q[i]
+            k0 += part
+            noise += abs(part)
+            k1 += system.J[r, i] * st.v[i]
+            k2 += system.J[r, i] * st.bend[i]
+    else:
+        for i in range(size):
+            part = on_slip * system.J[u + r, i] * st.v[i]
+            k0 += part
+            noise += abs(part)
+            k1 += on_slip * system.J[u + r, i] * st.bend[i]
+    # derivatives at the start, and bounds of them at all later times
+    first, second, third, second_bound, third_bound, fourth_bound, swing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    value = k0
+    for j in range(modes):
+        rate = flows.eigenvalue[s, j]
+        if order == FORCE:
+            g = on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]
+        elif order == POSITION:
+            g = flows.rows[s, r, j]
+        else:
+            g = on_slip * flows.rows[s, u + r, j] * rate
+        g *= st.amplitude[j]
+        guards.g[k, j] = g
+        fast = math.sqrt(rate.real * rate.real + rate.imag * rate.imag)
+        bound = (abs(g.real) + abs(g.imag)) * fast
+        if order == FORCE:
+            value += g.real
+            swing += abs(g.real) + abs(g.imag)
+        now = g * rate
+        if order != POSITION:
+            first += now.real
+        now *= rate
+        bound *= fast
+        second += now.real
+        second_bound += bound
+        third += (now * rate).real
+        third_bound += bound * fast
+        fourth_bound += bound * fast * fast
+    if order == FORCE and k0 > swing * grows:
+        return k
+    first += k1
+    second += k2 if order == POSITION else 0.0
+    guards.unit[k], guards.order[k], guards.what[k], guards.known[k] = r, order, what, _BOUNDED
+    guards.k0[k], guards.k1[k], guards.k2[k], guards.no_root_before[k] = k0, k1, k2, 0.0
+    guards.noise[k] = _ROUND_OFF * (noise + swing)
+    falls = first < -_NOTHING * second_bound * system.period
+    zero = _NOTHING * (noise + swing) if order == FORCE else _ZERO * (system.play[r] if order == POSITION else st.scale[0])
+    if st.fresh[r] != 0 and not falls and value <= zero:
+        guards.no_root_before[k] = _leave(
+            system.period, first, second, third, second_bound * grows + abs(k2), third_bound * grows,
+            fourth_bound * grows,
+        )  # fmt: skip
+        guards.known[k] = _EXPANDED
+    elif value > guards.noise[k]:
+        guards.no_root_before[k] = first_root_of_parabola(value, first, -second_bound * grows + min(k2, 0.0))
+    return k + 1
+
+
+@inlined
+def _leave(period, first, second, third, second_bound, third_bound, fourth_bound):
+    """A safe step of a function that begins at zero: by the first of its derivatives that is not round-off.
+
+    The decision of the contacts at this instant says that it rises.
+    """
+    shortest = 1e3 * RESOLUTION * period
+    omega = 2.0 * math.pi / period
+    step = shortest
+    if first > _NOTHING * second_bound / omega:
+        step = first / second_bound if second_bound > 0.0 else period
+    elif second > _NOTHING * max(third_bound / omega, second_bound):
+        step = 1.5 * second / third_bound if third_bound > 0.0 else period
+    elif third > 0.0 and second > -_NOTHING * max(third_bound / omega, second_bound):
+        step = 2.0 * third / fourth_bound if fourth_bound > 0.0 else period
+    return max(step, shortest)

@@ -1,0 +1,158 @@
+"""Impacts with friction: all contacts that are closed at the instant take part, in one problem on velocities.
+
+Newton's law in Moreau's form (Moreau 1988): after the impact v_N + k v_N- >= 0 and the impulse P_N >= 0 complement each
+other, and P_T stays within Coulomb's cone, at its edge where the contact still slips. With one coefficient for all
+contacts that never brings energy. With several it can (Kane's paradox): such an impact is solved again with the
+smallest of them.
+
+A block that comes to lie rocks from corner to corner ever faster, and ends in finite time, as a ball does. Contacts
+that would part for less than CHATTER are closed together: they lose the speed with which they would part.
+"""
+
+from __future__ import annotations
+
+from vanedamp.coupling.exact.event_functions import CHATTER
+from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF
+from vanedamp.coupling.exact.impacts import COLLAPSE
+from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.planar.contact_decisions import is_shut, loaded_acceleration, row_speed, solve_rows, speed_scale
+from vanedamp.coupling.planar.state import IMPACTS, LOGGED, PERIOD
+from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS
+
+#: energy that an impact may bring, as a share of what is in it, before it is solved again
+_GAIN = 1e-12
+#: how much more than the loads alone the forces of other contacts may press
+_FAR = 100.0
+
+
+@kernel
+def collide(system, st, rec, log, work):
+    """Let all closed contacts collide. Returns False if the problem cannot be solved."""
+    u, count, smallest = len(system.rest), 0, 1.0
+    tiny = 10.0 * ROUND_OFF * speed_scale(system, st.v)
+    for r in range(system.contacts):
+        if is_shut(system, st, r):
+            work.listed[count], work.way[count] = r, 0
+            count += 1
+            if row_speed(system, r, st.v) < -tiny:
+                smallest = min(smallest, _restitution(system, st, r))
+    for r in range(2 * u):
+        work.before_impact[r] = row_speed(system, r, st.v)
+    for turn in range(2):
+        for p in range(count):
+            r = work.listed[p]
+            normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
+            restitution = _restitution(system, st, r) if turn == 0 else smallest
+            work.speed[r] = normal + restitution * min(normal, 0.0)
+            work.speed[u + r] = work.before_impact[u + r]
+        if not solve_rows(system, work, count, work.speed):
+            return False
+        loss, there = _energy(system, st, work)
+        if loss >= -_GAIN * there:
+            break
+    _apply(system, st, work)
+    for p in range(count):
+        r = work.listed[p]
+        if work.impulse[r] > 0.0 or work.before_impact[r] < -tiny:
+            _note(system, st, rec, log, work, r)
+    _account(system, st, work)
+    return _catch(system, st, work, count, tiny)
+
+
+@inlined
+def _restitution(system, st, r):
+    """Coefficient of a contact; an impact at the end of a collapse is plastic."""
+    if st.time[0] - st.last_impact[r] < COLLAPSE * system.period:
+        return 0.0
+    return system.restitution[r]
+
+
+@inlined
+def _energy(system, st, work):
+    """Energy that the impulses take, and that there is in the motion, J."""
+    u, loss, there = len(system.rest), 0.0, 0.0
+    for r in range(2 * u):
+        if work.impulse[r] != 0.0:
+            after = work.before_impact[r]
+            for o in range(2 * u):
+                after += system.delassus[r, o] * work.impulse[o]
+            loss -= 0.5 * work.impulse[r] * (work.before_impact[r] + after)
+    for i in range(len(st.v)):
+        there += 0.5 * system.mass[i] * st.v[i] * st.v[i]
+    return loss, there
+
+
+@inlined
+def _apply(system, st, work):
+    """Change the velocities by the impulses."""
+    for i in range(len(st.v)):
+        total = 0.0
+        for r in range(len(work.impulse)):
+            total += system.J[r, i] * work.impulse[r]
+        st.v[i] += total / system.mass[i]
+
+
+@inlined
+def _account(system, st, work):
+    """Enter what the impulses took: of normal ones as impact loss, of tangential ones as friction, J."""
+    u = len(system.rest)
+    for r in range(2 * u):
+        if work.impulse[r] != 0.0:
+            loss = -0.5 * work.impulse[r] * (work.before_impact[r] + row_speed(system, r, st.v))
+            st.ledger[IMPACT_LOSS if r < u else FRICTION] += loss
+            st.by_contact[r % u, 0] += loss
+
+
+@inlined
+def _note(system, st, rec, log, work, r):
+    """Count an impact and log it: relative velocities, normal and tangential impulse."""
+    u = len(system.rest)
+    before = work.before_impact[r]
+    st.last_impact[r] = st.time[0]
+    st.counters[IMPACTS] += 1
+    rec.impacts[st.counters[PERIOD]] += 1
+    rec.collided[st.counters[PERIOD]] += 0.5 * before * before / system.delassus[r, r]
+    log_event(system, st, log, IMPACT, r, before, row_speed(system, r, st.v), work.impulse[r], work.impulse[u + r])
+
+
+@inlined
+def log_event(system, st, log, kind, r, before, after, normal, tangential):
+    """One entry: time, kind, unit, relative velocities (m/s), impulses (N s)."""
+    entry = log[st.counters[LOGGED]]
+    st.counters[LOGGED] += 1
+    entry[0] = st.counters[PERIOD] * system.period + st.time[0]
+    entry[1], entry[2], entry[3], entry[4], entry[5], entry[6] = kind, r, before, after, normal, tangential
+
+
+@kernel
+def _catch(system, st, work, count, tiny):
+    """Mark contacts that would part for less than CHATTER (st.caught): those that push in a step of that length.
+
+    The step is one of Moreau's scheme; a chatter takes 1/(1 - k) times its next flight. Returns False if that cannot be
+    decided.
+    """
+    u, moment, slow, size = len(system.rest), CHATTER * system.period, False, 0.0
+    for r in range(u):
+        work.sliding[r] = 0
+        if r >= system.contacts:
+            slip = row_speed(system, u + r, st.v)
+            work.sliding[r] = 0 if abs(slip) <= tiny else (1 if slip > 0.0 else -1)
+    loaded_acceleration(system, work, st.q, st.v, st.time[0])
+    for r in range(2 * u):
+        size = max(size, abs(work.speed[r]))
+    for p in range(count):
+        away = row_speed(system, work.listed[p], st.v)
+        slow = slow or tiny < away < _FAR * moment * size
+    if not slow:
+        return True
+    for p in range(count):
+        r = work.listed[p]
+        ahead = moment * max(1.0 - system.restitution[r], 0.1)
+        work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
+        work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
+    if not solve_rows(system, work, count, work.speed):
+        return False
+    for p in range(count):
+        r = work.listed[p]
+        st.caught[r] = work.impulse[r] > 0.0
+    return True

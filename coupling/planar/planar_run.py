@@ -1,0 +1,86 @@
+"""A run of the exact engine for bodies with extent."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vanedamp.coupling.exact.complex_modes import IllConditioned
+from vanedamp.coupling.planar import automaton
+from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
+from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
+from vanedamp.coupling.planar.state import (
+    EVALUATIONS,
+    EVENTS,
+    IMPACTS,
+    LOGGED,
+    PERIOD,
+    SEGMENTS,
+    new_guards,
+    new_scratch,
+    new_state,
+)
+from vanedamp.coupling.response.evaluation import Outcome
+from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.system.system import System
+
+_STATUS = {
+    automaton.DONE: Status.OK,
+    automaton.EVENT_BUDGET: Status.EVENT_BUDGET,
+    automaton.ACCURACY_LOST: Status.ACCURACY_LOST,
+    automaton.UNDECIDED: Status.UNDECIDED,
+}
+#: imbalance of the ledger above which a response is not to be used
+_OPEN_LEDGER = 1e-6
+
+
+class PlanarRun:
+    """The mutable state of one run, and the flows it has met."""
+
+    def __init__(
+        self, flat: System, system: PlanarSystem, initial: PlanarMotion, records: Records, events: bool, max_events: int
+    ) -> None:
+        self.flat, self.system, self.records, self.max_events, self.keep = flat, system, records, max_events, events
+        self.flows = empty_flows(system)
+        modes = self.flows.eigenvalue.shape[1]
+        self.all_modes = np.arange(modes)
+        self.state, self.guards = new_state(system, modes, initial), new_guards(system, modes)
+        self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), 7))
+        self.chunks: list[np.ndarray] = []
+        self.begun = False
+
+    def advance_to(self, periods: int) -> Status:
+        """Continue to the end of `periods`, or to what ends the run."""
+        counters = self.state.counters
+        if not self.begun:
+            self.begun = True
+            if not automaton.begin(self.system, self.state, self.records, self.log, self.scratch):
+                return Status.UNDECIDED
+        while True:
+            code = automaton.advance(
+                self.system, self.flows, self.state, self.guards, self.records, self.log, self.scratch,
+                self.all_modes, periods, self.max_events,
+            )  # fmt: skip
+            if self.keep and counters[LOGGED]:
+                self.chunks.append(self.log[: counters[LOGGED]].copy())
+            counters[LOGGED] = 0
+            if code == automaton.NEEDS_FLOW:
+                try:
+                    self.flows = add_flow(self.flows, self.system, self.state.state)
+                except IllConditioned:
+                    return Status.ILL_CONDITIONED
+            elif code != automaton.LOG_FULL:
+                return _STATUS[code]
+
+    def outcome(self) -> Outcome:
+        """What the run leaves behind."""
+        counters = self.state.counters
+        numbers = {"impacts": IMPACTS, "segments": SEGMENTS, "evaluations": EVALUATIONS}
+        found = {name: int(counters[place]) for name, place in numbers.items()}
+        found["subsystems"] = int(np.count_nonzero(self.flows.modes))
+        return Outcome(
+            self.flat, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER, found, self.chunks
+        )
+
+    def final(self) -> None:
+        """None: runs of bodies with extent do not hand over their state yet."""

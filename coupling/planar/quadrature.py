@@ -1,0 +1,150 @@
+"""What a segment adds up: energies, harmonics, peaks, the largest tilt; by Gauss's rule on pieces of it.
+
+The integrands are products of the motion's own exponentials and parabolas: on pieces in which the fastest mode turns by
+no more than _TURN the rule of eight points leaves out 1e-15 of them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
+from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.planar.state import FLOW, OPEN, PERIOD, SLIP_LEFT, SLIP_RIGHT
+from vanedamp.coupling.response.records import EXCITATION, FRICTION, VISCOUS
+
+_TURN = 1.5
+_NODES, _WEIGHTS = (tuple(part.tolist()) for part in np.polynomial.legendre.leggauss(8))
+
+
+@inlined
+def motion_at(system, flows, st, work, t, q, v):
+    """Coordinates and velocities (N,) at time t of the segment; work.turn (m,) becomes exp(lambda t) - 1."""
+    s = st.counters[FLOW]
+    for j in range(flows.modes[s]):
+        z = flows.eigenvalue[s, j] * t
+        first = exp_minus_one(z)
+        work.turn[j] = first
+        work.wave[j] = st.amplitude[j] * exp_minus_line(z, first)
+    for i in range(len(q)):
+        shift, speed = t * (st.v[i] + 0.5 * t * st.bend[i]), t * st.bend[i]
+        for j in range(flows.modes[s]):
+            shape = flows.motion[s, i, j]
+            shift += (shape * work.wave[j]).real
+            speed += (shape * flows.eigenvalue[s, j] * st.amplitude[j] * work.turn[j]).real
+        q[i], v[i] = st.q[i] + shift, st.v[i] + speed
+
+
+@kernel
+def add_up(system, flows, st, rec, work, tau):
+    """Add a segment of length tau to ledger and records; st is at its start."""
+    s, size, period = st.counters[FLOW], len(st.q), st.counters[PERIOD]
+    fastest = 0.0
+    for j in range(flows.modes[s]):
+        rate = flows.eigenvalue[s, j]
+        fastest = max(fastest, abs(rate.real) + abs(rate.imag))
+    pieces = max(1, math.ceil(tau * fastest / _TURN))
+    h, q, v = tau / pieces, work.ahead[0], work.ahead[1]
+    x0, rate0 = _response(system, st, st.q, st.v, st.time[0])
+    rec.peak[period] = max(rec.peak[period], abs(x0))
+    for piece in range(pieces):
+        for node in range(len(_NODES)):
+            t = h * (piece + 0.5 * (1.0 + _NODES[node]))
+            motion_at(system, flows, st, work, t, q, v)
+            _add_node(system, flows, st, rec, work, q, v, t, 0.5 * h * _WEIGHTS[node])
+        end = h * (piece + 1)
+        motion_at(system, flows, st, work, end, q, v)
+        x1, rate1 = _response(system, st, q, v, st.time[0] + end)
+        rec.peak[period] = max(rec.peak[period], abs(x1))
+        if rate0 * rate1 < 0.0:
+            rec.peak[period] = max(rec.peak[period], _extremum(system, flows, st, work, q, v, end - h, end, rate0))
+        rate0 = rate1
+    for b in range(len(system.along)):
+        if system.tilt[b] >= 0 and not _on_floor(system, st, b):
+            st.extremes[b, 1] += tau
+
+
+@inlined
+def _on_floor(system, st, b):
+    for r in range(system.contacts):
+        if system.body[r] == b and system.surface[r] == 2 and st.state[r] != OPEN:
+            return True
+    return False
+
+
+@kernel
+def _add_node(system, flows, st, rec, work, q, v, t, weight):
+    """Add the integrands at one point, times its weight."""
+    s, size, u, period = st.counters[FLOW], len(st.q), len(system.rest), st.counters[PERIOD]
+    power, loss, momentum = 0.0, 0.0, 0.0
+    for h in range(len(system.frequency)):
+        phase = st.amplitude[h] * (1.0 + work.turn[h])
+        for i in range(size):
+            power += (system.load[h, i] * phase).real * v[i]
+    for i in range(size):
+        damper = 0.0
+        for k in range(size):
+            damper += system.damping[i, k] * v[k]
+        loss += v[i] * damper
+    friction = 0.0
+    for r in range(u):
+        state = st.state[r]
+        if (state == SLIP_RIGHT or state == SLIP_LEFT) and not flows.held[s, r]:
+            slip, force = 0.0, st.force[u + r]
+            for i in range(size):
+                slip += system.J[u + r, i] * v[i]
+            for j in range(flows.modes[s]):
+                force += (flows.force[s, u + r, j] * st.amplitude[j] * (1.0 + work.turn[j])).real
+            friction -= force * slip
+            st.by_contact[r, 1] -= weight * force * slip
+    for b in range(len(system.along)):
+        momentum += system.mass[system.along[b]] * v[system.along[b]]
+        if system.tilt[b] >= 0:
+            tilt = q[system.tilt[b]]
+            for i in range(size):
+                tilt -= system.turn[b, i] * q[i]
+            st.extremes[b, 0] = max(st.extremes[b, 0], abs(tilt))
+    x, _ = _response(system, st, q, v, st.time[0] + t)
+    phase = st.amplitude[0] * (1.0 + work.turn[0])
+    back = complex(phase.real, -phase.imag)
+    st.ledger[EXCITATION] += weight * power
+    st.ledger[VISCOUS] += weight * loss
+    st.ledger[FRICTION] += weight * friction
+    rec.harmonic[period] += weight * x * back
+    rec.momentum[period] += weight * momentum * back
+    rec.square[period] += weight * x * x
+
+
+@inlined
+def _response(system, st, q, v, time):
+    """Displacement and speed of the response, that of a prescribed base included."""
+    x, rate = 0.0, 0.0
+    for h in range(len(system.frequency)):
+        if system.table[h] != 0.0:
+            angle = system.frequency[h] * time
+            part = system.table[h] * complex(math.cos(angle), math.sin(angle))
+            x += part.real
+            rate -= system.frequency[h] * part.imag
+    for i in range(len(q)):
+        x += system.response[i] * q[i]
+        rate += system.response[i] * v[i]
+    return x, rate
+
+
+@kernel
+def _extremum(system, flows, st, work, q, v, low, high, rate):
+    """|response| where its speed vanishes between two times: by bisection, and secants."""
+    x = 0.0
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        motion_at(system, flows, st, work, middle, q, v)
+        x, now = _response(system, st, q, v, st.time[0] + middle)
+        if now == 0.0:
+            break
+        if (now > 0.0) == (rate > 0.0):
+            low = middle
+        else:
+            high = middle
+    return abs(x)

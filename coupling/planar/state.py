@@ -1,0 +1,120 @@
+"""What changes during a run of bodies with extent, and scratch space. Sizes as in constraints.PlanarSystem; m modes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.exact.root_search import DEGREE
+from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
+from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
+from vanedamp.coupling.response.records import ENERGIES
+
+# state of a unit. TOUCHING: closed, but others carry its force. A contact without friction that is closed counts as
+# slipping; a friction element sticks or slips
+OPEN, TOUCHING, STICK, SLIP_RIGHT, SLIP_LEFT = np.arange(5)
+
+# what an event function stands for: a gap that closes, a normal force that vanishes, a slip that stops, a tangential
+# force that reaches its upper or its lower bound
+CLOSES, LETS_GO, STOPS, SLIDES_UP, SLIDES_DOWN = np.arange(5)
+
+COUNTERS = ("period", "flow", "logged", "events", "impacts", "evaluations", "segments", "at_once")
+PERIOD, FLOW, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AT_ONCE = range(len(COUNTERS))
+
+
+class PlanarState(NamedTuple):
+    """The state at the start of a segment."""
+
+    # changes all the time
+    counters: np.ndarray  # int, by the names above
+    time: np.ndarray  # (1,) within the period, s
+    q: np.ndarray  # (N,)
+    v: np.ndarray  # (N,)
+    state: np.ndarray  # (u,) int
+    fresh: np.ndarray  # (u,) int: whether contacts have been decided at this instant
+    caught: np.ndarray  # (u,) int: whether a contact that parts too slowly is to be closed
+    rate: np.ndarray  # (2u,) speeds of rows, scratch
+    scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
+    last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
+    ledger: np.ndarray  # (6,) J
+    extremes: np.ndarray  # (b, 3): largest |tilt| in the cavity, rad; time off the floor, s; largest |tilt| of all time
+    by_contact: np.ndarray  # (u, 2): energy lost in impacts and by friction, J
+    # of a segment
+    amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
+    bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
+    force: np.ndarray  # (2u,) constant part of the forces, N
+
+
+class Guards(NamedTuple):
+    """The event functions of a segment."""
+
+    unit: np.ndarray  # (k,) int
+    order: np.ndarray  # (k,) int: POSITION, VELOCITY or FORCE of exact.root_search
+    what: np.ndarray  # (k,) int
+    known: np.ndarray  # (k,) int: whether it has been expanded, and whether its root is found
+    k0: np.ndarray
+    k1: np.ndarray
+    k2: np.ndarray
+    noise: np.ndarray
+    no_root_before: np.ndarray  # s
+    g: np.ndarray  # (k, m) complex
+    lower: np.ndarray  # (2, DEGREE + 1) scratch
+
+
+class Scratch(NamedTuple):
+    """Space for intermediate results."""
+
+    free: np.ndarray  # (N,) acceleration without contact forces
+    rates: np.ndarray  # (N,) acceleration with them, or the velocity ahead
+    ahead: np.ndarray  # (2, N) coordinates and velocities a moment later
+    sizes: np.ndarray  # (N,) of the terms of `free`
+    speed: np.ndarray  # (2u,) right-hand side of a problem: accelerations or speeds of the rows
+    before_impact: np.ndarray  # (2u,) speeds
+    impulse: np.ndarray  # (2u,)
+    before: np.ndarray  # (u,) int: states before the event
+    listed: np.ndarray  # (u,) int: units of a problem
+    way: np.ndarray  # (u,) int: direction in which a listed unit slips, 0: none yet
+    place: np.ndarray  # (u,) int: where its unknowns begin
+    verdict: np.ndarray  # (u,) int
+    doubtful: np.ndarray  # (u,) int: whether the normal force (1) or the slip (2) was not decided
+    first: np.ndarray  # (u,) int: verdict now, while that a moment later is sought
+    doubt: np.ndarray  # (u,) int: doubtful now
+    sliding: np.ndarray  # (u,) int: direction in which a friction element slides
+    lemke: Lemke
+    turn: np.ndarray  # (m,) complex
+    wave: np.ndarray  # (m,) complex
+
+
+def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion) -> PlanarState:
+    """The state at time zero."""
+    u, size, b = len(system.rest), len(system.mass), len(system.along)
+    return PlanarState(
+        counters=np.zeros(len(COUNTERS), np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
+        state=np.zeros(u, np.int64), fresh=np.zeros(u, np.int64), caught=np.zeros(u, np.int64), scale=np.zeros(1), rate=np.zeros(2 * u), last_impact=np.full(u, -np.inf),
+        ledger=np.zeros(len(ENERGIES)), extremes=np.zeros((b, 3)), by_contact=np.zeros((u, 2)),
+        amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
+    )  # fmt: skip
+
+
+def new_guards(system: PlanarSystem, modes: int) -> Guards:
+    """Room for three event functions a unit."""
+    k = 3 * len(system.rest)
+    return Guards(
+        unit=np.zeros(k, np.int64), order=np.zeros(k, np.int64), what=np.zeros(k, np.int64),
+        known=np.zeros(k, np.int64), k0=np.zeros(k), k1=np.zeros(k), k2=np.zeros(k), noise=np.zeros(k),
+        no_root_before=np.zeros(k), g=np.zeros((k, modes), complex), lower=np.zeros((2, DEGREE + 1)),
+    )  # fmt: skip
+
+
+def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
+    """Scratch space for a scene."""
+    u, size = len(system.rest), len(system.mass)
+    return Scratch(
+        free=np.zeros(size), rates=np.zeros(size), ahead=np.zeros((2, size)), sizes=np.zeros(size),
+        speed=np.zeros(2 * u), before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), before=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
+        way=np.zeros(u, np.int64), place=np.zeros(u, np.int64), verdict=np.zeros(u, np.int64),
+        doubtful=np.zeros(u, np.int64), first=np.zeros(u, np.int64), doubt=np.zeros(u, np.int64),
+        sliding=np.zeros(u, np.int64), lemke=new_lemke(3 * u),
+        turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
+    )  # fmt: skip
