@@ -30,13 +30,16 @@ DONE, NEEDS_FLOW, EVENT_BUDGET, LOG_FULL, ACCURACY_LOST, UNDECIDED = range(6)
 _LOST = 1e-7
 #: events at one instant after which contacts are said to be undecided, for each unit
 _AT_ONCE = 20
+_TINY = 1e-150
+#: share of its terms that a force may be beyond its bound
+_OVER = 1e-9
 
 
 @entry
 def begin(system, st, rec, log, work):
     """Let contacts collide that are closed and approach at time zero, and decide their states. False if that fails."""
     _phase(system, st)
-    st.scale[0] = speed_scale(system, st.v)
+    st.scale[0] = max(speed_scale(system, st.v), system.speed)
     for r in range(system.contacts):
         if is_shut(system, st, r) and row_speed(system, r, st.v) < 0.0:
             if not collide(system, st, rec, log, work):
@@ -44,6 +47,8 @@ def begin(system, st, rec, log, work):
             break
     if not decide(system, st, work, st.scale[0]):
         return False
+    for r in range(len(system.rest)):
+        st.known[r] = st.state[r]
     st.counters[FLOW] = -1
     return True
 
@@ -58,6 +63,13 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
                 return NEEDS_FLOW
             st.counters[FLOW] = s
             _enter(system, flows, st)
+            _begin_segment(system, flows, st)
+            if not _shares(system, flows, st):
+                for r in range(len(st.state)):
+                    st.state[r] = st.other[r]
+                st.counters[FLOW] = -1
+                continue
+            _log_changes(system, st, log)
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
         if st.counters[LOGGED] + 4 * len(system.rest) >= len(log):
@@ -100,7 +112,6 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
 @inlined
 def _happen(system, st, rec, log, work, r, what):
     """The event of unit r. Returns False if it cannot be decided."""
-    u = len(system.rest)
     st.scale[0] = max(st.scale[0], speed_scale(system, st.v))
     if what == CLOSES:
         _close(system, st, r)
@@ -108,10 +119,19 @@ def _happen(system, st, rec, log, work, r, what):
             return False
     if not decide(system, st, work, st.scale[0]):
         return False
-    changed = False
+    for i in range(len(system.rest)):
+        if work.before[i] != st.state[i]:
+            st.counters[FLOW] = -1
+    return True
+
+
+@kernel
+def _log_changes(system, st, log):
+    """Log which units have changed their states."""
+    u = len(system.rest)
     for i in range(u):
-        was, now = work.before[i], st.state[i]
-        changed = changed or was != now
+        was, now = st.known[i], st.state[i]
+        st.known[i] = now
         if i < system.contacts and was == OPEN and now != OPEN:
             log_event(system, st, log, RESTS, i, 0.0, 0.0, 0.0, 0.0)
         elif i < system.contacts and was != OPEN and now == OPEN:
@@ -120,9 +140,6 @@ def _happen(system, st, rec, log, work, r, what):
             log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0)
         elif was == STICK and (now == SLIP_RIGHT or now == SLIP_LEFT):
             log_event(system, st, log, SLIPS, i, 0.0, row_speed(system, u + i, st.v), 0.0, 0.0)
-    if changed:
-        st.counters[FLOW] = -1
-    return True
 
 
 @kernel
@@ -178,6 +195,9 @@ def _snap(system, flows, st, s):
         if st.rate[r] != 0.0:
             for i in range(size):
                 st.q[i] -= flows.snap[s, i, r] * st.rate[r]
+    for i in range(size):  # the smallest doubles are slow
+        st.q[i] = st.q[i] if abs(st.q[i]) > _TINY else 0.0
+        st.v[i] = st.v[i] if abs(st.v[i]) > _TINY else 0.0
 
 
 @inlined
@@ -185,6 +205,31 @@ def _at_rest(system, st, row):
     """Whether contacts hold a row: the gap of a closed contact, the slip of one that sticks."""
     u = len(system.rest)
     return st.state[row] != OPEN and row < system.contacts if row < u else st.state[row - u] == STICK
+
+
+@kernel
+def _shares(system, flows, st):
+    """Whether sticking contacts that could do with less carry forces within their bounds, now and right after."""
+    s, u, differs = st.counters[FLOW], len(system.rest), False
+    for r in range(u):
+        differs = differs or st.state[r] != st.other[r]
+    if not differs:
+        return True
+    for r in range(u):
+        if st.state[r] != STICK:
+            continue
+        for way in (-1.0, 1.0):
+            room, rate, size = system.limit[r], 0.0, system.limit[r]
+            room += system.friction[r] * st.force[r] + way * st.force[u + r]
+            size += abs(system.friction[r] * st.force[r]) + abs(st.force[u + r])
+            for j in range(flows.modes[s]):
+                part = (system.friction[r] * flows.force[s, r, j] + way * flows.force[s, u + r, j]) * st.amplitude[j]
+                room += part.real
+                rate += (part * flows.eigenvalue[s, j]).real
+                size += abs(part.real) + abs(part.imag)
+            if room < -_OVER * size or (room <= _OVER * size and rate < 0.0):
+                return False
+    return True
 
 
 @inlined
@@ -225,7 +270,7 @@ def _begin_segment(system, flows, st):
         for r in range(len(system.J)):
             largest = max(largest, abs(system.J[r, i]))
         swing = max(swing, part * largest)
-    st.scale[0] = swing
+    st.scale[0] = max(swing, system.speed)
 
 
 @inlined

@@ -42,6 +42,7 @@ class PlanarSystem(NamedTuple):
     table: np.ndarray  # (e,) complex displacement of a base whose motion is the response, m
     frequency: np.ndarray  # (e,) rad/s
     period: float  # s
+    speed: float  # that the loads give the rows within a period, m/s: a scale for round-off
     J: np.ndarray  # (2u, N)
     rest: np.ndarray  # (u,) gap at q = 0, m
     delassus: np.ndarray  # (2u, 2u) J M^-1 J^T
@@ -156,10 +157,12 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             damping += (body.damper.dashpot or 0.0) * np.outer(own, own)
     response = np.zeros(size)
     response[:n] = flat.response[:n]
+    pushed = np.abs(weight) * flat.period + (np.abs(load) / flat.frequency[:, None]).sum(axis=0)
     column = lambda name: np.array([getattr(unit, name) for unit in units])  # noqa: E731
     return PlanarSystem(
         contacts=contacts, mass=mass, stiffness=stiffness, damping=damping, load=load, weight=weight,
-        response=response, table=flat.table, frequency=flat.frequency, period=flat.period, J=J,
+        response=response, table=flat.table, frequency=flat.frequency, period=flat.period,
+        speed=float((np.abs(J) @ (pushed / mass)).max(initial=0.0)), J=J,
         rest=column("rest").astype(float), delassus=(J / mass) @ J.T, friction=column("friction").astype(float),
         limit=column("limit").astype(float), restitution=column("restitution").astype(float),
         play=column("play").astype(float), body=column("body").astype(np.int64),

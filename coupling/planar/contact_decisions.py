@@ -215,10 +215,18 @@ def decide(system, st, work, scale):
     doubts = 0
     for p in range(count):
         doubts += work.doubtful[p]
-    if doubts > 0 and not _look_ahead(system, st, work, count):
-        return False
+    if doubts > 0:
+        if not _look_ahead(system, st, work, count):
+            return False
+        _stick_in_doubt(system, work, count)
+    for r in range(u):
+        st.other[r] = st.state[r]
     for p in range(count):
-        st.state[work.listed[p]] = work.verdict[p]
+        r = work.listed[p]
+        st.state[r], st.other[r] = work.verdict[p], work.verdict[p]
+        if doubts > 0 and work.doubtful[p] == _SLIP and work.way[p] == 0 and work.verdict[p] > STICK:
+            if r >= system.contacts or system.friction[r] > 0.0:
+                st.state[r] = STICK
     for r in range(u):
         st.fresh[r] = 1
     return True
@@ -255,5 +263,56 @@ def _look_ahead(system, st, work, count):
     _classify(system, work, count, _NEXT_TO_NOTHING, work.verdict)
     for p in range(count):
         if work.doubt[p] == 0 or (work.doubt[p] == _SLIP and work.verdict[p] <= TOUCHING):
-            work.verdict[p] = work.first[p]
+            work.verdict[p], work.doubtful[p] = work.first[p], work.doubt[p]
     return True
+
+
+@kernel
+def _stick_in_doubt(system, work, count):
+    """Let contacts stick whose friction is at its bound though nothing moves them, unless others hold their slip.
+
+    Both corners of a block that lies still may push against each other. Where others hold its slip, a force at the
+    bound is one of the possible ones (st.other); contacts share the force as long as none of them needs more than its
+    bound (automaton._shares).
+    """
+    u, found = len(system.rest), 0
+    for p in range(count):
+        r = work.listed[p]
+        if work.verdict[p] > TOUCHING and r < system.contacts:
+            found = _span(system, work, r, found)
+    for p in range(count):
+        if work.verdict[p] == STICK:
+            found = _span(system, work, u + work.listed[p], found)
+    for p in range(count):
+        r = work.listed[p]
+        in_doubt = work.doubtful[p] == _SLIP and (work.verdict[p] == SLIP_RIGHT or work.verdict[p] == SLIP_LEFT)
+        if in_doubt and work.way[p] == 0 and (r >= system.contacts or system.friction[r] > 0.0):
+            more = _span(system, work, u + r, found)
+            if more > found:
+                work.verdict[p], found = STICK, more
+
+
+@kernel
+def _span(system, work, row, found):
+    """Add a row to the orthonormal basis of those that are kept. Returns its size, the same if they hold the row."""
+    size, whole, left = len(system.mass), 0.0, 0.0
+    if found >= size:
+        return found
+    new = work.span[found]
+    for i in range(size):
+        new[i] = system.J[row, i] / math.sqrt(system.mass[i])
+        whole += new[i] * new[i]
+    for _ in range(2):
+        for k in range(found):
+            part = 0.0
+            for i in range(size):
+                part += work.span[k, i] * new[i]
+            for i in range(size):
+                new[i] -= part * work.span[k, i]
+    for i in range(size):
+        left += new[i] * new[i]
+    if left <= _NOTHING * whole:
+        return found
+    for i in range(size):
+        new[i] /= math.sqrt(left)
+    return found + 1

@@ -29,7 +29,7 @@ _FAR = 100.0
 def collide(system, st, rec, log, work):
     """Let all closed contacts collide. Returns False if the problem cannot be solved."""
     u, count, smallest = len(system.rest), 0, 1.0
-    tiny = 10.0 * ROUND_OFF * speed_scale(system, st.v)
+    tiny = 10.0 * ROUND_OFF * max(speed_scale(system, st.v), st.scale[0])
     for r in range(system.contacts):
         if is_shut(system, st, r):
             work.listed[count], work.way[count] = r, 0

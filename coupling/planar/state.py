@@ -32,6 +32,8 @@ class PlanarState(NamedTuple):
     q: np.ndarray  # (N,)
     v: np.ndarray  # (N,)
     state: np.ndarray  # (u,) int
+    other: np.ndarray  # (u,) int: states that move alike, with forces at their bounds where `state` shares them
+    known: np.ndarray  # (u,) int: states as last logged
     fresh: np.ndarray  # (u,) int: whether contacts have been decided at this instant
     caught: np.ndarray  # (u,) int: whether a contact that parts too slowly is to be closed
     rate: np.ndarray  # (2u,) speeds of rows, scratch
@@ -81,6 +83,7 @@ class Scratch(NamedTuple):
     first: np.ndarray  # (u,) int: verdict now, while that a moment later is sought
     doubt: np.ndarray  # (u,) int: doubtful now
     sliding: np.ndarray  # (u,) int: direction in which a friction element slides
+    span: np.ndarray  # (N, N) orthonormal basis of rows
     lemke: Lemke
     turn: np.ndarray  # (m,) complex
     wave: np.ndarray  # (m,) complex
@@ -91,7 +94,7 @@ def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion) -> Planar
     u, size, b = len(system.rest), len(system.mass), len(system.along)
     return PlanarState(
         counters=np.zeros(len(COUNTERS), np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
-        state=np.zeros(u, np.int64), fresh=np.zeros(u, np.int64), caught=np.zeros(u, np.int64), scale=np.zeros(1), rate=np.zeros(2 * u), last_impact=np.full(u, -np.inf),
+        state=np.zeros(u, np.int64), other=np.zeros(u, np.int64), known=np.zeros(u, np.int64), fresh=np.zeros(u, np.int64), caught=np.zeros(u, np.int64), scale=np.zeros(1), rate=np.zeros(2 * u), last_impact=np.full(u, -np.inf),
         ledger=np.zeros(len(ENERGIES)), extremes=np.zeros((b, 3)), by_contact=np.zeros((u, 2)),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
     )  # fmt: skip
@@ -115,6 +118,6 @@ def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
         speed=np.zeros(2 * u), before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), before=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
         way=np.zeros(u, np.int64), place=np.zeros(u, np.int64), verdict=np.zeros(u, np.int64),
         doubtful=np.zeros(u, np.int64), first=np.zeros(u, np.int64), doubt=np.zeros(u, np.int64),
-        sliding=np.zeros(u, np.int64), lemke=new_lemke(3 * u),
+        sliding=np.zeros(u, np.int64), span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
     )  # fmt: skip

@@ -1,0 +1,60 @@
+"""Runs of bodies with extent: a table that hardly moves, or any structure, and what tests ask of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vanedamp.coupling.planar.constraints import planar_motion, planar_system
+from vanedamp.coupling.planar.planar_run import PlanarRun
+from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.files.toml_input import validate
+
+
+class Run(PlanarRun):
+    """A run with its status and its log."""
+
+    status = None
+
+    def events(self, kind):
+        """Entries of the log of one kind (k, 7)."""
+        log = np.concatenate(self.chunks) if self.chunks else np.zeros((0, 7))
+        return log[log[:, 1] == kind]
+
+
+def still_table(frequency=1.0, amplitude=1e-15, gravity=9.81):
+    """Structure, excitation and gravity of a table that is prescribed to move, or as good as not to."""
+    return {
+        "structure": {"model": "prescribed", "displacement_amplitude": amplitude},
+        "excitation": {"frequency": frequency}, "gravity": {"acceleration": gravity},
+    }  # fmt: skip
+
+
+def planar_scene(data, *bodies, periods=1, gap=1.0, play=1.0):
+    """A scene with one cavity."""
+    dampers = [{"cavity": "c1"} | body for body in bodies]
+    cavity = [{"name": "c1", "gap": gap, "play": play}]
+    time = {"periods": periods, "transient": 0}
+    return validate(Scene, data | {"cavity": cavity, "damper": dampers, "time": time}, "scene")
+
+
+def run_planar(scene, periods, events=10**7):
+    """The run of a scene by the exact engine of bodies with extent."""
+    flat = assemble(scene)
+    system = planar_system(scene, flat)
+    records = new_records(flat, periods, 0)
+    run = Run(flat, system, planar_motion(scene, flat, system), records, True, events)
+    run.status = run.advance_to(periods)
+    return run
+
+
+def planar_run(data, *bodies, periods, events=10**7, **cavity):
+    """The run of a scene with one cavity."""
+    return run_planar(planar_scene(data, *bodies, periods=periods, **cavity), periods, events)
+
+
+def ledger(run):
+    """Imbalance of the energy ledger, J."""
+    change = run.records.ledger[run.state.counters[0]] - run.records.ledger[0]
+    return change[0] - change[1:].sum()
