@@ -4,28 +4,31 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.numerics.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import decide, gap, is_shut, row_speed, speed_scale
-from vanedamp.coupling.planar.event_functions import next_event
-from vanedamp.coupling.planar.impacts import collide, log_event
-from vanedamp.coupling.planar.quadrature import add_up, motion_at
-from vanedamp.coupling.planar.state import (
+from vanedamp.coupling.numerics.codes import (
+    ACCURACY_LOST,
     AT_ONCE,
     CLOSES,
+    DONE,
+    EVENT_BUDGET,
     EVENTS,
     FLOW,
+    LOG_FULL,
     LOGGED,
+    NEEDS_FLOW,
     OPEN,
     PERIOD,
     SLIP_LEFT,
     SLIP_RIGHT,
     STICK,
-    TOUCHING,
+    UNDECIDED,
 )
+from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.planar.contact_decisions import decide, gap, is_shut, row_speed, speed_scale
+from vanedamp.coupling.planar.event_functions import next_event
+from vanedamp.coupling.planar.impacts import collide, log_event
+from vanedamp.coupling.planar.quadrature import add_up, motion_at
 from vanedamp.coupling.response.records import DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS, STORED
 
-# what `advance` returns
-DONE, NEEDS_FLOW, EVENT_BUDGET, LOG_FULL, ACCURACY_LOST, UNDECIDED = range(6)
 #: overlap, as a share of the play, beyond which round-off has lost a contact
 _LOST = 1e-7
 #: events at one instant after which contacts are said to be undecided, for each unit
@@ -47,8 +50,6 @@ def begin(system, st, rec, log, work):
             break
     if not decide(system, st, work, st.scale[0]):
         return False
-    for r in range(len(system.rest)):
-        st.known[r] = st.state[r]
     st.counters[FLOW] = -1
     return True
 
@@ -69,7 +70,7 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
                     st.state[r] = st.other[r]
                 st.counters[FLOW] = -1
                 continue
-            _log_changes(system, st, log)
+            _log_changes(system, flows, st, log)
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
         if st.counters[LOGGED] + 4 * len(system.rest) >= len(log):
@@ -120,17 +121,19 @@ def _happen(system, st, rec, log, work, r, what):
     if not decide(system, st, work, st.scale[0]):
         return False
     for i in range(len(system.rest)):
-        if work.before[i] != st.state[i]:
+        if work.before[i] != st.state[i] or st.other[i] != st.state[i]:
             st.counters[FLOW] = -1
     return True
 
 
 @kernel
-def _log_changes(system, st, log):
+def _log_changes(system, flows, st, log):
     """Log which units have changed their states."""
     u = len(system.rest)
     for i in range(u):
         was, now = st.known[i], st.state[i]
+        if (now == SLIP_RIGHT or now == SLIP_LEFT) and flows.held[st.counters[FLOW], i] and _rubs(system, i):
+            now = STICK  # its force is at its bound, but others hold it
         st.known[i] = now
         if i < system.contacts and was == OPEN and now != OPEN:
             log_event(system, st, log, RESTS, i, 0.0, 0.0, 0.0, 0.0)
@@ -140,6 +143,11 @@ def _log_changes(system, st, log):
             log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0)
         elif was == STICK and (now == SLIP_RIGHT or now == SLIP_LEFT):
             log_event(system, st, log, SLIPS, i, 0.0, row_speed(system, u + i, st.v), 0.0, 0.0)
+
+
+@inlined
+def _rubs(system, i):
+    return i >= system.contacts or system.friction[i] > 0.0
 
 
 @kernel

@@ -1,14 +1,13 @@
 """From a scene to the coordinates of its bodies in the plane, and to the contacts between them and their cavities.
 
-Coordinates q = (p, bodies): modes of the structure, then of each body x along its cavity, and of one with extent y across
-it and its tilt theta, all relative to the base. x and y count from where the bodies of a cavity stand side by side on the
-floor, in the middle of the free travel. Tilts are small: a point (a, b) of a body, from its centre, moves by
-(x - theta b, y + theta a).
+Coordinates q = (p, bodies): modes of the structure, then of each body x along its cavity, and of one with extent y
+across it and its tilt theta, all relative to the base. x and y count from where the bodies of a cavity stand side by
+side on the floor, in the middle of the free travel. Tilts are small: a point (a, b) of a body, from its centre, moves
+by (x - theta b, y + theta a).
 """
 
 from __future__ import annotations
 
-import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -243,8 +242,8 @@ def _at_walls(cavity: Cavity, walls: _Walls, body: _Body, surface: int, wall: fl
                 body.number,
                 surface,
                 corner,
-            )  # fmt: skip
-        )
+            )
+        )  # fmt: skip
     return units
 
 
@@ -274,8 +273,8 @@ def _at_floor(
                 body.number,
                 surface,
                 corner,
-            )  # fmt: skip
-        )
+            )
+        )  # fmt: skip
     return units
 
 
@@ -319,8 +318,8 @@ def _between(scene: Scene, cavity: Cavity, left: _Body, right: _Body, size: int)
                 cavity.gap,
                 left.number,
                 BODY,
-            )  # fmt: skip
-        )
+            )
+        )  # fmt: skip
     return units
 
 

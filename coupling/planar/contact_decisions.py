@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF, SIMULTANEOUS
+from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, TOUCHING
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
-from vanedamp.coupling.planar.state import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, TOUCHING
 
 #: what is small beside the largest term, now and a moment later, and that moment, in periods
 _NOTHING, _NEXT_TO_NOTHING, _MOMENT = 1e-9, 1e-12, 1e-6
@@ -224,9 +224,8 @@ def decide(system, st, work, scale):
     for p in range(count):
         r = work.listed[p]
         st.state[r], st.other[r] = work.verdict[p], work.verdict[p]
-        if doubts > 0 and work.doubtful[p] == _SLIP and work.way[p] == 0 and work.verdict[p] > STICK:
-            if r >= system.contacts or system.friction[r] > 0.0:
-                st.state[r] = STICK
+        if doubts > 0 and work.doubtful[p] == _SLIP and _may_stick(system, work, p):
+            st.state[r] = STICK
     for r in range(u):
         st.fresh[r] = 1
     return True
@@ -262,7 +261,7 @@ def _look_ahead(system, st, work, count):
         return False
     _classify(system, work, count, _NEXT_TO_NOTHING, work.verdict)
     for p in range(count):
-        if work.doubt[p] == 0 or (work.doubt[p] == _SLIP and work.verdict[p] <= TOUCHING):
+        if work.doubt[p] == 0 or (work.doubt[p] == _SLIP and work.verdict[p] >= OPEN):
             work.verdict[p], work.doubtful[p] = work.first[p], work.doubt[p]
     return True
 
@@ -278,18 +277,25 @@ def _stick_in_doubt(system, work, count):
     u, found = len(system.rest), 0
     for p in range(count):
         r = work.listed[p]
-        if work.verdict[p] > TOUCHING and r < system.contacts:
+        if work.verdict[p] < OPEN and r < system.contacts:
             found = _span(system, work, r, found)
     for p in range(count):
         if work.verdict[p] == STICK:
             found = _span(system, work, u + work.listed[p], found)
     for p in range(count):
         r = work.listed[p]
-        in_doubt = work.doubtful[p] == _SLIP and (work.verdict[p] == SLIP_RIGHT or work.verdict[p] == SLIP_LEFT)
-        if in_doubt and work.way[p] == 0 and (r >= system.contacts or system.friction[r] > 0.0):
+        if work.doubtful[p] == _SLIP and _may_stick(system, work, p):
             more = _span(system, work, u + r, found)
             if more > found:
                 work.verdict[p], found = STICK, more
+
+
+@inlined
+def _may_stick(system, work, p):
+    """Whether a listed unit that counts as slipping has friction and no slip."""
+    r = work.listed[p]
+    slips = work.verdict[p] == SLIP_RIGHT or work.verdict[p] == SLIP_LEFT
+    return slips and work.way[p] == 0 and (r >= system.contacts or system.friction[r] > 0.0)
 
 
 @kernel

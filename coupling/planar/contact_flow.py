@@ -17,8 +17,8 @@ import numpy as np
 from scipy.linalg import eig, null_space, orth
 
 from vanedamp.coupling.exact.complex_modes import DEFECTIVE, LOST, IllConditioned
+from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
 from vanedamp.coupling.planar.constraints import PlanarSystem
-from vanedamp.coupling.planar.state import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, TOUCHING
 
 #: share of their size below which singular values are zero: rows that depend on each other
 _DEPENDENT = 1e-9
@@ -109,7 +109,7 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     root = np.sqrt(system.mass)
     rows = system.J / root
     units = np.arange(u)
-    closed = np.flatnonzero((state > TOUCHING) & (units < system.contacts))
+    closed = np.flatnonzero((state < OPEN) & (units < system.contacts))
     stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
     way = (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
     kept = np.r_[closed, u + stick]
@@ -165,7 +165,7 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
         _spread(target, carried @ part, closed, stick, drag, u)
     _spread(flows.force_held[s], carried @ net_held * root, closed, stick, drag, u)
     flows.force_constant[s, u + slides] = -(way * system.limit)[slides]
-    touching = np.flatnonzero((state >= TOUCHING) & (units < system.contacts))
+    touching = np.flatnonzero((state != OPEN) & (units < system.contacts))
     flows.snap[s], flows.snap_rate[s] = 0.0, 0.0
     flows.snap[s][:, touching] = np.linalg.pinv(rows[touching], rcond=_DEPENDENT) / root[:, None]
     still_rows = np.r_[touching, u + stick]
@@ -186,7 +186,7 @@ def _spread(
 
 
 def _forces(constraints: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forces of the kept rows (k, N) and accelerations (N, N) by the loads. Raises IllConditioned where there are none."""
+    """Return the forces of the kept rows (k, N) and accelerations (N, N) by the loads. Raises IllConditioned."""
     size = constraints.shape[1]
     if not len(constraints):
         return np.zeros((0, size)), np.eye(size)

@@ -5,26 +5,29 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.exact.event_functions import RESOLUTION, advance_or_stop
-from vanedamp.coupling.exact.root_search import DEGREE, FORCE, POSITION, VELOCITY, expand, first_root_of_parabola
-from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
-from vanedamp.coupling.planar.state import (
+from vanedamp.coupling.exact.root_search import DEGREE, expand, first_root_of_parabola
+from vanedamp.coupling.numerics.codes import (
+    AT_HIGH,
+    AT_LOW,
+    BOUNDED,
     CLOSES,
     EVALUATIONS,
+    EXPANDED,
     FLOW,
-    LETS_GO,
+    FORCE,
     OPEN,
+    POSITION,
+    ROOT,
     SEGMENTS,
-    SLIDES_DOWN,
-    SLIDES_UP,
     SLIP_LEFT,
     SLIP_RIGHT,
     STICK,
     STOPS,
     TOUCHING,
+    VELOCITY,
 )
+from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
 
-# what is known of an event function: a bound of its second derivative; more; its first root
-_BOUNDED, _EXPANDED, _ROOT = range(3)
 #: round-off of a sum, relative to the sum of its terms' sizes; what is small beside the bound of a derivative
 _ROUND_OFF, _NOTHING = 4.0 * 2.0**-52, 1e-9
 #: what counts as zero where contacts have just been decided: of a gap, as a share of the play; of a speed
@@ -48,9 +51,9 @@ def next_event(system, flows, st, guards, all_modes):
                 k, tau = i, guards.no_root_before[i]
         if k < 0:
             return left, -1
-        if guards.known[k] == _ROOT:
+        if guards.status[k] == ROOT:
             return (tau if tau > shortest else 0.0), k
-        if guards.known[k] == _BOUNDED:
+        if guards.status[k] == BOUNDED:
             tau = 0.0
         else:
             st.counters[EVALUATIONS] += 1
@@ -62,7 +65,7 @@ def next_event(system, flows, st, guards, all_modes):
             second, calm = second * grows, -1.0
             guards.lower[0, DEGREE] *= grows
         step, found = advance_or_stop(guards.lower, max(noise, guards.noise[k]), second, calm, system.period, shortest)
-        guards.known[k] = _ROOT if found else _EXPANDED
+        guards.status[k] = ROOT if found else EXPANDED
         guards.no_root_before[k] = tau + step if found else max(guards.no_root_before[k], tau + step)
 
 
@@ -76,15 +79,15 @@ def _watch(system, flows, st, guards, s, grows):
             if state == OPEN:
                 count = _add(system, flows, st, guards, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
             elif state != TOUCHING:
-                count = _add(system, flows, st, guards, s, r, FORCE, LETS_GO, 1.0, 0.0, grows, count)
+                count = _add(system, flows, st, guards, s, r, FORCE, AT_LOW, 1.0, 0.0, grows, count)
         if state == STICK and (r >= system.contacts or system.friction[r] > 0.0):
             bound = system.friction[r]
-            count = _add(system, flows, st, guards, s, r, FORCE, SLIDES_UP, bound, -1.0, grows, count)
-            count = _add(system, flows, st, guards, s, r, FORCE, SLIDES_DOWN, bound, 1.0, grows, count)
-        elif (state == SLIP_RIGHT or state == SLIP_LEFT) and not flows.held[s, r]:
-            if r >= system.contacts or system.friction[r] > 0.0:
-                way = 1.0 if state == SLIP_RIGHT else -1.0
-                count = _add(system, flows, st, guards, s, r, VELOCITY, STOPS, 0.0, way, grows, count)
+            count = _add(system, flows, st, guards, s, r, FORCE, AT_HIGH, bound, -1.0, grows, count)
+            count = _add(system, flows, st, guards, s, r, FORCE, AT_LOW, bound, 1.0, grows, count)
+        slips = (state == SLIP_RIGHT or state == SLIP_LEFT) and not flows.held[s, r]
+        if slips and (r >= system.contacts or system.friction[r] > 0.0):
+            way = 1.0 if state == SLIP_RIGHT else -1.0
+            count = _add(system, flows, st, guards, s, r, VELOCITY, STOPS, 0.0, way, grows, count)
     return count
 
 
@@ -145,17 +148,19 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
         return k
     first += k1
     second += k2 if order == POSITION else 0.0
-    guards.unit[k], guards.order[k], guards.what[k], guards.known[k] = r, order, what, _BOUNDED
+    guards.unit[k], guards.order[k], guards.what[k], guards.status[k] = r, order, what, BOUNDED
     guards.k0[k], guards.k1[k], guards.k2[k], guards.no_root_before[k] = k0, k1, k2, 0.0
     guards.noise[k] = _ROUND_OFF * (noise + swing)
     falls = first < -_NOTHING * second_bound * system.period
-    zero = _NOTHING * (noise + swing) if order == FORCE else _ZERO * (system.play[r] if order == POSITION else st.scale[0])
+    zero = (
+        _NOTHING * (noise + swing) if order == FORCE else _ZERO * (system.play[r] if order == POSITION else st.scale[0])
+    )
     if st.fresh[r] != 0 and not falls and value <= zero:
         guards.no_root_before[k] = _leave(
             system.period, first, second, third, second_bound * grows + abs(k2), third_bound * grows,
             fourth_bound * grows,
         )  # fmt: skip
-        guards.known[k] = _EXPANDED
+        guards.status[k] = EXPANDED
     elif value > guards.noise[k]:
         guards.no_root_before[k] = first_root_of_parabola(value, first, -second_bound * grows + min(k2, 0.0))
     return k + 1

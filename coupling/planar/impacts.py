@@ -14,9 +14,9 @@ from __future__ import annotations
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF
 from vanedamp.coupling.exact.impacts import COLLAPSE
+from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, PERIOD
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import is_shut, loaded_acceleration, row_speed, solve_rows, speed_scale
-from vanedamp.coupling.planar.state import IMPACTS, LOGGED, PERIOD
 from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS
 
 #: energy that an impact may bring, as a share of what is in it, before it is solved again

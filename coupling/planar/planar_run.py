@@ -5,31 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.exact.complex_modes import IllConditioned
-from vanedamp.coupling.planar import automaton
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
-from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
-from vanedamp.coupling.planar.state import (
+from vanedamp.coupling.numerics.codes import (
     EVALUATIONS,
     EVENTS,
     IMPACTS,
+    LOG_FULL,
     LOGGED,
+    NEEDS_FLOW,
     PERIOD,
     SEGMENTS,
-    new_guards,
-    new_scratch,
-    new_state,
-)
-from vanedamp.coupling.response.evaluation import Outcome
+)  # fmt: skip
+from vanedamp.coupling.planar.automaton import advance, begin
+from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
+from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
+from vanedamp.coupling.planar.state import new_guards, new_scratch, new_state
+from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.system import System
 
-_STATUS = {
-    automaton.DONE: Status.OK,
-    automaton.EVENT_BUDGET: Status.EVENT_BUDGET,
-    automaton.ACCURACY_LOST: Status.ACCURACY_LOST,
-    automaton.UNDECIDED: Status.UNDECIDED,
-}
 #: imbalance of the ledger above which a response is not to be used
 _OPEN_LEDGER = 1e-6
 
@@ -54,23 +48,23 @@ class PlanarRun:
         counters = self.state.counters
         if not self.begun:
             self.begun = True
-            if not automaton.begin(self.system, self.state, self.records, self.log, self.scratch):
+            if not begin(self.system, self.state, self.records, self.log, self.scratch):
                 return Status.UNDECIDED
         while True:
-            code = automaton.advance(
+            code = advance(
                 self.system, self.flows, self.state, self.guards, self.records, self.log, self.scratch,
                 self.all_modes, periods, self.max_events,
             )  # fmt: skip
             if self.keep and counters[LOGGED]:
                 self.chunks.append(self.log[: counters[LOGGED]].copy())
             counters[LOGGED] = 0
-            if code == automaton.NEEDS_FLOW:
+            if code == NEEDS_FLOW:
                 try:
                     self.flows = add_flow(self.flows, self.system, self.state.state)
                 except IllConditioned:
                     return Status.ILL_CONDITIONED
-            elif code != automaton.LOG_FULL:
-                return _STATUS[code]
+            elif code != LOG_FULL:
+                return STATUS_OF[int(code)]
 
     def outcome(self) -> Outcome:
         """What the run leaves behind."""

@@ -10,9 +10,10 @@ import math
 
 import numpy as np
 
+from vanedamp.coupling.numerics.codes import FLOW, OPEN, PERIOD, SLIP_LEFT, SLIP_RIGHT
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 from vanedamp.coupling.numerics.jit import inlined, kernel
-from vanedamp.coupling.planar.state import FLOW, OPEN, PERIOD, SLIP_LEFT, SLIP_RIGHT
+from vanedamp.coupling.planar.constraints import FLOOR
 from vanedamp.coupling.response.records import EXCITATION, FRICTION, VISCOUS
 
 _TURN = 1.5
@@ -40,7 +41,7 @@ def motion_at(system, flows, st, work, t, q, v):
 @kernel
 def add_up(system, flows, st, rec, work, tau):
     """Add a segment of length tau to ledger and records; st is at its start."""
-    s, size, period = st.counters[FLOW], len(st.q), st.counters[PERIOD]
+    s, period = st.counters[FLOW], st.counters[PERIOD]
     fastest = 0.0
     for j in range(flows.modes[s]):
         rate = flows.eigenvalue[s, j]
@@ -69,7 +70,7 @@ def add_up(system, flows, st, rec, work, tau):
 @inlined
 def _on_floor(system, st, b):
     for r in range(system.contacts):
-        if system.body[r] == b and system.surface[r] == 2 and st.state[r] != OPEN:
+        if system.body[r] == b and system.surface[r] == FLOOR and st.state[r] != OPEN:
             return True
     return False
 

@@ -7,31 +7,23 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.exact.root_search import DEGREE
+from vanedamp.coupling.numerics.codes import COUNTERS, OPEN
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
 from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
 from vanedamp.coupling.response.records import ENERGIES
-
-# state of a unit. TOUCHING: closed, but others carry its force. A contact without friction that is closed counts as
-# slipping; a friction element sticks or slips
-OPEN, TOUCHING, STICK, SLIP_RIGHT, SLIP_LEFT = np.arange(5)
-
-# what an event function stands for: a gap that closes, a normal force that vanishes, a slip that stops, a tangential
-# force that reaches its upper or its lower bound
-CLOSES, LETS_GO, STOPS, SLIDES_UP, SLIDES_DOWN = np.arange(5)
-
-COUNTERS = ("period", "flow", "logged", "events", "impacts", "evaluations", "segments", "at_once")
-PERIOD, FLOW, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AT_ONCE = range(len(COUNTERS))
 
 
 class PlanarState(NamedTuple):
     """The state at the start of a segment."""
 
     # changes all the time
-    counters: np.ndarray  # int, by the names above
+    counters: np.ndarray  # int (numerics.codes)
     time: np.ndarray  # (1,) within the period, s
     q: np.ndarray  # (N,)
     v: np.ndarray  # (N,)
-    state: np.ndarray  # (u,) int
+    # (u,) int: OPEN; TOUCHING, closed but others carry its force; STICK, SLIP_LEFT or SLIP_RIGHT, as which a closed
+    # contact without friction counts. A friction element sticks or slips
+    state: np.ndarray
     other: np.ndarray  # (u,) int: states that move alike, with forces at their bounds where `state` shares them
     known: np.ndarray  # (u,) int: states as last logged
     fresh: np.ndarray  # (u,) int: whether contacts have been decided at this instant
@@ -53,8 +45,9 @@ class Guards(NamedTuple):
 
     unit: np.ndarray  # (k,) int
     order: np.ndarray  # (k,) int: POSITION, VELOCITY or FORCE of exact.root_search
-    what: np.ndarray  # (k,) int
-    known: np.ndarray  # (k,) int: whether it has been expanded, and whether its root is found
+    # (k,) int: CLOSES, a gap; STOPS, a slip; AT_LOW, AT_HIGH, a force at its bound
+    what: np.ndarray
+    status: np.ndarray  # (k,) int
     k0: np.ndarray
     k1: np.ndarray
     k2: np.ndarray
@@ -68,9 +61,7 @@ class Scratch(NamedTuple):
     """Space for intermediate results."""
 
     free: np.ndarray  # (N,) acceleration without contact forces
-    rates: np.ndarray  # (N,) acceleration with them, or the velocity ahead
     ahead: np.ndarray  # (2, N) coordinates and velocities a moment later
-    sizes: np.ndarray  # (N,) of the terms of `free`
     speed: np.ndarray  # (2u,) right-hand side of a problem: accelerations or speeds of the rows
     before_impact: np.ndarray  # (2u,) speeds
     impulse: np.ndarray  # (2u,)
@@ -93,8 +84,9 @@ def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion) -> Planar
     """The state at time zero."""
     u, size, b = len(system.rest), len(system.mass), len(system.along)
     return PlanarState(
-        counters=np.zeros(len(COUNTERS), np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
-        state=np.zeros(u, np.int64), other=np.zeros(u, np.int64), known=np.zeros(u, np.int64), fresh=np.zeros(u, np.int64), caught=np.zeros(u, np.int64), scale=np.zeros(1), rate=np.zeros(2 * u), last_impact=np.full(u, -np.inf),
+        counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
+        state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
+        caught=np.zeros(u, np.int64), rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf),
         ledger=np.zeros(len(ENERGIES)), extremes=np.zeros((b, 3)), by_contact=np.zeros((u, 2)),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
     )  # fmt: skip
@@ -105,7 +97,7 @@ def new_guards(system: PlanarSystem, modes: int) -> Guards:
     k = 3 * len(system.rest)
     return Guards(
         unit=np.zeros(k, np.int64), order=np.zeros(k, np.int64), what=np.zeros(k, np.int64),
-        known=np.zeros(k, np.int64), k0=np.zeros(k), k1=np.zeros(k), k2=np.zeros(k), noise=np.zeros(k),
+        status=np.zeros(k, np.int64), k0=np.zeros(k), k1=np.zeros(k), k2=np.zeros(k), noise=np.zeros(k),
         no_root_before=np.zeros(k), g=np.zeros((k, modes), complex), lower=np.zeros((2, DEGREE + 1)),
     )  # fmt: skip
 
@@ -113,11 +105,11 @@ def new_guards(system: PlanarSystem, modes: int) -> Guards:
 def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
     """Scratch space for a scene."""
     u, size = len(system.rest), len(system.mass)
+    integers = iter(np.zeros((9, u), np.int64))
     return Scratch(
-        free=np.zeros(size), rates=np.zeros(size), ahead=np.zeros((2, size)), sizes=np.zeros(size),
-        speed=np.zeros(2 * u), before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), before=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
-        way=np.zeros(u, np.int64), place=np.zeros(u, np.int64), verdict=np.zeros(u, np.int64),
-        doubtful=np.zeros(u, np.int64), first=np.zeros(u, np.int64), doubt=np.zeros(u, np.int64),
-        sliding=np.zeros(u, np.int64), span=np.zeros((size, size)), lemke=new_lemke(3 * u),
+        free=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u), before_impact=np.zeros(2 * u),
+        impulse=np.zeros(2 * u), before=next(integers), listed=next(integers), way=next(integers),
+        place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
+        doubt=next(integers), sliding=next(integers), span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
     )  # fmt: skip
