@@ -52,4 +52,6 @@ class Method(Protocol):
 
         options: an instance of Options; initial: the motion at time zero; records: room for all periods, to be filled
         (response.recorder); events: whether to keep a log of them. Raises InputError for an impossible scene.
+        A method that takes bodies in the plane (coupling.planar) also has begin_planar(scene, system, options, records,
+        events), system with all of them as sliders.
         """

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Literal
 
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.scene.solver_options import SolverOptions
+from vanedamp.files.toml_input import Positive
 
 if TYPE_CHECKING:  # a scene takes the options without the engine
     from vanedamp.coupling.response.evaluation import Run
     from vanedamp.coupling.response.records import Records
+    from vanedamp.coupling.scene.scene import Scene
     from vanedamp.coupling.system.assembly import InitialMotion
     from vanedamp.coupling.system.system import System
 
@@ -18,9 +20,10 @@ RESTARTS = True
 
 
 class Options(SolverOptions):
-    """No more than every method has."""
+    """linearisation: how much a tilt may shorten a body, as a share of the smallest play; beyond, a run is not ok."""
 
     method: Literal["exact"] = "exact"
+    linearisation: Positive = 0.01
 
 
 def begin(system: System, options: SolverOptions, initial: InitialMotion, records: Records, events: bool) -> Run:
@@ -28,3 +31,10 @@ def begin(system: System, options: SolverOptions, initial: InitialMotion, record
     from vanedamp.coupling.exact.event_driven import EngineRun  # its kernels are loaded when they are wanted
 
     return EngineRun(system, initial, records, events, options.max_events)
+
+
+def begin_planar(scene: Scene, system: System, options: SolverOptions, records: Records, events: bool) -> Run:
+    """Return a run by the engine for bodies in the plane."""
+    from vanedamp.coupling.planar.planar_run import begin_run
+
+    return begin_run(scene, system, records, events, options.max_events, getattr(options, "linearisation", 0.01))

@@ -10,13 +10,14 @@ import numpy as np
 
 from vanedamp.coupling.methods import Method, exact
 from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
-from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.response.records import Records, new_records
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart import restart_from, restart_state
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.system.assembly import assemble, initial_motion, loads_of, physical_scale
+from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
 
@@ -46,7 +47,10 @@ def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: 
     system = assemble(scene)
     system = system._replace(response=np.r_[functional, np.zeros(system.bodies)])
     records = new_records(system, scene.time.simulated, samples_per_period)
-    run = exact.begin(system, scene.solver, initial_motion(scene, system), records, False)
+    if scene.planar:
+        run = exact.begin_planar(scene, system, scene.solver, records, False)
+    else:
+        run = exact.begin(system, scene.solver, initial_motion(scene, system), records, False)
     status, transient = run_scene(run, scene)
     return evaluate(scene, run.outcome(), status, transient, started)
 
@@ -63,15 +67,33 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     check_waveform(scene, scene.solver.method)
     system = assemble(scene)
     scale = physical_scale(scene, system)
-    initial = initial_motion(scene, system) if start is None else restart_from(system, scale, start)
     records = new_records(system, scene.time.simulated, samples_per_period)
+    if scene.planar:
+        return _begin_planar(scene, system, method, records, events)
+    initial = initial_motion(scene, system) if start is None else restart_from(system, scale, start)
     signal = scene.excitation.signal
     further = {} if signal is None else {"loads": loads_of(scene, signal)}
     return method.begin(system, scene.solver, initial, records, events, **further)
 
 
+def _begin_planar(scene: Scene, system: System, method: Method, records: Records, events: bool) -> Run:
+    begin = getattr(method, "begin_planar", None)
+    if begin is None:
+        able = [name for name, part in METHODS.all().items() if hasattr(part, "begin_planar")]
+        raise InputError(
+            f"solver.method: {scene.solver.method} takes sliders only; bodies with extent, stiffness or dashpot are "
+            f"for {' or '.join(able)}"
+        )
+    if scene.excitation.signal is not None:
+        raise InputError("excitation.waveform: bodies with extent, stiffness or dashpot take sums of sines only")
+    run: Run = begin(scene, system, scene.solver, records, events)
+    return run
+
+
 def why_no_restart(scene: Scene) -> str | None:
     """Return why runs of the scene's method cannot begin with the state of another; None if they can."""
+    if scene.planar:
+        return "runs with bodies that have an extent, stiffness or dashpot leave no state for another"
     return _why_not(scene.solver.method, "RESTARTS")
 
 

@@ -56,11 +56,14 @@ class PlanarSystem(NamedTuple):
     tilt: np.ndarray  # (b,) coordinate theta, -1: none
     floor: np.ndarray  # (b, N) motion of the floor along the cavity
     turn: np.ndarray  # (b, N) rotation of the cavity
+    neglected: (
+        np.ndarray
+    )  # (b,) shortening over the smallest play, per square of the tilt; nan for sliders, 0 for discs
 
 
 #: names of what a unit touches
-SURFACES = ("left", "right", "floor", "ceiling", "body", "casing")
-LEFT, RIGHT, FLOOR, CEILING, BODY, CASING = range(len(SURFACES))
+SURFACES = ("left", "right", "floor", "ceiling", "body", "stop", "casing")
+LEFT, RIGHT, FLOOR, CEILING, BODY, STOP, CASING = range(len(SURFACES))
 
 
 class PlanarMotion(NamedTuple):
@@ -135,7 +138,19 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     units: list[_Unit] = []
     for index, cavity in enumerate(scene.cavity):
         units += _contacts(scene, cavity, walls[index], [body for body in bodies if owner[body.number] == index], size)
+    for row in range(flat.friction_rows, len(flat.J)):
+        if not flat.J[row, n:].any():
+            gap = np.zeros(size)
+            gap[:n] = flat.J[row, :n]
+            number = row - (len(flat.J) - len(scene.stop))
+            units.append(
+                _Unit(
+                    gap, np.zeros(size), float(flat.rest[row]), 0.0, float(flat.restitution[row]),
+                    float(flat.free_travel[row]), number, STOP,
+                )
+            )  # fmt: skip
     contacts = len(units)
+    _check_friction(units, size, mass)
     for row in range(flat.friction_rows):
         if flat.limit[row] > 0.0 and not (row < len(bodies) and bodies[row].damper.shape != "slider"):
             functional = np.zeros(size)
@@ -169,7 +184,15 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         along=np.array([body.x for body in bodies], np.int64),
         tilt=np.array([-1 if body.damper.shape == "slider" else body.x + 2 for body in bodies], np.int64),
         floor=floor, turn=turn,
+        neglected=np.array([_neglected(body, scene.cavity[owner[body.number]]) for body in bodies]),
     )  # fmt: skip
+
+
+def _neglected(body: _Body, cavity: Cavity) -> float:
+    """Return how much a tilt shortens a body, to second order, over the smallest play and the square of the tilt."""
+    if body.damper.shape != "block":
+        return np.nan if body.damper.shape == "slider" else 0.0
+    return max(body.a, body.b) / 2 / min(cavity.gap, cavity.play or np.inf)
 
 
 def _walls(scene: Scene, basis: ModalBasis, index: int) -> _Walls:
@@ -276,6 +299,18 @@ def _at_floor(
             )
         )  # fmt: skip
     return units
+
+
+def _check_friction(units: list[_Unit], size: int, mass: np.ndarray) -> None:
+    """Raise InputError for a friction with which a single contact may jam or have two motions (Painleve 1895)."""
+    for unit in units:
+        normal = (unit.normal**2 / mass).sum()
+        coupled = abs((unit.normal * unit.slip / mass).sum())
+        if unit.friction > 0.0 and unit.friction * coupled >= normal:
+            raise InputError(
+                f"damper[{unit.body}].friction: {unit.friction:g} lets the body jam at the {SURFACES[unit.surface]}; "
+                f"with its length, height and inertia a corner has a unique motion only below {normal / coupled:.4g}"
+            )
 
 
 def _between(scene: Scene, cavity: Cavity, left: _Body, right: _Body, size: int) -> list[_Unit]:

@@ -16,29 +16,50 @@ from vanedamp.coupling.numerics.codes import (
     SEGMENTS,
 )  # fmt: skip
 from vanedamp.coupling.planar.automaton import advance, begin
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
+from vanedamp.coupling.planar.constraints import SURFACES, PlanarMotion, PlanarSystem, planar_motion, planar_system
 from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
 from vanedamp.coupling.planar.state import new_guards, new_scratch, new_state
-from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
+from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome, Plane
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
 #: imbalance of the ledger above which a response is not to be used
 _OPEN_LEDGER = 1e-6
 
 
+def begin_run(
+    scene: Scene, flat: System, records: Records, events: bool, max_events: int, linearisation: float
+) -> PlanarRun:
+    """Return a run of a scene at time zero. flat: its system with all bodies as sliders. Raises InputError."""
+    system = planar_system(scene, flat)
+    initial = planar_motion(scene, flat, system)
+    return PlanarRun(flat, system, initial, records, events, max_events, linearisation)
+
+
+def plane_of(system: PlanarSystem, tilt: np.ndarray, lifted: np.ndarray, linearisation: float) -> Plane:
+    """Return the results in the plane of a run; tilt, lifted: (periods, b)."""
+    places = [
+        (int(body), SURFACES[surface], int(corner))
+        for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
+    ]
+    return Plane(tilt, lifted, system.neglected, linearisation, places)
+
+
 class PlanarRun:
     """The mutable state of one run, and the flows it has met."""
 
     def __init__(
-        self, flat: System, system: PlanarSystem, initial: PlanarMotion, records: Records, events: bool, max_events: int
-    ) -> None:
+        self, flat: System, system: PlanarSystem, initial: PlanarMotion, records: Records, events: bool,
+        max_events: int, linearisation: float = 0.01,
+    ) -> None:  # fmt: skip
         self.flat, self.system, self.records, self.max_events, self.keep = flat, system, records, max_events, events
+        self.linearisation = linearisation
         self.flows = empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
         self.all_modes = np.arange(modes)
-        self.state, self.guards = new_state(system, modes, initial), new_guards(system, modes)
+        self.state, self.guards = new_state(system, modes, initial, len(records.peak) - 1), new_guards(system, modes)
         self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), 7))
         self.chunks: list[np.ndarray] = []
         self.begun = False
@@ -73,8 +94,9 @@ class PlanarRun:
         found = {name: int(counters[place]) for name, place in numbers.items()}
         found["subsystems"] = int(np.count_nonzero(self.flows.modes))
         return Outcome(
-            self.flat, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER, found, self.chunks
-        )
+            self.flat, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER, found, self.chunks,
+            plane=plane_of(self.system, self.state.tilt, self.state.lifted, self.linearisation),
+        )  # fmt: skip
 
     def final(self) -> None:
         """None: runs of bodies with extent do not hand over their state yet."""

@@ -64,7 +64,7 @@ def add_up(system, flows, st, rec, work, tau):
         rate0 = rate1
     for b in range(len(system.along)):
         if system.tilt[b] >= 0 and not _on_floor(system, st, b):
-            st.extremes[b, 1] += tau
+            st.lifted[period, b] += tau
 
 
 @inlined
@@ -106,7 +106,7 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
             tilt = q[system.tilt[b]]
             for i in range(size):
                 tilt -= system.turn[b, i] * q[i]
-            st.extremes[b, 0] = max(st.extremes[b, 0], abs(tilt))
+            st.tilt[period, b] = max(st.tilt[period, b], abs(tilt))
     x, _ = _response(system, st, q, v, st.time[0] + t)
     phase = st.amplitude[0] * (1.0 + work.turn[0])
     back = complex(phase.real, -phase.imag)

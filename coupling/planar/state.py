@@ -32,7 +32,8 @@ class PlanarState(NamedTuple):
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
     ledger: np.ndarray  # (6,) J
-    extremes: np.ndarray  # (b, 3): largest |tilt| in the cavity, rad; time off the floor, s; largest |tilt| of all time
+    tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
+    lifted: np.ndarray  # (periods + 1, b) time off the floor, s
     by_contact: np.ndarray  # (u, 2): energy lost in impacts and by friction, J
     # of a segment
     amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
@@ -80,14 +81,15 @@ class Scratch(NamedTuple):
     wave: np.ndarray  # (m,) complex
 
 
-def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion) -> PlanarState:
+def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, periods: int) -> PlanarState:
     """The state at time zero."""
     u, size, b = len(system.rest), len(system.mass), len(system.along)
     return PlanarState(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
         state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
         caught=np.zeros(u, np.int64), rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf),
-        ledger=np.zeros(len(ENERGIES)), extremes=np.zeros((b, 3)), by_contact=np.zeros((u, 2)),
+        ledger=np.zeros(len(ENERGIES)),
+        tilt=np.zeros((periods + 1, b)), lifted=np.zeros((periods + 1, b)), by_contact=np.zeros((u, 2)),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
     )  # fmt: skip
 

@@ -5,10 +5,11 @@ Every method leaves the same records behind, so that figures of different method
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -25,6 +26,8 @@ from vanedamp.coupling.system.transient import outlasted
 _CHUNK = 100
 #: share of the energy there is that counts as flow in any case
 _CARRIED = 1e-3
+#: statuses of runs that came to their end
+_USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
 
 #: status of a run whose compiled part has ended with a code
 STATUS_OF = {
@@ -51,6 +54,21 @@ class Run(Protocol):
         """Return the motion that another run can begin with; None if the run ended within a period, or keeps none."""
 
 
+class Plane(NamedTuple):
+    """Further results of a run with bodies in the plane, of all its periods; b bodies.
+
+    tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
+    shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status
+    ok; places: body, side and corner by the row in the log.
+    """
+
+    tilt: np.ndarray
+    lifted: np.ndarray
+    neglected: np.ndarray
+    bound: float
+    places: Sequence[tuple[int, str, int]]
+
+
 @dataclass(frozen=True)
 class Outcome:
     """The outcome of a run: records of `periods` periods, counters, chunks of its log.
@@ -67,6 +85,7 @@ class Outcome:
     counters: dict[str, int]
     log: Sequence[np.ndarray]
     penetration: float = 0.0
+    plane: Plane | None = None
 
 
 def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | None = None) -> tuple[Status, int]:
@@ -114,9 +133,13 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     evaluated = {name: float(value) for name, value in zip(ENERGIES, ledger[-1], strict=True)}
     peaks = records.peak[window]
     balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(system, records))
-    if not balance <= run.open_ledger and status in (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN):
+    if not balance <= run.open_ledger and status in _USABLE:
         status = Status.ENERGY
     samples = records.samples_per_period
+    extent: dict[str, Any] = {}
+    if run.plane is not None:
+        extent, tilted = _in_plane(run.plane, window, span)
+        status = Status.TILTED if tilted and status in _USABLE else status
     return Response(
         status=status,
         frequency=scene.excitation.frequency,
@@ -145,12 +168,35 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         section=section[:, :2].copy(),
         slip=section[:, 3 : 3 + b].copy(),
         slip_velocity=section[:, 3 + b :].copy(),
-        event_list=events_of(system, run.log),
+        event_list=events_of(system, run.log) if run.plane is None else _events_in_plane(run.plane, run.log),
         time=np.arange(done * samples) * (system.period / max(samples, 1)),
         displacement=records.samples[: done * samples, 0].copy(),
         body_displacement=records.samples[: done * samples, 1:].copy(),
         penetration=run.penetration,
+        **extent,
     )
+
+
+def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any], bool]:
+    """Return the figures of bodies in the plane over the evaluated periods, and whether they tilt too far."""
+    tilt = plane.tilt[window].max(axis=0, initial=0.0)
+    neglected = plane.neglected * tilt**2
+    parts = {"tilt_max": tilt, "lift_share": plane.lifted[window].sum(axis=0) / span, "linearisation": neglected}
+    slider = np.isnan(plane.neglected)
+    figures = {
+        name: tuple(None if slider[body] else float(value) for body, value in enumerate(values))
+        for name, values in parts.items()
+    }
+    return figures, bool(np.any(neglected[~slider] > plane.bound))
+
+
+def _events_in_plane(plane: Plane, chunks: Sequence[np.ndarray]) -> list[Event]:
+    """Return the events of a log of bodies in the plane: (k, 7), as of events_of and the tangential impulse."""
+    found = []
+    for moment, kind, row, before, after, impulse, tangential in itertools.chain(*(chunk.tolist() for chunk in chunks)):
+        body, side, corner = plane.places[int(row)]
+        found.append(Event(moment, KINDS[int(kind)], body, side, before, after, impulse, corner, tangential))
+    return found
 
 
 def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> float:

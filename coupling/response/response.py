@@ -21,6 +21,7 @@ class Status(StrEnum):
     grew beyond all bounds; ENERGY: the ledger is open by more than the method's bound, its figures are not to be used.
     ILL_CONDITIONED: while some contacts are closed, modes are critically damped to round-off or masses and stiffnesses
     so far apart that doubles cannot resolve the motion; change a damping, a mass or a stiffness.
+    TILTED: bodies tilt so far that what small tilts neglect exceeds `solver.linearisation`.
     NOT_STEADY: no end of the transient in sight, or `time.transient` is too short for it; UNCERTAIN: the mean's
     confidence interval is still too wide. The other troubles mean that the figures cover only the periods that were
     completed.
@@ -33,6 +34,7 @@ class Status(StrEnum):
     ILL_CONDITIONED = "ill_conditioned"
     PENETRATION = "penetration"
     DIVERGED = "diverged"
+    TILTED = "tilt_too_large"
     ENERGY = "energy_not_balanced"
     NOT_STEADY = "not_steady"
     UNCERTAIN = "confidence_not_reached"
@@ -42,8 +44,10 @@ class Status(StrEnum):
 class Event:
     """One event: time (s), kind, number of the body, side, speeds (m/s) and impulse (N s).
 
-    side: "left", "right" (walls), "body" (the next body to the right), "floor"; "casing" for a friction damper, "stop"
-    for a stop, whose number is then meant. Speeds are relative to the wall or body met; at a stop, of its gap.
+    side: "left", "right" (walls), "body" (the next body to the right), "floor", "ceiling"; "casing" for a friction
+    damper, "stop" for a stop, whose number is then meant. Speeds are relative to the wall or body met; of bodies in the
+    plane and at stops, those of the gap. corner: of a block, 0 to 3 against the clock from the lower left one; -1:
+    none.
     """
 
     time: float
@@ -53,6 +57,8 @@ class Event:
     relative_velocity_before: float
     relative_velocity_after: float
     impulse: float
+    corner: int = -1
+    tangential_impulse: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -69,7 +75,9 @@ class Response:
     and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model
     whose number of modes was chosen automatically (model_order.selection), None otherwise; warnings: to be read
     before its figures are used; final: the state at its end, with which another run can begin, None for one
-    that ended within a period, or whose method leaves none.
+    that ended within a period, or whose method leaves none; tilt_max (rad), lift_share (of the time), linearisation:
+    largest tilt of each body in its cavity, its share of the time off the floor, and what small tilts neglect over the
+    smallest play; None for sliders, and without bodies in the plane.
     """
 
     status: Status
@@ -102,6 +110,9 @@ class Response:
     estimate: dict[str, Any] | None = None
     final: RestartState | None = None
     warnings: tuple[str, ...] = ()
+    tilt_max: tuple[float | None, ...] | None = None
+    lift_share: tuple[float | None, ...] | None = None
+    linearisation: tuple[float | None, ...] | None = None
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
@@ -113,6 +124,9 @@ class Response:
         )  # fmt: skip
         data: dict[str, Any] = {"status": self.status.value} | {name: getattr(self, name) for name in names}
         data["warnings"] = list(self.warnings)
+        for name in ("tilt_max", "lift_share", "linearisation"):
+            if (values := getattr(self, name)) is not None:
+                data[name] = list(values)
         if self.estimate is not None:
             data["estimate"] = self.estimate
         if events:
@@ -138,7 +152,10 @@ class Response:
         save(path, "response", variables, attributes | {"provenance": provenance or {}})
 
     def _event_variables(self) -> dict[str, Variable]:
-        units = {"time": "s", "relative_velocity_before": "m/s", "relative_velocity_after": "m/s", "impulse": "N s"}
+        units = {
+            "time": "s", "relative_velocity_before": "m/s", "relative_velocity_after": "m/s", "impulse": "N s",
+            "tangential_impulse": "N s",
+        }  # fmt: skip
         return {
             f"event_{name}": Variable(
                 [getattr(event, name) for event in self.event_list], ("event",), units.get(name, "1")

@@ -82,8 +82,13 @@ class Damper:
             raise ValueError(f"normal_load: a {self.shape} is pressed by its contacts; leave it out")
 
     @property
+    def planar(self) -> bool:
+        """Whether the body needs the plane: it has an extent, or a spring of its own."""
+        return self.shape != "slider" or self.stiffness is not None or self.dashpot is not None
+
+    @property
     def half_extent(self) -> tuple[float, float]:
-        """Half the length and half the height, m; 0 for a slider."""
+        """Half the length and half the height, m; 0 of a slider."""
         if self.shape == "disc":
             assert self.radius is not None
             return self.radius, self.radius

@@ -128,7 +128,36 @@ class Scene:
             self._check_contact(f"stop[{index}]", stop.restitution, 1.0)
         for cavity in self.cavity:
             self._check_row(cavity)
+        if self.planar:
+            self._check_plane()
         self._check_structure()
+
+    @property
+    def planar(self) -> bool:
+        """Whether a body moves in the plane of its cavity, or has a spring of its own."""
+        return any(damper.planar for damper in self.damper)
+
+    def _check_plane(self) -> None:
+        """Raise ValueError where a scene with planar bodies lacks or has something that they cannot do with."""
+        play = {cavity.name: cavity.play for cavity in self.cavity}
+        for index, damper in enumerate(self.damper):
+            if damper.shape != "slider" and play[damper.cavity] is None:
+                number = [cavity.name for cavity in self.cavity].index(damper.cavity)
+                raise ValueError(
+                    f'cavity[{number}].play: missing; damper[{index}] with shape = "{damper.shape}" needs the free '
+                    "travel across the cavity"
+                )
+        if self.contact.law != "newton":
+            raise ValueError(
+                f'contact.law: "{self.contact.law}" is for sliders without springs; bodies with extent, stiffness or '
+                'dashpot take "newton"'
+            )
+        for index, friction_damper in enumerate(self.friction_damper):
+            if friction_damper.stiffness is not None:
+                raise ValueError(
+                    f"friction_damper[{index}].stiffness: beside bodies with extent, stiffness or dashpot a friction "
+                    "damper is rigid; leave it out"
+                )
 
     def _check_contact(self, key: str, restitution: float, mass: float) -> None:
         try:
