@@ -50,6 +50,7 @@ def add_up(system, flows, st, rec, work, tau):
     h, q, v = tau / pieces, work.ahead[0], work.ahead[1]
     x0, rate0 = _response(system, st, st.q, st.v, st.time[0])
     rec.peak[period] = max(rec.peak[period], abs(x0))
+    _tilt(system, st, st.q, period)
     for piece in range(pieces):
         for node in range(len(_NODES)):
             t = h * (piece + 0.5 * (1.0 + _NODES[node]))
@@ -102,11 +103,7 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
             st.by_contact[r, 1] -= weight * force * slip
     for b in range(len(system.along)):
         momentum += system.mass[system.along[b]] * v[system.along[b]]
-        if system.tilt[b] >= 0:
-            tilt = q[system.tilt[b]]
-            for i in range(size):
-                tilt -= system.turn[b, i] * q[i]
-            st.tilt[period, b] = max(st.tilt[period, b], abs(tilt))
+    _tilt(system, st, q, period)
     x, _ = _response(system, st, q, v, st.time[0] + t)
     phase = st.amplitude[0] * (1.0 + work.turn[0])
     back = complex(phase.real, -phase.imag)
@@ -116,6 +113,17 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
     rec.harmonic[period] += weight * x * back
     rec.momentum[period] += weight * momentum * back
     rec.square[period] += weight * x * x
+
+
+@inlined
+def _tilt(system, st, q, period):
+    """Note the tilt of each body in its cavity, where it is the largest of the period so far."""
+    for b in range(len(system.along)):
+        if system.tilt[b] >= 0:
+            tilt = q[system.tilt[b]]
+            for i in range(len(q)):
+                tilt -= system.turn[b, i] * q[i]
+            st.tilt[period, b] = max(st.tilt[period, b], abs(tilt))
 
 
 @inlined
