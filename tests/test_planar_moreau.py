@@ -9,7 +9,7 @@ from pydantic.dataclasses import dataclass
 from tests.tools.planar import planar_scene, run_planar, still_table
 from vanedamp.coupling.methods import moreau
 from vanedamp.coupling.response.evaluation import residual
-from vanedamp.coupling.response.records import FRICTION, IMPACT_LOSS, new_records
+from vanedamp.coupling.response.records import EXCITATION, FRICTION, IMPACT_LOSS, STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.waveform import Waveform, register
@@ -87,7 +87,7 @@ def vane(shape, periods, body=None, **excitation):
 
 
 def test_the_steady_amplitude_of_a_block_is_that_of_the_exact_engine():
-    """An independent program finds 0.103, the exact engine 0.105. Chaos: means of 700 periods scatter by 1 %.
+    """An independent program finds 0.103, the exact engine 0.104. Chaos: means of 700 periods scatter by 2 %.
 
     The block begins off the floor: steps take two corners that hit within one as one face, and keep a block flat on
     the floor that has come to lie there.
@@ -132,6 +132,12 @@ def test_a_slider_moves_as_in_the_scheme_of_sliders(excitation):
     for name in ("peak", "section", "samples", "harmonic", "momentum", "square", "parts", "impacts", "collided"):
         mine, theirs = getattr(run.records, name), getattr(records, name)
         np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
+    # in a step with an impact, wall and floor act along one line: the schemes share the force between them differently
+    mine, theirs = (
+        np.column_stack([ledger[:, [EXCITATION, VISCOUS, STORED]], ledger[:, [FRICTION, IMPACT_LOSS]].sum(axis=1)])
+        for ledger in (run.records.ledger, records.ledger)
+    )
+    np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
     mine, theirs = (np.concatenate(chunks) for chunks in (run.chunks, other.chunks))
     assert len(mine) == len(theirs) > 0
 
@@ -169,7 +175,7 @@ def random_scene(seed):
 
 
 def test_random_scenes_move_as_in_the_exact_engine():
-    """In half a period of some 50 impacts; a few scenes multiply an error of a step by a hundred in that time."""
+    """In half a period, with some 40 impacts or up to 500; a few scenes multiply an error by a hundred in that time."""
     samples, steps, errors = 100, 16000, []
     for seed in range(30):
         scene = random_scene(seed)
