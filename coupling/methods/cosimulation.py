@@ -16,7 +16,7 @@ from pydantic import Field
 from scipy.linalg import expm
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, net_load, row_force, with_penalty
 from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
 from vanedamp.coupling.methods.time_stepping import SteppedRun
@@ -70,7 +70,7 @@ def begin(
             deepest,
         )  # fmt: skip
 
-    return SteppedRun(soft, march, initial, records, events)
+    return SteppedRun(soft, march, start(soft, initial), records, events)
 
 
 def cosimulation_matrices(

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
     apply_inverse,
@@ -31,10 +31,12 @@ from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, PERIOD, SOLVES, UNDECIDED
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.planar.constraints import planar_motion, planar_system
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import SteppingOptions
-from vanedamp.coupling.system.assembly import InitialMotion, Loads
+from vanedamp.coupling.system.assembly import InitialMotion, Loads, loads_of
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Real
@@ -70,7 +72,35 @@ def begin(
     def march(motion: Motion, log: np.ndarray, periods: int) -> int:
         return march_moreau(system, times, motion, records, log, problem, *matrices, theta, periods, budget, deepest)
 
-    return SteppedRun(system, march, initial, records, events)
+    return SteppedRun(system, march, start(system, initial), records, events)
+
+
+def begin_planar(scene: Scene, flat: System, options: Options, records: Records, events: bool) -> Run:
+    """Return a run of bodies with extent. flat: the scene's system with every body as a slider.
+
+    Raises InputError for what bodies with extent do not allow.
+    """
+    from vanedamp.coupling.planar import moreau as planar  # its kernels are loaded when they are wanted
+
+    system, signal = planar_system(scene, flat), scene.excitation.signal
+    coordinates = [*range(flat.modes), *system.along]
+
+    def loads(angle: np.ndarray) -> np.ndarray:
+        if signal is None:
+            return (flat.phases(angle) @ system.load).real
+        load = np.zeros((len(angle), len(system.mass)))
+        load[:, coordinates] = loads_of(scene, signal)(angle)
+        return load
+
+    times, theta = time_grid(flat, options.steps_per_period, loads), options.theta
+    matrices = planar.step_matrices(system, times.step, theta)
+    budget, deepest = options.max_events, options.penetration
+
+    def march(motion: planar.SteppedMotion, log: np.ndarray, periods: int) -> int:
+        return planar.march(system, times, motion, records, log, *matrices, theta, periods, budget, deepest)
+
+    motion = planar.start_steps(system, planar_motion(scene, flat, system))
+    return SteppedRun(flat, march, motion, records, events, columns=7)
 
 
 def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

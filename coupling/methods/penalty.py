@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.central_difference import central_difference_matrix, march_central_difference
-from vanedamp.coupling.methods.equations_of_motion import Motion, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, start, time_grid
 from vanedamp.coupling.methods.newmark import march_newmark, newmark_matrices
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, with_penalty
 from vanedamp.coupling.methods.time_stepping import SteppedRun
@@ -64,4 +64,4 @@ def begin(
         def march(motion: Motion, log: np.ndarray, periods: int) -> int:
             return march_newmark(soft, times, motion, records, log, problem, *matrices, slow, periods, budget, deepest)
 
-    return SteppedRun(soft, march, initial, records, events)
+    return SteppedRun(soft, march, start(soft, initial), records, events)

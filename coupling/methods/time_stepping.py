@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, Protocol
 
 import numpy as np
 
-from vanedamp.coupling.methods.equations_of_motion import Motion, start
 from vanedamp.coupling.numerics.codes import DONE, IMPACTS, LOGGED, PERIOD, SOLVES, STEPS
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
 
 #: imbalance of the ledger above which a response is not to be used
@@ -20,16 +19,29 @@ _OPEN_LEDGER = 0.1
 _LOG = 100_000
 
 #: step the motion to the end of a number of periods with this log; returns a code of numerics.codes
-March = Callable[[Motion, np.ndarray, int], int]
+March = Callable[[Any, np.ndarray, int], int]
+
+
+class Stepped(Protocol):
+    """What a run reads of its motion."""
+
+    @property
+    def counters(self) -> np.ndarray:
+        """Counters (COUNTERS,) of numerics.codes."""
+
+    @property
+    def deepest(self) -> np.ndarray:
+        """Largest penetration (1,), relative to the free travel."""
 
 
 class SteppedRun:
     """A run of a stepping method: the system as the method has it, its march, the motion and the records."""
 
-    def __init__(self, system: System, march: March, initial: InitialMotion, records: Records, events: bool) -> None:
-        self.system, self.march, self.records = system, march, records
-        self.motion = start(system, initial)
-        self.log = np.zeros((_LOG if events else 0, 6))
+    def __init__(
+        self, system: System, march: March, motion: Stepped, records: Records, events: bool, columns: int = 6
+    ) -> None:
+        self.system, self.march, self.motion, self.records = system, march, motion, records
+        self.log = np.zeros((_LOG if events else 0, columns))
         self.chunks: list[np.ndarray] = []
 
     def advance_to(self, periods: int) -> Status:

@@ -1,0 +1,307 @@
+"""Moreau-Jean time stepping of bodies with extent: a witness that shares no solver with the exact engine.
+
+Jean (1999); Acary and Brogliato (2008), chapter 10. The theta method for the smooth part; a contact takes part in a
+step if its gap, half a step ahead, is closed: Newton's law on its normal velocity, Coulomb's on its slip. The impulses
+of a step are found by projected Gauss-Seidel iteration (Jourdan, Alart and Jean 1998), one impulse after the other. An
+impact that others bring about within a step is a problem of its own, after theirs, as in methods.moreau.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.numerics.codes import (
+    COUNTERS,
+    DIVERGED,
+    DONE,
+    EVENT_BUDGET,
+    IMPACTS,
+    LOGGED,
+    PENETRATION,
+    PERIOD,
+    SOLVES,
+    STEPS,
+    UNDECIDED,
+)
+from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.planar.automaton import _record as record_section
+from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
+from vanedamp.coupling.planar.contact_decisions import gap, row_speed
+from vanedamp.coupling.response.recorder import cubic_peak
+from vanedamp.coupling.response.records import ENERGIES, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
+
+#: problems that a step may take, the last with all contacts at once
+_TURNS = 20
+#: share of the speeds in a scene by which a sweep may still change one, and below which a contact counts as at rest
+_TOLERANCE, _AT_REST = 1e-13, 1e-10
+#: sweeps that a problem may take
+_SWEEPS = 100_000
+#: share of the play by which round-off may open a gap
+_ROUND_OFF = 1e-12
+#: a motion above this, in m or m/s, has no physical meaning
+_BOUND = 1e30
+
+
+class SteppedMotion(NamedTuple):
+    """The state of a run, advanced in place. Sizes as in constraints.PlanarSystem."""
+
+    # changes in every step
+    q: np.ndarray  # (N,)
+    v: np.ndarray  # (N,)
+    counters: np.ndarray  # int (numerics.codes)
+    ledger: np.ndarray  # (6,) J
+    deepest: np.ndarray  # (1,) largest penetration relative to the play
+
+    # changes with the contacts
+    active: np.ndarray  # (u,) int: contacts that carry force
+    speed: np.ndarray  # (u,) at the beginning of the present contact, m/s
+    begun: np.ndarray  # (u,) time of that, s
+    total: np.ndarray  # (2u,) impulse since then, N s
+
+    # scratch
+    start: np.ndarray  # (2, N) coordinates and velocities as the step begins
+    free: np.ndarray  # (2, N) right-hand side; velocities at the step's end with the impulses found so far
+    before: np.ndarray  # (2u,) speeds as the step begins
+    impulse: np.ndarray  # (2u,) of the step
+    more: np.ndarray  # (2u,) that the present problem adds
+    left: np.ndarray  # (2u,) its speeds, less what restitution asks for
+    closed: np.ndarray  # (u,) int: whether a contact takes part in the step
+    listed: np.ndarray  # (u,) int: units of the problem
+
+
+def start_steps(system: PlanarSystem, initial: PlanarMotion) -> SteppedMotion:
+    """Return the motion at time zero."""
+    u, size = len(system.rest), len(system.mass)
+    return SteppedMotion(
+        q=initial.q.copy(), v=initial.v.copy(), counters=np.zeros(COUNTERS, np.int64), ledger=np.zeros(len(ENERGIES)),
+        deepest=np.zeros(1), active=np.zeros(u, np.int64), speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u),
+        start=np.zeros((2, size)), free=np.zeros((2, size)), before=np.zeros(2 * u), impulse=np.zeros(2 * u),
+        more=np.zeros(2 * u), left=np.zeros(2 * u), closed=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
+    )  # fmt: skip
+
+
+def step_matrices(system: PlanarSystem, step: float, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the inverse of the iteration matrix (N, N), its product with J^T (N, 2u), and the mobility (2u, 2u)."""
+    matrix = np.diag(system.mass) + step * theta * (system.damping + step * theta * system.stiffness)
+    inverse = np.linalg.inv(matrix)
+    turned = inverse @ system.J.T
+    return inverse, turned, system.J @ turned
+
+
+@entry
+def march(system, times, motion, records, log, inverse, turned, mobility, theta, periods, budget, deepest):
+    """Step to the end of `periods`, on a grid of equations_of_motion.TimeGrid. Return the code of numerics.codes."""
+    h, steps, size = times.step, len(times.phase) - 1, len(motion.q)
+    q, v, rhs, free = motion.start[0], motion.start[1], motion.free[0], motion.free[1]
+    if motion.counters[PERIOD] == 0:
+        record_section(system, motion, records)
+    while motion.counters[PERIOD] < periods:
+        for k in range(steps):
+            for i in range(size):
+                q[i], v[i] = motion.q[i], motion.v[i]
+            _sample(system, times, motion, records, k)
+            for i in range(size):
+                rhs[i] = system.weight[i] + theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i]
+                for j in range(size):
+                    rhs[i] -= system.damping[i, j] * v[j] + system.stiffness[i, j] * (q[j] + h * theta * v[j])
+            for i in range(size):
+                free[i] = v[i]
+                for j in range(size):
+                    free[i] += h * inverse[i, j] * rhs[j]
+            if not _impulses(system, motion, mobility, turned, h):
+                return UNDECIDED
+            for i in range(size):
+                motion.v[i] = free[i]
+                motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
+            _follow_contacts(system, times, motion, records, log, k)
+            code = _account(system, times, motion, records, k, deepest)
+            if code != DONE:
+                return code
+        motion.counters[PERIOD] += 1
+        record_section(system, motion, records)
+        if motion.counters[IMPACTS] >= budget:
+            return EVENT_BUDGET
+    return DONE
+
+
+@kernel
+def _impulses(system, motion, mobility, turned, h):
+    """Set the impulses of a step and the velocities (motion.free) that they leave. Returns False if undecided.
+
+    A contact that parts as the step begins waits: where impulses of others drive it together, it meets an impact of its
+    own after theirs.
+    """
+    u, free, fastest = len(system.rest), motion.free[1], 0.0
+    for r in range(2 * u):
+        motion.before[r], motion.impulse[r], size = row_speed(system, r, motion.v), 0.0, 0.0
+        for i in range(len(free)):
+            size += abs(system.J[r, i]) * max(abs(free[i]), abs(motion.v[i]))
+        fastest = max(fastest, size)
+    for r in range(system.contacts):
+        ahead = gap(system, r, motion.q) + 0.5 * h * motion.before[r]
+        motion.closed[r] = 1 if ahead <= _ROUND_OFF * system.play[r] else 0
+    for turn in range(_TURNS):
+        count = _list_units(system, motion, turn, _AT_REST * fastest)
+        if count == 0:
+            return True
+        motion.counters[SOLVES] += 1
+        if not _gauss_seidel(system, motion, mobility, count, h, _TOLERANCE * fastest):
+            return False
+        for p in range(count):
+            for r in (motion.listed[p], u + motion.listed[p]):
+                motion.impulse[r] += motion.more[r]
+                for i in range(len(free)):
+                    free[i] += turned[i, r] * motion.more[r]
+        approaching = False
+        for r in range(system.contacts):
+            approaching = approaching or (
+                motion.closed[r] == 1 and row_speed(system, r, free) < -_AT_REST * fastest
+            )  # fmt: skip
+        if not approaching:
+            return True
+    return True
+
+
+@inlined
+def _list_units(system, motion, turn, slowest):
+    """List the units that take part in a turn, with what Newton's law leaves of their speeds. Return their number."""
+    u, count, free = len(system.rest), 0, motion.free[1]
+    for r in range(u):
+        if r < system.contacts:
+            if motion.closed[r] == 0:
+                continue
+            now = row_speed(system, r, free)
+            before = motion.before[r] if turn == 0 else now
+            if turn < _TURNS - 1 and before > slowest and now > -slowest:
+                continue
+            motion.left[r] = now + system.restitution[r] * min(before, 0.0)
+        motion.left[u + r] = row_speed(system, u + r, free)
+        motion.listed[count] = r
+        count += 1
+    return count
+
+
+@kernel
+def _gauss_seidel(system, motion, mobility, count, h, tolerance):
+    """Find the impulses (motion.more) of the listed units. Returns False if they do not converge."""
+    u, more = len(system.rest), motion.more
+    for p in range(count):
+        more[motion.listed[p]], more[u + motion.listed[p]] = 0.0, 0.0
+    for _ in range(_SWEEPS):
+        largest = 0.0
+        for p in range(count):
+            r = motion.listed[p]
+            if r < system.contacts:
+                largest = max(largest, _push(system, motion, mobility, count, r, 0.0, math.inf))
+                bound = system.friction[r] * more[r]
+                low, high = -bound, bound
+            else:
+                low, high = -h * system.limit[r] - motion.impulse[u + r], h * system.limit[r] - motion.impulse[u + r]
+            if r >= system.contacts or system.friction[r] > 0.0:
+                largest = max(largest, _push(system, motion, mobility, count, u + r, low, high))
+        if largest <= tolerance:
+            return True
+    return False
+
+
+@inlined
+def _push(system, motion, mobility, count, row, low, high):
+    """Bring a row to rest, or its impulse to a bound. Return by how much that changes its speed."""
+    u, own = len(system.rest), mobility[row, row]
+    wanted = min(max(motion.more[row] - motion.left[row] / own, low), high)
+    change = wanted - motion.more[row]
+    if change != 0.0:
+        motion.more[row] = wanted
+        for p in range(count):
+            r = motion.listed[p]
+            motion.left[r] += mobility[r, row] * change
+            motion.left[u + r] += mobility[u + r, row] * change
+    return abs(change) * own
+
+
+@inlined
+def _response(system, times, k, q, v):
+    """Return displacement and velocity of the response at step k of the period."""
+    x, rate = times.table[k, 0], times.table[k, 1]
+    for i in range(len(q)):
+        x += system.response[i] * q[i]
+        rate += system.response[i] * v[i]
+    return x, rate
+
+
+@inlined
+def _account(system, times, motion, records, k, deepest):
+    """Account for step k of the period: energies by midpoints, response. Returns DONE, DIVERGED or PENETRATION."""
+    h, u, p, q, v = times.step, len(system.rest), motion.counters[PERIOD], motion.start[0], motion.start[1]
+    x0, rate0 = _response(system, times, k, q, v)
+    x1, rate1 = _response(system, times, k + 1, motion.q, motion.v)
+    c0, s0, c1, s1 = times.phase[k, 0], times.phase[k, 1], times.phase[k + 1, 0], times.phase[k + 1, 1]
+    records.peak[p] = max(records.peak[p], abs(x1), cubic_peak(h, x0, x1, rate0, rate1))
+    records.square[p] += h * (x0 * x0 + x1 * x1) / 2.0
+    records.harmonic[p] += h / 2.0 * complex(x0 * c0 + x1 * c1, -x0 * s0 - x1 * s1)
+    m0, m1 = 0.0, 0.0
+    for b in range(len(system.along)):
+        m0 += system.mass[system.along[b]] * v[system.along[b]]
+        m1 += system.mass[system.along[b]] * motion.v[system.along[b]]
+    records.momentum[p] += h / 2.0 * complex(m0 * c0 + m1 * c1, -m0 * s0 - m1 * s1)
+    size, deep = abs(x1), 0.0
+    for i in range(len(q)):
+        moved = motion.q[i] - q[i]
+        size = max(size, abs(motion.v[i]))
+        motion.ledger[EXCITATION] += 0.5 * (times.load[k, i] + times.load[k + 1, i]) * moved
+        for j in range(len(q)):
+            motion.ledger[VISCOUS] += 0.5 * system.damping[i, j] * (v[j] + motion.v[j]) * moved
+    for r in range(u):
+        for row in (r, u + r):
+            if motion.impulse[row] != 0.0:
+                moved = 0.0
+                for i in range(len(q)):
+                    moved += system.J[row, i] * (motion.q[i] - q[i])
+                motion.ledger[IMPACT_LOSS if row < u else FRICTION] -= motion.impulse[row] / h * moved
+        if r < system.contacts:
+            deep = max(deep, -gap(system, r, motion.q) / system.play[r])
+    motion.deepest[0] = max(motion.deepest[0], deep)
+    motion.counters[STEPS] += 1
+    if not size < _BOUND:
+        return DIVERGED
+    return PENETRATION if deep > deepest else DONE
+
+
+@inlined
+def _follow_contacts(system, times, motion, records, log, k):
+    """Count contacts that begin to carry force, and log those that have ended, as impacts.log_event does."""
+    u, p = len(system.rest), motion.counters[PERIOD]
+    for r in range(system.contacts):
+        pushed, before = motion.impulse[r] > 0.0, motion.before[r]
+        if pushed and motion.active[r] == 0 and before < 0.0:
+            motion.counters[IMPACTS] += 1
+            records.impacts[p] += 1
+            records.collided[p] += 0.5 * before * before / system.delassus[r, r]
+            motion.speed[r], motion.total[r], motion.total[u + r] = before, 0.0, 0.0
+            motion.begun[r] = (p * (len(times.phase) - 1) + k) * times.step
+        if pushed:
+            motion.total[r] += motion.impulse[r]
+            motion.total[u + r] += motion.impulse[u + r]
+        elif motion.active[r] == 1 and motion.counters[LOGGED] < len(log):
+            entry = log[motion.counters[LOGGED]]
+            entry[0], entry[1], entry[2], entry[3] = motion.begun[r], IMPACT, r, motion.speed[r]
+            entry[4], entry[5], entry[6] = before, motion.total[r], motion.total[u + r]
+            motion.counters[LOGGED] += 1
+        motion.active[r] = 1 if pushed else 0
+
+
+@inlined
+def _sample(system, times, motion, records, k):
+    """Keep a sample if step k of the period begins at one."""
+    each = len(records.samples) // max(len(records.peak) - 1, 1)
+    if each == 0 or k % ((len(times.phase) - 1) // each) != 0:
+        return
+    row = records.samples[motion.counters[PERIOD] * each + k // ((len(times.phase) - 1) // each)]
+    row[0], _ = _response(system, times, k, motion.q, motion.v)
+    for b in range(len(system.along)):
+        row[1 + b] = motion.q[system.along[b]]
+        for i in range(len(motion.q)):
+            row[1 + b] -= system.floor[b, i] * motion.q[i]
