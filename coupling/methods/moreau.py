@@ -32,6 +32,7 @@ from vanedamp.coupling.numerics.codes import DONE, PERIOD, SOLVES, UNDECIDED
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.constraints import planar_motion, planar_system
+from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
@@ -99,8 +100,8 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
     def march(motion: planar.SteppedMotion, log: np.ndarray, periods: int) -> int:
         return planar.march(system, times, motion, records, log, *matrices, theta, periods, budget, deepest)
 
-    motion = planar.start_steps(system, planar_motion(scene, flat, system))
-    return SteppedRun(flat, march, motion, records, events, columns=7)
+    motion = planar.start_steps(system, planar_motion(scene, flat, system), len(records.peak) - 1)
+    return SteppedRun(flat, march, motion, records, events, plane_of(system, motion.tilt, motion.lifted, np.inf))
 
 
 def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

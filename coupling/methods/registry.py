@@ -84,8 +84,6 @@ def _begin_planar(scene: Scene, system: System, method: Method, records: Records
             f"solver.method: {scene.solver.method} takes sliders only; bodies with extent, stiffness or dashpot are "
             f"for {' or '.join(able)}"
         )
-    if scene.excitation.signal is not None:
-        raise InputError("excitation.waveform: bodies with extent, stiffness or dashpot take sums of sines only")
     run: Run = begin(scene, system, scene.solver, records, events)
     return run
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import DONE, IMPACTS, LOGGED, PERIOD, SOLVES, STEPS
-from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
+from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome, Plane
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.system import System
@@ -38,10 +38,10 @@ class SteppedRun:
     """A run of a stepping method: the system as the method has it, its march, the motion and the records."""
 
     def __init__(
-        self, system: System, march: March, motion: Stepped, records: Records, events: bool, columns: int = 6
+        self, system: System, march: March, motion: Stepped, records: Records, events: bool, plane: Plane | None = None
     ) -> None:
-        self.system, self.march, self.motion, self.records = system, march, motion, records
-        self.log = np.zeros((_LOG if events else 0, columns))
+        self.system, self.march, self.motion, self.records, self.plane = system, march, motion, records, plane
+        self.log = np.zeros((_LOG if events else 0, 6 if plane is None else 7))
         self.chunks: list[np.ndarray] = []
 
     def advance_to(self, periods: int) -> Status:
@@ -67,7 +67,7 @@ class SteppedRun:
         }  # fmt: skip
         return Outcome(
             self.system, self.records, int(counters[PERIOD]), numbers["impacts"], _OPEN_LEDGER, numbers,
-            [chunk for chunk in self.chunks if len(chunk)], float(self.motion.deepest[0]),
+            [chunk for chunk in self.chunks if len(chunk)], float(self.motion.deepest[0]), self.plane,
         )  # fmt: skip
 
     def final(self) -> None:

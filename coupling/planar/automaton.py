@@ -27,7 +27,8 @@ from vanedamp.coupling.planar.contact_decisions import decide, gap, is_shut, row
 from vanedamp.coupling.planar.event_functions import next_event
 from vanedamp.coupling.planar.impacts import collide, log_event
 from vanedamp.coupling.planar.quadrature import add_up, motion_at
-from vanedamp.coupling.response.records import DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS, STORED
+from vanedamp.coupling.planar.recorder import record_section
+from vanedamp.coupling.response.records import DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS
 
 #: overlap, as a share of the play, beyond which round-off has lost a contact
 _LOST = 1e-7
@@ -77,7 +78,7 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
             return LOG_FULL
         _begin_segment(system, flows, st)
         if st.time[0] == 0.0:
-            _record(system, st, rec)
+            record_section(system, st, rec)
         tau, who = next_event(system, flows, st, guards, all_modes)
         if tau > 0.0:
             add_up(system, flows, st, rec, work, tau)
@@ -95,7 +96,7 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
                 st.last_impact[r] -= system.period
             _phase(system, st)
             _begin_segment(system, flows, st)
-            _record(system, st, rec)
+            record_section(system, st, rec)
             continue
         st.counters[EVENTS] += 1
         st.counters[AT_ONCE] += 1
@@ -288,44 +289,6 @@ def _inside(system, st):
         if st.state[r] == OPEN and not gap(system, r, st.q) >= -_LOST * system.play[r]:
             return False
     return True
-
-
-@kernel
-def _record(system, st, rec):
-    """Record section, energies and ledger at the start of a period."""
-    size, bodies, period = len(st.q), len(system.along), st.counters[PERIOD]
-    entry, part = rec.section[period], rec.parts[period]
-    x, rate, momentum, energy = 0.0, 0.0, 0.0, 0.0
-    for h in range(len(system.table)):
-        x += system.table[h].real
-        rate -= system.frequency[h] * system.table[h].imag
-    for i in range(size):
-        x += system.response[i] * st.q[i]
-        rate += system.response[i] * st.v[i]
-        force = 0.0
-        for k in range(size):
-            force += system.stiffness[i, k] * st.q[k]
-        energy += 0.5 * st.q[i] * force
-    first = size if bodies == 0 else system.along[0]
-    for i in range(first):
-        energy += 0.5 * system.mass[i] * st.v[i] * st.v[i]
-    part[0] = energy
-    for b in range(bodies):
-        at = system.along[b]
-        part[1 + b] = 0.0
-        for i in range(at, at + (3 if system.tilt[b] >= 0 else 1)):
-            part[1 + b] += 0.5 * system.mass[i] * st.v[i] * st.v[i] - system.weight[i] * st.q[i]
-        energy += part[1 + b]
-        momentum += system.mass[at] * st.v[at]
-        slip, speed = st.q[at], st.v[at]
-        for i in range(size):
-            slip -= system.floor[b, i] * st.q[i]
-            speed -= system.floor[b, i] * st.v[i]
-        entry[3 + b], entry[3 + bodies + b] = slip, speed
-    entry[0], entry[1], entry[2] = x, rate, momentum
-    st.ledger[STORED] = energy
-    for i in range(len(st.ledger)):
-        rec.ledger[period, i] = st.ledger[i]
 
 
 @inlined

@@ -171,7 +171,7 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             damping += (body.damper.dashpot or 0.0) * np.outer(own, own)
     response = np.zeros(size)
     response[:n] = flat.response[:n]
-    pushed = np.abs(weight) * flat.period + (np.abs(load) / flat.frequency[:, None]).sum(axis=0)
+    pushed = np.abs(weight) * flat.period + (np.abs(load) / np.maximum(flat.frequency, flat.omega)[:, None]).sum(axis=0)
     column = lambda name: np.array([getattr(unit, name) for unit in units])  # noqa: E731
     return PlanarSystem(
         contacts=contacts, mass=mass, stiffness=stiffness, damping=damping, load=load, weight=weight,

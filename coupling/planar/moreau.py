@@ -27,9 +27,9 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
 )
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.automaton import _record as record_section
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
+from vanedamp.coupling.planar.constraints import FLOOR, PlanarMotion, PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import gap, row_speed
+from vanedamp.coupling.planar.recorder import note_tilts, record_section
 from vanedamp.coupling.response.recorder import cubic_peak
 from vanedamp.coupling.response.records import ENERGIES, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 
@@ -54,6 +54,8 @@ class SteppedMotion(NamedTuple):
     counters: np.ndarray  # int (numerics.codes)
     ledger: np.ndarray  # (6,) J
     deepest: np.ndarray  # (1,) largest penetration relative to the play
+    tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
+    lifted: np.ndarray  # (periods + 1, b) time without an impulse at the floor, s
 
     # changes with the contacts
     active: np.ndarray  # (u,) int: contacts that carry force
@@ -72,12 +74,13 @@ class SteppedMotion(NamedTuple):
     listed: np.ndarray  # (u,) int: units of the problem
 
 
-def start_steps(system: PlanarSystem, initial: PlanarMotion) -> SteppedMotion:
+def start_steps(system: PlanarSystem, initial: PlanarMotion, periods: int) -> SteppedMotion:
     """Return the motion at time zero."""
-    u, size = len(system.rest), len(system.mass)
+    u, size, of_bodies = len(system.rest), len(system.mass), (periods + 1, len(system.along))
     return SteppedMotion(
         q=initial.q.copy(), v=initial.v.copy(), counters=np.zeros(COUNTERS, np.int64), ledger=np.zeros(len(ENERGIES)),
-        deepest=np.zeros(1), active=np.zeros(u, np.int64), speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u),
+        deepest=np.zeros(1), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
+        active=np.zeros(u, np.int64), speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u),
         start=np.zeros((2, size)), free=np.zeros((2, size)), before=np.zeros(2 * u), impulse=np.zeros(2 * u),
         more=np.zeros(2 * u), left=np.zeros(2 * u), closed=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
     )  # fmt: skip
@@ -264,10 +267,23 @@ def _account(system, times, motion, records, k, deepest):
         if r < system.contacts:
             deep = max(deep, -gap(system, r, motion.q) / system.play[r])
     motion.deepest[0] = max(motion.deepest[0], deep)
+    note_tilts(system, motion, motion.q, p)
+    for b in range(len(system.along)):
+        if system.tilt[b] >= 0 and not _stands(system, motion, b):
+            motion.lifted[p, b] += h
     motion.counters[STEPS] += 1
     if not size < _BOUND:
         return DIVERGED
     return PENETRATION if deep > deepest else DONE
+
+
+@inlined
+def _stands(system, motion, b):
+    """Whether the floor pushes a body in this step."""
+    for r in range(system.contacts):
+        if system.body[r] == b and system.surface[r] == FLOOR and motion.impulse[r] > 0.0:
+            return True
+    return False
 
 
 @inlined

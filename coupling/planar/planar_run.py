@@ -16,10 +16,11 @@ from vanedamp.coupling.numerics.codes import (
     SEGMENTS,
 )  # fmt: skip
 from vanedamp.coupling.planar.automaton import advance, begin
-from vanedamp.coupling.planar.constraints import SURFACES, PlanarMotion, PlanarSystem, planar_motion, planar_system
+from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem, planar_motion, planar_system
 from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
+from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.planar.state import new_guards, new_scratch, new_state
-from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome, Plane
+from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
@@ -36,15 +37,6 @@ def begin_run(
     system = planar_system(scene, flat)
     initial = planar_motion(scene, flat, system)
     return PlanarRun(flat, system, initial, records, events, max_events, linearisation)
-
-
-def plane_of(system: PlanarSystem, tilt: np.ndarray, lifted: np.ndarray, linearisation: float) -> Plane:
-    """Return the results in the plane of a run; tilt, lifted: (periods, b)."""
-    places = [
-        (int(body), SURFACES[surface], int(corner))
-        for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
-    ]
-    return Plane(tilt, lifted, system.neglected, linearisation, places)
 
 
 class PlanarRun:

@@ -14,6 +14,7 @@ from vanedamp.coupling.numerics.codes import FLOW, OPEN, PERIOD, SLIP_LEFT, SLIP
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.planar.constraints import FLOOR
+from vanedamp.coupling.planar.recorder import note_tilts
 from vanedamp.coupling.response.records import EXCITATION, FRICTION, VISCOUS
 
 _TURN = 1.5
@@ -50,7 +51,7 @@ def add_up(system, flows, st, rec, work, tau):
     h, q, v = tau / pieces, work.ahead[0], work.ahead[1]
     x0, rate0 = _response(system, st, st.q, st.v, st.time[0])
     rec.peak[period] = max(rec.peak[period], abs(x0))
-    _tilt(system, st, st.q, period)
+    note_tilts(system, st, st.q, period)
     for piece in range(pieces):
         for node in range(len(_NODES)):
             t = h * (piece + 0.5 * (1.0 + _NODES[node]))
@@ -103,7 +104,7 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
             st.by_contact[r, 1] -= weight * force * slip
     for b in range(len(system.along)):
         momentum += system.mass[system.along[b]] * v[system.along[b]]
-    _tilt(system, st, q, period)
+    note_tilts(system, st, q, period)
     x, _ = _response(system, st, q, v, st.time[0] + t)
     phase = st.amplitude[0] * (1.0 + work.turn[0])
     back = complex(phase.real, -phase.imag)
@@ -113,17 +114,6 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
     rec.harmonic[period] += weight * x * back
     rec.momentum[period] += weight * momentum * back
     rec.square[period] += weight * x * x
-
-
-@inlined
-def _tilt(system, st, q, period):
-    """Note the tilt of each body in its cavity, where it is the largest of the period so far."""
-    for b in range(len(system.along)):
-        if system.tilt[b] >= 0:
-            tilt = q[system.tilt[b]]
-            for i in range(len(q)):
-                tilt -= system.turn[b, i] * q[i]
-            st.tilt[period, b] = max(st.tilt[period, b], abs(tilt))
 
 
 @inlined
