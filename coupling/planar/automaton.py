@@ -116,8 +116,10 @@ def _happen(system, st, rec, log, work, r, what):
     st.scale[0] = max(st.scale[0], speed_scale(system, st.v))
     if what == CLOSES:
         _close(system, st, r)
-        if row_speed(system, r, st.v) < 0.0 and not collide(system, st, rec, log, work):
-            return False
+        if row_speed(system, r, st.v) < 0.0:
+            if not collide(system, st, rec, log, work):
+                return False
+            st.counters[FLOW] = -1  # contacts that are caught are to be stopped (_enter), whether states change or not
     if not decide(system, st, work, st.scale[0]):
         return False
     for i in range(len(system.rest)):
@@ -217,27 +219,37 @@ def _at_rest(system, st, row):
 
 @kernel
 def _shares(system, flows, st):
-    """Whether sticking contacts that could do with less carry forces within their bounds, now and right after."""
-    s, u, differs = st.counters[FLOW], len(system.rest), False
+    """Whether no contact needs to pull, and none that sticks more than its bound, where some could do with less.
+
+    Now and right after.
+    """
+    u, differs = len(system.rest), False
     for r in range(u):
         differs = differs or st.state[r] != st.other[r]
     if not differs:
         return True
     for r in range(u):
-        if st.state[r] != STICK:
-            continue
-        for way in (-1.0, 1.0):
-            room, rate, size = system.limit[r], 0.0, system.limit[r]
-            room += system.friction[r] * st.force[r] + way * st.force[u + r]
-            size += abs(system.friction[r] * st.force[r]) + abs(st.force[u + r])
-            for j in range(flows.modes[s]):
-                part = (system.friction[r] * flows.force[s, r, j] + way * flows.force[s, u + r, j]) * st.amplitude[j]
-                room += part.real
-                rate += (part * flows.eigenvalue[s, j]).real
-                size += abs(part.real) + abs(part.imag)
-            if room < -_OVER * size or (room <= _OVER * size and rate < 0.0):
-                return False
+        if r < system.contacts and st.state[r] < OPEN and _is_beyond(system, flows, st, r, 1.0, 0.0):
+            return False
+        if st.state[r] == STICK:
+            for way in (-1.0, 1.0):
+                if _is_beyond(system, flows, st, r, system.friction[r], way):
+                    return False
     return True
+
+
+@inlined
+def _is_beyond(system, flows, st, r, on_normal, on_slip):
+    """Whether the limit, and the forces of both rows of a unit times these factors, are negative, or become so."""
+    s, u, rate = st.counters[FLOW], len(system.rest), 0.0
+    room = system.limit[r] + on_normal * st.force[r] + on_slip * st.force[u + r]
+    size = system.limit[r] + abs(on_normal * st.force[r]) + abs(on_slip * st.force[u + r])
+    for j in range(flows.modes[s]):
+        part = (on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]) * st.amplitude[j]
+        room += part.real
+        rate += (part * flows.eigenvalue[s, j]).real
+        size += abs(part.real) + abs(part.imag)
+    return room < -_OVER * size or (room <= _OVER * size and rate < 0.0)
 
 
 @inlined

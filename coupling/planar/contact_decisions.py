@@ -56,26 +56,33 @@ def is_shut(system, st, unit):
 
 @kernel
 def free_acceleration(system, work, q, v, time):
-    """Accelerations (work.free) without contact forces, friction elements included, at a time within the period."""
+    """Accelerations (work.free) without contact forces, friction elements included, at a time within the period.
+
+    work.terms: sizes of the terms that they are sums of.
+    """
     size = len(q)
     for i in range(size):
-        total = system.weight[i]
+        total, terms = system.weight[i], abs(system.weight[i])
         for h in range(len(system.frequency)):
-            angle = system.frequency[h] * time
-            total += (system.load[h, i] * complex(math.cos(angle), math.sin(angle))).real
+            angle, load = system.frequency[h] * time, system.load[h, i]
+            total += (load * complex(math.cos(angle), math.sin(angle))).real
+            terms += abs(load.real) + abs(load.imag)
         for k in range(size):
-            total -= system.stiffness[i, k] * q[k] + system.damping[i, k] * v[k]
-        work.free[i] = total / system.mass[i]
+            spring, dashpot = system.stiffness[i, k] * q[k], system.damping[i, k] * v[k]
+            total -= spring + dashpot
+            terms += abs(spring) + abs(dashpot)
+        work.free[i], work.terms[i] = total / system.mass[i], terms / system.mass[i]
 
 
 @kernel
-def solve_rows(system, work, count, right):
+def solve_rows(system, work, count, right, least):
     """Solve the problem of the listed units: accelerations (or speeds) right + G forces, forces in work.impulse (2u,).
 
-    right: (2u,) without the unknown forces. Returns False if there is no solution, or none is found.
+    right: (2u,) without the unknown forces; least: what they are to be measured by, at least, per root of the
+    diagonal of G. Returns False if there is no solution, or none is found.
     """
     u, problem, size = len(system.rest), work.lemke, 0
-    scale = 0.0
+    scale = least
     for p in range(count):
         r = work.listed[p]
         work.place[p] = size
@@ -208,8 +215,8 @@ def decide(system, st, work, scale):
             continue
         work.listed[count], work.way[count] = r, way if system.friction[r] > 0.0 or r >= system.contacts else 0
         count += 1
-    loaded_acceleration(system, work, st.q, st.v, st.time[0])
-    if not solve_rows(system, work, count, work.speed):
+    terms = loaded_acceleration(system, work, st.q, st.v, st.time[0])
+    if not solve_rows(system, work, count, work.speed, terms):
         return False
     _classify(system, work, count, _NOTHING, work.verdict)
     doubts = 0
@@ -233,15 +240,25 @@ def decide(system, st, work, scale):
 
 @inlined
 def loaded_acceleration(system, work, q, v, time):
-    """Accelerations of the rows (work.speed) without contact forces, with those of friction elements that slide."""
+    """Accelerations of the rows (work.speed) without contact forces, with those of friction elements that slide.
+
+    Returns the size of the terms that they are sums of, per root of the diagonal of G: what is far below is round-off.
+    """
     u = len(system.rest)
     free_acceleration(system, work, q, v, time)
     for r in range(system.contacts, u):
         if work.sliding[r] != 0:
             for i in range(len(q)):
                 work.free[i] -= work.sliding[r] * system.limit[r] * system.J[u + r, i] / system.mass[i]
+    largest = 0.0
     for r in range(2 * u):
         work.speed[r] = row_speed(system, r, work.free)
+        terms = 0.0
+        for i in range(len(q)):
+            terms += abs(system.J[r, i]) * work.terms[i]
+        if system.delassus[r, r] > 0.0:
+            largest = max(largest, terms / math.sqrt(system.delassus[r, r]))
+    return largest
 
 
 @kernel
@@ -256,8 +273,8 @@ def _look_ahead(system, st, work, count):
         work.ahead[1, i] = st.v[i] + moment * total
     for p in range(count):
         work.first[p], work.doubt[p] = work.verdict[p], work.doubtful[p]
-    loaded_acceleration(system, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
-    if not solve_rows(system, work, count, work.speed):
+    terms = loaded_acceleration(system, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
+    if not solve_rows(system, work, count, work.speed, terms):
         return False
     _classify(system, work, count, _NEXT_TO_NOTHING, work.verdict)
     for p in range(count):

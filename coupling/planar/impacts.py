@@ -21,6 +21,8 @@ from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS
 
 #: energy that an impact may bring, as a share of what is in it, before it is solved again
 _GAIN = 1e-12
+#: bisections of the factor of the coefficients
+_HALVINGS = 40
 #: how much more than the loads alone the forces of other contacts may press
 _FAR = 100.0
 
@@ -28,28 +30,28 @@ _FAR = 100.0
 @kernel
 def collide(system, st, rec, log, work):
     """Let all closed contacts collide. Returns False if the problem cannot be solved."""
-    u, count, smallest = len(system.rest), 0, 1.0
+    u, count = len(system.rest), 0
     tiny = 10.0 * ROUND_OFF * max(speed_scale(system, st.v), st.scale[0])
     for r in range(system.contacts):
         if is_shut(system, st, r):
             work.listed[count], work.way[count] = r, 0
             count += 1
-            if row_speed(system, r, st.v) < -tiny:
-                smallest = min(smallest, _restitution(system, st, r))
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
-    for turn in range(2):
-        for p in range(count):
-            r = work.listed[p]
-            normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
-            restitution = _restitution(system, st, r) if turn == 0 else smallest
-            work.speed[r] = normal + restitution * min(normal, 0.0)
-            work.speed[u + r] = work.before_impact[u + r]
-        if not solve_rows(system, work, count, work.speed):
+    if not _rebound(system, st, work, count, 1.0, tiny):
+        return False
+    if _brings_energy(system, st, work):
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            if not _rebound(system, st, work, count, middle, tiny):
+                return False
+            if _brings_energy(system, st, work):
+                high = middle
+            else:
+                low = middle
+        if not _rebound(system, st, work, count, low, tiny):
             return False
-        loss, there = _energy(system, st, work)
-        if loss >= -_GAIN * there:
-            break
     _apply(system, st, work)
     for p in range(count):
         r = work.listed[p]
@@ -57,6 +59,18 @@ def collide(system, st, rec, log, work):
             _note(system, st, rec, log, work, r)
     _account(system, st, work)
     return _catch(system, st, work, count, tiny)
+
+
+@kernel
+def _rebound(system, st, work, count, share, tiny):
+    """Impulses (work.impulse) with this share of the coefficients. Returns False if there are none."""
+    u = len(system.rest)
+    for p in range(count):
+        r = work.listed[p]
+        normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
+        work.speed[r] = normal + share * _restitution(system, st, r) * min(normal, 0.0)
+        work.speed[u + r] = work.before_impact[u + r]
+    return solve_rows(system, work, count, work.speed, 0.0)
 
 
 @inlined
@@ -68,8 +82,8 @@ def _restitution(system, st, r):
 
 
 @inlined
-def _energy(system, st, work):
-    """Energy that the impulses take, and that there is in the motion, J."""
+def _brings_energy(system, st, work):
+    """Whether the impulses bring more energy than round-off of what there is."""
     u, loss, there = len(system.rest), 0.0, 0.0
     for r in range(2 * u):
         if work.impulse[r] != 0.0:
@@ -79,7 +93,7 @@ def _energy(system, st, work):
             loss -= 0.5 * work.impulse[r] * (work.before_impact[r] + after)
     for i in range(len(st.v)):
         there += 0.5 * system.mass[i] * st.v[i] * st.v[i]
-    return loss, there
+    return loss < -_GAIN * there
 
 
 @inlined
@@ -150,7 +164,7 @@ def _catch(system, st, work, count, tiny):
         ahead = moment * max(1.0 - system.restitution[r], 0.1)
         work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
-    if not solve_rows(system, work, count, work.speed):
+    if not solve_rows(system, work, count, work.speed, 0.0):
         return False
     for p in range(count):
         r = work.listed[p]

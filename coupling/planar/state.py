@@ -61,6 +61,7 @@ class Scratch(NamedTuple):
     """Space for intermediate results."""
 
     free: np.ndarray  # (N,) acceleration without contact forces
+    terms: np.ndarray  # (N,) size of the terms that it is a sum of
     ahead: np.ndarray  # (2, N) coordinates and velocities a moment later
     speed: np.ndarray  # (2u,) right-hand side of a problem: accelerations or speeds of the rows
     before_impact: np.ndarray  # (2u,) speeds
@@ -107,7 +108,7 @@ def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
     u, size = len(system.rest), len(system.mass)
     integers = iter(np.zeros((9, u), np.int64))
     return Scratch(
-        free=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u), before_impact=np.zeros(2 * u),
+        free=np.zeros(size), terms=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u), before_impact=np.zeros(2 * u),
         impulse=np.zeros(2 * u), before=next(integers), listed=next(integers), way=next(integers),
         place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
         doubt=next(integers), sliding=next(integers), span=np.zeros((size, size)), lemke=new_lemke(3 * u),

@@ -273,6 +273,7 @@ class Motion:
         self.force = spread @ forces
         self.force[u:, -1] += slides
         self.acceleration = free + (system.J.T @ spread @ forces) / system.mass[:, None]
+        self.terms = np.abs(free) + (np.abs(system.J.T) @ np.abs(spread @ forces)) / system.mass[:, None]
         self.matrix = np.zeros((len(free.T),) * 2)
         self.matrix[:n, n : 2 * n] = np.eye(n)
         self.matrix[n : 2 * n] = self.acceleration
@@ -284,6 +285,12 @@ class Motion:
         """The vector z at a moment."""
         angle = self.system.frequency * moment.phase
         return np.r_[moment.q, moment.v, np.cos(angle), np.sin(angle), 1.0]
+
+    def size(self, z: np.ndarray) -> np.ndarray:
+        """Sizes of the terms in such vectors; of loads their amplitudes."""
+        size = np.abs(z)
+        size[..., 2 * self.n :] = 1.0
+        return size
 
     def path(self, moment: Moment, span: float) -> np.ndarray:
         """Vectors z (POINTS + 1, :) on the way, at even intervals from the moment to `span` later."""
@@ -345,7 +352,8 @@ class Checker:
         self.speed = (np.abs(system.J) @ self.fastest).max()
         self._between(before.state, motion, path, where)
         q, v = path[-1, :n], path[-1, n : 2 * n]
-        shut = self.contact & ((after.state != OPEN) | (system.rest + system.J[: self.u] @ q <= 1e-9 * system.play))
+        gap = system.rest + system.J[: self.u] @ q
+        shut = self.contact & ((after.state != OPEN) | (gap <= SIMULTANEOUS * system.play))
         reach = np.abs(q).max() + np.abs(before.q).max() + system.period * self.fastest.max()
         worst.note("motion", np.abs(after.q - q).max() / reach, where)
         if len(hits):
@@ -363,7 +371,7 @@ class Checker:
         rate = path[:, n : 2 * n] @ system.J[:u].T
         force = path @ motion.force.T
         # forces are differences of these
-        size = (np.abs(path) @ np.abs(motion.force).T).max(axis=0) + 1e-300
+        size = (motion.size(path) @ np.abs(motion.force).T).max(axis=0) + 1e-300
         open_, closed = self.contact & (state == OPEN), self.contact & (state != OPEN)
         share = -gap / np.where(self.contact, system.play, 1.0)
         worst.note("penetration", share[:, open_].max(initial=0.0), where)
@@ -384,7 +392,7 @@ class Checker:
         system, u, n = self.system, self.u, motion.n
         z = motion.start(now)
         acceleration = system.J @ (motion.acceleration @ z)
-        size = (np.abs(system.J) @ (np.abs(motion.acceleration) @ np.abs(z))).max() + 1e-300
+        size = (np.abs(system.J) @ (motion.terms @ motion.size(z))).max() + 1e-300
         speed = (np.abs(system.J) @ np.maximum(self.fastest, np.abs(now.v))).max()
         gap, rates = system.rest + system.J[:u] @ now.q, system.J @ now.v
         rests = self.contact & (now.state == OPEN) & (gap <= SIMULTANEOUS * system.play)
@@ -423,21 +431,21 @@ class Checker:
         worst.note("impulse", (tangential * then[u:])[shut].max(initial=0.0) / (size * speed), where)
         approach = np.maximum(-first[:u], 0.0)
         restitution = np.where(after.time - self.last < 2 * COLLAPSE * system.period, 0.0, system.restitution)
-        hit = shut & (approach > 1e-12 * speed)
-        least = system.restitution[hit].min(initial=1.0)
         worst.note("newton", (-then[:u])[shut].max(initial=0.0) / speed, where)
         lost = 0.5 * ((v**2 - (v + (system.J.T @ impulse) / system.mass) ** 2) * system.mass).sum()
         there = 0.5 * (system.mass * self.fastest**2).sum()
         worst.note("gain", -lost / there, where)
-        short = restitution * approach - then[:u]
-        lesser = np.minimum(restitution, least) * approach - then[:u]
-        pushes = shut & (normal > 1e-9 * size)
-        fits = np.abs(short[pushes]).max(initial=0.0) <= 1e-9 * speed and short[shut].max(initial=0.0) <= 1e-9 * speed
-        if not fits:  # Kane: solved again with the smallest coefficient
-            worst.note("newton", lesser[shut].max(initial=0.0) / speed, where)
-            worst.note("newton", np.abs(lesser[pushes]).max(initial=0.0) / speed, where)
+        target, pushes = restitution * approach, shut & (normal > 1e-9 * size)
+        first_hit = np.argmax(np.where(pushes, target, 0.0))
+        if target[first_hit] > 0.0 and then[first_hit] < (1 - 1e-9) * target[first_hit]:
+            # Kane: the same share of all coefficients, so that the impact brings no energy
+            target = target * max(then[first_hit] / target[first_hit], 0.0)
+            worst.note("gain", abs(lost) / there, where)
+        short = target - then[:u]
+        worst.note("newton", short[shut].max(initial=0.0) / speed, where)
+        worst.note("newton", np.abs(short[pushes]).max(initial=0.0) / speed, where)
         z = motion.start(after)
-        acceleration = np.abs(system.J) @ (np.abs(motion.acceleration) @ np.abs(z))
+        acceleration = np.abs(system.J) @ (motion.terms @ motion.size(z))
         allowed = 200 * CHATTER * system.period * acceleration.max() / speed
         caught = np.abs(then[:u][shut & (after.state != OPEN)]).max(initial=0.0) > 1e-12 * speed
         self._jump(v, after, impulse, allowed if caught else 0.0, where)
