@@ -23,7 +23,7 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
 )
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import decide, gap, is_shut, row_speed, speed_scale
+from vanedamp.coupling.planar.contact_decisions import AT_REST, decide, gap, is_shut, row_speed, speed_scale
 from vanedamp.coupling.planar.event_functions import next_event
 from vanedamp.coupling.planar.impacts import collide, log_event
 from vanedamp.coupling.planar.quadrature import add_up, motion_at
@@ -43,11 +43,8 @@ def begin(system, st, rec, log, work):
     """Let contacts collide that are closed and approach at time zero, and decide their states. False if that fails."""
     _phase(system, st)
     st.scale[0] = max(speed_scale(system, st.v), system.speed)
-    for r in range(system.contacts):
-        if is_shut(system, st, r) and row_speed(system, r, st.v) < 0.0:
-            if not collide(system, st, rec, log, work):
-                return False
-            break
+    if _approaches(system, st) and not collide(system, st, rec, log, work):
+        return False
     if not decide(system, st, work, st.scale[0]):
         return False
     st.counters[FLOW] = -1
@@ -111,15 +108,23 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
 
 
 @inlined
+def _approaches(system, st):
+    """Whether a contact that is closed approaches, by more than round-off."""
+    for r in range(system.contacts):
+        if is_shut(system, st, r) and row_speed(system, r, st.v) < -AT_REST * st.scale[0]:
+            return True
+    return False
+
+
+@inlined
 def _happen(system, st, rec, log, work, r, what):
     """The event of unit r. Returns False if it cannot be decided."""
     st.scale[0] = max(st.scale[0], speed_scale(system, st.v))
     if what == CLOSES:
         _close(system, st, r)
-        if row_speed(system, r, st.v) < 0.0:
-            if not collide(system, st, rec, log, work):
-                return False
-            st.counters[FLOW] = -1  # contacts that are caught are to be stopped (_enter), whether states change or not
+    # at any event another gap may be closed as well, within the resolution of gaps
+    if _approaches(system, st) and not collide(system, st, rec, log, work):
+        return False
     if not decide(system, st, work, st.scale[0]):
         return False
     for i in range(len(system.rest)):
@@ -177,7 +182,7 @@ def _find(flows, st):
 
 @kernel
 def _enter(system, flows, st):
-    """Stop what the contacts hold, and enter what that takes from the motion: the last of a chatter, and round-off."""
+    """Stop what the contacts hold, and enter what that takes from the motion."""
     s, size, loss = st.counters[FLOW], len(st.q), 0.0
     for i in range(size):
         loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
@@ -185,8 +190,6 @@ def _enter(system, flows, st):
     for i in range(size):
         loss -= 0.5 * system.mass[i] * st.v[i] * st.v[i]
     st.ledger[IMPACT_LOSS] += loss
-    for r in range(len(st.caught)):
-        st.caught[r] = 0
 
 
 @inlined

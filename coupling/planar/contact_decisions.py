@@ -17,7 +17,7 @@ from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
 #: what is small beside the largest term, now and a moment later, and that moment, in periods
 _NOTHING, _NEXT_TO_NOTHING, _MOMENT = 1e-9, 1e-12, 1e-6
 #: share of the speeds in a scene that is round-off
-_AT_REST = 10 * ROUND_OFF
+AT_REST = 10 * ROUND_OFF
 _NORMAL, _SLIP = 1, 2
 
 
@@ -204,13 +204,13 @@ def decide(system, st, work, scale):
     for r in range(u):
         work.before[r], work.sliding[r] = st.state[r], 0
         slip = row_speed(system, u + r, st.v)
-        way = 0 if abs(slip) <= _AT_REST * scale else (1 if slip > 0.0 else -1)
+        way = 0 if abs(slip) <= AT_REST * scale else (1 if slip > 0.0 else -1)
         if r >= system.contacts:
             if way != 0:
                 st.state[r] = SLIP_RIGHT if way > 0 else SLIP_LEFT
                 work.sliding[r] = way
                 continue
-        elif not is_shut(system, st, r) or (not st.caught[r] and row_speed(system, r, st.v) > _AT_REST * scale):
+        elif not is_shut(system, st, r) or row_speed(system, r, st.v) > AT_REST * scale:
             st.state[r] = OPEN
             continue
         work.listed[count], work.way[count] = r, way if system.friction[r] > 0.0 or r >= system.contacts else 0
@@ -295,14 +295,14 @@ def _stick_in_doubt(system, work, count):
     for p in range(count):
         r = work.listed[p]
         if work.verdict[p] < OPEN and r < system.contacts:
-            found = _span(system, work, r, found)
+            found = span(system, work, r, found)
     for p in range(count):
         if work.verdict[p] == STICK:
-            found = _span(system, work, u + work.listed[p], found)
+            found = span(system, work, u + work.listed[p], found)
     for p in range(count):
         r = work.listed[p]
         if work.doubtful[p] == _SLIP and _may_stick(system, work, p):
-            more = _span(system, work, u + r, found)
+            more = span(system, work, u + r, found)
             if more > found:
                 work.verdict[p], found = STICK, more
 
@@ -316,7 +316,7 @@ def _may_stick(system, work, p):
 
 
 @kernel
-def _span(system, work, row, found):
+def span(system, work, row, found):
     """Add a row to the orthonormal basis of those that are kept. Returns its size, the same if they hold the row."""
     size, whole, left = len(system.mass), 0.0, 0.0
     if found >= size:

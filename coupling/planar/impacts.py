@@ -11,18 +11,29 @@ that would part for less than CHATTER are closed together: they lose the speed w
 
 from __future__ import annotations
 
+import math
+
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF
 from vanedamp.coupling.exact.impacts import COLLAPSE
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, PERIOD
 from vanedamp.coupling.numerics.jit import inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import is_shut, loaded_acceleration, row_speed, solve_rows, speed_scale
+from vanedamp.coupling.planar.contact_decisions import (
+    is_shut,
+    loaded_acceleration,
+    row_speed,
+    solve_rows,
+    span,
+    speed_scale,
+)
 from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS
 
 #: energy that an impact may bring, as a share of what is in it, before it is solved again
 _GAIN = 1e-12
 #: bisections of the factor of the coefficients
 _HALVINGS = 40
+#: share by which friction is short of its bound where a contact sticks
+_EDGE = 1e-9
 #: how much more than the loads alone the forces of other contacts may press
 _FAR = 100.0
 
@@ -140,12 +151,12 @@ def log_event(system, st, log, kind, r, before, after, normal, tangential):
 
 @kernel
 def _catch(system, st, work, count, tiny):
-    """Mark contacts that would part for less than CHATTER (st.caught): those that push in a step of that length.
+    """Stop contacts that would part for less than CHATTER: those that push in a step of that length.
 
     The step is one of Moreau's scheme; a chatter takes 1/(1 - k) times its next flight. Returns False if that cannot be
     decided.
     """
-    u, moment, slow, size = len(system.rest), CHATTER * system.period, False, 0.0
+    u, moment, near, size = len(system.rest), CHATTER * system.period, False, 0.0
     for r in range(u):
         work.sliding[r] = 0
         if r >= system.contacts:
@@ -154,10 +165,10 @@ def _catch(system, st, work, count, tiny):
     loaded_acceleration(system, work, st.q, st.v, st.time[0])
     for r in range(2 * u):
         size = max(size, abs(work.speed[r]))
+    slow = _FAR * moment * size
     for p in range(count):
-        away = row_speed(system, work.listed[p], st.v)
-        slow = slow or tiny < away < _FAR * moment * size
-    if not slow:
+        near = near or tiny < row_speed(system, work.listed[p], st.v) < slow
+    if not near:
         return True
     for p in range(count):
         r = work.listed[p]
@@ -166,7 +177,49 @@ def _catch(system, st, work, count, tiny):
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
     if not solve_rows(system, work, count, work.speed, 0.0):
         return False
+    near = False
     for p in range(count):
         r = work.listed[p]
-        st.caught[r] = work.impulse[r] > 0.0
+        near = near or (work.impulse[r] > 0.0 and row_speed(system, r, st.v) > tiny)
+    if near:
+        _stop(system, st, work, count, tiny, slow)
     return True
+
+
+@inlined
+def _stop(system, st, work, count, tiny, slow):
+    """Stop the contacts that push (work.impulse), those that stick with their slips, and whom that drives together."""
+    u, found, loss = len(system.rest), 0, 0.0
+    for i in range(len(st.v)):
+        loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
+    for p in range(count):
+        r = work.listed[p]
+        normal = work.impulse[r]
+        if normal > 0.0:
+            found = _stop_row(system, st, work, r, found)
+            sticks = abs(work.impulse[u + r]) < (1.0 - _EDGE) * system.friction[r] * normal
+            if sticks and abs(row_speed(system, u + r, st.v)) < slow:
+                found = _stop_row(system, st, work, u + r, found)
+    again = found > 0
+    while again:
+        again = False
+        for p in range(count):
+            if row_speed(system, work.listed[p], st.v) < -tiny:
+                more = _stop_row(system, st, work, work.listed[p], found)
+                again, found = again or more > found, more
+    for i in range(len(st.v)):
+        loss -= 0.5 * system.mass[i] * st.v[i] * st.v[i]
+    st.ledger[IMPACT_LOSS] += loss
+
+
+@inlined
+def _stop_row(system, st, work, row, found):
+    """Take a row's speed out of the velocities, and keep it stopped. Returns the number of directions stopped."""
+    more = span(system, work, row, found)
+    if more > found:
+        part = 0.0
+        for i in range(len(st.v)):
+            part += work.span[found, i] * math.sqrt(system.mass[i]) * st.v[i]
+        for i in range(len(st.v)):
+            st.v[i] -= work.span[found, i] * part / math.sqrt(system.mass[i])
+    return more

@@ -27,7 +27,6 @@ class PlanarState(NamedTuple):
     other: np.ndarray  # (u,) int: states that move alike, with forces at their bounds where `state` shares them
     known: np.ndarray  # (u,) int: states as last logged
     fresh: np.ndarray  # (u,) int: whether contacts have been decided at this instant
-    caught: np.ndarray  # (u,) int: whether a contact that parts too slowly is to be closed
     rate: np.ndarray  # (2u,) speeds of rows, scratch
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
@@ -87,7 +86,7 @@ def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion) -> Planar
     return PlanarState(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
         state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
-        caught=np.zeros(u, np.int64), rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf),
+        rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf),
         ledger=np.zeros(len(ENERGIES)), extremes=np.zeros((b, 3)), by_contact=np.zeros((u, 2)),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
     )  # fmt: skip

@@ -389,7 +389,7 @@ class Checker:
 
     def _settled(self, now: Moment, motion: Motion, where: str) -> None:
         """Accelerations right after an event: apart from the surface, and along the slip that begins."""
-        system, u, n = self.system, self.u, motion.n
+        system, u = self.system, self.u
         z = motion.start(now)
         acceleration = system.J @ (motion.acceleration @ z)
         size = (np.abs(system.J) @ (motion.terms @ motion.size(z))).max() + 1e-300
@@ -411,7 +411,14 @@ class Checker:
         self.worst.note("momentum", max(excess, 0.0), where)
 
     def _impact(
-        self, v: np.ndarray, before: Moment, after: Moment, hits: np.ndarray, shut: np.ndarray, motion: Motion, where: str
+        self,
+        v: np.ndarray,
+        before: Moment,
+        after: Moment,
+        hits: np.ndarray,
+        shut: np.ndarray,
+        motion: Motion,
+        where: str,
     ) -> None:
         """Newton's law, impulses that push and stay in their cones, no gain of energy."""
         system, u, worst = self.system, self.u, self.worst
@@ -436,8 +443,8 @@ class Checker:
         there = 0.5 * (system.mass * self.fastest**2).sum()
         worst.note("gain", -lost / there, where)
         target, pushes = restitution * approach, shut & (normal > 1e-9 * size)
-        first_hit = np.argmax(np.where(pushes, target, 0.0))
-        if target[first_hit] > 0.0 and then[first_hit] < (1 - 1e-9) * target[first_hit]:
+        first_hit = np.argmax(np.where(pushes, target, -1.0))
+        if pushes[first_hit] and target[first_hit] > 1e-9 * speed and then[first_hit] < (1 - 1e-9) * target[first_hit]:
             # Kane: the same share of all coefficients, so that the impact brings no energy
             target = target * max(then[first_hit] / target[first_hit], 0.0)
             worst.note("gain", abs(lost) / there, where)
@@ -447,7 +454,7 @@ class Checker:
         z = motion.start(after)
         acceleration = np.abs(system.J) @ (motion.terms @ motion.size(z))
         allowed = 200 * CHATTER * system.period * acceleration.max() / speed
-        caught = np.abs(then[:u][shut & (after.state != OPEN)]).max(initial=0.0) > 1e-12 * speed
+        caught = np.any(shut & (then[:u] > 1e-13 * speed) & (then[:u] < allowed * speed))
         self._jump(v, after, impulse, allowed if caught else 0.0, where)
         self.last[hits[:, 2].astype(int)] = after.time
 
