@@ -50,17 +50,13 @@ def collide(system, st, rec, log, work):
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
     if not _rebound(system, st, work, count, 1.0, tiny):
-        return False
-    if _brings_energy(system, st, work):
         low, high = 0.0, 1.0
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            if not _rebound(system, st, work, count, middle, tiny):
-                return False
-            if _brings_energy(system, st, work):
-                high = middle
-            else:
+            if _rebound(system, st, work, count, middle, tiny):
                 low = middle
+            else:
+                high = middle
         if not _rebound(system, st, work, count, low, tiny):
             return False
     _apply(system, st, work)
@@ -74,14 +70,14 @@ def collide(system, st, rec, log, work):
 
 @kernel
 def _rebound(system, st, work, count, share, tiny):
-    """Impulses (work.impulse) with this share of the coefficients. Returns False if there are none."""
+    """Find impulses (work.impulse) with this share of the coefficients. Returns if there are any, without new energy."""
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
         normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
         work.speed[r] = normal + share * _restitution(system, st, r) * min(normal, 0.0)
         work.speed[u + r] = work.before_impact[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0)
+    return solve_rows(system, work, count, work.speed, 0.0) and not _brings_energy(system, st, work)
 
 
 @inlined
