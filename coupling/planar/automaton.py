@@ -25,7 +25,7 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import AT_REST, decide, gap, is_shut, row_speed, speed_scale
 from vanedamp.coupling.planar.event_functions import next_event
-from vanedamp.coupling.planar.impacts import collide, log_event
+from vanedamp.coupling.planar.impacts import collide, jam, log_event
 from vanedamp.coupling.planar.quadrature import add_up, motion_at
 from vanedamp.coupling.response.records import DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS, STORED
 
@@ -45,7 +45,7 @@ def begin(system, st, rec, log, work):
     st.scale[0] = max(speed_scale(system, st.v), system.speed)
     if _approaches(system, st) and not collide(system, st, rec, log, work):
         return False
-    if not decide(system, st, work, st.scale[0]):
+    if not _settle(system, st, rec, log, work):
         return False
     st.counters[FLOW] = -1
     return True
@@ -125,12 +125,20 @@ def _happen(system, st, rec, log, work, r, what):
     # at any event another gap may be closed as well, within the resolution of gaps
     if _approaches(system, st) and not collide(system, st, rec, log, work):
         return False
-    if not decide(system, st, work, st.scale[0]):
+    if not _settle(system, st, rec, log, work):
         return False
     for i in range(len(system.rest)):
         if work.before[i] != st.state[i] or st.other[i] != st.state[i]:
             st.counters[FLOW] = -1
     return True
+
+
+@kernel
+def _settle(system, st, rec, log, work):
+    """Decide the states, if no forces are possible after the impulses that stop what slips. False if that fails."""
+    if decide(system, st, work, st.scale[0]):
+        return True
+    return jam(system, st, rec, log, work) and decide(system, st, work, st.scale[0])
 
 
 @kernel
@@ -224,7 +232,8 @@ def _at_rest(system, st, row):
 def _shares(system, flows, st):
     """Whether no contact needs to pull, and none that sticks more than its bound, where some could do with less.
 
-    Now and right after.
+    Now and right after. The normal forces may be others too, and with them friction elsewhere: what begins to slip, or
+    to part, must still do so.
     """
     u, differs = len(system.rest), False
     for r in range(u):
@@ -238,7 +247,38 @@ def _shares(system, flows, st):
             for way in (-1.0, 1.0):
                 if _is_beyond(system, flows, st, r, system.friction[r], way):
                     return False
+        elif st.state[r] == OPEN and _rests_open(system, st, r):
+            if _turns_back(system, flows, st, r, 1.0):
+                return False
+        elif (st.state[r] == SLIP_RIGHT or st.state[r] == SLIP_LEFT) and not flows.held[st.counters[FLOW], r]:
+            starts = abs(row_speed(system, u + r, st.v)) <= AT_REST * st.scale[0]
+            way = 1.0 if st.state[r] == SLIP_RIGHT else -1.0
+            if starts and _rubs(system, r) and _turns_back(system, flows, st, u + r, way):
+                return False
     return True
+
+
+@inlined
+def _rests_open(system, st, r):
+    """Whether the gap of an open contact is zero and stays so but for accelerations."""
+    return is_shut(system, st, r) and abs(row_speed(system, r, st.v)) <= AT_REST * st.scale[0]
+
+
+@inlined
+def _turns_back(system, flows, st, row, way):
+    """Whether a row at rest accelerates against its way, now or right after."""
+    s, total, rate, size = st.counters[FLOW], 0.0, 0.0, 0.0
+    for i in range(len(st.q)):
+        part = system.J[row, i] * st.bend[i]
+        total += part
+        size += abs(part)
+    for j in range(flows.modes[s]):
+        eigenvalue = flows.eigenvalue[s, j]
+        part = flows.rows[s, row, j] * st.amplitude[j] * eigenvalue * eigenvalue
+        total += part.real
+        size += abs(part.real) + abs(part.imag)
+        rate += (part * eigenvalue).real
+    return way * total < -_OVER * size or (way * total <= _OVER * size and way * rate < 0.0)
 
 
 @inlined

@@ -19,6 +19,7 @@ from vanedamp.coupling.exact.impacts import COLLAPSE
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, PERIOD
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import (
+    AT_REST,
     is_shut,
     loaded_acceleration,
     row_speed,
@@ -70,7 +71,7 @@ def collide(system, st, rec, log, work):
 
 @kernel
 def _rebound(system, st, work, count, share, tiny):
-    """Find impulses (work.impulse) with this share of the coefficients. Returns if there are any, without new energy."""
+    """Find impulses (work.impulse) with this share of the coefficients. False if there are none, or they bring energy."""
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
@@ -152,26 +153,12 @@ def _catch(system, st, work, count, tiny):
     The step is one of Moreau's scheme; a chatter takes 1/(1 - k) times its next flight. Returns False if that cannot be
     decided.
     """
-    u, moment, near, size = len(system.rest), CHATTER * system.period, False, 0.0
-    for r in range(u):
-        work.sliding[r] = 0
-        if r >= system.contacts:
-            slip = row_speed(system, u + r, st.v)
-            work.sliding[r] = 0 if abs(slip) <= tiny else (1 if slip > 0.0 else -1)
-    loaded_acceleration(system, work, st.q, st.v, st.time[0])
-    for r in range(2 * u):
-        size = max(size, abs(work.speed[r]))
-    slow = _FAR * moment * size
+    slow, near = _FAR * _accelerate(system, st, work), False
     for p in range(count):
         near = near or tiny < row_speed(system, work.listed[p], st.v) < slow
     if not near:
         return True
-    for p in range(count):
-        r = work.listed[p]
-        ahead = moment * max(1.0 - system.restitution[r], 0.1)
-        work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
-        work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
-    if not solve_rows(system, work, count, work.speed, 0.0):
+    if not _step(system, st, work, count):
         return False
     near = False
     for p in range(count):
@@ -180,6 +167,59 @@ def _catch(system, st, work, count, tiny):
     if near:
         _stop(system, st, work, count, tiny, slow)
     return True
+
+
+@kernel
+def jam(system, st, rec, log, work):
+    """Apply the impulses of closed contacts that no forces can hold (Painleve's paradox): a wedged block stops.
+
+    They are those of a step of Moreau's scheme in the limit of short ones. Returns False if there are none.
+    """
+    u, count = len(system.rest), 0
+    tiny = 10.0 * ROUND_OFF * max(speed_scale(system, st.v), st.scale[0])
+    for r in range(system.contacts):
+        if is_shut(system, st, r):
+            work.listed[count], work.way[count] = r, 0
+            count += 1
+    slow = _FAR * _accelerate(system, st, work)
+    if not _step(system, st, work, count):
+        return False
+    for r in range(2 * u):
+        work.before_impact[r] = row_speed(system, r, st.v)
+    _apply(system, st, work)
+    for p in range(count):
+        if work.impulse[work.listed[p]] > 0.0:
+            _note(system, st, rec, log, work, work.listed[p])
+    _account(system, st, work)
+    _stop(system, st, work, count, tiny, slow)
+    return True
+
+
+@inlined
+def _accelerate(system, st, work):
+    """Set accelerations of the rows (work.speed) without contact forces. Returns the speed they give in CHATTER."""
+    u, largest = len(system.rest), 0.0
+    for r in range(u):
+        work.sliding[r] = 0
+        if r >= system.contacts:
+            slip = row_speed(system, u + r, st.v)
+            work.sliding[r] = 0 if abs(slip) <= AT_REST * st.scale[0] else (1 if slip > 0.0 else -1)
+    loaded_acceleration(system, work, st.q, st.v, st.time[0])
+    for r in range(2 * u):
+        largest = max(largest, abs(work.speed[r]))
+    return largest * CHATTER * system.period
+
+
+@inlined
+def _step(system, st, work, count):
+    """Find the impulses (work.impulse) of a step of Moreau's scheme of length CHATTER. Returns if there are any."""
+    u = len(system.rest)
+    for p in range(count):
+        r = work.listed[p]
+        ahead = CHATTER * system.period * max(1.0 - system.restitution[r], 0.1)
+        work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
+        work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
+    return solve_rows(system, work, count, work.speed, 0.0)
 
 
 @inlined

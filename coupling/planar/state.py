@@ -107,9 +107,9 @@ def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
     u, size = len(system.rest), len(system.mass)
     integers = iter(np.zeros((9, u), np.int64))
     return Scratch(
-        free=np.zeros(size), terms=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u), before_impact=np.zeros(2 * u),
-        impulse=np.zeros(2 * u), before=next(integers), listed=next(integers), way=next(integers),
-        place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
+        free=np.zeros(size), terms=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u),
+        before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), before=next(integers), listed=next(integers),
+        way=next(integers), place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
         doubt=next(integers), sliding=next(integers), span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
     )  # fmt: skip
