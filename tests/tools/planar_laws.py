@@ -71,6 +71,7 @@ class Worst:
     ledger: float = 0.0
     scenes: int = 0
     steps: int = 0
+    jams: int = 0  # impacts without a collision
     reduced: int = 0  # impacts with less than their coefficients
     impacts: int = 0
 
@@ -426,7 +427,8 @@ class Checker:
         system, u, worst = self.system, self.u, self.worst
         impulse = np.zeros(2 * u)
         for hit in hits:
-            impulse[int(hit[2])], impulse[u + int(hit[2])] = hit[5], hit[6]
+            impulse[int(hit[2])] += hit[5]
+            impulse[u + int(hit[2])] += hit[6]
         first, then = system.J @ v, system.J @ (v + (system.J.T @ impulse) / system.mass)
         normal, tangential = impulse[:u], impulse[u:]
         self.fastest = np.maximum(self.fastest, np.abs(after.v))
@@ -435,13 +437,20 @@ class Checker:
         size = np.abs(impulse).max() + 1e-6 * speed * heaviest
         worst.note("impulse", (-normal).max(initial=0.0) / size, where)
         worst.note("impulse", (np.abs(tangential) - system.friction * np.maximum(normal, 0.0)).max() / size, where)
+        lost = 0.5 * ((v**2 - (v + (system.J.T @ impulse) / system.mass) ** 2) * system.mass).sum()
+        there = 0.5 * (system.mass * self.fastest**2).sum()
+        # Painleve's paradox: impulses without a collision, or after one, up to the accelerations of a moment
+        numbers, apart = hits[:, 2].astype(int), np.abs(first[:u][hits[:, 2].astype(int)])
+        if len(np.unique(numbers)) < len(numbers) or apart.max() <= 1e-12 * speed:
+            worst.jams += 1
+            self._jump(v, after, impulse, self._moment(after, motion) / speed, where)
+            worst.note("gain", -lost / there, where)
+            return
         inside = shut & (system.friction > 0) & (np.abs(tangential) < system.friction * normal - 1e-9 * size)
         worst.note("newton", np.abs(then[u:][inside]).max(initial=0.0) / speed, where)
         worst.note("impulse", (tangential * then[u:])[shut].max(initial=0.0) / (size * speed), where)
         approach = np.maximum(-first[:u], 0.0)
         worst.note("newton", (-then[:u])[shut].max(initial=0.0) / speed, where)
-        lost = 0.5 * ((v**2 - (v + (system.J.T @ impulse) / system.mass) ** 2) * system.mass).sum()
-        there = 0.5 * (system.mass * self.fastest**2).sum()
         worst.note("gain", -lost / there, where)
         target, pushes = system.restitution * approach, shut & (normal > 1e-9 * size)
         first_hit = np.argmax(np.where(pushes, target, -1.0))
@@ -455,12 +464,15 @@ class Checker:
         if judged[pushes].all():
             worst.note("newton", short[judged].max(initial=0.0) / speed, where)
             worst.note("newton", np.abs(short[pushes]).max(initial=0.0) / speed, where)
-        z = motion.start(after)
-        acceleration = np.abs(system.J) @ (motion.terms @ motion.size(z))
-        allowed = 200 * CHATTER * system.period * acceleration.max() / speed
+        allowed = self._moment(after, motion) / speed
         caught = np.any(shut & (then[:u] > 1e-13 * speed) & (then[:u] < allowed * speed))
         self._jump(v, after, impulse, allowed if caught else 0.0, where)
         self.last[hits[:, 2].astype(int)] = after.time
+
+    def _moment(self, now: Moment, motion: Motion) -> float:
+        """Speed that counts as chatter."""
+        acceleration = np.abs(self.system.J) @ (motion.terms @ motion.size(motion.start(now)))
+        return 200 * CHATTER * self.system.period * acceleration.max()
 
     def _energy(self, moment: Moment) -> float:
         system = self.system
