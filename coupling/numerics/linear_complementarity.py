@@ -46,10 +46,10 @@ def solve_lemke(problem, k):
     M and q should have numbers of size one: round-off is judged by that. Where it makes a wrong choice among ties,
     another covering vector leads past them.
     """
-    for attempt in range(_ATTEMPTS):
-        if _solve(problem, k, attempt):
-            return True
-    return False
+    attempt = 0
+    while attempt < _ATTEMPTS and not _solve(problem, k, attempt):
+        attempt += 1
+    return attempt < _ATTEMPTS
 
 
 @kernel

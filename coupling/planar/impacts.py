@@ -71,7 +71,7 @@ def collide(system, st, rec, log, work):
 
 @kernel
 def _rebound(system, st, work, count, share, tiny):
-    """Find impulses (work.impulse) with this share of the coefficients. False if there are none, or they bring energy."""
+    """Find impulses for this share of the coefficients. Returns False if there are none, or they bring energy."""
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]

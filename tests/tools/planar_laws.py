@@ -46,6 +46,8 @@ from vanedamp.files.toml_input import InputError, validate
 POINTS = 12
 #: steps of one scene among thousands that are looked at: an elastic body may hop for ever
 LONGEST = 150
+#: points of a period at which a scene is compared with its image; perturbation that measures chaos; where that ends
+PLACES, PERTURBATION, PARTED = 20, 1e-11, 1e-6
 #: limits of the violations, each as a share of the terms that it is a difference of
 LIMITS = {
     "penetration": 1e-9, "apart": 1e-9, "motion": 1e-8, "pull": 1e-7, "cone": 1e-7, "along_slip": 1e-8,
@@ -511,6 +513,71 @@ def laws_of(first: int, count: int, longest: int = LONGEST) -> tuple[Worst, Coun
             ends[int(code)] += code not in (DONE, EVENT_BUDGET)
         seed += 1
     return largest, +ends
+
+
+# --- mirror images
+
+
+def positions(stepper: Stepper, times: np.ndarray) -> np.ndarray:
+    """Coordinates (t, N) of a run at increasing times; fewer if it ends before."""
+    stepper.settle()
+    before, found = stepper.moment(), []
+    for _ in range(LONGEST):
+        if len(found) == len(times) or stepper.step() is None:
+            break
+        after, motion = stepper.moment(), Motion(stepper.run.system, before.state)
+        while len(found) < len(times) and times[len(found)] <= after.time:
+            z = expm(motion.matrix * (times[len(found)] - before.time)) @ motion.start(before)
+            found.append(z[: motion.n])
+        before = after
+    return np.reshape(found, (len(found), len(before.q)))
+
+
+def image_parts(seed: int) -> int:
+    """Compare a random scene with its mirror image at points in time. Returns at how many.
+
+    Up to where scenes with other masses, by PERTURBATION, have parted from it; there the image may be as far from it.
+    """
+    data = tables(seed)
+    try:
+        steppers = [Stepper(scene_of(each)) for each in (data, mirrored(data), *map(_perturbed(data), (1, -1)))]
+    except InputError:
+        return 0
+    system = steppers[0].run.system
+    times = np.linspace(0.0, 2.0 * system.period, 2 * PLACES + 1)
+    one, image, *near = (positions(stepper, times) for stepper in steppers)
+    place, sign = _image_of(system, steppers[1].run.system)
+    count = min(map(len, (one, image, *near)))
+    size = np.maximum(np.abs(one).max(), np.abs(one).max(axis=0)) + 1e-3
+    spread = np.max([np.abs((other[:count] - one[:count]) / size).max(axis=1) for other in near], axis=0)
+    spread = np.maximum.accumulate(spread)
+    apart = np.abs((sign * image[:count, place] - one[:count]) / size).max(axis=1)
+    compared = int(np.argmax(spread > PARTED)) if np.any(spread > PARTED) else count
+    for k in range(compared):
+        assert apart[k] <= max(10.0 * spread[k], 1e-9), f"apart by {apart[k]:.3g} at {times[k]:.6g} (seed {seed})"
+    return compared
+
+
+def _perturbed(data: dict):
+    def other(sign: int) -> dict:
+        share = 1.0 + sign * PERTURBATION
+        dampers = [damper | {"mass": damper["mass"] * share**k} for k, damper in enumerate(data["damper"], 1)]
+        cavities = [cavity | {"gap": cavity["gap"] * share**2} for cavity in data["cavity"]]
+        return data | {"damper": dampers, "cavity": cavities}
+
+    return other
+
+
+def _image_of(system: PlanarSystem, image: PlanarSystem) -> tuple[np.ndarray, np.ndarray]:
+    """Place in the mirror image of every coordinate, and its sign there: bodies are counted from the other end."""
+    place, sign = np.arange(len(system.mass)), -np.ones(len(system.mass))
+    for k, x in enumerate(system.along):
+        partner = len(system.along) - 1 - k
+        many = 3 if system.tilt[k] >= 0 else 1
+        place[x : x + many] = image.along[partner] + np.arange(many)
+        if many == 3:
+            sign[x + 1] = 1.0
+    return place, sign
 
 
 def main(first: int = 0, count: int = 200) -> None:
