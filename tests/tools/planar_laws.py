@@ -518,13 +518,17 @@ def laws_of(first: int, count: int, longest: int = LONGEST) -> tuple[Worst, Coun
 # --- mirror images
 
 
-def positions(stepper: Stepper, times: np.ndarray) -> np.ndarray:
-    """Coordinates (t, N) of a run at increasing times; fewer if it ends before."""
+def positions(stepper: Stepper, times: np.ndarray, unique: bool = False) -> np.ndarray:
+    """Coordinates (t, N) of a run at increasing times; fewer if it ends before, or `unique` impacts do."""
     stepper.settle()
     before, found = stepper.moment(), []
+    friction = stepper.run.system.friction
     for _ in range(LONGEST):
-        if len(found) == len(times) or stepper.step() is None:
+        hits = stepper.step() if len(found) < len(times) else None
+        if hits is None:
             break
+        if unique and np.count_nonzero(friction[hits[:, 2].astype(int)]) > 2:
+            times = times[times < stepper.moment().time]
         after, motion = stepper.moment(), Motion(stepper.run.system, before.state)
         while len(found) < len(times) and times[len(found)] <= after.time:
             z = expm(motion.matrix * (times[len(found)] - before.time)) @ motion.start(before)
@@ -537,6 +541,8 @@ def image_parts(seed: int) -> int:
     """Compare a random scene with its mirror image at points in time. Returns at how many.
 
     Up to where scenes with other masses, by PERTURBATION, have parted from it; there the image may be as far from it.
+    A chatter may end a flight earlier or later, and an impact of many contacts with friction may have several
+    solutions: there the comparison ends, too.
     """
     data = tables(seed)
     try:
@@ -545,7 +551,7 @@ def image_parts(seed: int) -> int:
         return 0
     system = steppers[0].run.system
     times = np.linspace(0.0, 2.0 * system.period, 2 * PLACES + 1)
-    one, image, *near = (positions(stepper, times) for stepper in steppers)
+    one, image, *near = (positions(stepper, times, unique=True) for stepper in steppers)
     place, sign = _image_of(system, steppers[1].run.system)
     count = min(map(len, (one, image, *near)))
     size = np.maximum(np.abs(one).max(), np.abs(one).max(axis=0)) + 1e-3
@@ -554,7 +560,9 @@ def image_parts(seed: int) -> int:
     apart = np.abs((sign * image[:count, place] - one[:count]) / size).max(axis=1)
     compared = int(np.argmax(spread > PARTED)) if np.any(spread > PARTED) else count
     for k in range(compared):
-        assert apart[k] <= max(10.0 * spread[k], 1e-9), f"apart by {apart[k]:.3g} at {times[k]:.6g} (seed {seed})"
+        assert apart[k] <= max(10.0 * spread[k], 10 * CHATTER), (
+            f"apart by {apart[k]:.3g} at {times[k]:.6g} (seed {seed})"
+        )
     return compared
 
 
