@@ -16,6 +16,8 @@ from vanedamp.coupling.numerics.jit import entry, kernel
 
 #: entries of the tableau below this are round-off, for problems scaled to numbers of size one
 _PIVOT = 1e-11
+#: covering vectors that are tried, and the ratio that spreads their entries
+_ATTEMPTS, _GOLDEN = 4, 0.6180339887498949
 
 
 class Lemke(NamedTuple):
@@ -41,8 +43,18 @@ def new_lemke(k: int) -> Lemke:
 def solve_lemke(problem, k):
     """Solve the problem of the first k unknowns in place (z, w). Returns False if the method finds no solution.
 
-    M and q should have numbers of size one: round-off is judged by that.
+    M and q should have numbers of size one: round-off is judged by that. Where it makes a wrong choice among ties,
+    another covering vector leads past them.
     """
+    attempt = 0
+    while attempt < _ATTEMPTS and not _solve(problem, k, attempt):
+        attempt += 1
+    return attempt < _ATTEMPTS
+
+
+@kernel
+def _solve(problem, k, attempt):
+    """Solve the problem by one covering vector: that of ones, or another one for later attempts."""
     t, basis, cover, last = problem.tableau, problem.basis, 2 * k, 2 * k + 1
     lowest, leaving = -_PIVOT, -1
     for i in range(k):
@@ -51,10 +63,11 @@ def solve_lemke(problem, k):
         t[i, i] = 1.0
         for j in range(k):
             t[i, k + j] = -problem.matrix[i, j]
-        t[i, cover], t[i, last] = -1.0, problem.q[i]
+        covering = 1.0 + attempt * ((i + 1) * _GOLDEN % 1.0)
+        t[i, cover], t[i, last] = -covering, problem.q[i]
         basis[i] = i
-        if problem.q[i] < lowest:
-            lowest, leaving = problem.q[i], i
+        if problem.q[i] < lowest * covering:
+            lowest, leaving = problem.q[i] / covering, i
         problem.z[i], problem.w[i] = 0.0, max(problem.q[i], 0.0)
     if leaving < 0:
         return True

@@ -23,9 +23,9 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
 )
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import decide, gap, is_shut, row_speed, speed_scale
+from vanedamp.coupling.planar.contact_decisions import AT_REST, decide, gap, is_shut, row_speed, speed_scale
 from vanedamp.coupling.planar.event_functions import next_event
-from vanedamp.coupling.planar.impacts import collide, log_event
+from vanedamp.coupling.planar.impacts import collide, jam, log_event
 from vanedamp.coupling.planar.quadrature import add_up, motion_at
 from vanedamp.coupling.planar.recorder import record_section
 from vanedamp.coupling.response.records import DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS
@@ -44,12 +44,9 @@ def begin(system, st, rec, log, work):
     """Let contacts collide that are closed and approach at time zero, and decide their states. False if that fails."""
     _phase(system, st)
     st.scale[0] = max(speed_scale(system, st.v), system.speed)
-    for r in range(system.contacts):
-        if is_shut(system, st, r) and row_speed(system, r, st.v) < 0.0:
-            if not collide(system, st, rec, log, work):
-                return False
-            break
-    if not decide(system, st, work, st.scale[0]):
+    if _approaches(system, st) and not collide(system, st, rec, log, work):
+        return False
+    if not _settle(system, st, rec, log, work):
         return False
     st.counters[FLOW] = -1
     return True
@@ -112,19 +109,37 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
 
 
 @inlined
+def _approaches(system, st):
+    """Whether a contact that is closed approaches, by more than round-off."""
+    for r in range(system.contacts):
+        if is_shut(system, st, r) and row_speed(system, r, st.v) < -AT_REST * st.scale[0]:
+            return True
+    return False
+
+
+@inlined
 def _happen(system, st, rec, log, work, r, what):
     """The event of unit r. Returns False if it cannot be decided."""
     st.scale[0] = max(st.scale[0], speed_scale(system, st.v))
     if what == CLOSES:
         _close(system, st, r)
-        if row_speed(system, r, st.v) < 0.0 and not collide(system, st, rec, log, work):
-            return False
-    if not decide(system, st, work, st.scale[0]):
+    # at any event another gap may be closed as well, within the resolution of gaps
+    if _approaches(system, st) and not collide(system, st, rec, log, work):
+        return False
+    if not _settle(system, st, rec, log, work):
         return False
     for i in range(len(system.rest)):
         if work.before[i] != st.state[i] or st.other[i] != st.state[i]:
             st.counters[FLOW] = -1
     return True
+
+
+@kernel
+def _settle(system, st, rec, log, work):
+    """Decide the states, if no forces are possible after the impulses that stop what slips. False if that fails."""
+    if decide(system, st, work, st.scale[0]):
+        return True
+    return jam(system, st, rec, log, work) and decide(system, st, work, st.scale[0])
 
 
 @kernel
@@ -176,7 +191,7 @@ def _find(flows, st):
 
 @kernel
 def _enter(system, flows, st):
-    """Stop what the contacts hold, and enter what that takes from the motion: the last of a chatter, and round-off."""
+    """Stop what the contacts hold, and enter what that takes from the motion."""
     s, size, loss = st.counters[FLOW], len(st.q), 0.0
     for i in range(size):
         loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
@@ -184,8 +199,6 @@ def _enter(system, flows, st):
     for i in range(size):
         loss -= 0.5 * system.mass[i] * st.v[i] * st.v[i]
     st.ledger[IMPACT_LOSS] += loss
-    for r in range(len(st.caught)):
-        st.caught[r] = 0
 
 
 @inlined
@@ -218,27 +231,69 @@ def _at_rest(system, st, row):
 
 @kernel
 def _shares(system, flows, st):
-    """Whether sticking contacts that could do with less carry forces within their bounds, now and right after."""
-    s, u, differs = st.counters[FLOW], len(system.rest), False
+    """Whether no contact needs to pull, and none that sticks more than its bound, where some could do with less.
+
+    Now and right after. The normal forces may be others too, and with them friction elsewhere: what begins to slip, or
+    to part, must still do so.
+    """
+    u, differs = len(system.rest), False
     for r in range(u):
         differs = differs or st.state[r] != st.other[r]
     if not differs:
         return True
     for r in range(u):
-        if st.state[r] != STICK:
-            continue
-        for way in (-1.0, 1.0):
-            room, rate, size = system.limit[r], 0.0, system.limit[r]
-            room += system.friction[r] * st.force[r] + way * st.force[u + r]
-            size += abs(system.friction[r] * st.force[r]) + abs(st.force[u + r])
-            for j in range(flows.modes[s]):
-                part = (system.friction[r] * flows.force[s, r, j] + way * flows.force[s, u + r, j]) * st.amplitude[j]
-                room += part.real
-                rate += (part * flows.eigenvalue[s, j]).real
-                size += abs(part.real) + abs(part.imag)
-            if room < -_OVER * size or (room <= _OVER * size and rate < 0.0):
+        if r < system.contacts and st.state[r] < OPEN and _is_beyond(system, flows, st, r, 1.0, 0.0):
+            return False
+        if st.state[r] == STICK:
+            for way in (-1.0, 1.0):
+                if _is_beyond(system, flows, st, r, system.friction[r], way):
+                    return False
+        elif st.state[r] == OPEN and _rests_open(system, st, r):
+            if _turns_back(system, flows, st, r, 1.0):
+                return False
+        elif (st.state[r] == SLIP_RIGHT or st.state[r] == SLIP_LEFT) and not flows.held[st.counters[FLOW], r]:
+            starts = abs(row_speed(system, u + r, st.v)) <= AT_REST * st.scale[0]
+            way = 1.0 if st.state[r] == SLIP_RIGHT else -1.0
+            if starts and _rubs(system, r) and _turns_back(system, flows, st, u + r, way):
                 return False
     return True
+
+
+@inlined
+def _rests_open(system, st, r):
+    """Whether the gap of an open contact is zero and stays so but for accelerations."""
+    return is_shut(system, st, r) and abs(row_speed(system, r, st.v)) <= AT_REST * st.scale[0]
+
+
+@inlined
+def _turns_back(system, flows, st, row, way):
+    """Whether a row at rest accelerates against its way, now or right after."""
+    s, total, rate, size = st.counters[FLOW], 0.0, 0.0, 0.0
+    for i in range(len(st.q)):
+        part = system.J[row, i] * st.bend[i]
+        total += part
+        size += abs(part)
+    for j in range(flows.modes[s]):
+        eigenvalue = flows.eigenvalue[s, j]
+        part = flows.rows[s, row, j] * st.amplitude[j] * eigenvalue * eigenvalue
+        total += part.real
+        size += abs(part.real) + abs(part.imag)
+        rate += (part * eigenvalue).real
+    return way * total < -_OVER * size or (way * total <= _OVER * size and way * rate < 0.0)
+
+
+@inlined
+def _is_beyond(system, flows, st, r, on_normal, on_slip):
+    """Whether the limit, and the forces of both rows of a unit times these factors, are negative, or become so."""
+    s, u, rate = st.counters[FLOW], len(system.rest), 0.0
+    room = system.limit[r] + on_normal * st.force[r] + on_slip * st.force[u + r]
+    size = system.limit[r] + abs(on_normal * st.force[r]) + abs(on_slip * st.force[u + r])
+    for j in range(flows.modes[s]):
+        part = (on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]) * st.amplitude[j]
+        room += part.real
+        rate += (part * flows.eigenvalue[s, j]).real
+        size += abs(part.real) + abs(part.imag)
+    return room < -_OVER * size or (room <= _OVER * size and rate < 0.0)
 
 
 @inlined

@@ -17,7 +17,7 @@ from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
 #: what is small beside the largest term, now and a moment later, and that moment, in periods
 _NOTHING, _NEXT_TO_NOTHING, _MOMENT = 1e-9, 1e-12, 1e-6
 #: share of the speeds in a scene that is round-off
-_AT_REST = 10 * ROUND_OFF
+AT_REST = 10 * ROUND_OFF
 _NORMAL, _SLIP = 1, 2
 
 
@@ -56,26 +56,33 @@ def is_shut(system, st, unit):
 
 @kernel
 def free_acceleration(system, work, q, v, time):
-    """Accelerations (work.free) without contact forces, friction elements included, at a time within the period."""
+    """Accelerations (work.free) without contact forces, friction elements included, at a time within the period.
+
+    work.terms: sizes of the terms that they are sums of.
+    """
     size = len(q)
     for i in range(size):
-        total = system.weight[i]
+        total, terms = system.weight[i], abs(system.weight[i])
         for h in range(len(system.frequency)):
-            angle = system.frequency[h] * time
-            total += (system.load[h, i] * complex(math.cos(angle), math.sin(angle))).real
+            angle, load = system.frequency[h] * time, system.load[h, i]
+            total += (load * complex(math.cos(angle), math.sin(angle))).real
+            terms += abs(load.real) + abs(load.imag)
         for k in range(size):
-            total -= system.stiffness[i, k] * q[k] + system.damping[i, k] * v[k]
-        work.free[i] = total / system.mass[i]
+            spring, dashpot = system.stiffness[i, k] * q[k], system.damping[i, k] * v[k]
+            total -= spring + dashpot
+            terms += abs(spring) + abs(dashpot)
+        work.free[i], work.terms[i] = total / system.mass[i], terms / system.mass[i]
 
 
 @kernel
-def solve_rows(system, work, count, right):
+def solve_rows(system, work, count, right, least):
     """Solve the problem of the listed units: accelerations (or speeds) right + G forces, forces in work.impulse (2u,).
 
-    right: (2u,) without the unknown forces. Returns False if there is no solution, or none is found.
+    right: (2u,) without the unknown forces; least: what they are to be measured by, at least, per root of the
+    diagonal of G. Returns False if there is no solution, or none is found.
     """
     u, problem, size = len(system.rest), work.lemke, 0
-    scale = 0.0
+    scale = least
     for p in range(count):
         r = work.listed[p]
         work.place[p] = size
@@ -197,19 +204,19 @@ def decide(system, st, work, scale):
     for r in range(u):
         work.before[r], work.sliding[r] = st.state[r], 0
         slip = row_speed(system, u + r, st.v)
-        way = 0 if abs(slip) <= _AT_REST * scale else (1 if slip > 0.0 else -1)
+        way = 0 if abs(slip) <= AT_REST * scale else (1 if slip > 0.0 else -1)
         if r >= system.contacts:
             if way != 0:
                 st.state[r] = SLIP_RIGHT if way > 0 else SLIP_LEFT
                 work.sliding[r] = way
                 continue
-        elif not is_shut(system, st, r) or (not st.caught[r] and row_speed(system, r, st.v) > _AT_REST * scale):
+        elif not is_shut(system, st, r) or row_speed(system, r, st.v) > AT_REST * scale:
             st.state[r] = OPEN
             continue
         work.listed[count], work.way[count] = r, way if system.friction[r] > 0.0 or r >= system.contacts else 0
         count += 1
-    loaded_acceleration(system, work, st.q, st.v, st.time[0])
-    if not solve_rows(system, work, count, work.speed):
+    terms = loaded_acceleration(system, work, st.q, st.v, st.time[0])
+    if not solve_rows(system, work, count, work.speed, terms):
         return False
     _classify(system, work, count, _NOTHING, work.verdict)
     doubts = 0
@@ -233,15 +240,25 @@ def decide(system, st, work, scale):
 
 @inlined
 def loaded_acceleration(system, work, q, v, time):
-    """Accelerations of the rows (work.speed) without contact forces, with those of friction elements that slide."""
+    """Accelerations of the rows (work.speed) without contact forces, with those of friction elements that slide.
+
+    Returns the size of the terms that they are sums of, per root of the diagonal of G: what is far below is round-off.
+    """
     u = len(system.rest)
     free_acceleration(system, work, q, v, time)
     for r in range(system.contacts, u):
         if work.sliding[r] != 0:
             for i in range(len(q)):
                 work.free[i] -= work.sliding[r] * system.limit[r] * system.J[u + r, i] / system.mass[i]
+    largest = 0.0
     for r in range(2 * u):
         work.speed[r] = row_speed(system, r, work.free)
+        terms = 0.0
+        for i in range(len(q)):
+            terms += abs(system.J[r, i]) * work.terms[i]
+        if system.delassus[r, r] > 0.0:
+            largest = max(largest, terms / math.sqrt(system.delassus[r, r]))
+    return largest
 
 
 @kernel
@@ -256,8 +273,8 @@ def _look_ahead(system, st, work, count):
         work.ahead[1, i] = st.v[i] + moment * total
     for p in range(count):
         work.first[p], work.doubt[p] = work.verdict[p], work.doubtful[p]
-    loaded_acceleration(system, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
-    if not solve_rows(system, work, count, work.speed):
+    terms = loaded_acceleration(system, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
+    if not solve_rows(system, work, count, work.speed, terms):
         return False
     _classify(system, work, count, _NEXT_TO_NOTHING, work.verdict)
     for p in range(count):
@@ -278,14 +295,14 @@ def _stick_in_doubt(system, work, count):
     for p in range(count):
         r = work.listed[p]
         if work.verdict[p] < OPEN and r < system.contacts:
-            found = _span(system, work, r, found)
+            found = span(system, work, r, found)
     for p in range(count):
         if work.verdict[p] == STICK:
-            found = _span(system, work, u + work.listed[p], found)
+            found = span(system, work, u + work.listed[p], found)
     for p in range(count):
         r = work.listed[p]
         if work.doubtful[p] == _SLIP and _may_stick(system, work, p):
-            more = _span(system, work, u + r, found)
+            more = span(system, work, u + r, found)
             if more > found:
                 work.verdict[p], found = STICK, more
 
@@ -299,7 +316,7 @@ def _may_stick(system, work, p):
 
 
 @kernel
-def _span(system, work, row, found):
+def span(system, work, row, found):
     """Add a row to the orthonormal basis of those that are kept. Returns its size, the same if they hold the row."""
     size, whole, left = len(system.mass), 0.0, 0.0
     if found >= size:

@@ -123,7 +123,9 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     basis = _stretched(system)
     allowed = np.eye(len(basis))
     if len(basis) and len(constraints):
-        allowed = orth(basis @ null_space(constraints, rcond=_DEPENDENT))
+        # both are orthonormal: singular values are sines, and what constraints hold has none above round-off
+        turned, sine, _ = np.linalg.svd(basis @ null_space(constraints, rcond=_DEPENDENT), full_matrices=False)
+        allowed = turned[:, sine > _DEPENDENT]
     k = allowed.shape[1]
     held = basis.T @ basis - basis.T @ allowed @ allowed.T @ basis if k < len(basis) else np.zeros((size, size))
     held[np.abs(held) < 1e-15] = 0.0

@@ -27,6 +27,7 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
+from vanedamp.coupling.planar.contact_decisions import AT_REST
 
 #: round-off of a sum, relative to the sum of its terms' sizes; what is small beside the bound of a derivative
 _ROUND_OFF, _NOTHING = 4.0 * 2.0**-52, 1e-9
@@ -152,6 +153,8 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
     guards.k0[k], guards.k1[k], guards.k2[k], guards.no_root_before[k] = k0, k1, k2, 0.0
     guards.noise[k] = _ROUND_OFF * (noise + swing)
     falls = first < -_NOTHING * second_bound * system.period
+    if order == POSITION:
+        falls = falls and first < -AT_REST * st.scale[0]
     zero = (
         _NOTHING * (noise + swing) if order == FORCE else _ZERO * (system.play[r] if order == POSITION else st.scale[0])
     )

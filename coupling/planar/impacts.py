@@ -11,16 +11,30 @@ that would part for less than CHATTER are closed together: they lose the speed w
 
 from __future__ import annotations
 
+import math
+
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF
 from vanedamp.coupling.exact.impacts import COLLAPSE
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, PERIOD
 from vanedamp.coupling.numerics.jit import inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import is_shut, loaded_acceleration, row_speed, solve_rows, speed_scale
+from vanedamp.coupling.planar.contact_decisions import (
+    AT_REST,
+    is_shut,
+    loaded_acceleration,
+    row_speed,
+    solve_rows,
+    span,
+    speed_scale,
+)
 from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS
 
 #: energy that an impact may bring, as a share of what is in it, before it is solved again
 _GAIN = 1e-12
+#: bisections of the factor of the coefficients
+_HALVINGS = 40
+#: share by which friction is short of its bound where a contact sticks
+_EDGE = 1e-9
 #: how much more than the loads alone the forces of other contacts may press
 _FAR = 100.0
 
@@ -28,28 +42,24 @@ _FAR = 100.0
 @kernel
 def collide(system, st, rec, log, work):
     """Let all closed contacts collide. Returns False if the problem cannot be solved."""
-    u, count, smallest = len(system.rest), 0, 1.0
+    u, count = len(system.rest), 0
     tiny = 10.0 * ROUND_OFF * max(speed_scale(system, st.v), st.scale[0])
     for r in range(system.contacts):
         if is_shut(system, st, r):
             work.listed[count], work.way[count] = r, 0
             count += 1
-            if row_speed(system, r, st.v) < -tiny:
-                smallest = min(smallest, _restitution(system, st, r))
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
-    for turn in range(2):
-        for p in range(count):
-            r = work.listed[p]
-            normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
-            restitution = _restitution(system, st, r) if turn == 0 else smallest
-            work.speed[r] = normal + restitution * min(normal, 0.0)
-            work.speed[u + r] = work.before_impact[u + r]
-        if not solve_rows(system, work, count, work.speed):
+    if not _rebound(system, st, work, count, 1.0, tiny):
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            if _rebound(system, st, work, count, middle, tiny):
+                low = middle
+            else:
+                high = middle
+        if not _rebound(system, st, work, count, low, tiny):
             return False
-        loss, there = _energy(system, st, work)
-        if loss >= -_GAIN * there:
-            break
     _apply(system, st, work)
     for p in range(count):
         r = work.listed[p]
@@ -57,6 +67,18 @@ def collide(system, st, rec, log, work):
             _note(system, st, rec, log, work, r)
     _account(system, st, work)
     return _catch(system, st, work, count, tiny)
+
+
+@kernel
+def _rebound(system, st, work, count, share, tiny):
+    """Find impulses for this share of the coefficients. Returns False if there are none, or they bring energy."""
+    u = len(system.rest)
+    for p in range(count):
+        r = work.listed[p]
+        normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
+        work.speed[r] = normal + share * _restitution(system, st, r) * min(normal, 0.0)
+        work.speed[u + r] = work.before_impact[u + r]
+    return solve_rows(system, work, count, work.speed, 0.0) and not _brings_energy(system, st, work)
 
 
 @inlined
@@ -68,8 +90,8 @@ def _restitution(system, st, r):
 
 
 @inlined
-def _energy(system, st, work):
-    """Energy that the impulses take, and that there is in the motion, J."""
+def _brings_energy(system, st, work):
+    """Whether the impulses bring more energy than round-off of what there is."""
     u, loss, there = len(system.rest), 0.0, 0.0
     for r in range(2 * u):
         if work.impulse[r] != 0.0:
@@ -79,7 +101,7 @@ def _energy(system, st, work):
             loss -= 0.5 * work.impulse[r] * (work.before_impact[r] + after)
     for i in range(len(st.v)):
         there += 0.5 * system.mass[i] * st.v[i] * st.v[i]
-    return loss, there
+    return loss < -_GAIN * there
 
 
 @inlined
@@ -126,33 +148,114 @@ def log_event(system, st, log, kind, r, before, after, normal, tangential):
 
 @kernel
 def _catch(system, st, work, count, tiny):
-    """Mark contacts that would part for less than CHATTER (st.caught): those that push in a step of that length.
+    """Stop contacts that would part for less than CHATTER: those that push in a step of that length.
 
     The step is one of Moreau's scheme; a chatter takes 1/(1 - k) times its next flight. Returns False if that cannot be
     decided.
     """
-    u, moment, slow, size = len(system.rest), CHATTER * system.period, False, 0.0
+    slow, near = _FAR * _accelerate(system, st, work), False
+    for p in range(count):
+        near = near or tiny < row_speed(system, work.listed[p], st.v) < slow
+    if not near:
+        return True
+    if not _step(system, st, work, count):
+        return False
+    near = False
+    for p in range(count):
+        r = work.listed[p]
+        near = near or (work.impulse[r] > 0.0 and row_speed(system, r, st.v) > tiny)
+    if near:
+        _stop(system, st, work, count, tiny, slow)
+    return True
+
+
+@kernel
+def jam(system, st, rec, log, work):
+    """Apply the impulses of closed contacts that no forces can hold (Painleve's paradox): a wedged block stops.
+
+    They are those of a step of Moreau's scheme in the limit of short ones. Returns False if there are none.
+    """
+    u, count = len(system.rest), 0
+    tiny = 10.0 * ROUND_OFF * max(speed_scale(system, st.v), st.scale[0])
+    for r in range(system.contacts):
+        if is_shut(system, st, r):
+            work.listed[count], work.way[count] = r, 0
+            count += 1
+    slow = _FAR * _accelerate(system, st, work)
+    if not _step(system, st, work, count):
+        return False
+    for r in range(2 * u):
+        work.before_impact[r] = row_speed(system, r, st.v)
+    _apply(system, st, work)
+    for p in range(count):
+        if work.impulse[work.listed[p]] > 0.0:
+            _note(system, st, rec, log, work, work.listed[p])
+    _account(system, st, work)
+    _stop(system, st, work, count, tiny, slow)
+    return True
+
+
+@inlined
+def _accelerate(system, st, work):
+    """Set accelerations of the rows (work.speed) without contact forces. Returns the speed they give in CHATTER."""
+    u, largest = len(system.rest), 0.0
     for r in range(u):
         work.sliding[r] = 0
         if r >= system.contacts:
             slip = row_speed(system, u + r, st.v)
-            work.sliding[r] = 0 if abs(slip) <= tiny else (1 if slip > 0.0 else -1)
+            work.sliding[r] = 0 if abs(slip) <= AT_REST * st.scale[0] else (1 if slip > 0.0 else -1)
     loaded_acceleration(system, work, st.q, st.v, st.time[0])
     for r in range(2 * u):
-        size = max(size, abs(work.speed[r]))
-    for p in range(count):
-        away = row_speed(system, work.listed[p], st.v)
-        slow = slow or tiny < away < _FAR * moment * size
-    if not slow:
-        return True
+        largest = max(largest, abs(work.speed[r]))
+    return largest * CHATTER * system.period
+
+
+@inlined
+def _step(system, st, work, count):
+    """Find the impulses (work.impulse) of a step of Moreau's scheme of length CHATTER. Returns if there are any."""
+    u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
-        ahead = moment * max(1.0 - system.restitution[r], 0.1)
+        ahead = CHATTER * system.period * max(1.0 - system.restitution[r], 0.1)
         work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
-    if not solve_rows(system, work, count, work.speed):
-        return False
+    return solve_rows(system, work, count, work.speed, 0.0)
+
+
+@inlined
+def _stop(system, st, work, count, tiny, slow):
+    """Stop the contacts that push (work.impulse), those that stick with their slips, and whom that drives together."""
+    u, found, loss = len(system.rest), 0, 0.0
+    for i in range(len(st.v)):
+        loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
     for p in range(count):
         r = work.listed[p]
-        st.caught[r] = work.impulse[r] > 0.0
-    return True
+        normal = work.impulse[r]
+        if normal > 0.0:
+            found = _stop_row(system, st, work, r, found)
+            sticks = abs(work.impulse[u + r]) < (1.0 - _EDGE) * system.friction[r] * normal
+            if sticks and abs(row_speed(system, u + r, st.v)) < slow:
+                found = _stop_row(system, st, work, u + r, found)
+    again = found > 0
+    while again:
+        again = False
+        for p in range(count):
+            if row_speed(system, work.listed[p], st.v) < -tiny:
+                more = _stop_row(system, st, work, work.listed[p], found)
+                again, found = again or more > found, more
+    for i in range(len(st.v)):
+        loss -= 0.5 * system.mass[i] * st.v[i] * st.v[i]
+    st.ledger[IMPACT_LOSS] += loss
+
+
+@inlined
+def _stop_row(system, st, work, row, found):
+    """Take a row's speed out of the velocities, and keep it stopped. Returns the number of directions stopped."""
+    more = span(system, work, row, found)
+    if more > found:
+        part = 0.0
+        for i in range(len(st.v)):
+            part += work.span[found, i] * math.sqrt(system.mass[i]) * st.v[i]
+        for i in range(len(st.v)):
+            st.v[i] -= work.span[found, i] * part / math.sqrt(system.mass[i])
+    return more

@@ -27,7 +27,6 @@ class PlanarState(NamedTuple):
     other: np.ndarray  # (u,) int: states that move alike, with forces at their bounds where `state` shares them
     known: np.ndarray  # (u,) int: states as last logged
     fresh: np.ndarray  # (u,) int: whether contacts have been decided at this instant
-    caught: np.ndarray  # (u,) int: whether a contact that parts too slowly is to be closed
     rate: np.ndarray  # (2u,) speeds of rows, scratch
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
@@ -62,6 +61,7 @@ class Scratch(NamedTuple):
     """Space for intermediate results."""
 
     free: np.ndarray  # (N,) acceleration without contact forces
+    terms: np.ndarray  # (N,) size of the terms that it is a sum of
     ahead: np.ndarray  # (2, N) coordinates and velocities a moment later
     speed: np.ndarray  # (2u,) right-hand side of a problem: accelerations or speeds of the rows
     before_impact: np.ndarray  # (2u,) speeds
@@ -87,8 +87,7 @@ def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, periods: 
     return PlanarState(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
         state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
-        caught=np.zeros(u, np.int64), rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf),
-        ledger=np.zeros(len(ENERGIES)),
+        rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), ledger=np.zeros(len(ENERGIES)),
         tilt=np.zeros((periods + 1, b)), lifted=np.zeros((periods + 1, b)), by_contact=np.zeros((u, 2)),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
     )  # fmt: skip
@@ -109,9 +108,9 @@ def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
     u, size = len(system.rest), len(system.mass)
     integers = iter(np.zeros((9, u), np.int64))
     return Scratch(
-        free=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u), before_impact=np.zeros(2 * u),
-        impulse=np.zeros(2 * u), before=next(integers), listed=next(integers), way=next(integers),
-        place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
+        free=np.zeros(size), terms=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u),
+        before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), before=next(integers), listed=next(integers),
+        way=next(integers), place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
         doubt=next(integers), sliding=next(integers), span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
     )  # fmt: skip

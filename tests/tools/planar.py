@@ -39,12 +39,17 @@ def planar_scene(data, *bodies, periods=1, gap=1.0, play=1.0):
     return validate(Scene, data | {"cavity": cavity, "damper": dampers, "time": time}, "scene")
 
 
-def run_planar(scene, periods, events=10**7, samples=0):
-    """The run of a scene by the exact engine of bodies with extent."""
+def open_run(scene, periods, events, samples=0):
+    """A run of a scene that has not begun."""
     flat = assemble(scene)
     system = planar_system(scene, flat)
     records = new_records(flat, periods, samples)
-    run = Run(flat, system, planar_motion(scene, flat, system), records, True, events)
+    return Run(flat, system, planar_motion(scene, flat, system), records, True, events)
+
+
+def run_planar(scene, periods, events=10**7, samples=0):
+    """The run of a scene by the exact engine of bodies with extent."""
+    run = open_run(scene, periods, events, samples)
     run.status = run.advance_to(periods)
     return run
 
