@@ -277,8 +277,13 @@ def _look_ahead(system, st, work, count):
     if not solve_rows(system, work, count, work.speed, terms):
         return False
     _classify(system, work, count, _NEXT_TO_NOTHING, work.verdict)
+    # which of contacts that depend on each other carry the force is decided for all of them together
+    carriers = False
     for p in range(count):
-        if work.doubt[p] == 0 or (work.doubt[p] == _SLIP and work.verdict[p] >= OPEN):
+        carriers = carriers or work.doubt[p] == _NORMAL
+    for p in range(count):
+        sure = work.doubt[p] == 0 and not (carriers and work.verdict[p] == TOUCHING)
+        if sure or (work.doubt[p] == _SLIP and work.verdict[p] >= OPEN):
             work.verdict[p], work.doubtful[p] = work.first[p], work.doubt[p]
     return True
 

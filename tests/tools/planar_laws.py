@@ -374,8 +374,8 @@ class Checker:
         slip = path[:, n : 2 * n] @ system.J[u:].T
         rate = path[:, n : 2 * n] @ system.J[:u].T
         force = path @ motion.force.T
-        # forces are differences of these
-        size = (motion.size(path) @ np.abs(motion.force).T).max(axis=0) + 1e-300
+        # forces are differences of these, in a wedged block of those of its other contacts
+        size = np.full(2 * u, (motion.size(path) @ np.abs(motion.force).T).max() + 1e-300)
         open_, closed = self.contact & (state == OPEN), self.contact & (state != OPEN)
         share = -gap / np.where(self.contact, system.play, 1.0)
         worst.note("penetration", share[:, open_].max(initial=0.0), where)
