@@ -37,6 +37,8 @@ _AT_ONCE = 20
 _TINY = 1e-150
 #: share of its terms that a force may be beyond its bound
 _OVER = 1e-9
+#: share of all forces by which one may break its law
+_BROKEN = 1e-6
 
 
 @entry
@@ -68,6 +70,8 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
                     st.state[r] = st.other[r]
                 st.counters[FLOW] = -1
                 continue
+            if not _holds(system, flows, st):
+                return UNDECIDED
             _log_changes(system, flows, st, log)
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
@@ -256,6 +260,31 @@ def _shares(system, flows, st):
             way = 1.0 if st.state[r] == SLIP_RIGHT else -1.0
             if starts and _rubs(system, r) and _turns_back(system, flows, st, u + r, way):
                 return False
+    return True
+
+
+@kernel
+def _holds(system, flows, st):
+    """Whether the forces obey their laws as a flow begins: no contact pulls, friction stays within its bound.
+
+    A decision that has mistaken the forces of contacts that depend on each other is found here, and is no answer.
+    """
+    s, u, largest = st.counters[FLOW], len(system.rest), 0.0
+    for check in range(2):
+        for r in range(u):
+            normal, slip, size = st.force[r], st.force[u + r], abs(st.force[r]) + abs(st.force[u + r])
+            for j in range(flows.modes[s]):
+                push, drag = flows.force[s, r, j] * st.amplitude[j], flows.force[s, u + r, j] * st.amplitude[j]
+                normal, slip = normal + push.real, slip + drag.real
+                size += abs(push.real) + abs(push.imag) + abs(drag.real) + abs(drag.imag)
+            if check == 0:
+                largest = max(largest, size)
+            elif r < system.contacts and st.state[r] < OPEN and normal < -_BROKEN * largest:
+                return False
+            elif st.state[r] == STICK:
+                bound = system.friction[r] * normal if r < system.contacts else system.limit[r]
+                if _rubs(system, r) and abs(slip) > bound + _BROKEN * largest:
+                    return False
     return True
 
 
