@@ -130,7 +130,8 @@ class Response:
         if self.estimate is not None:
             data["estimate"] = self.estimate
         if events:
-            data["event_list"] = [vars(event) for event in self.event_list]
+            names = self._event_fields()
+            data["event_list"] = [{name: getattr(event, name) for name in names} for event in self.event_list]
         return data
 
     def save(self, path: str | Path, provenance: dict[str, Any] | None = None) -> None:
@@ -160,8 +161,13 @@ class Response:
             f"event_{name}": Variable(
                 [getattr(event, name) for event in self.event_list], ("event",), units.get(name, "1")
             )
-            for name in Event.__dataclass_fields__
+            for name in self._event_fields()
         }
+
+    def _event_fields(self) -> list[str]:
+        """Return the names of the fields of events; corner and tangential impulse are those of bodies in the plane."""
+        planar = {"corner", "tangential_impulse"}
+        return [name for name in Event.__dataclass_fields__ if self.tilt_max is not None or name not in planar]
 
 
 def classify(

@@ -48,11 +48,12 @@ POINTS = 12
 LONGEST = 150
 #: points of a period at which a scene is compared with its image; perturbation that measures chaos; where that ends
 PLACES, PERTURBATION, PARTED = 20, 1e-11, 1e-6
-#: limits of the violations, each as a share of the terms that it is a difference of
+#: limits of the violations, each as a share of the terms that it is a difference of. What an instant leaves open is
+#: decided by the forces a millionth of a period later, which have changed by 6e-6 of their size: pull, cone and starts.
+#: A nearly singular wedge has had a closed gap of 1.6e-9 of the play
 LIMITS = {
-    "penetration": 1e-9, "apart": 1e-8,  # a nearly singular wedge has had 1.6e-9
-    "motion": 1e-8, "pull": 1e-7, "cone": 1e-7, "along_slip": 1e-8,
-    "starts": 1e-7, "newton": 1e-9, "impulse": 1e-9, "momentum": 1e-8, "gain": 1e-9, "ledger": 1e-10,
+    "penetration": 1e-9, "apart": 1e-8, "motion": 1e-8, "pull": 1e-5, "cone": 1e-5, "along_slip": 1e-8,
+    "starts": 1e-5, "newton": 1e-9, "impulse": 1e-9, "momentum": 1e-8, "gain": 1e-9, "ledger": 1e-10,
 }  # fmt: skip
 
 
