@@ -130,8 +130,8 @@ class Response:
         if self.estimate is not None:
             data["estimate"] = self.estimate
         if events:
-            names = self._event_fields()
-            data["event_list"] = [{name: getattr(event, name) for name in names} for event in self.event_list]
+            fields = self._event_fields()
+            data["event_list"] = [{name: getattr(event, name) for name in fields} for event in self.event_list]
         return data
 
     def save(self, path: str | Path, provenance: dict[str, Any] | None = None) -> None:
