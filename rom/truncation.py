@@ -49,7 +49,11 @@ def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedMode
     own: list[np.ndarray] = []
     if (blocks or model.residual_flexibility is not None) and dropped.size:
         check_elastic(count_rigid_motions(rigidity, *spectrum(inertia, rigidity)), 0)
-        static = np.linalg.solve(rigidity, model.selection[:, dropped].T)
+        try:
+            static = np.linalg.solve(rigidity, model.selection[:, dropped].T)
+        except np.linalg.LinAlgError:  # singular to the last bit, where the count has seen no rigid motion
+            check_elastic(1, 0)
+            raise
         if model.residual_flexibility is not None:
             lost = np.zeros((model.size, len(model.interface)))
             lost[dropped] = static

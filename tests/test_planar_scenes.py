@@ -43,9 +43,11 @@ TABLE = {
 def test_means_of_an_independent_program(ratio):
     """Within 4 %: that program's own steps change its figures by up to 3 %.
 
-    The motion is chaotic: single means spread by up to 1.7 % (one deviation), so that eight starts are averaged.
+    The motion is chaotic: single means spread by up to 1.7 % (one deviation), so that eight starts are averaged, from
+    well above the floor: near it, round-off may decide whether a block lies flat before it meets a wall, and is a
+    slider for good.
     """
-    responses = [simulate(reference(ratio, tilt=1e-5 * (1 + 1e-3 * turn))) for turn in range(8)]
+    responses = [simulate(reference(ratio, lift=8e-5, tilt=2e-3 * (1 + 1e-3 * turn))) for turn in range(8)]
     mean = np.mean([response.amplitude_mean for response in responses])
     assert mean / X == pytest.approx(TABLE[ratio], rel=0.04)
     for response in responses:
