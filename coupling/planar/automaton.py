@@ -23,10 +23,10 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
 )
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import AT_REST, decide, gap, is_shut, row_speed, speed_scale
+from vanedamp.coupling.planar.contact_decisions import AT_REST, decide, gap, is_shut, row_speed, rubs, speed_scale
 from vanedamp.coupling.planar.event_functions import next_event
 from vanedamp.coupling.planar.impacts import collide, jam, log_event
-from vanedamp.coupling.planar.quadrature import add_up, motion_at
+from vanedamp.coupling.planar.quadrature import add_up, motion_at, response_at
 from vanedamp.coupling.planar.recorder import record_section
 from vanedamp.coupling.response.records import DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS
 
@@ -73,12 +73,13 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
             if not _holds(system, flows, st):
                 return UNDECIDED
             _log_changes(system, flows, st, log)
+        else:
+            _begin_segment(system, flows, st)
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
         if st.counters[LOGGED] + 4 * len(system.rest) >= len(log):
             return LOG_FULL
-        _begin_segment(system, flows, st)
-        if st.time[0] == 0.0:
+        if st.counters[PERIOD] == 0 and st.time[0] == 0.0:
             record_section(system, st, rec)
         tau, who = next_event(system, flows, st, guards, all_modes)
         if tau > 0.0:
@@ -96,7 +97,7 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
             for r in range(len(st.last_impact)):
                 st.last_impact[r] -= system.period
             _phase(system, st)
-            _begin_segment(system, flows, st)
+            _snap(system, flows, st, st.counters[FLOW])
             record_section(system, st, rec)
             continue
         st.counters[EVENTS] += 1
@@ -152,7 +153,7 @@ def _log_changes(system, flows, st, log):
     u = len(system.rest)
     for i in range(u):
         was, now = st.known[i], st.state[i]
-        if (now == SLIP_RIGHT or now == SLIP_LEFT) and flows.held[st.counters[FLOW], i] and _rubs(system, i):
+        if (now == SLIP_RIGHT or now == SLIP_LEFT) and flows.held[st.counters[FLOW], i] and rubs(system, i):
             now = STICK  # its force is at its bound, but others hold it
         st.known[i] = now
         if i < system.contacts and was == OPEN and now != OPEN:
@@ -163,11 +164,6 @@ def _log_changes(system, flows, st, log):
             log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0)
         elif was == STICK and (now == SLIP_RIGHT or now == SLIP_LEFT):
             log_event(system, st, log, SLIPS, i, 0.0, row_speed(system, u + i, st.v), 0.0, 0.0)
-
-
-@inlined
-def _rubs(system, i):
-    return i >= system.contacts or system.friction[i] > 0.0
 
 
 @kernel
@@ -258,7 +254,7 @@ def _shares(system, flows, st):
         elif (st.state[r] == SLIP_RIGHT or st.state[r] == SLIP_LEFT) and not flows.held[st.counters[FLOW], r]:
             starts = abs(row_speed(system, u + r, st.v)) <= AT_REST * st.scale[0]
             way = 1.0 if st.state[r] == SLIP_RIGHT else -1.0
-            if starts and _rubs(system, r) and _turns_back(system, flows, st, u + r, way):
+            if starts and rubs(system, r) and _turns_back(system, flows, st, u + r, way):
                 return False
     return True
 
@@ -283,7 +279,7 @@ def _holds(system, flows, st):
                 return False
             elif st.state[r] == STICK:
                 bound = system.friction[r] * normal if r < system.contacts else system.limit[r]
-                if _rubs(system, r) and abs(slip) > bound + _BROKEN * largest:
+                if rubs(system, r) and abs(slip) > bound + _BROKEN * largest:
                     return False
     return True
 
@@ -388,12 +384,7 @@ def _sample(system, flows, st, rec, work, tau):
         row = st.counters[PERIOD] * many + k
         if row < len(rec.samples):
             motion_at(system, flows, st, work, max(k * step - st.time[0], 0.0), q, v)
-            rec.samples[row, 0] = 0.0
-            for h in range(len(system.table)):
-                angle = system.frequency[h] * k * step
-                rec.samples[row, 0] += (system.table[h] * complex(math.cos(angle), math.sin(angle))).real
-            for i in range(len(q)):
-                rec.samples[row, 0] += system.response[i] * q[i]
+            rec.samples[row, 0], _ = response_at(system, q, v, k * step)
             for b in range(len(system.along)):
                 slip = q[system.along[b]]
                 for i in range(len(q)):

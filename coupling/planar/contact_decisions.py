@@ -37,6 +37,12 @@ def gap(system, unit, q):
 
 
 @inlined
+def rubs(system, unit):
+    """Whether a unit has friction."""
+    return unit >= system.contacts or system.friction[unit] > 0.0
+
+
+@inlined
 def speed_scale(system, v):
     """Largest sum of the parts of a row's speed, m/s."""
     largest = 0.0
@@ -106,7 +112,7 @@ def solve_rows(system, work, count, right, least):
     for p in range(count):
         r, i = work.listed[p], work.place[p]
         contact = r < system.contacts
-        at_rest = work.way[p] == 0 and (not contact or system.friction[r] > 0.0)
+        at_rest = work.way[p] == 0 and rubs(system, r)
         normal = 1.0 / math.sqrt(system.delassus[r, r]) if contact else 0.0
         slip = 1.0 / math.sqrt(system.delassus[u + r, u + r]) if at_rest else 0.0
         first = i + 1 if contact else i  # the unknown of the friction to the right
@@ -123,7 +129,7 @@ def solve_rows(system, work, count, right, least):
         for o in range(count):
             c, j = work.listed[o], work.place[o]
             other = c < system.contacts
-            free = work.way[o] == 0 and (not other or system.friction[c] > 0.0)
+            free = work.way[o] == 0 and rubs(system, c)
             if other:
                 weight = 1.0 / math.sqrt(system.delassus[c, c])
                 drag = -system.friction[c] * (1.0 if free else float(work.way[o]))
@@ -149,7 +155,7 @@ def solve_rows(system, work, count, right, least):
             work.impulse[r] = problem.z[i] * scale / math.sqrt(system.delassus[r, r])
             if work.way[p] != 0:
                 work.impulse[u + r] = -work.way[p] * system.friction[r] * work.impulse[r]
-        if work.way[p] == 0 and (not contact or system.friction[r] > 0.0):
+        if work.way[p] == 0 and rubs(system, r):
             low = system.friction[r] * work.impulse[r] if contact else system.limit[r]
             share = problem.z[i + 1 if contact else i] * scale / math.sqrt(system.delassus[u + r, u + r])
             work.impulse[u + r] = share - low
@@ -213,7 +219,7 @@ def decide(system, st, work, scale):
         elif not is_shut(system, st, r) or row_speed(system, r, st.v) > AT_REST * scale:
             st.state[r] = OPEN
             continue
-        work.listed[count], work.way[count] = r, way if system.friction[r] > 0.0 or r >= system.contacts else 0
+        work.listed[count], work.way[count] = r, way if rubs(system, r) else 0
         count += 1
     terms = loaded_acceleration(system, work, st.q, st.v, st.time[0])
     if not solve_rows(system, work, count, work.speed, terms):
@@ -317,7 +323,7 @@ def _may_stick(system, work, p):
     """Whether a listed unit that counts as slipping has friction and no slip."""
     r = work.listed[p]
     slips = work.verdict[p] == SLIP_RIGHT or work.verdict[p] == SLIP_LEFT
-    return slips and work.way[p] == 0 and (r >= system.contacts or system.friction[r] > 0.0)
+    return slips and work.way[p] == 0 and rubs(system, r)
 
 
 @kernel

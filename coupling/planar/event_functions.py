@@ -27,7 +27,7 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import AT_REST
+from vanedamp.coupling.planar.contact_decisions import AT_REST, rubs
 
 #: round-off of a sum, relative to the sum of its terms' sizes; what is small beside the bound of a derivative
 _ROUND_OFF, _NOTHING = 4.0 * 2.0**-52, 1e-9
@@ -81,12 +81,12 @@ def _watch(system, flows, st, guards, s, grows):
                 count = _add(system, flows, st, guards, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
             elif state != TOUCHING:
                 count = _add(system, flows, st, guards, s, r, FORCE, AT_LOW, 1.0, 0.0, grows, count)
-        if state == STICK and (r >= system.contacts or system.friction[r] > 0.0):
+        if state == STICK and rubs(system, r):
             bound = system.friction[r]
             count = _add(system, flows, st, guards, s, r, FORCE, AT_HIGH, bound, -1.0, grows, count)
             count = _add(system, flows, st, guards, s, r, FORCE, AT_LOW, bound, 1.0, grows, count)
         slips = (state == SLIP_RIGHT or state == SLIP_LEFT) and not flows.held[s, r]
-        if slips and (r >= system.contacts or system.friction[r] > 0.0):
+        if slips and rubs(system, r):
             way = 1.0 if state == SLIP_RIGHT else -1.0
             count = _add(system, flows, st, guards, s, r, VELOCITY, STOPS, 0.0, way, grows, count)
     return count

@@ -1,9 +1,9 @@
 """Impacts with friction: all contacts that are closed at the instant take part, in one problem on velocities.
 
 Newton's law in Moreau's form (Moreau 1988): after the impact v_N + k v_N- >= 0 and the impulse P_N >= 0 complement each
-other, and P_T stays within Coulomb's cone, at its edge where the contact still slips. With one coefficient for all
-contacts that never brings energy. With several it can (Kane's paradox): such an impact is solved again with the
-smallest of them.
+other, and P_T stays within Coulomb's cone, at its edge where the contact still slips. Without friction one
+coefficient for all contacts never brings energy; with friction, or with several coefficients, the law can (Kane's
+paradox). Then all coefficients are smaller by one factor, the largest that brings none.
 
 A block that comes to lie rocks from corner to corner ever faster, and ends in finite time, as a ball does. Contacts
 that would part for less than CHATTER are closed together: they lose the speed with which they would part.
@@ -14,10 +14,9 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.exact.event_functions import CHATTER
-from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF
 from vanedamp.coupling.exact.impacts import COLLAPSE
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, PERIOD
-from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import (
     AT_REST,
     is_shut,
@@ -42,12 +41,8 @@ _FAR = 100.0
 @kernel
 def collide(system, st, rec, log, work):
     """Let all closed contacts collide. Returns False if the problem cannot be solved."""
-    u, count = len(system.rest), 0
-    tiny = 10.0 * ROUND_OFF * max(speed_scale(system, st.v), st.scale[0])
-    for r in range(system.contacts):
-        if is_shut(system, st, r):
-            work.listed[count], work.way[count] = r, 0
-            count += 1
+    u, count = len(system.rest), _list_shut(system, st, work)
+    tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
     if not _rebound(system, st, work, count, 1.0, tiny):
@@ -67,6 +62,17 @@ def collide(system, st, rec, log, work):
             _note(system, st, rec, log, work, r)
     _account(system, st, work)
     return _catch(system, st, work, count, tiny)
+
+
+@inlined
+def _list_shut(system, st, work):
+    """List the contacts whose gaps are zero. Returns how many they are."""
+    count = ZERO
+    for r in range(system.contacts):
+        if is_shut(system, st, r):
+            work.listed[count], work.way[count] = r, 0
+            count += 1
+    return count
 
 
 @kernel
@@ -122,7 +128,6 @@ def _account(system, st, work):
         if work.impulse[r] != 0.0:
             loss = -0.5 * work.impulse[r] * (work.before_impact[r] + row_speed(system, r, st.v))
             st.ledger[IMPACT_LOSS if r < u else FRICTION] += loss
-            st.by_contact[r % u, 0] += loss
 
 
 @inlined
@@ -175,12 +180,8 @@ def jam(system, st, rec, log, work):
 
     They are those of a step of Moreau's scheme in the limit of short ones. Returns False if there are none.
     """
-    u, count = len(system.rest), 0
-    tiny = 10.0 * ROUND_OFF * max(speed_scale(system, st.v), st.scale[0])
-    for r in range(system.contacts):
-        if is_shut(system, st, r):
-            work.listed[count], work.way[count] = r, 0
-            count += 1
+    u, count = len(system.rest), _list_shut(system, st, work)
+    tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     slow = _FAR * _accelerate(system, st, work)
     if not _step(system, st, work, count):
         return False

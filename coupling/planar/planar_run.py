@@ -80,7 +80,7 @@ class PlanarRun:
                 return STATUS_OF[int(code)]
 
     def outcome(self) -> Outcome:
-        """What the run leaves behind."""
+        """Return the results of the run."""
         counters = self.state.counters
         numbers = {"impacts": IMPACTS, "segments": SEGMENTS, "evaluations": EVALUATIONS}
         found = {name: int(counters[place]) for name, place in numbers.items()}
@@ -91,4 +91,4 @@ class PlanarRun:
         )  # fmt: skip
 
     def final(self) -> None:
-        """None: runs of bodies with extent do not hand over their state yet."""
+        """Return None: runs of bodies with extent do not hand over their state yet."""

@@ -1,4 +1,4 @@
-"""What a segment adds up: energies, harmonics, peaks, the largest tilt; by Gauss's rule on pieces of it.
+"""Integrals of a segment: energies, harmonics, peaks, the largest tilt; by Gauss's rule on pieces of it.
 
 The integrands are products of the motion's own exponentials and parabolas: on pieces in which the fastest mode turns by
 no more than _TURN the rule of eight points leaves out 1e-15 of them.
@@ -49,7 +49,7 @@ def add_up(system, flows, st, rec, work, tau):
         fastest = max(fastest, abs(rate.real) + abs(rate.imag))
     pieces = max(1, math.ceil(tau * fastest / _TURN))
     h, q, v = tau / pieces, work.ahead[0], work.ahead[1]
-    x0, rate0 = _response(system, st, st.q, st.v, st.time[0])
+    x0, rate0 = response_at(system, st.q, st.v, st.time[0])
     rec.peak[period] = max(rec.peak[period], abs(x0))
     note_tilts(system, st, st.q, period)
     for piece in range(pieces):
@@ -59,7 +59,7 @@ def add_up(system, flows, st, rec, work, tau):
             _add_node(system, flows, st, rec, work, q, v, t, 0.5 * h * _WEIGHTS[node])
         end = h * (piece + 1)
         motion_at(system, flows, st, work, end, q, v)
-        x1, rate1 = _response(system, st, q, v, st.time[0] + end)
+        x1, rate1 = response_at(system, q, v, st.time[0] + end)
         rec.peak[period] = max(rec.peak[period], abs(x1))
         if rate0 * rate1 < 0.0:
             rec.peak[period] = max(rec.peak[period], _extremum(system, flows, st, work, q, v, end - h, end, rate0))
@@ -101,11 +101,10 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
             for j in range(flows.modes[s]):
                 force += (flows.force[s, u + r, j] * st.amplitude[j] * (1.0 + work.turn[j])).real
             friction -= force * slip
-            st.by_contact[r, 1] -= weight * force * slip
     for b in range(len(system.along)):
         momentum += system.mass[system.along[b]] * v[system.along[b]]
     note_tilts(system, st, q, period)
-    x, _ = _response(system, st, q, v, st.time[0] + t)
+    x, _ = response_at(system, q, v, st.time[0] + t)
     phase = st.amplitude[0] * (1.0 + work.turn[0])
     back = complex(phase.real, -phase.imag)
     st.ledger[EXCITATION] += weight * power
@@ -117,8 +116,8 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
 
 
 @inlined
-def _response(system, st, q, v, time):
-    """Displacement and speed of the response, that of a prescribed base included."""
+def response_at(system, q, v, time):
+    """Return displacement and speed of the response, that of a prescribed base included."""
     x, rate = 0.0, 0.0
     for h in range(len(system.frequency)):
         if system.table[h] != 0.0:
@@ -134,12 +133,12 @@ def _response(system, st, q, v, time):
 
 @kernel
 def _extremum(system, flows, st, work, q, v, low, high, rate):
-    """|response| where its speed vanishes between two times: by bisection, and secants."""
+    """Return |response| where its speed vanishes between two times, by bisection."""
     x = 0.0
     for _ in range(30):
         middle = 0.5 * (low + high)
         motion_at(system, flows, st, work, middle, q, v)
-        x, now = _response(system, st, q, v, st.time[0] + middle)
+        x, now = response_at(system, q, v, st.time[0] + middle)
         if now == 0.0:
             break
         if (now > 0.0) == (rate > 0.0):

@@ -1,4 +1,4 @@
-"""What changes during a run of bodies with extent, and scratch space. Sizes as in constraints.PlanarSystem; m modes."""
+"""The state of a run of bodies with extent, and scratch space. Sizes as in constraints.PlanarSystem; m modes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,6 @@ class PlanarState(NamedTuple):
     ledger: np.ndarray  # (6,) J
     tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
     lifted: np.ndarray  # (periods + 1, b) time off the floor, s
-    by_contact: np.ndarray  # (u, 2): energy lost in impacts and by friction, J
     # of a segment
     amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
     bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
@@ -82,19 +81,19 @@ class Scratch(NamedTuple):
 
 
 def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, periods: int) -> PlanarState:
-    """The state at time zero."""
+    """Return the state at time zero."""
     u, size, b = len(system.rest), len(system.mass), len(system.along)
     return PlanarState(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
         state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
         rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), ledger=np.zeros(len(ENERGIES)),
-        tilt=np.zeros((periods + 1, b)), lifted=np.zeros((periods + 1, b)), by_contact=np.zeros((u, 2)),
+        tilt=np.zeros((periods + 1, b)), lifted=np.zeros((periods + 1, b)),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
     )  # fmt: skip
 
 
 def new_guards(system: PlanarSystem, modes: int) -> Guards:
-    """Room for three event functions a unit."""
+    """Return room for three event functions a unit."""
     k = 3 * len(system.rest)
     return Guards(
         unit=np.zeros(k, np.int64), order=np.zeros(k, np.int64), what=np.zeros(k, np.int64),
@@ -104,7 +103,7 @@ def new_guards(system: PlanarSystem, modes: int) -> Guards:
 
 
 def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
-    """Scratch space for a scene."""
+    """Return scratch space for a scene."""
     u, size = len(system.rest), len(system.mass)
     integers = iter(np.zeros((9, u), np.int64))
     return Scratch(
