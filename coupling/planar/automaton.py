@@ -27,7 +27,7 @@ from vanedamp.coupling.planar.contact_decisions import AT_REST, decide, gap, is_
 from vanedamp.coupling.planar.event_functions import next_event
 from vanedamp.coupling.planar.impacts import collide, jam, log_event
 from vanedamp.coupling.planar.quadrature import add_up, motion_at, response_at
-from vanedamp.coupling.planar.recorder import record_section
+from vanedamp.coupling.planar.recorder import put_sample, record_section
 from vanedamp.coupling.response.records import DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS
 
 #: overlap, as a share of the play, beyond which round-off has lost a contact
@@ -157,13 +157,13 @@ def _log_changes(system, flows, st, log):
             now = STICK  # its force is at its bound, but others hold it
         st.known[i] = now
         if i < system.contacts and was == OPEN and now != OPEN:
-            log_event(system, st, log, RESTS, i, 0.0, 0.0, 0.0, 0.0)
+            log_event(system, st, log, RESTS, i, 0.0, 0.0, 0.0, 0.0, 0.0)
         elif i < system.contacts and was != OPEN and now == OPEN:
-            log_event(system, st, log, DETACHES, i, 0.0, row_speed(system, i, st.v), 0.0, 0.0)
+            log_event(system, st, log, DETACHES, i, 0.0, row_speed(system, i, st.v), 0.0, 0.0, 0.0)
         elif now == STICK and (was == SLIP_RIGHT or was == SLIP_LEFT):
-            log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0)
+            log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0, 0.0)
         elif was == STICK and (now == SLIP_RIGHT or now == SLIP_LEFT):
-            log_event(system, st, log, SLIPS, i, 0.0, row_speed(system, u + i, st.v), 0.0, 0.0)
+            log_event(system, st, log, SLIPS, i, 0.0, row_speed(system, u + i, st.v), 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -384,10 +384,6 @@ def _sample(system, flows, st, rec, work, tau):
         row = st.counters[PERIOD] * many + k
         if row < len(rec.samples):
             motion_at(system, flows, st, work, max(k * step - st.time[0], 0.0), q, v)
-            rec.samples[row, 0], _ = response_at(system, q, v, k * step)
-            for b in range(len(system.along)):
-                slip = q[system.along[b]]
-                for i in range(len(q)):
-                    slip -= system.floor[b, i] * q[i]
-                rec.samples[row, 1 + b] = slip
+            x, _ = response_at(system, q, v, k * step)
+            put_sample(system, st, rec, row, x, q, st.state, OPEN)
         k += 1
