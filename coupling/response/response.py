@@ -13,7 +13,6 @@ import numpy as np
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.files.store import Variable, save
 
-
 #: figures of each body in the plane
 _OF_BODIES = ("tilt_max", "lift_share", "linearisation")
 
@@ -84,6 +83,11 @@ class PlanarSamples(NamedTuple):
     contact_gap: np.ndarray
     contact_closed: np.ndarray
     contacts: tuple[tuple[int, str, int], ...]
+
+    def cut(self, kept: Any) -> PlanarSamples:
+        """Return the samples at some of the times, as numpy indexes them."""
+        arrays = {name: getattr(self, name)[kept] for name in self._fields[:-1]}
+        return self._replace(**arrays)
 
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file, with dimensions and units."""
