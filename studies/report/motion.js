@@ -14,6 +14,7 @@
     const svg = draw(figure, "svg", {viewBox: data.box.join(" "), role: "img", "aria-label": `cavity ${data.name}`});
     const caption = document.createElement("figcaption");
     figure.style.flex = `${width} 1 ${2 * width}px`;
+    figure.style.maxWidth = `${6 * width}px`;
     parent.append(figure);
     figure.append(caption);
     // where the cavity is at rest
@@ -33,16 +34,13 @@
     return k => {
       const [along, across, turn] = data.shift[k], left = data.left[k], right = data.right[k], w = data.wall;
       frame.setAttribute("transform", `translate(${along} ${across}) rotate(${turn})`);
-      const inside = data.ceiling.length
-        ? data.ceiling.map(([from, to, height], i, all) => {
-            const last = i + 1 === all.length;
-            return `L${i ? from : left} ${-height}L${last ? right : to} ${-height}`;
-          }).join("")
-        : `L${left} ${top}L${right} ${top}`;
-      const outside = `M${left - w} ${w}V${top - (data.ceiling.length ? w : 0)}`;
-      ground.setAttribute("d", data.ceiling.length
-        ? `${outside}H${right + w}V${w}ZM${left} 0${inside}L${right} 0Z`
-        : `${outside}H${left}V0H${right}V${top}H${right + w}V${w}Z`);
+      const inside = data.ceiling.map(({ends, heights}, i, all) => {
+        const [low, high] = heights[k];
+        return `L${i ? ends[0] : left[1]} ${-low}L${i + 1 < all.length ? ends[1] : right[1]} ${-high}`;
+      }).join("");
+      ground.setAttribute("d", inside
+        ? `M${left[0] - w} ${w}V${top - w}H${right[0] + w}V${w}ZM${left[0]} 0${inside}L${right[0]} 0Z`
+        : `M${left[0] - w} ${w}V${top}H${left[1]}L${left[0]} 0H${right[0]}L${right[1]} ${top}H${right[0] + w}V${w}Z`);
       for (const body of bodies) {
         const points = body.data.outline[k];
         if (body.mark) {

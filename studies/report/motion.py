@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,18 +62,25 @@ class ContactMotion:
     light: np.ndarray
 
 
+class CeilingPart(NamedTuple):
+    """The ceiling above a body: its ends along the cavity, and heights (n, 2) there."""
+
+    ends: tuple[float, float]
+    heights: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class CavityMotion:
     """A cavity as drawn, in the frame of its floor, whose middle is at (0, 0).
 
-    left, right: (n,) faces of the walls; ceiling: from, to and height of its parts, one above each body, empty without
-    play; shift: (n, 3) displacement of the floor's middle, and rotation (rad)
+    left, right: (n, 2) faces of the walls at the height of the floor and at `height`; ceiling: parts above each body,
+    empty without play; shift: (n, 3) displacement of the floor's middle, and rotation (rad)
     """
 
     name: str
     left: np.ndarray
     right: np.ndarray
-    ceiling: list[tuple[float, float, float]]
+    ceiling: list[CeilingPart]
     shift: np.ndarray
     height: float
     bodies: list[BodyMotion]
@@ -191,12 +198,14 @@ class _Drawing:
             places.append(at + self.half[k][0])
             bodies.append(self._body(k, damper, places[-1]))
             at += 2 * self.half[k][0]
+        highest = max(2 * self.half[k][1] for k, _ in inside)
         if cavity.play is not None:
-            for (k, _), place in zip(inside, places, strict=True):
+            for (k, damper), place in zip(inside, places, strict=True):
                 a, b = self.half[k]
-                height = 2 * b + self.factor * cavity.play
-                ceiling.append((self.scale * (place - a), self.scale * (place + a), self.scale * height))
-        walls = [self._wall(cavity, inside, side) for side in ("left", "right")]
+                heights = 2 * b + self.factor * (cavity.play + self._ceiling(cavity.play, k, damper))
+                ceiling.append(CeilingPart((self.scale * (place - a), self.scale * (place + a)), self.scale * heights))
+            highest += self.factor * cavity.play
+        walls = [self._wall(cavity, inside, side, highest) for side in ("left", "right")]
         k = inside[0][0]
         rotation = self.plane.floor_rotation[:, k]
         across = np.nan_to_num(self.plane.floor_across[:, k]) - rotation * places[0]
@@ -206,13 +215,11 @@ class _Drawing:
             for number, place in enumerate(self.plane.contacts)
             if place[1] != "stop" and any(body.number == place[0] for body in bodies)
         ]
-        height = self.scale * max(2 * self.half[k][1] for k, _ in inside)
-        height = max([height, *(part[2] for part in ceiling)])
         left, right = (
             self.scale * (sign * (length + self.factor * cavity.gap) / 2 + self.factor * wall)
             for sign, wall in zip((-1, 1), walls, strict=True)
         )
-        return CavityMotion(cavity.name, left, right, ceiling, shift, height, bodies, contacts)
+        return CavityMotion(cavity.name, left, right, ceiling, shift, self.scale * highest, bodies, contacts)
 
     def _pose(self, k: int, damper: Damper) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return along, lift and tilt (n,) of a body in the frame of its floor: at its centre, not at its foot."""
@@ -235,15 +242,34 @@ class _Drawing:
             self.plane.body_lift[:, k], self.plane.body_tilt[:, k],
         )  # fmt: skip
 
-    def _wall(self, cavity: Cavity, inside: list[tuple[int, Damper]], side: str) -> np.ndarray:
-        """Return by how much a wall has moved relative to the floor (n,), from the gap of a corner."""
+    def _moved(self, k: int, damper: Damper, side: str, play: float) -> list[np.ndarray]:
+        """Return by how much a surface has moved towards its outside, relative to the floor: (n,) at each contact.
+
+        That is its gap less what the body's pose leaves of the play; corners in the order of their height, or from
+        left to right.
+        """
+        along, lift, tilt = self._pose(k, damper)
+        across, sign = side == "ceiling", -1.0 if side == "left" else 1.0
+        moved = {}
+        for number, (body, at, corner) in enumerate(self.plane.contacts):
+            if (body, at) == (k, side):
+                a, b = _CORNERS[corner] * self.half[k] if damper.shape == "block" else (0.0, 0.0)
+                place = lift + a * tilt if across else along - b * tilt
+                moved[a if across else b] = self.plane.contact_gap[:, number] - play + sign * place
+        return [moved[point] for point in sorted(moved)]
+
+    def _ceiling(self, play: float, k: int, damper: Damper) -> np.ndarray:
+        """Return by how much the ceiling above a body has risen relative to the floor, (n, 2) at the body's ends."""
+        moved = self._moved(k, damper, "ceiling", play) if damper.shape != "slider" else [np.zeros(len(self.along))]
+        return np.column_stack([moved[0], moved[-1]])
+
+    def _wall(self, cavity: Cavity, inside: list[tuple[int, Damper]], side: str, height: float) -> np.ndarray:
+        """Return by how much a wall has moved along relative to the floor, (n, 2) at the floor and at a height."""
         k, damper = inside[0 if side == "left" else -1]
-        sign = 1.0 if side == "left" else -1.0
-        number = next(i for i, (body, at, _) in enumerate(self.plane.contacts) if (body, at) == (k, side))
-        along, _, tilt = self._pose(k, damper)
-        if damper.shape == "block":
-            along = along - _CORNERS[self.plane.contacts[number][2]][1] * self.half[k][1] * tilt
-        return along + sign * (cavity.gap / 2 - self.plane.contact_gap[:, number])
+        sign = -1.0 if side == "left" else 1.0
+        moved = self._moved(k, damper, side, cavity.gap / 2)
+        slope = (moved[-1] - moved[0]) / max(2 * self.half[k][1], 1e-300)
+        return sign * np.column_stack([moved[0], moved[0] + slope * height])
 
     def _points(self, number: int, bodies: list[BodyMotion]) -> np.ndarray:
         """Return the point of a body at which a contact acts (n, 2)."""
@@ -315,7 +341,7 @@ def _drawn(cavity: CavityMotion) -> dict[str, Any]:
         "name": cavity.name, "wall": _WALL, "height": round(cavity.height, 2),
         "box": [round(value, 2) for value in (left, -cavity.height - low, right - left, cavity.height + 2 * low)],
         "left": _short(cavity.left, 2), "right": _short(cavity.right, 2), "shift": _short(shift, 3),
-        "ceiling": [[round(value, 2) for value in part] for part in cavity.ceiling],
+        "ceiling": [{"ends": part.ends, "heights": _short(part.heights, 2)} for part in cavity.ceiling],
         "bodies": [
             {
                 "number": body.number + 1, "shape": body.shape, "colour": COLOURS[body.number % len(COLOURS)],

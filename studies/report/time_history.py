@@ -149,7 +149,8 @@ def history_figure(history: History) -> go.Figure:
     for row, (title, _, _) in enumerate(panels, start=3):
         figure.update_yaxes(title_text=title, row=row, col=1)
     end = milliseconds[-1]
-    figure.update_xaxes(range=[end - 1e3 * _SHOWN_PERIODS * history.period, end], hoverformat=".6g")
+    begin = max(end - 1e3 * _SHOWN_PERIODS * history.period, milliseconds[0])
+    figure.update_xaxes(range=[begin, end], hoverformat=".6g")
     figure.update_xaxes(title_text="time, ms", row=rows, col=1)
     figure.update_layout(hovermode="x unified")
     return dressed(figure, height=280 * rows)
