@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -130,6 +131,28 @@ def test_gaps_are_drawn_as_they_are(model, folder, response):
         moved = motion.cavities[0]
         assert np.ptp(moved.right[:, 0] - moved.left[:, 0]) > 0.01 * motion.scale * motion.factor * GAP
         assert (np.ptp(moved.shift, axis=0) > 0).all()
+
+
+def test_walls_and_ceilings_that_turn_are_drawn_so(folder):
+    """A gap at one corner that is larger for an instant: there the surface has moved away, by as much as it says."""
+    run_of(folder / "alone.h5", **ALONE)
+    history = History.load(folder / "alone.h5")
+    more = 1e-4
+    for side, corner in (("right", 2), ("left", 0), ("ceiling", 3)):
+        gap = history.plane.contact_gap.copy()
+        gap[-1, history.plane.contacts.index((0, side, corner))] += more
+        changed = replace(history, plane=history.plane._replace(contact_gap=gap)).motion()
+        (before,), (after,) = history.motion().cavities, changed.cavities
+        unit = changed.scale * changed.factor * more
+        shares = {
+            "left": (after.left - before.left) / unit, "right": (after.right - before.right) / unit,
+            "ceiling": (after.ceiling[0].heights - before.ceiling[0].heights) / unit,
+        }  # fmt: skip
+        tall = after.height / (2 * after.bodies[0].half[1])
+        expected = {"right": (0.0, tall), "left": (-1.0, tall - 1.0), "ceiling": (1.0, 0.0)}[side]
+        for name, moved in shares.items():
+            np.testing.assert_allclose(moved[-1], expected if name == side else (0.0, 0.0), atol=1e-9)
+            np.testing.assert_allclose(moved[:-1], 0.0, atol=1e-9)
 
 
 def test_faces_meet_where_they_are_drawn(folder, response):

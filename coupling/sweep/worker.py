@@ -133,9 +133,9 @@ def _run(
         value = getattr(response, name)
         row[place] = np.nan if value is None else value
     row[len(MEASURES) : len(COLUMNS)] = _shares(response)
-    if len(row) > len(COLUMNS):
-        values = [getattr(response, name) for name in IN_PLANE]
-        row[len(COLUMNS) :] = np.array(values, float).ravel()  # None, of sliders, is nan
+    of_bodies = np.reshape(row[len(COLUMNS) :], (len(IN_PLANE), -1))
+    for place, name in enumerate(IN_PLANE if of_bodies.size else ()):
+        of_bodies[place] = getattr(response, name)  # None, of sliders, is nan
     texts.append((response.status.value, response.classification))
     return response.final
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.response.response import PlanarSamples
-from vanedamp.coupling.scene.bodies import Cavity, Damper
+from vanedamp.coupling.scene.bodies import Cavity
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.report.charts import COLOURS
 
@@ -158,19 +158,16 @@ def motion_of(
     stride = -(-sampled // _MOST_FRAMES)
     frames = slice(max(len(time) // sampled - _PERIODS, 0) * sampled, None, stride)
     plane = plane.cut(frames)
-    time, half = time[frames], _half_extents(scene)
+    time, kinds, half = time[frames], _kinds(scene, plane), _half_extents(scene)
     factor = _factor(scene, half)
-    widths = [sum(2 * half[k][0] for k, _ in _inside(scene, cavity)) for cavity in scene.cavity]
+    widths = [sum(2 * half[k][0] for k in _inside(scene, cavity)) for cavity in scene.cavity]
     swing = min(factor, _rounded(_SWING * max(widths) / max(np.abs(plane.floor_along).max(), 1e-300)))
-    draw = _Drawing(scene, plane, along[frames], half, factor, swing, _WIDTH / max(widths))
-    light = {
-        place: np.where(closed, CLOSED, OPEN)
-        for place, closed in zip(range(len(plane.contacts)), plane.contact_closed.T, strict=True)
-    }
+    draw = _Drawing(scene, plane, along[frames], kinds, half, factor, swing, _WIDTH / max(widths))
+    light = np.where(plane.contact_closed, CLOSED, OPEN)
     for moment, place in impacts:
-        recent = (time >= moment - 1e-9 * period) & (time < moment + _FLASH * period)
-        for number in (number for number, other in enumerate(plane.contacts) if other == place):
-            light[number][recent] = HIT
+        recent = (time >= moment) & (time < moment + _FLASH * period)
+        struck = np.array([other == place for other in plane.contacts])
+        light[recent[:, None] & struck] = HIT
     cavities = [draw.cavity(cavity, light) for cavity in scene.cavity if _inside(scene, cavity)]
     return Motion(
         time / period, sampled // stride, displacement[frames], factor, swing, draw.scale, cavities, sampled,
@@ -184,34 +181,35 @@ class _Drawing:
     scene: Scene
     plane: PlanarSamples
     along: np.ndarray
+    kinds: list[str]
     half: list[tuple[float, float]]
     factor: float
     swing: float
     scale: float
 
-    def cavity(self, cavity: Cavity, light: Mapping[int, np.ndarray]) -> CavityMotion:
-        """Draw a cavity and its bodies, which stand from left to right."""
+    def cavity(self, cavity: Cavity, light: np.ndarray) -> CavityMotion:
+        """Draw a cavity and its bodies, which stand from left to right. light: (n, contacts)."""
         inside = _inside(self.scene, cavity)
-        length = sum(2 * self.half[k][0] for k, _ in inside)
+        length = sum(2 * self.half[k][0] for k in inside)
         bodies, places, ceiling, at = [], [], [], -length / 2
-        for k, damper in inside:
+        for k in inside:
             places.append(at + self.half[k][0])
-            bodies.append(self._body(k, damper, places[-1]))
+            bodies.append(self._body(k, places[-1]))
             at += 2 * self.half[k][0]
-        highest = max(2 * self.half[k][1] for k, _ in inside)
+        highest = max(2 * self.half[k][1] for k in inside)
         if cavity.play is not None:
-            for (k, damper), place in zip(inside, places, strict=True):
+            for k, place in zip(inside, places, strict=True):
                 a, b = self.half[k]
-                heights = 2 * b + self.factor * (cavity.play + self._ceiling(cavity.play, k, damper))
+                heights = 2 * b + self.factor * (cavity.play + self._ceiling(cavity.play, k))
                 ceiling.append(CeilingPart((self.scale * (place - a), self.scale * (place + a)), self.scale * heights))
             highest += self.factor * cavity.play
         walls = [self._wall(cavity, inside, side, highest) for side in ("left", "right")]
-        k = inside[0][0]
+        k = inside[0]
         rotation = self.plane.floor_rotation[:, k]
         across = np.nan_to_num(self.plane.floor_across[:, k]) - rotation * places[0]
         shift = self.swing * np.column_stack([self.scale * self.plane.floor_along[:, k], self.scale * across, rotation])
         contacts = [
-            ContactMotion(place, self._points(number, bodies), light[number])
+            ContactMotion(place, self._points(number, bodies), light[:, number])
             for number, place in enumerate(self.plane.contacts)
             if place[1] != "stop" and any(body.number == place[0] for body in bodies)
         ]
@@ -221,53 +219,53 @@ class _Drawing:
         )
         return CavityMotion(cavity.name, left, right, ceiling, shift, self.scale * highest, bodies, contacts)
 
-    def _pose(self, k: int, damper: Damper) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _pose(self, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return along, lift and tilt (n,) of a body in the frame of its floor: at its centre, not at its foot."""
-        b = 0.0 if damper.shape == "slider" else self.half[k][1]
+        b = 0.0 if self.kinds[k] == "slider" else self.half[k][1]
         along = self.along[:, k] + b * self.plane.floor_rotation[:, k]
         return along, np.nan_to_num(self.plane.body_lift[:, k]), np.nan_to_num(self.plane.body_tilt[:, k])
 
-    def _body(self, k: int, damper: Damper, place: float) -> BodyMotion:
-        along, lift, tilt = self._pose(k, damper)
+    def _body(self, k: int, place: float) -> BodyMotion:
+        along, lift, tilt = self._pose(k)
         a, b = self.half[k]
         centre = np.column_stack([place + self.factor * along, b + self.factor * lift])
         turn = self.factor * tilt[:, None]
-        if damper.shape == "disc":
+        if self.kinds[k] == "disc":
             rim = a * np.hstack([-np.sin(turn), np.cos(turn)])
             outline = np.stack([centre, centre + rim], axis=1)
         else:
             outline = centre[:, None, :] + _turned(turn, _CORNERS * (a, b))
         return BodyMotion(
-            k, damper.shape, (self.scale * a, self.scale * b), self.scale * outline, self.along[:, k],
+            k, self.kinds[k], (self.scale * a, self.scale * b), self.scale * outline, self.along[:, k],
             self.plane.body_lift[:, k], self.plane.body_tilt[:, k],
         )  # fmt: skip
 
-    def _moved(self, k: int, damper: Damper, side: str, play: float) -> list[np.ndarray]:
+    def _moved(self, k: int, side: str, play: float) -> list[np.ndarray]:
         """Return by how much a surface has moved towards its outside, relative to the floor: (n,) at each contact.
 
         That is its gap less what the body's pose leaves of the play; corners in the order of their height, or from
         left to right.
         """
-        along, lift, tilt = self._pose(k, damper)
+        along, lift, tilt = self._pose(k)
         across, sign = side == "ceiling", -1.0 if side == "left" else 1.0
         moved = {}
         for number, (body, at, corner) in enumerate(self.plane.contacts):
             if (body, at) == (k, side):
-                a, b = _CORNERS[corner] * self.half[k] if damper.shape == "block" else (0.0, 0.0)
+                a, b = _CORNERS[corner] * self.half[k] if corner >= 0 else (0.0, 0.0)
                 place = lift + a * tilt if across else along - b * tilt
                 moved[a if across else b] = self.plane.contact_gap[:, number] - play + sign * place
         return [moved[point] for point in sorted(moved)]
 
-    def _ceiling(self, play: float, k: int, damper: Damper) -> np.ndarray:
+    def _ceiling(self, play: float, k: int) -> np.ndarray:
         """Return by how much the ceiling above a body has risen relative to the floor, (n, 2) at the body's ends."""
-        moved = self._moved(k, damper, "ceiling", play) if damper.shape != "slider" else [np.zeros(len(self.along))]
+        moved = self._moved(k, "ceiling", play) or [np.zeros(len(self.along))]
         return np.column_stack([moved[0], moved[-1]])
 
-    def _wall(self, cavity: Cavity, inside: list[tuple[int, Damper]], side: str, height: float) -> np.ndarray:
+    def _wall(self, cavity: Cavity, inside: list[int], side: str, height: float) -> np.ndarray:
         """Return by how much a wall has moved along relative to the floor, (n, 2) at the floor and at a height."""
-        k, damper = inside[0 if side == "left" else -1]
+        k = inside[0 if side == "left" else -1]
         sign = -1.0 if side == "left" else 1.0
-        moved = self._moved(k, damper, side, cavity.gap / 2)
+        moved = self._moved(k, side, cavity.gap / 2)
         slope = (moved[-1] - moved[0]) / max(2 * self.half[k][1], 1e-300)
         return sign * np.column_stack([moved[0], moved[0] + slope * height])
 
@@ -302,15 +300,25 @@ def _heights(body: BodyMotion, other: BodyMotion) -> list[float]:
     return [0.0, 2 * min(body.half[1], other.half[1])]
 
 
-def _inside(scene: Scene, cavity: Cavity) -> list[tuple[int, Damper]]:
-    return [(k, damper) for k, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
+def _inside(scene: Scene, cavity: Cavity) -> list[int]:
+    """Return the numbers of the bodies in a cavity."""
+    return [k for k, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
+
+
+def _kinds(scene: Scene, plane: PlanarSamples) -> list[str]:
+    """Return as what each body ran: a body without tilt is a slider, whatever the scene's shape allows."""
+    return [
+        "slider" if np.isnan(tilt).any() else "block" if damper.radius is None else "disc"
+        for damper, tilt in zip(scene.damper, plane.body_tilt.T, strict=True)
+    ]
 
 
 def _half_extents(scene: Scene) -> list[tuple[float, float]]:
-    """Return half length and half height of every body; sliders have none, and are drawn like the others."""
-    known = [damper.half_extent for damper in scene.damper if damper.shape != "slider"]
+    """Return half length and half height of every body; those without any are drawn like the others."""
+    extents = [damper.half_extent for damper in scene.damper]
+    known = [extent for extent in extents if extent[0] > 0.0]
     a, b = np.mean(known, axis=0) if known else np.array([1.5, 1.0]) * max(cavity.gap for cavity in scene.cavity)
-    return [(float(a), float(b)) if damper.shape == "slider" else damper.half_extent for damper in scene.damper]
+    return [extent if extent[0] > 0.0 else (float(a), float(b)) for extent in extents]
 
 
 def _factor(scene: Scene, half: list[tuple[float, float]]) -> float:
@@ -319,8 +327,8 @@ def _factor(scene: Scene, half: list[tuple[float, float]]) -> float:
     for cavity in scene.cavity:
         inside = _inside(scene, cavity)
         if inside:
-            bounds.append(_ALONG * sum(2 * half[k][0] for k, _ in inside) / cavity.gap)
-            bounds.append(_ACROSS * min(2 * half[k][1] for k, _ in inside) / (cavity.play or 1e-300))
+            bounds.append(_ALONG * sum(2 * half[k][0] for k in inside) / cavity.gap)
+            bounds.append(_ACROSS * min(2 * half[k][1] for k in inside) / (cavity.play or 1e-300))
     return max(_rounded(min(bounds)), 1.0)
 
 

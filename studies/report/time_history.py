@@ -161,9 +161,10 @@ def _planar_panels(history: History) -> list[tuple[str, np.ndarray, str]]:
     if history.plane is None:
         return []
     lift, tilt = 1e6 * history.plane.body_lift, 1e3 * history.plane.body_tilt.copy()
-    shapes = [damper.shape for damper in history.scene.damper] if history.scene else []
-    if "block" in shapes:  # beside the turns of discs their tilts would not show
-        tilt[:, [shape == "disc" for shape in shapes]] = np.nan
+    if history.scene is not None:
+        discs = np.array([damper.radius is not None for damper in history.scene.damper])
+        if np.isfinite(tilt[:, ~discs]).any():  # beside the turns of discs, tilts would not show
+            tilt[:, discs] = np.nan
     return [("above the floor, µm", lift, "µm"), ("tilt, mrad", tilt, "mrad")]
 
 
