@@ -342,6 +342,14 @@ def test_peak_is_refused_where_it_could_not_be_run(tmp_path, capsys):
         assert not list(tmp_path.glob("*.h5*"))
 
 
+def test_no_peak_is_told(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(SCENE + SWEEP + "[solver]\nmax_events = 1\n")
+    options = ["-o", str(tmp_path / "sweep.h5"), "--peak", str(tmp_path / "peak.h5"), "--workers", "1"]
+    assert main(["sweep", str(tmp_path / "scene.toml"), *options]) == 0
+    assert "--peak: no point is ok" in capsys.readouterr().err
+    assert [file.name for file in tmp_path.glob("*.h5*")] == ["sweep.h5"]
+
+
 def test_sweep_of_sliders_has_no_section_of_tilt(tmp_path):
     (tmp_path / "scene.toml").write_text(re.sub(r"shape.*\nlength.*\nheight.*\ntilt.*\n", "", SCENE) + SWEEP)
     assert main(["sweep", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "sweep.h5"), "--workers", "1"]) == 0
