@@ -71,8 +71,8 @@ class PlanarSamples(NamedTuple):
     body_lift: (n, b) m, height of each body's centre above that of the body flat on its floor; body_tilt: (n, b) rad,
     relative to the cavity, against the clock. floor_along, floor_across: (n, b) m, displacement of the floor under a
     body, that of a base which is prescribed to move included; floor_rotation: (n, b) rad. contact_gap: (n, c) m;
-    contact_closed: (n, c) bool. Lift, tilt and floor_across are nan for sliders. contacts: body, side and corner of
-    each contact, as of an Event.
+    contact_closed: (n, c) bool, of methods with time steps whether it carried force in the step before. Lift, tilt and
+    floor_across are nan for sliders. contacts: body, side and corner of each contact, as of an Event.
     """
 
     body_lift: np.ndarray
