@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -24,8 +24,8 @@ class ModalBasis:
     """Modes of a structure without bodies.
 
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); base: (n, 3) load of an acceleration of the
-    base. By interface label: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), and residual
-    flexibility, m/N, which the modes lack.
+    base. By interface label: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), residual flexibility,
+    m/N, which the modes lack, and positions (3,), m, where they are known. rotations: labels of angles.
     """
 
     stiffness: np.ndarray
@@ -35,6 +35,8 @@ class ModalBasis:
     directions: dict[str, np.ndarray]
     normals: dict[str, np.ndarray]
     flexibility: dict[str, float]
+    positions: dict[str, np.ndarray] = field(default_factory=dict)
+    rotations: frozenset[str] = frozenset()
 
 
 #: direction of the one axis that a structure without an interface has
@@ -105,4 +107,9 @@ def modal_basis(model: ReducedModel) -> ModalBasis:
     own = np.zeros(len(model.interface)) if residual is None else np.diag(residual)
     flexibility = dict(zip(model.interface, own.tolist(), strict=True))
     base = frozen(shapes.T @ model.base_load)
-    return ModalBasis(frozen(squares), frozen(damping), base, rows, directions, normals, flexibility)
+    places = {} if model.positions is None else dict(zip(model.interface, model.positions, strict=True))
+    arms = np.zeros(len(model.interface)) if model.arms is None else model.arms
+    rotations = frozenset(label for label, arm in zip(model.interface, arms, strict=True) if arm > 0.0)
+    return ModalBasis(
+        frozen(squares), frozen(damping), base, rows, directions, normals, flexibility, places, rotations
+    )  # fmt: skip

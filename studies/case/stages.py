@@ -29,7 +29,14 @@ from vanedamp.modal.stress import HotSpot, hot_spot
 from vanedamp.modal.units import doubts
 from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
 from vanedamp.rom.error_estimate import LadderError, choose, frequency_grid, rigid_errors
-from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, normal_direction
+from vanedamp.rom.interface import (
+    Interface,
+    InterfaceCoordinate,
+    InterfaceError,
+    normal_direction,
+    outward_normal,
+    plane_motion,
+)
 from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.calibration_tables import CalibrationTable
@@ -86,20 +93,38 @@ def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
 def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
     """Return the case's interface coordinates on its matrices, all of them or those named."""
     tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
-    coordinates = [
-        InterfaceCoordinate(label, table.facets, _direction(label, table, matrices), table.kind, table.motion)
-        for label, table in tables.items()
-    ]
+    coordinates = [item for label, table in tables.items() for item in _coordinates(label, table, matrices)]
     return Interface.on_patches(matrices, coordinates)
 
 
-def _direction(label: str, table: InterfaceTable, matrices: SystemMatrices) -> tuple[float, float, float]:
-    if table.direction != "normal":
-        return table.direction
+def _coordinates(label: str, table: InterfaceTable, matrices: SystemMatrices) -> list[InterfaceCoordinate]:
+    """Return the interface coordinates of a table: one, or those of a motion in a plane."""
+    direction = _direction(label, "direction", table.direction, table, matrices)
+    if not table.planar:
+        return [InterfaceCoordinate(label, table.facets, direction, table.kind, table.motion)]
+    normal = table.normal
+    if normal is None:
+        try:
+            normal = outward_normal(matrices, table.facets)
+        except InterfaceError:
+            raise InputError(
+                f"interface.{label}.normal: missing; give the direction across, out of the floor into the cavity, or "
+                "the floor's facet group"
+            ) from None
+    across = _direction(label, "normal", normal, table, matrices)
+    return plane_motion(matrices, label, table.facets, direction, across, table.kind)
+
+
+def _direction(
+    label: str, key: str, given: tuple[float, float, float] | str, table: InterfaceTable, matrices: SystemMatrices
+) -> tuple[float, float, float]:
+    """Return a direction of a table: numbers, "normal" for its facets' own, or the normal of a facet group."""
+    if not isinstance(given, str):
+        return given
     try:
-        return normal_direction(matrices, table.facets)
+        return normal_direction(matrices, table.facets) if given == "normal" else outward_normal(matrices, given)
     except InterfaceError as error:
-        raise InputError(f"interface.{label}.direction: {error}") from None
+        raise InputError(f"interface.{label}.{key}: {error}") from None
 
 
 @dataclass(frozen=True, eq=False)
