@@ -148,8 +148,9 @@ def _check_across(cavity: Cavity, key: str, directions: Vectors, normals: Vector
         angle = _angle(across, sign * normals[surface])
         if angle > 90.0 - _ALONG:
             raise InputError(
-                f"{key}.{side}: the facets of '{surface}' look along {_format(normals[surface])}, {angle:.0f} degrees off "
-                f"a {side}'s in a cavity whose direction across is {_format(across)}; name its {side}, or mend `normal`"
+                f"{key}.{side}: the facets of '{surface}' look along {_format(normals[surface])}, which is "
+                f"{angle:.0f} degrees off a {side}'s where the direction across is {_format(across)}; name the {side}, "
+                "or mend `normal`"
             )
 
 
