@@ -123,15 +123,15 @@ def plane_motion(
         offsets = matrices.coordinates[patch.nodes] - _centroid(matrices, patch)
         middle = 0.5 * (np.min(offsets @ first) + np.max(offsets @ first))
         point = _triple(_centroid(matrices, patch) + middle * first + np.min(offsets @ second) * second)
-    own = "node" if kind == "node" else "average"
+    own, one = "node" if kind == "node" else "average", facets if isinstance(facets, str) else groups
     motion = [
-        InterfaceCoordinate(label, groups, _triple(first), own, point=point),
-        InterfaceCoordinate(label + NORMAL, groups, _triple(second), own, point=point),
+        InterfaceCoordinate(label, one, _triple(first), own, point=point),
+        InterfaceCoordinate(label + NORMAL, one, _triple(second), own, point=point),
     ]
     if kind == "node":
         return motion
     axis = _triple(np.cross(first, second))
-    return [*motion, InterfaceCoordinate(label + ROTATION, groups, axis, own, "rotation")]
+    return [*motion, InterfaceCoordinate(label + ROTATION, one, axis, own, "rotation")]
 
 
 def normal_direction(matrices: SystemMatrices, facets: str | Sequence[str]) -> tuple[float, float, float]:
