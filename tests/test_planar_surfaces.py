@@ -13,10 +13,12 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.planar.constraints import planar_system
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble as assemble_scene
+from vanedamp.coupling.system.modal_basis import modal_basis
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.modal import msh
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.truncation import massless
 from vanedamp.studies.case.stages import assemble, interface, modal_analysis, reduction
 from vanedamp.studies.case.tables import Case
 
@@ -270,6 +272,37 @@ def test_a_rigid_model_of_the_mode(tmp_path):
     assert one.impacts_per_period > 1
     # the reduced model has the mode within 1e-9 or so; impacts let differences grow
     np.testing.assert_allclose(two.peak[:4], one.peak[:4], rtol=1e-4)
+
+
+def test_residual_flexibility_at_a_corner(cluster_files):
+    """A point of a patch yields by what its own row lacks of the static flexibility, with all it shares."""
+    model = ReducedModel.load(cluster_files / "patches.h5")
+    basis = modal_basis(massless(model, 2))
+    row = model.row("c1.normal") + 0.007 * model.row("c1.rotation")
+    squares, shapes = model.natural
+    lacking = (((row @ shapes) ** 2) / squares)[2:].sum()
+    assert basis.flexibility({"c1.normal": 1.0, "c1.rotation": 0.007}) == pytest.approx(lacking, rel=1e-9)
+    assert basis.flexibility({"c1.normal": 1.0}) < lacking
+    assert modal_basis(model).flexibility({"c1.normal": 1.0}) == 0.0
+
+
+def test_a_slider_on_patches_that_yield(cluster_files):
+    """The compliant law takes the residual flexibility of a patch's motion along: a shorter contact without it."""
+    patches = {"left": "left", "right": "right", "floor": "c1"}
+    slider = {"cavity": "c1", "mass": 0.003, "restitution": 1.0, "velocity": 0.3}
+    scene = cluster_scene(cluster_files / "patches.h5", patches).replace(
+        {"damper": [slider], "structure.modes": 2, "structure.natural": True, "time.periods": 20}
+    )
+    springs = []
+    for residual in (False, True):
+        law = {"law": "compliant", "stiffness": 1e8, "residual": residual}
+        yielding = scene.replace({"contact": law})
+        assert simulate(yielding).energy_residual < 1e-10
+        springs.append(assemble_scene(yielding).spring[-2:])
+    model = ReducedModel.load(cluster_files / "patches.h5")
+    own = np.diag(massless(model, 2).residual_flexibility)
+    lacking = [own[model.interface.index(label)] for label in ("left", "right")]
+    np.testing.assert_allclose(1 / springs[1] - 1 / springs[0], lacking, rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -24,8 +25,9 @@ class ModalBasis:
     """Modes of a structure without bodies.
 
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); base: (n, 3) load of an acceleration of the
-    base. By interface label: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), residual flexibility,
-    m/N, which the modes lack, and positions (3,), m, where they are known. rotations: labels of angles.
+    base. By interface label, in one order: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), and
+    positions (3,), m, where they are known. rotations: labels of angles. residual: (k, k) m/N, flexibility of the
+    interface that the modes lack; None: nothing.
     """
 
     stiffness: np.ndarray
@@ -34,9 +36,20 @@ class ModalBasis:
     rows: dict[str, np.ndarray]
     directions: dict[str, np.ndarray]
     normals: dict[str, np.ndarray]
-    flexibility: dict[str, float]
     positions: dict[str, np.ndarray] = field(default_factory=dict)
     rotations: frozenset[str] = frozenset()
+    residual: np.ndarray | None = None
+
+    def flexibility(self, shares: Mapping[str, float]) -> float:
+        """Return the residual flexibility, m/N, of a displacement that is the sum of shares of interface coordinates.
+
+        shares: by label, such as 1 of a patch's motion across and x of its rotation for its point at x.
+        """
+        if self.residual is None:
+            return 0.0
+        places = [list(self.rows).index(label) for label in shares]
+        weights = np.array(list(shares.values()))
+        return float(weights @ self.residual[np.ix_(places, places)] @ weights)
 
 
 #: direction of the one axis that a structure without an interface has
@@ -63,11 +76,11 @@ def basis_of(scene: Scene) -> ModalBasis:
         root = np.sqrt(structure.mass)
         return ModalBasis(
             frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
-            frozen([root * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {}, {},
+            frozen([root * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {},
         )  # fmt: skip
     if isinstance(structure, Prescribed):
         none = np.zeros(0)
-        return ModalBasis(none, np.zeros((0, 0)), np.zeros((0, 3)), {"structure": none}, {"structure": _AXIS}, {}, {})
+        return ModalBasis(none, np.zeros((0, 0)), np.zeros((0, 3)), {"structure": none}, {"structure": _AXIS}, {})
     return _rom_basis(structure, file_stamp(structure.file))
 
 
@@ -103,13 +116,10 @@ def modal_basis(model: ReducedModel) -> ModalBasis:
     directions = dict(zip(model.interface, model.directions, strict=True))
     unknown = np.zeros((len(model.interface), 3))
     normals = dict(zip(model.interface, unknown if model.normals is None else model.normals, strict=True))
-    residual = model.residual_flexibility
-    own = np.zeros(len(model.interface)) if residual is None else np.diag(residual)
-    flexibility = dict(zip(model.interface, own.tolist(), strict=True))
     base = frozen(shapes.T @ model.base_load)
     places = {} if model.positions is None else dict(zip(model.interface, model.positions, strict=True))
     arms = np.zeros(len(model.interface)) if model.arms is None else model.arms
     rotations = frozenset(label for label, arm in zip(model.interface, arms, strict=True) if arm > 0.0)
     return ModalBasis(
-        frozen(squares), frozen(damping), base, rows, directions, normals, flexibility, places, rotations
+        frozen(squares), frozen(damping), base, rows, directions, normals, places, rotations, model.residual_flexibility
     )  # fmt: skip
