@@ -144,7 +144,7 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         floor[k, :n], turn[k, :n] = cavities[owner[k]][FLOOR].along, cavities[owner[k]][FLOOR].turn
         if body.damper.shape != "slider":
             label = surface_labels(scene, owner[k])[2]
-            normal = basis.directions.get(label + NORMAL)
+            normal = basis.across(label)
             _, across = scene.gravity.components(basis.directions[label], normal)
             mass[x + 1], weight[x + 1] = body.damper.mass, -body.damper.mass * across
             if normal is not None:
@@ -230,6 +230,8 @@ def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> tuple[_Surface, ..
     x_floor = 0.0 if places is None else places[FLOOR][0]
     surfaces = []
     for side, label in enumerate(labels):
+        x: float | None
+        y: float | None
         x, y = (0.0, 0.0) if places is None else places[side]
         own = label != below and label + NORMAL in basis.rows
         if label != below and label + ROTATION in basis.rows and (places is None or not own):
@@ -237,16 +239,14 @@ def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> tuple[_Surface, ..
                 f"{key}.{SURFACES[side]}: '{label}' has a rotation, but '{label}' or '{below}' lacks its place or its "
                 'motion across; take kind = "patch" for both'
             )
-        surfaces.append(
-            _Surface(
-                rows[side],
-                basis.rows[label + NORMAL] if own else across,
-                basis.rows.get(label + ROTATION, turn),
-                # a wall's motion across, and a ceiling's along, are those where it is touched
-                None if own and side != CEILING else x if own else x_floor,
-                None if label != below and side == CEILING else y,
-            )
-        )
+        if not own:
+            x = x_floor
+        elif side != CEILING:
+            x = None  # a wall is touched on its plane, and a ceiling, wherever they are
+        if side == CEILING and label != below:
+            y = None
+        moves_across = basis.rows[label + NORMAL] if own else across
+        surfaces.append(_Surface(rows[side], moves_across, basis.rows.get(label + ROTATION, turn), x, y))
     return tuple(surfaces)
 
 
@@ -256,9 +256,9 @@ def _places(basis: ModalBasis, labels: tuple[str, ...]) -> list[tuple[float, flo
     labels: of left wall, right wall, floor and ceiling.
     """
     left, right, floor, _ = labels
-    if not all(label in basis.positions for label in labels) or floor + NORMAL not in basis.directions:
+    across, along, at = basis.across(floor), basis.directions[floor], basis.positions
+    if across is None or not all(label in at for label in labels):
         return None
-    along, across, at = basis.directions[floor], basis.directions[floor + NORMAL], basis.positions
     middle = at[floor] if floor in (left, right) else 0.5 * (at[left] + at[right])
     return [(float((at[label] - middle) @ along), float((at[label] - at[floor]) @ across)) for label in labels]
 

@@ -45,15 +45,16 @@ def check_known(scene: Scene, directions: Vectors) -> None:
     """Raise InputError where base acceleration or gravity need a direction that the reduced model does not know."""
     excitation, gravity = scene.excitation, scene.gravity
     reasons = ["excitation.base_acceleration"] if excitation.base_acceleration else []
-    wanted = {"excitation.at": excitation.at} if reasons else {}
+    wanted = [("excitation.at", str(excitation.at))] if reasons else []
     if gravity.direction is not None and gravity.acceleration:
         reasons.append("gravity.direction")
     if reasons:
         used = {damper.cavity for damper in scene.damper}
         cavities = [(index, cavity) for index, cavity in enumerate(scene.cavity) if cavity.name in used]
-        wanted |= {f"cavity[{index}].floor": cavity.labels()[2] for index, cavity in cavities}
-    for key, label in wanted.items():
-        if not directions[str(label)].any():
+        floors = [(f"cavity[{index}].floor", str(cavity.labels()[2])) for index, cavity in cavities]
+        wanted += floors + [(key, label + NORMAL) for key, label in floors if label + NORMAL in directions]
+    for key, label in wanted:
+        if not directions[label].any():
             raise InputError(
                 f"{key}: the reduced model knows no direction of '{label}', which {reasons[0]} needs; give the "
                 "interface coordinate a direction and reduce or import again"
@@ -142,9 +143,9 @@ def _check_across(cavity: Cavity, key: str, directions: Vectors, normals: Vector
                 f"and {_format(across)}: all surfaces take the one `normal` out of the floor; mend the interface's and "
                 "reduce again"
             )
-    for side, surface, sign in (("floor", cavity.floor, 1.0), ("ceiling", cavity.ceiling, -1.0)):
-        if surface is None or (surface == floor) != (side == "floor"):
-            continue  # one label for several surfaces may be any of them
+    for side, surface, sign in (("floor", floor, 1.0), ("ceiling", cavity.ceiling or floor, -1.0)):
+        if side == "ceiling" and surface == floor:
+            continue
         angle = _angle(across, sign * normals[surface])
         if angle > 90.0 - _ALONG:
             raise InputError(

@@ -14,7 +14,7 @@ from vanedamp.coupling.system.reduced_model_file import file_stamp, reduced_mode
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.dense_modes import rounding
-from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.reduced import NORMAL, ReducedModel
 
 # share of a natural frequency that round-off of the stiffness may be worth
 _FREQUENCY_ERROR = 1e-3
@@ -39,6 +39,11 @@ class ModalBasis:
     positions: dict[str, np.ndarray] = field(default_factory=dict)
     rotations: frozenset[str] = frozenset()
     residual: np.ndarray | None = None
+
+    def across(self, label: str) -> np.ndarray | None:
+        """Return the direction (3,) of the motion across beside that of an interface label; None where unknown."""
+        direction = self.directions.get(label + NORMAL)
+        return direction if direction is not None and direction.any() else None
 
     def flexibility(self, shares: Mapping[str, float]) -> float:
         """Return the residual flexibility, m/N, of a displacement that is the sum of shares of interface coordinates.
