@@ -1,5 +1,7 @@
 """Motion of patches in a plane: along, across and rotation, of rigid motions, of a beam's tip, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
@@ -55,15 +57,9 @@ def test_rigid_motions_of_a_patch(block, facets):
 
 
 def functional(matrices, coordinate):
-    free = Interface.on_patches(turned_loose(matrices), [coordinate])
-    return np.array(free.vectors[:, 0])
-
-
-def turned_loose(matrices):
-    """The structure without supports, on which a root can be a patch, too."""
-    from dataclasses import replace
-
-    return replace(matrices, fixed=np.array([], np.int64))
+    """The functional of a coordinate on the structure without supports, on which a root can be a patch, too."""
+    loose = replace(matrices, fixed=np.array([], np.int64))
+    return Interface.on_patches(loose, [coordinate]).vectors[:, 0]
 
 
 def test_places_and_arms(block):
@@ -173,3 +169,19 @@ def test_a_node_has_two_coordinates():
 def test_a_point_is_for_means():
     with pytest.raises(InterfaceError, match='c: a point is for the translation of a patch of kind "average"'):
         InterfaceCoordinate("c", "a", (1, 0, 0), "rigid", point=(0.0, 0.0, 0.0))
+
+
+def test_a_node_set_is_a_patch():
+    """Nodes without facets: their weighted best rigid motion, in a plane of given directions."""
+    matrices = truss()
+    along, across = np.array([0.6, 0.8, 0.0]), np.array([0.0, 0.0, 1.0])
+    vectors = Interface.on_patches(matrices, plane_motion(matrices, "n", "a", along, across)).vectors
+    shift, turn = np.random.default_rng(6).standard_normal((2, 3))
+    patch = matrices.patch("a")
+    place = patch.weights @ matrices.coordinates[patch.nodes] / patch.area
+    moved = shift + np.cross(turn, place)
+    rigid = (shift + np.cross(turn, matrices.coordinates)).ravel()
+    expected = [moved @ along, moved @ across, turn @ np.cross(along, across)]
+    np.testing.assert_allclose(vectors.T @ rigid, expected, atol=1e-12)
+    with pytest.raises(InterfaceError, match="'a' has no normal: it is a node set"):
+        outward_normal(matrices, "a")
