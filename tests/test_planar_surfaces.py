@@ -336,8 +336,12 @@ def test_a_slider_on_patches_that_yield(cluster_files):
     ],
 )
 def test_surfaces_at_the_wrong_place_are_refused(cluster_files, surfaces, message):
+    scene = cluster_scene(cluster_files / "patches.h5", surfaces)
     with pytest.raises(InputError, match=message):
-        simulate(cluster_scene(cluster_files / "patches.h5", surfaces))
+        simulate(scene)
+    # a slider moves along only
+    slider = {"cavity": "c1", "mass": 0.003}
+    assert simulate(scene.replace({"damper": [slider], "time.periods": 2})).status == "ok"
 
 
 def test_a_ceiling_with_a_direction_of_its_own_is_refused(tmp_path):

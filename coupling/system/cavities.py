@@ -39,6 +39,9 @@ def check_directions(scene: Scene, basis: ModalBasis) -> None:
     check_displacements(scene, basis.rotations)
     check_known(scene, basis.directions)
     check_surfaces(scene.cavity, basis.directions, basis.normals)
+    if scene.planar:
+        for index, cavity in enumerate(scene.cavity):
+            _check_across(cavity, f"cavity[{index}]", basis.directions, basis.normals)
 
 
 def check_known(scene: Scene, directions: Vectors) -> None:
@@ -82,7 +85,6 @@ def check_surfaces(cavities: Sequence[Cavity], directions: Vectors, normals: Vec
     for index, cavity in enumerate(cavities):
         _check_parallel(cavity, f"cavity[{index}]", directions)
         _check_walls(cavity, f"cavity[{index}]", directions, normals)
-        _check_across(cavity, f"cavity[{index}]", directions, normals)
 
 
 def _check_parallel(cavity: Cavity, key: str, directions: Vectors) -> None:
