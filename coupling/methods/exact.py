@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.scene.solver_options import SolverOptions
-from vanedamp.files.toml_input import Positive
+from vanedamp.coupling.scene.solver_options import PlanarOptions, SolverOptions
 
 if TYPE_CHECKING:  # a scene takes the options without the engine
     from vanedamp.coupling.response.evaluation import Run
@@ -19,11 +18,10 @@ VARIANTS = (Variant("exact engine", "#1d4f91", "*", setting=None),)
 RESTARTS = True
 
 
-class Options(SolverOptions):
-    """linearisation: how much a tilt may shorten a body, as a share of the smallest play; beyond, a run is not ok."""
+class Options(PlanarOptions):
+    """No options of its own."""
 
     method: Literal["exact"] = "exact"
-    linearisation: Positive = 0.01
 
 
 def begin(system: System, options: SolverOptions, initial: InitialMotion, records: Records, events: bool) -> Run:

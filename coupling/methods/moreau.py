@@ -16,6 +16,7 @@ from pydantic import Field
 
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
+from vanedamp.coupling.methods.planar.start import planar_start
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
     apply_inverse,
@@ -31,13 +32,12 @@ from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, PERIOD, SOLVES, UNDECIDED
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.constraints import planar_motion, planar_system
 from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.solver_options import SteppingOptions
-from vanedamp.coupling.system.assembly import InitialMotion, Loads, loads_of
+from vanedamp.coupling.scene.solver_options import PlanarOptions, SteppingOptions
+from vanedamp.coupling.system.assembly import InitialMotion, Loads
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Real
@@ -51,7 +51,7 @@ _TURNS, _ROUND_OFF = 20, 1e-12
 _CLOSED = 4
 
 
-class Options(SteppingOptions):
+class Options(SteppingOptions, PlanarOptions):
     """theta: weight of a step's end in the smooth forces; 1/2 is of second order, 1 damps."""
 
     method: Literal["moreau"] = "moreau"
@@ -81,27 +81,18 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
 
     Raises InputError for what bodies with extent do not allow.
     """
-    from vanedamp.coupling.planar import moreau as planar  # its kernels are loaded when they are wanted
+    from vanedamp.coupling.methods.planar import moreau as planar  # its kernels are loaded when they are wanted
+    from vanedamp.coupling.methods.planar.step_records import SteppedMotion, start_steps
 
-    system, signal = planar_system(scene, flat), scene.excitation.signal
-    coordinates = [*range(flat.modes), *system.along]
-
-    def loads(angle: np.ndarray) -> np.ndarray:
-        if signal is None:
-            return (flat.phases(angle) @ system.load).real
-        load = np.zeros((len(angle), len(system.mass)))
-        load[:, coordinates] = loads_of(scene, signal)(angle)
-        return load
-
-    times, theta = time_grid(flat, options.steps_per_period, loads), options.theta
+    system, initial, times = planar_start(scene, flat, options.steps_per_period)
+    theta, budget, deepest = options.theta, options.max_events, options.penetration
     matrices = planar.step_matrices(system, times.step, theta)
-    budget, deepest = options.max_events, options.penetration
 
-    def march(motion: planar.SteppedMotion, log: np.ndarray, periods: int) -> int:
+    def march(motion: SteppedMotion, log: np.ndarray, periods: int) -> int:
         return planar.march(system, times, motion, records, log, *matrices, theta, periods, budget, deepest)
 
-    motion = planar.start_steps(system, planar_motion(scene, flat, system), records)
-    plane = plane_of(system, motion.tilt, motion.lifted, motion.sampled, motion.shut, np.inf)
+    motion = start_steps(system, initial, records)
+    plane = plane_of(system, motion.tilt, motion.lifted, motion.sampled, motion.shut, options.linearisation)
     return SteppedRun(flat, march, motion, records, events, plane)
 
 

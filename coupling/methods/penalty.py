@@ -12,13 +12,17 @@ from vanedamp.coupling.methods.central_difference import central_difference_matr
 from vanedamp.coupling.methods.equations_of_motion import Motion, start, time_grid
 from vanedamp.coupling.methods.newmark import march_newmark, newmark_matrices
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, with_penalty
+from vanedamp.coupling.methods.planar.start import planar_start
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.complementarity import new_problem
+from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.solver_options import PlanarOptions
 from vanedamp.coupling.system.assembly import InitialMotion, Loads
 from vanedamp.coupling.system.system import System
-from vanedamp.files.toml_input import Real
+from vanedamp.files.toml_input import InputError, Real
 
 VARIANTS = (
     Variant("penalty, central differences", "#15803d", "s"),
@@ -28,7 +32,7 @@ VARIANTS = (
 WAVEFORMS = True
 
 
-class Options(PenaltyOptions):
+class Options(PenaltyOptions, PlanarOptions):
     """scheme: of the steps; alpha: numerical damping of "hht"."""
 
     method: Literal["penalty"] = "penalty"
@@ -65,3 +69,28 @@ def begin(
             return march_newmark(soft, times, motion, records, log, problem, *matrices, slow, periods, budget, deepest)
 
     return SteppedRun(soft, march, start(soft, initial), records, events)
+
+
+def begin_planar(scene: Scene, flat: System, options: Options, records: Records, events: bool) -> Run:
+    """Return a run of bodies with extent. flat: the scene's system with every body as a slider.
+
+    Raises InputError for implicit schemes, for a restitution of 0, and for what bodies with extent do not allow.
+    """
+    from vanedamp.coupling.methods.planar import penalty as planar  # its kernels are loaded when they are wanted
+    from vanedamp.coupling.methods.planar.step_records import SteppedMotion, start_steps
+
+    if options.scheme != "central_difference":
+        raise InputError(
+            f'solver.scheme: "{options.scheme}" takes sliders only; bodies with extent, stiffness or dashpot take '
+            '"central_difference"'
+        )
+    system, initial, times = planar_start(scene, flat, options.steps_per_period)
+    forces, inverse = planar.penalty_forces(system, times.step, options), planar.step_matrix(system, times.step)
+    budget, deepest = options.max_events, options.penetration
+
+    def march(motion: SteppedMotion, log: np.ndarray, periods: int) -> int:
+        return planar.march(system, times, motion, records, log, forces, inverse, periods, budget, deepest)
+
+    motion = start_steps(system, initial, records, forces.spring)
+    plane = plane_of(system, motion.tilt, motion.lifted, motion.sampled, motion.shut, options.linearisation)
+    return SteppedRun(flat, march, motion, records, events, plane)

@@ -38,9 +38,6 @@ class PenaltyOptions(SteppingOptions):
 def with_penalty(system: System, times: TimeGrid, options: PenaltyOptions) -> tuple[System, np.ndarray]:
     """Return rigid contacts as springs and dashpots, and the slip speed (friction rows,) of regularised friction.
 
-    The spring makes a contact last `contact_steps` steps: unless given, 2 steps^(1/3) of them, which makes the error of
-    a contact that is too soft and that of one resolved by too few steps fall alike. The dashpot gives an isolated
-    collision its restitution.
     Raises InputError for a restitution of 0, and for one that depends on the speed.
     """
     if system.restitution_at:
@@ -52,15 +49,25 @@ def with_penalty(system: System, times: TimeGrid, options: PenaltyOptions) -> tu
     for r in range(system.friction_rows, len(spring)):
         if np.isinf(spring[r]):
             reduced = 1 / system.delassus[r, r]
-            duration = (options.contact_steps or 2 * options.steps_per_period ** (1 / 3)) * times.step
-            spring[r] = options.contact_stiffness or reduced * (np.pi / duration) ** 2
-            dashpot[r] = 2 * damping_ratio(system.restitution[r]) * np.sqrt(spring[r] * reduced)
+            spring[r], dashpot[r] = contact_spring(reduced, system.restitution[r], times.step, options)
     slips = slice(0, system.friction_rows)
     # four times the speed at which an explicit step becomes unstable (docs/accuracy.md)
     slow = 2 * system.limit[slips] * np.diag(system.delassus)[slips] * times.step
     if options.slip_velocity is not None:
         slow = np.full(len(slow), options.slip_velocity)
     return system._replace(spring=spring, dashpot=dashpot), slow
+
+
+def contact_spring(reduced: float, restitution: float, step: float, options: PenaltyOptions) -> tuple[float, float]:
+    """Return stiffness and dashpot of a contact with a reduced mass (kg). Raises InputError for a restitution of 0.
+
+    The spring makes a contact last `contact_steps` steps: unless given, 2 steps^(1/3) of them, which makes the error of
+    a contact that is too soft and that of one resolved by too few steps fall alike. The dashpot gives an isolated
+    collision its restitution.
+    """
+    duration = (options.contact_steps or 2 * options.steps_per_period ** (1 / 3)) * step
+    spring = options.contact_stiffness or reduced * (np.pi / duration) ** 2
+    return spring, 2 * damping_ratio(restitution) * np.sqrt(spring * reduced)
 
 
 @kernel

@@ -81,6 +81,15 @@ class SteppingOptions(SolverOptions):
             )
 
 
+class PlanarOptions(SolverOptions):
+    """The options of methods that take bodies with extent.
+
+    linearisation: how much a tilt may shorten a body, as a share of the smallest play; beyond, a run is not ok.
+    """
+
+    linearisation: Positive = 0.01
+
+
 def options_of(table: Mapping[str, Any]) -> SolverOptions:
     """Return the options in a [solver] table; None counts as not given.
 

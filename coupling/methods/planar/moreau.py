@@ -1,0 +1,167 @@
+"""Moreau-Jean time stepping of bodies with extent: a witness that shares no solver with the exact engine.
+
+Jean (1999); Acary and Brogliato (2008), chapter 10. The theta method for the smooth part; a contact takes part in a
+step if its gap, half a step ahead, is closed: Newton's law on its normal velocity, Coulomb's on its slip. The impulses
+of a step are found by projected Gauss-Seidel iteration (Jourdan, Alart and Jean 1998), one impulse after the other. An
+impact that others bring about within a step is a problem of its own, after theirs, as in methods.moreau.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vanedamp.coupling.methods.planar.step_records import account_step, follow_contacts, record_sample, record_start
+from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD, SOLVES, UNDECIDED
+from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.planar.constraints import PlanarSystem
+from vanedamp.coupling.planar.contact_decisions import gap, row_speed
+
+#: problems that a step may take, the last with all contacts at once
+_TURNS = 20
+#: share of the speeds in a scene by which a sweep may still change one, and below which a contact counts as at rest
+_TOLERANCE, _AT_REST = 1e-13, 1e-10
+#: sweeps that a problem may take
+_SWEEPS = 100_000
+#: share of the play by which round-off may open a gap
+_ROUND_OFF = 1e-12
+
+
+def step_matrices(system: PlanarSystem, step: float, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the inverse of the iteration matrix (N, N), its product with J^T (N, 2u), and the mobility (2u, 2u)."""
+    matrix = np.diag(system.mass) + step * theta * (system.damping + step * theta * system.stiffness)
+    inverse = np.linalg.inv(matrix)
+    turned = inverse @ system.J.T
+    return inverse, turned, system.J @ turned
+
+
+@entry
+def march(system, times, motion, records, log, inverse, turned, mobility, theta, periods, budget, deepest):
+    """Step to the end of `periods`, on a grid of equations_of_motion.TimeGrid. Return the code of numerics.codes."""
+    h, steps, size = times.step, len(times.phase) - 1, len(motion.q)
+    q, v, rhs, free = motion.start[0], motion.start[1], motion.free[0], motion.free[1]
+    if motion.counters[PERIOD] == 0:
+        record_start(system, motion, records)
+    while motion.counters[PERIOD] < periods:
+        for k in range(steps):
+            for i in range(size):
+                q[i], v[i] = motion.q[i], motion.v[i]
+            record_sample(system, times, motion, records, k)
+            for i in range(size):
+                rhs[i] = system.weight[i] + theta * times.load[k + 1, i] + (1.0 - theta) * times.load[k, i]
+                for j in range(size):
+                    rhs[i] -= system.damping[i, j] * v[j] + system.stiffness[i, j] * (q[j] + h * theta * v[j])
+            for i in range(size):
+                free[i] = v[i]
+                for j in range(size):
+                    free[i] += h * inverse[i, j] * rhs[j]
+            if not _impulses(system, motion, mobility, turned, h):
+                return UNDECIDED
+            for i in range(size):
+                motion.v[i] = free[i]
+                motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
+            follow_contacts(system, times, motion, records, log, k)
+            code = account_step(system, times, motion, records, k, deepest)
+            if code != DONE:
+                return code
+        motion.counters[PERIOD] += 1
+        record_start(system, motion, records)
+        if motion.counters[IMPACTS] >= budget:
+            return EVENT_BUDGET
+    return DONE
+
+
+@kernel
+def _impulses(system, motion, mobility, turned, h):
+    """Set the impulses of a step and the velocities (motion.free) that they leave. Returns False if undecided.
+
+    A contact that parts as the step begins waits: where impulses of others drive it together, it meets an impact of its
+    own after theirs.
+    """
+    u, free, fastest = len(system.rest), motion.free[1], 0.0
+    for r in range(2 * u):
+        motion.before[r], motion.impulse[r], size = row_speed(system, r, motion.v), 0.0, 0.0
+        for i in range(len(free)):
+            size += abs(system.J[r, i]) * max(abs(free[i]), abs(motion.v[i]))
+        fastest = max(fastest, size)
+    for r in range(system.contacts):
+        ahead = gap(system, r, motion.q) + 0.5 * h * motion.before[r]
+        motion.closed[r] = 1 if ahead <= _ROUND_OFF * system.play[r] else 0
+    for turn in range(_TURNS):
+        count = _list_units(system, motion, turn, _AT_REST * fastest)
+        if count == 0:
+            return True
+        motion.counters[SOLVES] += 1
+        if not _gauss_seidel(system, motion, mobility, count, h, _TOLERANCE * fastest):
+            return False
+        for p in range(count):
+            for r in (motion.listed[p], u + motion.listed[p]):
+                motion.impulse[r] += motion.more[r]
+                for i in range(len(free)):
+                    free[i] += turned[i, r] * motion.more[r]
+        approaching = False
+        for r in range(system.contacts):
+            approaching = approaching or (
+                motion.closed[r] == 1 and row_speed(system, r, free) < -_AT_REST * fastest
+            )  # fmt: skip
+        if not approaching:
+            return True
+    return True
+
+
+@inlined
+def _list_units(system, motion, turn, slowest):
+    """List the units that take part in a turn, with what Newton's law leaves of their speeds. Return their number."""
+    u, count, free = len(system.rest), 0, motion.free[1]
+    for r in range(u):
+        if r < system.contacts:
+            if motion.closed[r] == 0:
+                continue
+            now = row_speed(system, r, free)
+            before = motion.before[r] if turn == 0 else now
+            if turn < _TURNS - 1 and before > slowest and now > -slowest:
+                continue
+            motion.left[r] = now + system.restitution[r] * min(before, 0.0)
+        motion.left[u + r] = row_speed(system, u + r, free)
+        motion.listed[count] = r
+        count += 1
+    return count
+
+
+@kernel
+def _gauss_seidel(system, motion, mobility, count, h, tolerance):
+    """Find the impulses (motion.more) of the listed units. Returns False if they do not converge."""
+    u, more = len(system.rest), motion.more
+    for p in range(count):
+        more[motion.listed[p]], more[u + motion.listed[p]] = 0.0, 0.0
+    for _ in range(_SWEEPS):
+        largest = 0.0
+        for p in range(count):
+            r = motion.listed[p]
+            if r < system.contacts:
+                largest = max(largest, _push(system, motion, mobility, count, r, 0.0, math.inf))
+                bound = system.friction[r] * more[r]
+                low, high = -bound, bound
+            else:
+                low, high = -h * system.limit[r] - motion.impulse[u + r], h * system.limit[r] - motion.impulse[u + r]
+            if r >= system.contacts or system.friction[r] > 0.0:
+                largest = max(largest, _push(system, motion, mobility, count, u + r, low, high))
+        if largest <= tolerance:
+            return True
+    return False
+
+
+@inlined
+def _push(system, motion, mobility, count, row, low, high):
+    """Bring a row to rest, or its impulse to a bound. Return by how much that changes its speed."""
+    u, own = len(system.rest), mobility[row, row]
+    wanted = min(max(motion.more[row] - motion.left[row] / own, low), high)
+    change = wanted - motion.more[row]
+    if change != 0.0:
+        motion.more[row] = wanted
+        for p in range(count):
+            r = motion.listed[p]
+            motion.left[r] += mobility[r, row] * change
+            motion.left[u + r] += mobility[u + r, row] * change
+    return abs(change) * own
