@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import PERIOD
-from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.numerics.jit import entry, inlined
 from vanedamp.coupling.planar.constraints import FLOOR, SURFACES, PlanarSystem
 from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.records import STORED
@@ -56,7 +56,7 @@ def _samples(
     )  # fmt: skip
 
 
-@kernel
+@entry
 def record_section(system, st, rec):
     """Record section, energies and ledger at the start of a period."""
     size, bodies, period = len(st.q), len(system.along), st.counters[PERIOD]

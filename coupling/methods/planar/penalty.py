@@ -14,8 +14,9 @@ from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, contact_spr
 from vanedamp.coupling.methods.planar.step_records import account_step, follow_contacts, record_sample, record_start
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD
 from vanedamp.coupling.numerics.jit import entry, inlined
-from vanedamp.coupling.planar.constraints import PlanarSystem
+from vanedamp.coupling.planar.constraints import STOP, PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import gap, row_speed
+from vanedamp.files.toml_input import InputError
 
 
 class PenaltyForces(NamedTuple):
@@ -40,7 +41,11 @@ def penalty_forces(system: PlanarSystem, step: float, options: PenaltyOptions) -
     u, mobility = len(system.rest), np.diag(system.delassus)
     spring, dashpot = np.zeros(u), np.zeros(u)
     for r in range(system.contacts):
-        spring[r], dashpot[r] = contact_spring(1 / mobility[r], float(system.restitution[r]), step, options)
+        try:
+            spring[r], dashpot[r] = contact_spring(1 / mobility[r], float(system.restitution[r]), step, options)
+        except InputError as error:
+            owner = "stop" if system.surface[r] == STOP else "damper"
+            raise InputError(f"{owner}[{system.body[r]}].{error}") from None
     slow = np.full(u, np.nan if options.slip_velocity is None else options.slip_velocity)
     with np.errstate(divide="ignore"):
         # a quarter of the dashpot at which an explicit step becomes unstable, as for sliders

@@ -7,9 +7,11 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from vanedamp.coupling.methods import Variant
+from vanedamp.coupling.planar.constraints import planar_motion, planar_system
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.scene.solver_options import PERIOD_SECONDS, SteppingOptions
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.solver_options import PERIOD_SECONDS, PlanarOptions, SteppingOptions
 from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Positive, Real, Whole
@@ -19,7 +21,7 @@ VARIANTS = (Variant("solve_ivp, DOP853 with events", "#a16207", ">", setting="rt
 _STEP_SECONDS = 1e-3
 
 
-class Options(SteppingOptions):
+class Options(SteppingOptions, PlanarOptions):
     """steps_per_period: the least number; rtol: relative tolerance.
 
     complete_chatter: whether impacts that follow each other ever faster end at once, in rest.
@@ -42,3 +44,14 @@ def begin(system: System, options: Options, initial: InitialMotion, records: Rec
     from vanedamp.coupling.methods.scipy_ivp.run import IvpRun  # its kernels are loaded when they are wanted
 
     return IvpRun(system, options, initial, records, events)
+
+
+def begin_planar(scene: Scene, flat: System, options: Options, records: Records, events: bool) -> Run:
+    """Return a run of bodies with extent. flat: the scene's system with every body as a slider.
+
+    Raises InputError for what bodies with extent do not allow.
+    """
+    from vanedamp.coupling.methods.scipy_ivp.planar_run import PlanarIvpRun
+
+    system = planar_system(scene, flat)
+    return PlanarIvpRun(flat, system, options, planar_motion(scene, flat, system), records, events)

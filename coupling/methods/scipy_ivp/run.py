@@ -9,12 +9,10 @@ methods.scipy_ivp.impacts); events are searched on the solver's interpolant, whe
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from scipy.integrate import DOP853
 
 from vanedamp.coupling.methods.scipy_ivp import Options
+from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
 from vanedamp.coupling.methods.scipy_ivp.impacts import COLLAPSE, FRESH, TOUCH, simultaneous_impacts, zero_round_off
 from vanedamp.coupling.methods.scipy_ivp.integrals import Recorder
@@ -30,7 +28,6 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
     Motion,
     Unforced,
 )
-from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.records import Records
@@ -46,21 +43,6 @@ _TOUCHING = 1e-12
 _OPEN_LEDGER, _LEAST = 1e3, 1e-9
 #: events without time between them before the run is given up
 _STANDING = 100
-
-
-class Arc(NamedTuple):
-    """Motion between two events: states (size, k) at the points t (k,) of the grid, and its end.
-
-    event: index of the event function, None at the end of the grid; duration, last: time since the start, state there.
-    """
-
-    t: np.ndarray
-    y: np.ndarray
-    event: int | None
-    duration: float
-    last: np.ndarray
-    evaluations: int
-    failed: bool = False
 
 
 class IvpRun:
@@ -154,41 +136,19 @@ class IvpRun:
 
     def _integrate(self, grid: np.ndarray) -> Arc:
         """Return the motion from now to the first event, or to the end of the grid."""
-        u, far = self.unforced, grid - self.time
-        solver = DOP853(
-            lambda tau, y: self.rate(self.time + tau, y), 0.0, self.y, far[-1], max_step=self.step,
-            rtol=self.tolerance, atol=self.absolute, first_step=min(self._first_step(), far[-1]),
+        u, guards = self.unforced, self.guards
+        return integrate(
+            self.rate, self.y, self.time, grid, lambda t, y: guards.functional @ u.extended(t, y[: u.size]),
+            guards.order, self.tolerance, self.absolute, self._first_step(), self.step,
         )  # fmt: skip
-        states, order, reached, root = [], self.guards.order, 0, None
-        while solver.status == "running" and root is None:
-            solver.step()
-            if solver.status == "failed":
-                return Arc(grid[:0], self.y[:, None][:, :0], None, 0.0, self.y, solver.nfev, True)
-            piece, now, last = solver.dense_output(), solver.t, solver.y
-            if len(order):
-                at = solver.t_old + NODES * (solver.t - solver.t_old)
-                root = first_root(self.guards.functional @ u.extended(self.time + at, piece(at)[: u.size]), order)
-            if root is not None:
-                now = solver.t_old + root[0] * (solver.t - solver.t_old)
-                last = piece(now)
-            passed = reached + np.count_nonzero(far[reached:] <= now)
-            states += [piece(tau) for tau in far[reached:passed]]
-            order, reached = np.zeros_like(order), passed
-        points = np.array(states).reshape(reached, len(self.y)).T
-        return Arc(grid[:reached], points, None if root is None else root[1], now, last, solver.nfev)
 
     def _first_step(self) -> float:
-        """Return twice the time to the first event by the functions' parabolas: round-off is that of the flight."""
         u, guards = self.unforced, self.guards
         now = u.extended(self.time, self.y[: u.size])
         rate = u.rates(self.motion, now)
         value = np.where(guards.order > 0, 0.0, guards.functional @ now)
         slope, curvature = guards.functional @ rate, guards.functional @ u.rates(self.motion, rate)
-        with np.errstate(all="ignore"):
-            root = np.sqrt(slope**2 - 2 * curvature * value)
-            times = np.where(slope > 0, -(slope + root) / curvature, 2 * value / (root - slope))
-        times = times[np.isfinite(times) & (times > 0)]
-        return float(np.clip(2 * times.min(initial=np.inf), _SHORTEST * self.system.period, self.step))
+        return first_step(value, slope, curvature, _SHORTEST * self.system.period, self.step)
 
     def rate(self, t: float, y: np.ndarray) -> np.ndarray:
         """Return the rates of the state and of the integrals."""

@@ -1,0 +1,315 @@
+"""Contacts of bodies with extent for an integrator: which states are possible, by trying them.
+
+Between two events every unit keeps its state, and the motion is linear in the extended state (q, v, 1, cos, sin) of
+the excitation's harmonics; so are gaps, slips and forces. States are right if nothing of these turns negative that must
+not: of a quantity that is zero now, the first derivative that is not zero decides. The search repairs one state after
+the other, and tries all of them in turn where that goes round in circles (Glocker and Pfeiffer 1996 solve the same by
+complementarity). Impacts are the same question for velocities and impulses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import product
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from vanedamp.coupling.planar.constraints import PlanarSystem
+
+#: states of a unit; a closed contact without friction slips to the right
+OPEN, STICK, LEFT, RIGHT = range(4)
+_WAY = np.array([0.0, 0.0, -1.0, 1.0])
+#: derivatives that are looked at, and the order of a zero whose derivatives all vanish
+_LEVELS, NEVER = 7, 99
+#: values below this share of the terms that they are sums of are round-off
+ROUND_OFF = 1e-11
+#: share of their size below which rows depend on each other
+_DEPENDENT = 1e-9
+#: share of a row's motion by which forces may fail to hold it
+_LOST = 1e-7
+#: units in question of which all states are tried
+_MOST = 8
+#: bisections of the restitution of an impact that would bring energy
+_HALVINGS = 50
+
+States = tuple[int, ...]
+Found = TypeVar("Found")
+
+
+class Wrong(NamedTuple):
+    """What speaks against a choice of states: a unit, and the state that it should have instead."""
+
+    unit: int
+    state: int
+
+
+class Unforced:
+    """A system without forces of its contacts, on the extended state: size 2N, extent, slices, accelerations."""
+
+    def __init__(self, system: PlanarSystem) -> None:
+        n, e = len(system.mass), len(system.frequency)
+        self.system, self.n, self.u, self.size, self.one = system, n, len(system.rest), 2 * n, 2 * n
+        self.q, self.v, self.extent = slice(0, n), slice(n, 2 * n), 2 * n + 1 + 2 * e
+        self.cosine, self.sine = slice(2 * n + 1, 2 * n + 1 + e), slice(2 * n + 1 + e, self.extent)
+        self.load = np.zeros((n, self.extent))
+        self.load[:, self.cosine], self.load[:, self.sine] = system.load.real.T, -system.load.imag.T
+        forces = self.load.copy()
+        forces[:, self.q], forces[:, self.v] = -system.stiffness, -system.damping
+        forces[:, self.one] = system.weight
+        self.accelerations = forces / system.mass[:, None]
+        self.normal, self.slip = system.J[: self.u], system.J[self.u :]
+        self.contact = np.arange(self.u) < system.contacts
+        self.rubs = np.where(self.contact, system.friction, system.limit) > 0.0
+
+    def extended(self, t: float | np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the states (2N, ...) at times t (...) with 1, cos and sin below them."""
+        phase = np.multiply.outer(self.system.frequency, np.asarray(t, float))
+        return np.concatenate([z, np.ones((1, *phase.shape[1:])), np.cos(phase), np.sin(phase)])
+
+    def gaps(self, q: np.ndarray) -> np.ndarray:
+        """Return the gaps (contacts,) at coordinates q (N,), m."""
+        gaps: np.ndarray = (self.system.rest + self.normal @ q)[: self.system.contacts]
+        return gaps
+
+
+class Holding:
+    """The rows that states keep at rest, and the wrenches of their forces: W_N - way mu W_T of a contact that slips.
+
+    inverse (k, k): forces of the kept rows that give them accelerations; possible: whether there are such forces.
+    """
+
+    def __init__(self, free: Unforced, state: np.ndarray) -> None:
+        system = free.system
+        self.state = state
+        self.closed = np.flatnonzero((state != OPEN) & free.contact)
+        self.stick = np.flatnonzero((state == STICK) & free.rubs)
+        self.drag = (_WAY[state] * system.friction)[self.closed]
+        self.rows = np.vstack([free.normal[self.closed], free.slip[self.stick]])
+        self.wrench = self.rows.copy()
+        self.wrench[: len(self.closed)] -= self.drag[:, None] * free.slip[self.closed]
+        scale = 1 / np.sqrt(np.maximum((self.rows**2 / system.mass).sum(axis=1), 1e-300))
+        mobility = (self.rows / system.mass) @ self.wrench.T * scale * scale[:, None]
+        inverse = np.linalg.pinv(mobility, rcond=_DEPENDENT) if len(scale) else mobility
+        self.inverse = inverse * scale[:, None] * scale
+        left = self.rows - (self.rows / system.mass) @ self.wrench.T @ self.inverse @ self.rows
+        sizes = np.abs(self.rows).max(axis=1, initial=0.0)
+        self.possible = bool(np.all(np.abs(left).max(axis=1, initial=0.0) <= _LOST * sizes))
+
+    def spread(self, forces: np.ndarray, u: int) -> np.ndarray:
+        """Return the forces (2u, ...) of all rows from those of the kept ones (k, ...)."""
+        count, spread = len(self.closed), np.zeros((2 * u, *forces.shape[1:]))
+        spread[self.closed] = forces[:count]
+        spread[u + self.closed] = -(self.drag * forces[:count].T).T
+        spread[u + self.stick] = forces[count:]
+        return spread
+
+
+class Motion:
+    """The linear motion while units keep their states (u,): rate (extent, extent), force (2u, extent), event functions.
+
+    guard (k, extent): positive until its event; order (k,): of its zero now, as `judge` has found it.
+    """
+
+    def __init__(self, free: Unforced, state: np.ndarray) -> None:
+        system, u = free.system, free.u
+        holding = Holding(free, state)
+        self.state, self.possible = state, holding.possible
+        force = np.zeros((2 * u, free.extent))
+        slides = np.where(free.contact, 0.0, -_WAY[state] * system.limit)
+        force[u:, free.one] = slides
+        pushed = free.accelerations + (system.J / system.mass).T @ force
+        force += holding.spread(-holding.inverse @ (holding.rows @ pushed), u)
+        self.force = force
+        self.rate = np.zeros((free.extent, free.extent))
+        self.rate[free.q, free.v] = np.eye(free.n)
+        self.rate[free.v] = free.accelerations + (system.J / system.mass).T @ force
+        self.rate[free.cosine, free.sine] = -np.diag(system.frequency)
+        self.rate[free.sine, free.cosine] = np.diag(system.frequency)
+        guards, self.wrong = _guards(free, state, force)
+        self.guard = np.reshape(guards, (len(guards), free.extent))
+        self.order = np.zeros(len(guards), int)
+
+    def judge(self, now: np.ndarray, sizes: np.ndarray) -> Wrong | None:
+        """Set the orders of the event functions at an extended state (extent,); return what turns negative at once.
+
+        sizes: (extent,) of the state's terms, whose round-off is no value.
+        """
+        open_, found = np.ones(len(self.guard), bool), -1
+        self.order[:] = NEVER
+        for level in range(_LEVELS):
+            value, noise = self.guard @ now, ROUND_OFF * (np.abs(self.guard) @ sizes)
+            decided = open_ & (np.abs(value) > noise)
+            self.order[decided] = level
+            negative = np.flatnonzero(decided & (value < 0.0))
+            if len(negative) and found < 0:
+                found = int(negative[0])
+            open_ &= ~decided
+            if not open_.any():
+                break
+            now, sizes = self.rate @ now, np.abs(self.rate) @ sizes
+        return None if found < 0 else self.wrong[found]
+
+
+def _guards(free: Unforced, state: np.ndarray, force: np.ndarray) -> tuple[list[np.ndarray], list[Wrong]]:
+    """Return the event functions (k, extent) of all units, and what each says where it is negative."""
+    system, u, guards, wrong = free.system, free.u, [], []
+
+    def watch(guard: np.ndarray, unit: int, instead: int) -> None:
+        guards.append(guard)
+        wrong.append(Wrong(unit, instead))
+
+    for r in range(u):
+        if free.contact[r] and state[r] == OPEN:
+            gap = np.zeros(free.extent)
+            gap[free.q], gap[free.one] = free.normal[r], system.rest[r]
+            watch(gap, r, STICK)
+            continue
+        bound = system.friction[r] * force[r]
+        if free.contact[r]:
+            watch(force[r], r, OPEN)
+        else:
+            bound[free.one] = system.limit[r]
+        if state[r] == STICK and free.rubs[r]:
+            watch(bound - force[u + r], r, LEFT)
+            watch(bound + force[u + r], r, RIGHT)
+        elif free.rubs[r]:
+            speed = np.zeros(free.extent)
+            speed[free.v] = _WAY[state[r]] * free.slip[r]
+            watch(speed, r, STICK)
+    return guards, wrong
+
+
+def search(
+    options: Sequence[Sequence[int]], begin: Sequence[int], judge: Callable[[States], tuple[Found, Wrong | None] | None]
+) -> Found | None:
+    """Return what `judge` makes of the first states it finds nothing wrong with; None if there are none.
+
+    options: the states that each unit may have; begin: those to begin with. `judge` returns None where the states are
+    impossible.
+    """
+    at, seen = tuple(begin), set()
+    while at not in seen:
+        seen.add(at)
+        judged = judge(at)
+        if judged is None:
+            break
+        found, wrong = judged
+        if wrong is None:
+            return found
+        if wrong.state not in options[wrong.unit]:
+            closed = [state for state in options[wrong.unit] if (state == OPEN) == (wrong.state == OPEN)]
+            if not closed:
+                break
+            wrong = Wrong(wrong.unit, closed[0])
+        at = (*at[: wrong.unit], wrong.state, *at[wrong.unit + 1 :])
+    if sum(len(choice) > 1 for choice in options) > _MOST:
+        return None
+    changes = lambda states: sum(one != other for one, other in zip(states, begin, strict=True))  # noqa: E731
+    for states in sorted(product(*options), key=changes):
+        if states not in seen:
+            judged = judge(states)
+            if judged is not None and judged[1] is None:
+                return judged[0]
+    return None
+
+
+def decide(free: Unforced, now: np.ndarray, sizes: np.ndarray, present: np.ndarray, touch: np.ndarray, slow: float):
+    """Return the motion that begins at an extended state (extent,); None if no states are possible.
+
+    present: (u,) states so far; touch: (contacts,) gaps below which contacts are closed, m; slow: speed that is none.
+    """
+    gaps, v = free.gaps(now[free.q]), now[free.v]
+    speed, slip = free.normal @ v, free.slip @ v
+    options, begin = [], []
+    for r in range(free.u):
+        ways = [STICK, RIGHT, LEFT] if abs(slip[r]) <= slow else [RIGHT if slip[r] > 0.0 else LEFT]
+        if not free.rubs[r]:
+            ways = [RIGHT] if free.contact[r] else [OPEN]
+        if free.contact[r]:
+            ways = [*ways, OPEN] if gaps[r] <= touch[r] and speed[r] <= slow else [OPEN]
+        options.append(ways)
+        begin.append(int(present[r]) if present[r] in ways else ways[0])
+
+    def judge(states: States) -> tuple[Motion, Wrong | None] | None:
+        motion = Motion(free, np.array(states))
+        return (motion, motion.judge(now, sizes)) if motion.possible else None
+
+    return search(options, begin, judge)
+
+
+class Impact(NamedTuple):
+    """Impulses (2u,), velocities (N,) after them, and the states (u,) of the contacts meanwhile."""
+
+    impulse: np.ndarray
+    v: np.ndarray
+    state: np.ndarray
+
+
+def impact(free: Unforced, v: np.ndarray, closed: np.ndarray, restitution: np.ndarray) -> Impact | None:
+    """Return Newton's law in Moreau's form with Coulomb's at closed contacts (contacts,); None without a solution.
+
+    restitution: (u,). Where the impact would bring energy, all coefficients are smaller by one factor.
+    """
+    found = _impulses(free, v, closed, restitution)
+    if found is None or _gain(free, v, found) <= 0.0:
+        return found
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        found = _impulses(free, v, closed, middle * restitution)
+        low, high = (middle, high) if found is not None and _gain(free, v, found) <= 0.0 else (low, middle)
+    return _impulses(free, v, closed, low * restitution)
+
+
+def _gain(free: Unforced, v: np.ndarray, found: Impact) -> float:
+    """Return the energy that an impact brings beyond round-off, J."""
+    mass = free.system.mass
+    return float(mass @ (found.v**2 - v**2) - 1e-12 * mass @ v**2)
+
+
+def _impulses(free: Unforced, v: np.ndarray, closed: np.ndarray, restitution: np.ndarray) -> Impact | None:
+    system, u = free.system, free.u
+    rebound = restitution * np.minimum(free.normal @ v, 0.0)
+    terms = np.abs(system.J) @ np.abs(v)
+    slow = ROUND_OFF * float(terms.max(initial=0.0))
+    options = [[OPEN] for _ in range(u)]
+    for r in np.flatnonzero(closed):
+        options[r] = [STICK, RIGHT, LEFT, OPEN] if free.rubs[r] else [RIGHT, OPEN]
+
+    def judge(states: States) -> tuple[Impact, Wrong | None] | None:
+        holding = Holding(free, np.array(states))
+        if not holding.possible:
+            return None
+        left = holding.rows @ v
+        left[: len(holding.closed)] += rebound[holding.closed]
+        impulse = holding.spread(-holding.inverse @ left, u)
+        after = v + (system.J / system.mass).T @ impulse
+        return Impact(impulse, after, np.array(states)), _violation(free, states, impulse, after, rebound, slow, closed)
+
+    return search(options, [choice[0] for choice in options], judge)
+
+
+def _violation(
+    free: Unforced,
+    states: States,
+    impulse: np.ndarray,
+    after: np.ndarray,
+    rebound: np.ndarray,
+    slow: float,
+    closed: np.ndarray,
+) -> Wrong | None:
+    """Return what speaks against impulses (2u,) and the velocities (N,) that they leave."""
+    u, least = free.u, ROUND_OFF * float(np.abs(impulse).max(initial=0.0))
+    for r in range(free.system.contacts):
+        push, drag, bound = impulse[r], impulse[u + r], free.system.friction[r] * impulse[r]
+        if states[r] == OPEN:
+            if closed[r] and free.normal[r] @ after + rebound[r] < -slow:
+                return Wrong(r, STICK)
+        elif push < -least:
+            return Wrong(r, OPEN)
+        elif states[r] == STICK and abs(drag) > bound + least:
+            return Wrong(r, LEFT if drag > 0.0 else RIGHT)
+        elif states[r] in (LEFT, RIGHT) and free.rubs[r] and _WAY[states[r]] * (free.slip[r] @ after) < -slow:
+            return Wrong(r, STICK)
+    return None

@@ -1,0 +1,208 @@
+"""Bodies with extent by scipy's DOP853, stopped at every event: an independent witness of the exact engine.
+
+It shares the rows of a scene with that engine (coupling.planar.constraints), but neither motion nor search nor
+decisions nor impacts (methods.scipy_ivp.planar_contacts). Closed contacts are constraints on accelerations, impacts
+jumps between two integrations; events are searched on the solver's interpolant, where none can be missed
+(methods.scipy_ivp.root_search). Energies and harmonics are integrated along (methods.scipy_ivp.planar_records).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vanedamp.coupling.methods.scipy_ivp import Options
+from vanedamp.coupling.methods.scipy_ivp.arcs import first_step, integrate
+from vanedamp.coupling.methods.scipy_ivp.planar_contacts import (
+    NEVER,
+    OPEN,
+    STICK,
+    Motion,
+    Unforced,
+    decide,
+    impact,
+)
+from vanedamp.coupling.methods.scipy_ivp.planar_records import PlanarRecorder
+from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
+from vanedamp.coupling.planar.recorder import plane_of
+from vanedamp.coupling.response.evaluation import Outcome
+from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.system.system import System
+
+#: the shortest first step, as a share of a period
+_SHORTEST = 1e-26
+#: gaps below this share of the play are closed; speeds below this share of the scene's are none
+_TOUCH, _STILL = 1e-11, 1e-11
+#: flights shorter than this share of a period, and all that follow them, are the end of a chatter
+_CHATTER = 1e-6
+#: time without events, as a share of a period, in which events happen at once; how many may
+_AT_ONCE, _STANDING = 1e-13, 100
+#: imbalance of the ledger above which a response is not to be used, in units of rtol or of _LEAST
+_OPEN_LEDGER, _LEAST = 1e3, 1e-9
+
+
+class PlanarIvpRun:
+    """A run by solve_ivp: state y = (q, v, integrals) and the states of the units. Times count from the period's start.
+
+    flat: the scene's system with every body as a slider.
+    """
+
+    def __init__(
+        self, flat: System, system: PlanarSystem, options: Options, initial: PlanarMotion, records: Records,
+        events: bool,
+    ) -> None:  # fmt: skip
+        self.flat, self.system, self.options, self.steps = flat, system, options, options.steps_per_period
+        self.free = free = Unforced(system)
+        self.record = PlanarRecorder(free, records, self.steps, events)
+        self.time, self.step = 0.0, system.period / self.steps
+        self.sizes = self.record.sizes(float(flat.omega))
+        self.absolute = options.rtol * self.sizes
+        self.y = np.concatenate([initial.q, initial.v, np.zeros(self.record.count)])
+        self.touch = _TOUCH * system.play[: system.contacts]
+        self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
+        self.state = np.full(free.u, OPEN)
+        self.motion: Motion
+        self.guard, self.order = np.zeros((0, free.extent)), np.zeros(0, int)
+        self.begun = False
+
+    def advance_to(self, periods: int) -> Status:
+        """Continue to the end of `periods`, unless the run ends before."""
+        if not self.begun:
+            self.begun = True
+            self.record.section(self.y)
+            if not self._decide():
+                return Status.UNDECIDED
+        with np.errstate(all="ignore"):
+            while self.record.period < periods:
+                if self.events >= self.options.max_events:
+                    return Status.EVENT_BUDGET
+                status = self._segment()
+                if status is not Status.OK:
+                    return status
+        return Status.OK
+
+    def outcome(self) -> Outcome:
+        """Return the results of the run."""
+        record = self.record
+        numbers = {"impacts": record.impacts, "evaluations": self.evaluations}
+        log = [np.array(record.log)] if record.log else []
+        return Outcome(
+            self.flat, record.records, record.period, self.events,
+            _OPEN_LEDGER * max(self.options.rtol, _LEAST), numbers, log, max(record.deep, 0.0),
+            plane_of(self.system, record.tilt, record.lifted, self.options.linearisation),
+        )  # fmt: skip
+
+    def final(self) -> None:
+        """Return None: the states of contacts are no part of a motion that another run could begin with."""
+
+    # -- motion between events
+
+    def _segment(self) -> Status:
+        """Integrate to the next event or to the end of the period."""
+        grid = np.arange(1, self.steps + 1) * self.step
+        grid = grid[grid > self.time]
+        if not len(grid):  # an event has fallen on the period's end
+            return self._end_period()
+        free, guard = self.free, self.guard
+        arc = integrate(
+            self._rate, self.y, self.time, grid, lambda t, y: guard @ free.extended(t, y[: free.size]), self.order,
+            self.options.rtol, self.absolute, self._first_step(), self.step,
+        )  # fmt: skip
+        self.evaluations += arc.evaluations
+        if arc.failed or not np.isfinite(arc.last).all():
+            return Status.DIVERGED
+        self.record.points(arc.t, arc.y)
+        if self.record.deep > self.options.penetration:
+            return Status.PENETRATION
+        self.record.flight(arc.duration, self.state)
+        self.time, self.y = self.time + arc.duration, arc.last
+        if arc.event is None:
+            self.order = np.zeros_like(self.order)
+            return self._end_period()
+        self.events += 1
+        self.standing = self.standing + 1 if arc.duration < _AT_ONCE * self.system.period else 0
+        if self.standing > _STANDING:
+            return Status.UNDECIDED
+        return Status.OK if self._decide() else Status.UNDECIDED
+
+    def _end_period(self) -> Status:
+        self.time = 0.0
+        self.record.end_period(self.y)
+        return Status.OK
+
+    def _first_step(self) -> float:
+        now = self.free.extended(self.time, self.y[: self.free.size])
+        rate = self.motion.rate @ now
+        value = np.where(self.order > 0, 0.0, self.guard @ now)
+        slope, curvature = self.guard @ rate, self.guard @ (self.motion.rate @ rate)
+        return first_step(value, slope, curvature, _SHORTEST * self.system.period, self.step)
+
+    def _rate(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Return the rates of the state and of the integrals."""
+        extended = self.free.extended(t, y[: self.free.size])
+        rate = (self.motion.rate @ extended)[: self.free.size]
+        return np.concatenate([rate, self.record.rates(extended, self.motion.force @ extended)])
+
+    # -- events
+
+    def _decide(self) -> bool:
+        """Apply impacts, then decide the states. Returns False if nothing is possible."""
+        free, system = self.free, self.system
+        q, v = self.y[free.q], self.y[free.v]
+        self.record.turning(self.time, self.y)
+        self.sizes[: free.size] = np.maximum(self.sizes[: free.size], np.abs(self.y[: free.size]))
+        self.fastest = max(self.fastest, float((np.abs(system.J) @ np.abs(v)).max(initial=0.0)), system.speed)
+        slow = _STILL * self.fastest
+        closed = (self.state[: system.contacts] != OPEN) | (free.gaps(q) <= self.touch)
+        self._bring(q, free.normal[: system.contacts][closed], free.gaps(q)[closed])
+        for _ in range(_STANDING):
+            approach = free.normal[: system.contacts] @ v
+            if not np.any(approach[closed] < -slow):
+                break
+            found = impact(free, v, closed, system.restitution)
+            if found is None:
+                return False
+            self.record.impact(self.time, v, found)
+            v[:] = found.v
+            self._catch(v, closed, slow)
+        else:
+            return False
+        rows = [*np.flatnonzero(closed), *(free.u + np.flatnonzero(np.r_[closed, ~free.contact[system.contacts :]]))]
+        still = [row for row in rows if abs(system.J[row] @ v) <= slow]
+        self._bring(v, system.J[still], system.J[still] @ v)
+        now = free.extended(self.time, self.y[: free.size])
+        sizes = np.concatenate([self.sizes[: free.size], np.ones(free.extent - free.size)])
+        motion = decide(free, now, sizes, self.state, self.touch, slow)
+        if motion is None:
+            return False
+        self.motion, self.state = motion, motion.state
+        watched = motion.order != NEVER
+        self.guard, self.order = motion.guard[watched], motion.order[watched]
+        self.record.turning(self.time, self.y)
+        return True
+
+    def _bring(self, values: np.ndarray, rows: np.ndarray, off: np.ndarray) -> None:
+        """Take from coordinates or velocities (N,), in place, what rows (k, N) are off zero."""
+        if np.any(off != 0.0):
+            root = np.sqrt(self.system.mass)
+            values -= np.linalg.pinv(rows / root, rcond=1e-9) @ off / root
+
+    def _catch(self, v: np.ndarray, closed: np.ndarray, slow: float) -> None:
+        """Stop contacts that part for a flight shorter than _CHATTER: all that push in a step of that length."""
+        free, system = self.free, self.system
+        ahead = _CHATTER * system.period
+        extended = free.extended(self.time, np.concatenate([self.y[free.q], v]))
+        accelerations = free.accelerations @ extended
+        slides = np.where(free.contact, 0.0, -system.limit * np.sign(free.slip @ v))
+        accelerations += (free.slip / system.mass).T @ slides
+        step = impact(free, v + ahead * accelerations, closed, np.zeros(free.u))
+        if step is None:
+            return
+        pushed = np.flatnonzero(step.impulse[: system.contacts] > 0.0)
+        if not np.any(free.normal[pushed] @ v > slow):
+            return
+        stuck = [r for r in pushed if step.state[r] == STICK and free.rubs[r]]
+        rows = np.vstack([free.normal[pushed], free.slip[stuck]])
+        before = v.copy()
+        self._bring(v, rows, rows @ v)
+        self.record.stopped(before, v)
