@@ -15,7 +15,9 @@ from vanedamp.coupling.methods.scipy_ivp.arcs import first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.planar_contacts import (
     NEVER,
     OPEN,
+    ROUND_OFF,
     STICK,
+    Impact,
     Motion,
     Unforced,
     decide,
@@ -31,8 +33,9 @@ from vanedamp.coupling.system.system import System
 
 #: the shortest first step, as a share of a period
 _SHORTEST = 1e-26
-#: gaps below this share of the play are closed; speeds below this share of the scene's are none
-_TOUCH, _STILL = 1e-11, 1e-11
+#: gaps below this share of the play, and of the terms that they are sums of, are closed; speeds below this share of the
+#: scene's are none
+_TOUCH, _NEAR, _STILL = 1e-11, 10 * ROUND_OFF, 1e-11
 #: flights shorter than this share of a period, and all that follow them, are the end of a chatter
 _CHATTER = 1e-6
 #: time without events, as a share of a period, in which events happen at once; how many may
@@ -58,7 +61,6 @@ class PlanarIvpRun:
         self.sizes = self.record.sizes(float(flat.omega))
         self.absolute = options.rtol * self.sizes
         self.y = np.concatenate([initial.q, initial.v, np.zeros(self.record.count)])
-        self.touch = _TOUCH * system.play[: system.contacts]
         self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
         self.state = np.full(free.u, OPEN)
         self.motion: Motion
@@ -147,32 +149,35 @@ class PlanarIvpRun:
 
     def _decide(self) -> bool:
         """Apply impacts, then decide the states. Returns False if nothing is possible."""
-        free, system = self.free, self.system
+        free, system, normal = self.free, self.system, self.free.normal[: self.system.contacts]
         q, v = self.y[free.q], self.y[free.v]
         self.record.turning(self.time, self.y)
         self.sizes[: free.size] = np.maximum(self.sizes[: free.size], np.abs(self.y[: free.size]))
         self.fastest = max(self.fastest, float((np.abs(system.J) @ np.abs(v)).max(initial=0.0)), system.speed)
         slow = _STILL * self.fastest
-        closed = (self.state[: system.contacts] != OPEN) | (free.gaps(q) <= self.touch)
-        self._bring(q, free.normal[: system.contacts][closed], free.gaps(q)[closed])
+        terms = system.rest[: system.contacts] + np.abs(normal) @ self.sizes[free.q]
+        touch = np.maximum(_TOUCH * system.play[: system.contacts], _NEAR * terms)
+        closed = (self.state[: system.contacts] != OPEN) | (free.gaps(q) <= touch)
+        self._bring(q, normal[closed], free.gaps(q)[closed])
         for _ in range(_STANDING):
-            approach = free.normal[: system.contacts] @ v
-            if not np.any(approach[closed] < -slow):
+            if not np.any(normal[closed] @ v < -slow):
                 break
             found = impact(free, v, closed, system.restitution)
             if found is None:
                 return False
-            self.record.impact(self.time, v, found)
-            v[:] = found.v
+            self._jump(v, found)
             self._catch(v, closed, slow)
         else:
             return False
-        rows = [*np.flatnonzero(closed), *(free.u + np.flatnonzero(np.r_[closed, ~free.contact[system.contacts :]]))]
-        still = [row for row in rows if abs(system.J[row] @ v) <= slow]
-        self._bring(v, system.J[still], system.J[still] @ v)
-        now = free.extended(self.time, self.y[: free.size])
-        sizes = np.concatenate([self.sizes[: free.size], np.ones(free.extent - free.size)])
-        motion = decide(free, now, sizes, self.state, self.touch, slow)
+        motion = self._motion(closed, touch, slow)
+        if motion is None:
+            # no forces can hold what slips: impulses stop it (Painleve's paradox)
+            step = self._short_step(v, closed)
+            if step is None:
+                return False
+            self._jump(v, Impact(step.impulse, v + (system.J / system.mass).T @ step.impulse, step.state))
+            self._stop(v, step)
+            motion = self._motion(closed, touch, slow)
         if motion is None:
             return False
         self.motion, self.state = motion, motion.state
@@ -180,6 +185,21 @@ class PlanarIvpRun:
         self.guard, self.order = motion.guard[watched], motion.order[watched]
         self.record.turning(self.time, self.y)
         return True
+
+    def _motion(self, closed: np.ndarray, touch: np.ndarray, slow: float) -> Motion | None:
+        """Return the motion that begins now, with speeds that are round-off set to zero."""
+        free, system, v = self.free, self.system, self.y[self.free.v]
+        rows = [*np.flatnonzero(closed), *(free.u + np.flatnonzero(np.r_[closed, ~free.contact[system.contacts :]]))]
+        still = [row for row in rows if abs(system.J[row] @ v) <= slow]
+        self._bring(v, system.J[still], system.J[still] @ v)
+        now = free.extended(self.time, self.y[: free.size])
+        sizes = np.concatenate([self.sizes[: free.size], np.ones(free.extent - free.size)])
+        return decide(free, now, sizes, self.state, touch, slow)
+
+    def _jump(self, v: np.ndarray, found: Impact) -> None:
+        """Change the velocities, in place, by an impact."""
+        self.record.impact(self.time, v, found)
+        v[:] = found.v
 
     def _bring(self, values: np.ndarray, rows: np.ndarray, off: np.ndarray) -> None:
         """Take from coordinates or velocities (N,), in place, what rows (k, N) are off zero."""
@@ -189,20 +209,23 @@ class PlanarIvpRun:
 
     def _catch(self, v: np.ndarray, closed: np.ndarray, slow: float) -> None:
         """Stop contacts that part for a flight shorter than _CHATTER: all that push in a step of that length."""
+        step = self._short_step(v, closed)
+        if step is not None and np.any((step.impulse[: self.free.u] > 0.0) & (self.free.normal @ v > slow)):
+            self._stop(v, step)
+
+    def _short_step(self, v: np.ndarray, closed: np.ndarray) -> Impact | None:
+        """Return the impulses of a step of Moreau's scheme of length _CHATTER, without restitution."""
         free, system = self.free, self.system
-        ahead = _CHATTER * system.period
-        extended = free.extended(self.time, np.concatenate([self.y[free.q], v]))
-        accelerations = free.accelerations @ extended
+        accelerations = free.accelerations @ free.extended(self.time, np.concatenate([self.y[free.q], v]))
         slides = np.where(free.contact, 0.0, -system.limit * np.sign(free.slip @ v))
         accelerations += (free.slip / system.mass).T @ slides
-        step = impact(free, v + ahead * accelerations, closed, np.zeros(free.u))
-        if step is None:
-            return
-        pushed = np.flatnonzero(step.impulse[: system.contacts] > 0.0)
-        if not np.any(free.normal[pushed] @ v > slow):
-            return
+        return impact(free, v + _CHATTER * system.period * accelerations, closed, np.zeros(free.u))
+
+    def _stop(self, v: np.ndarray, step: Impact) -> None:
+        """Stop, in place, the contacts that push in a step, and the slips of those that stick."""
+        free = self.free
+        pushed = np.flatnonzero(step.impulse[: free.u] > 0.0)
         stuck = [r for r in pushed if step.state[r] == STICK and free.rubs[r]]
-        rows = np.vstack([free.normal[pushed], free.slip[stuck]])
-        before = v.copy()
+        rows, before = np.vstack([free.normal[pushed], free.slip[stuck]]), v.copy()
         self._bring(v, rows, rows @ v)
         self.record.stopped(before, v)
