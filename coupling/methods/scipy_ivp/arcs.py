@@ -53,7 +53,8 @@ def integrate(
         if root is not None:
             now = solver.t_old + root[0] * (solver.t - solver.t_old)
             last = piece(now)
-        passed = reached + np.count_nonzero(far[reached:] <= now)
+        # an event may fall on a point of the grid, which round-off must not leave out
+        passed = np.count_nonzero((far <= now) | (grid <= time + now))
         states += [piece(tau) for tau in far[reached:passed]]
         order, reached = np.zeros_like(order), passed
     points = np.array(states).reshape(reached, len(y)).T

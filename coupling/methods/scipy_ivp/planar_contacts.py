@@ -9,8 +9,8 @@ complementarity). Impacts are the same question for velocities and impulses.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import product
+from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations, islice, product
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -28,8 +28,8 @@ ROUND_OFF = 1e-11
 _DEPENDENT = 1e-9
 #: share of a row's motion by which forces may fail to hold it
 _LOST = 1e-7
-#: units in question of which all states are tried
-_MOST = 8
+#: states that may be tried in turn: all of six contacts with friction, and what is near of more
+_MOST = 5000
 #: bisections of the restitution of an impact that would bring energy
 _HALVINGS = 50
 
@@ -126,29 +126,30 @@ class Motion:
         self.rate[free.v] = free.accelerations + (system.J / system.mass).T @ force
         self.rate[free.cosine, free.sine] = -np.diag(system.frequency)
         self.rate[free.sine, free.cosine] = np.diag(system.frequency)
+        #: of the sums that rates are: those of coordinates that contacts hold cancel
+        self.terms = np.abs(self.rate)
+        self.terms[free.v] = np.abs(free.accelerations) + (np.abs(system.J) / system.mass).T @ np.abs(force)
         guards, self.wrong = _guards(free, state, force)
         self.guard = np.reshape(guards, (len(guards), free.extent))
         self.order = np.zeros(len(guards), int)
 
-    def judge(self, now: np.ndarray, sizes: np.ndarray) -> Wrong | None:
+    def judge(self, now: np.ndarray, sizes: np.ndarray) -> list[Wrong]:
         """Set the orders of the event functions at an extended state (extent,); return what turns negative at once.
 
         sizes: (extent,) of the state's terms, whose round-off is no value.
         """
-        open_, found = np.ones(len(self.guard), bool), -1
+        open_, wrong = np.ones(len(self.guard), bool), []
         self.order[:] = NEVER
         for level in range(_LEVELS):
             value, noise = self.guard @ now, ROUND_OFF * (np.abs(self.guard) @ sizes)
             decided = open_ & (np.abs(value) > noise)
             self.order[decided] = level
-            negative = np.flatnonzero(decided & (value < 0.0))
-            if len(negative) and found < 0:
-                found = int(negative[0])
+            wrong += [self.wrong[k] for k in np.flatnonzero(decided & (value < 0.0))]
             open_ &= ~decided
             if not open_.any():
                 break
-            now, sizes = self.rate @ now, np.abs(self.rate) @ sizes
-        return None if found < 0 else self.wrong[found]
+            now, sizes = self.rate @ now, self.terms @ sizes
+        return wrong
 
 
 def _guards(free: Unforced, state: np.ndarray, force: np.ndarray) -> tuple[list[np.ndarray], list[Wrong]]:
@@ -181,37 +182,45 @@ def _guards(free: Unforced, state: np.ndarray, force: np.ndarray) -> tuple[list[
 
 
 def search(
-    options: Sequence[Sequence[int]], begin: Sequence[int], judge: Callable[[States], tuple[Found, Wrong | None] | None]
+    options: Sequence[Sequence[int]], begin: Sequence[int], judge: Callable[[States], tuple[Found, list[Wrong]] | None]
 ) -> Found | None:
     """Return what `judge` makes of the first states it finds nothing wrong with; None if there are none.
 
     options: the states that each unit may have; begin: those to begin with. `judge` returns None where the states are
     impossible.
     """
-    at, seen = tuple(begin), set()
+    at, seen = tuple(begin), set[States]()
     while at not in seen:
         seen.add(at)
         judged = judge(at)
         if judged is None:
             break
         found, wrong = judged
-        if wrong is None:
+        if not wrong:
             return found
-        if wrong.state not in options[wrong.unit]:
-            closed = [state for state in options[wrong.unit] if (state == OPEN) == (wrong.state == OPEN)]
-            if not closed:
-                break
-            wrong = Wrong(wrong.unit, closed[0])
-        at = (*at[: wrong.unit], wrong.state, *at[wrong.unit + 1 :])
-    if sum(len(choice) > 1 for choice in options) > _MOST:
-        return None
-    changes = lambda states: sum(one != other for one, other in zip(states, begin, strict=True))  # noqa: E731
-    for states in sorted(product(*options), key=changes):
+        unit, state = wrong[0]
+        if state not in options[unit]:
+            state = next((other for other in options[unit] if (other == OPEN) == (state == OPEN)), at[unit])
+        at = (*at[:unit], state, *at[unit + 1 :])
+    for states in islice(_around(options, begin), _MOST):
         if states not in seen:
             judged = judge(states)
-            if judged is not None and judged[1] is None:
+            if judged is not None and not judged[1]:
                 return judged[0]
     return None
+
+
+def _around(options: Sequence[Sequence[int]], begin: Sequence[int]) -> Iterator[States]:
+    """Yield all states, those first that differ from `begin` in few units."""
+    others = [[state for state in choice if state != at] for choice, at in zip(options, begin, strict=True)]
+    units = [unit for unit, choice in enumerate(others) if choice]
+    for count in range(1, len(units) + 1):
+        for changed in combinations(units, count):
+            for states in product(*(others[unit] for unit in changed)):
+                at = list(begin)
+                for unit, state in zip(changed, states, strict=True):
+                    at[unit] = state
+                yield tuple(at)
 
 
 def decide(free: Unforced, now: np.ndarray, sizes: np.ndarray, present: np.ndarray, touch: np.ndarray, slow: float):
@@ -231,7 +240,7 @@ def decide(free: Unforced, now: np.ndarray, sizes: np.ndarray, present: np.ndarr
         options.append(ways)
         begin.append(int(present[r]) if present[r] in ways else ways[0])
 
-    def judge(states: States) -> tuple[Motion, Wrong | None] | None:
+    def judge(states: States) -> tuple[Motion, list[Wrong]] | None:
         motion = Motion(free, np.array(states))
         return (motion, motion.judge(now, sizes)) if motion.possible else None
 
@@ -277,7 +286,7 @@ def _impulses(free: Unforced, v: np.ndarray, closed: np.ndarray, restitution: np
     for r in np.flatnonzero(closed):
         options[r] = [STICK, RIGHT, LEFT, OPEN] if free.rubs[r] else [RIGHT, OPEN]
 
-    def judge(states: States) -> tuple[Impact, Wrong | None] | None:
+    def judge(states: States) -> tuple[Impact, list[Wrong]] | None:
         holding = Holding(free, np.array(states))
         if not holding.possible:
             return None
@@ -298,18 +307,18 @@ def _violation(
     rebound: np.ndarray,
     slow: float,
     closed: np.ndarray,
-) -> Wrong | None:
+) -> list[Wrong]:
     """Return what speaks against impulses (2u,) and the velocities (N,) that they leave."""
-    u, least = free.u, ROUND_OFF * float(np.abs(impulse).max(initial=0.0))
-    for r in range(free.system.contacts):
+    u, least, wrong = free.u, ROUND_OFF * float(np.abs(impulse).max(initial=0.0)), []
+    for r in np.flatnonzero(closed).tolist():
         push, drag, bound = impulse[r], impulse[u + r], free.system.friction[r] * impulse[r]
         if states[r] == OPEN:
-            if closed[r] and free.normal[r] @ after + rebound[r] < -slow:
-                return Wrong(r, STICK)
+            if free.normal[r] @ after + rebound[r] < -slow:
+                wrong.append(Wrong(r, STICK))
         elif push < -least:
-            return Wrong(r, OPEN)
+            wrong.append(Wrong(r, OPEN))
         elif states[r] == STICK and abs(drag) > bound + least:
-            return Wrong(r, LEFT if drag > 0.0 else RIGHT)
+            wrong.append(Wrong(r, LEFT if drag > 0.0 else RIGHT))
         elif states[r] in (LEFT, RIGHT) and free.rubs[r] and _WAY[states[r]] * (free.slip[r] @ after) < -slow:
-            return Wrong(r, STICK)
-    return None
+            wrong.append(Wrong(r, STICK))
+    return wrong
