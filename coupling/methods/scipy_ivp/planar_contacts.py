@@ -30,6 +30,8 @@ _DEPENDENT = 1e-9
 _LOST = 1e-7
 #: states that may be tried in turn: all of six contacts with friction, and what is near of more
 _MOST = 5000
+#: sweeps that guess the states of an impact, the change that ends them, and how near to its bound a force slips
+_SWEEPS, _CONVERGED, _NEARLY = 200, 1e-9, 1e-6
 #: bisections of the restitution of an impact that would bring energy
 _HALVINGS = 50
 
@@ -255,8 +257,8 @@ class Impact(NamedTuple):
     state: np.ndarray
 
 
-def impact(free: Unforced, v: np.ndarray, closed: np.ndarray, restitution: np.ndarray) -> Impact | None:
-    """Return Newton's law in Moreau's form with Coulomb's at closed contacts (contacts,); None without a solution.
+def impact(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution: np.ndarray) -> Impact | None:
+    """Return Newton's law in Moreau's form with Coulomb's at the closed contacts; None without a solution.
 
     restitution: (u,). Where the impact would bring energy, all coefficients are smaller by one factor.
     """
@@ -277,13 +279,13 @@ def _gain(free: Unforced, v: np.ndarray, found: Impact) -> float:
     return float(mass @ (found.v**2 - v**2) - 1e-12 * mass @ v**2)
 
 
-def _impulses(free: Unforced, v: np.ndarray, closed: np.ndarray, restitution: np.ndarray) -> Impact | None:
+def _impulses(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution: np.ndarray) -> Impact | None:
     system, u = free.system, free.u
     rebound = restitution * np.minimum(free.normal @ v, 0.0)
     terms = np.abs(system.J) @ np.abs(v)
     slow = ROUND_OFF * float(terms.max(initial=0.0))
     options = [[OPEN] for _ in range(u)]
-    for r in np.flatnonzero(closed):
+    for r in closed:
         options[r] = [STICK, RIGHT, LEFT, OPEN] if free.rubs[r] else [RIGHT, OPEN]
 
     def judge(states: States) -> tuple[Impact, list[Wrong]] | None:
@@ -296,7 +298,32 @@ def _impulses(free: Unforced, v: np.ndarray, closed: np.ndarray, restitution: np
         after = v + (system.J / system.mass).T @ impulse
         return Impact(impulse, after, np.array(states)), _violation(free, states, impulse, after, rebound, slow, closed)
 
-    return search(options, [choice[0] for choice in options], judge)
+    return search(options, _sweep(free, v, closed, rebound), judge)
+
+
+def _sweep(free: Unforced, v: np.ndarray, closed: Sequence[int], rebound: np.ndarray) -> list[int]:
+    """Return the states (u,) that projected Gauss-Seidel sweeps arrive at, to begin with (Jean 1999)."""
+    system, u, impulse = free.system, free.u, np.zeros(2 * free.u)
+    mobility, speed = system.delassus, system.J @ v
+    speed[:u] += rebound
+    for _ in range(_SWEEPS):
+        before = impulse.copy()
+        for r in closed:
+            bound = np.inf
+            for row in (r, u + r) if free.rubs[r] else (r,):
+                low = 0.0 if row < u else -bound
+                change = min(max(impulse[row] - speed[row] / mobility[row, row], low), bound) - impulse[row]
+                impulse[row] += change
+                speed += mobility[:, row] * change
+                bound = system.friction[r] * impulse[r]
+        if np.abs(impulse - before).max() <= _CONVERGED * np.abs(impulse).max():
+            break
+    state = [OPEN] * u
+    for r in closed:
+        if impulse[r] > 0.0:
+            slips = not free.rubs[r] or abs(impulse[u + r]) >= (1 - _NEARLY) * system.friction[r] * impulse[r]
+            state[r] = STICK if not slips else LEFT if impulse[u + r] > 0.0 else RIGHT
+    return state
 
 
 def _violation(
@@ -306,11 +333,11 @@ def _violation(
     after: np.ndarray,
     rebound: np.ndarray,
     slow: float,
-    closed: np.ndarray,
+    closed: Sequence[int],
 ) -> list[Wrong]:
     """Return what speaks against impulses (2u,) and the velocities (N,) that they leave."""
     u, least, wrong = free.u, ROUND_OFF * float(np.abs(impulse).max(initial=0.0)), []
-    for r in np.flatnonzero(closed).tolist():
+    for r in closed:
         push, drag, bound = impulse[r], impulse[u + r], free.system.friction[r] * impulse[r]
         if states[r] == OPEN:
             if free.normal[r] @ after + rebound[r] < -slow:

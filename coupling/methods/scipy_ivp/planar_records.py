@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.methods.scipy_ivp.planar_contacts import OPEN, Impact, Unforced
+from vanedamp.coupling.methods.scipy_ivp.planar_contacts import OPEN, ROUND_OFF, Impact, Unforced
 from vanedamp.coupling.numerics.codes import COUNTERS, PERIOD
 from vanedamp.coupling.planar.constraints import FLOOR
 from vanedamp.coupling.planar.recorder import record_section
@@ -127,7 +127,7 @@ class PlanarRecorder:
         losses = -0.5 * impact.impulse * (speed + after)
         self.impact_loss += float(losses[:u].sum())
         self.impact_friction += float(losses[u:].sum())
-        for r in np.flatnonzero(impact.impulse[: system.contacts] > 0.0):
+        for r in np.flatnonzero(impact.impulse[: system.contacts] > ROUND_OFF * impact.impulse.max()):
             self.impacts += 1
             self.records.impacts[self.period] += 1
             self.records.collided[self.period] += 0.5 * speed[r] ** 2 / system.delassus[r, r]

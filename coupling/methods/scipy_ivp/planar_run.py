@@ -62,7 +62,7 @@ class PlanarIvpRun:
         self.absolute = options.rtol * self.sizes
         self.y = np.concatenate([initial.q, initial.v, np.zeros(self.record.count)])
         self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
-        self.state = np.full(free.u, OPEN)
+        self.state, self.struck = np.full(free.u, OPEN), np.full(free.u, -np.inf)  # times of the last impacts
         self.motion: Motion
         self.guard, self.order = np.zeros((0, free.extent)), np.zeros(0, int)
         self.begun = False
@@ -129,6 +129,7 @@ class PlanarIvpRun:
 
     def _end_period(self) -> Status:
         self.time = 0.0
+        self.struck -= self.system.period
         self.record.end_period(self.y)
         return Status.OK
 
@@ -162,7 +163,7 @@ class PlanarIvpRun:
         for _ in range(_STANDING):
             if not np.any(normal[closed] @ v < -slow):
                 break
-            found = impact(free, v, closed, system.restitution)
+            found = impact(free, v, np.flatnonzero(closed).tolist(), self._restitution())
             if found is None:
                 return False
             self._jump(v, found)
@@ -196,9 +197,15 @@ class PlanarIvpRun:
         sizes = np.concatenate([self.sizes[: free.size], np.ones(free.extent - free.size)])
         return decide(free, now, sizes, self.state, touch, slow)
 
+    def _restitution(self) -> np.ndarray:
+        """Return the coefficients (u,): impacts that follow each other at once end without rebound."""
+        collapses = self.time - self.struck < _AT_ONCE * self.system.period
+        return np.where(collapses, 0.0, self.system.restitution)
+
     def _jump(self, v: np.ndarray, found: Impact) -> None:
         """Change the velocities, in place, by an impact."""
         self.record.impact(self.time, v, found)
+        self.struck[(found.impulse[: self.free.u] > 0.0) & (self.free.normal @ v < 0.0)] = self.time
         v[:] = found.v
 
     def _bring(self, values: np.ndarray, rows: np.ndarray, off: np.ndarray) -> None:
@@ -219,7 +226,8 @@ class PlanarIvpRun:
         accelerations = free.accelerations @ free.extended(self.time, np.concatenate([self.y[free.q], v]))
         slides = np.where(free.contact, 0.0, -system.limit * np.sign(free.slip @ v))
         accelerations += (free.slip / system.mass).T @ slides
-        return impact(free, v + _CHATTER * system.period * accelerations, closed, np.zeros(free.u))
+        ahead = v + _CHATTER * system.period * accelerations
+        return impact(free, ahead, np.flatnonzero(closed).tolist(), np.zeros(free.u))
 
     def _stop(self, v: np.ndarray, step: Impact) -> None:
         """Stop, in place, the contacts that push in a step, and the slips of those that stick."""
