@@ -260,10 +260,11 @@ class Impact(NamedTuple):
 def impact(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution: np.ndarray) -> Impact | None:
     """Return Newton's law in Moreau's form with Coulomb's at the closed contacts; None without a solution.
 
-    restitution: (u,). Where the impact would bring energy, all coefficients are smaller by one factor.
+    restitution: (u,). Where the impact would bring energy, or has no solution, all coefficients are smaller by one
+    factor.
     """
     found = _impulses(free, v, closed, restitution)
-    if found is None or _gain(free, v, found) <= 0.0:
+    if found is not None and _gain(free, v, found) <= 0.0:
         return found
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
@@ -296,6 +297,10 @@ def _impulses(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution:
         left[: len(holding.closed)] += rebound[holding.closed]
         impulse = holding.spread(-holding.inverse @ left, u)
         after = v + (system.J / system.mass).T @ impulse
+        left = holding.rows @ after
+        left[: len(holding.closed)] += rebound[holding.closed]
+        if np.abs(left).max(initial=0.0) > slow:  # rows that depend on each other, but are to part
+            return None
         return Impact(impulse, after, np.array(states)), _violation(free, states, impulse, after, rebound, slow, closed)
 
     return search(options, _sweep(free, v, closed, rebound), judge)
