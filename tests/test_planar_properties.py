@@ -1,11 +1,8 @@
 """Laws that every motion of blocks, discs and sliders obeys, over random scenes, event by event."""
 
-import numpy as np
 import pytest
 
-from tests.tools.planar_laws import Stepper, image_parts, laws_of, positions, scene_of, tables
-from tests.tools.planar_moreau import time_stepping
-from vanedamp.coupling.planar.constraints import PlanarMotion
+from tests.tools.planar_laws import image_parts, laws_of
 
 
 def test_laws():
@@ -42,22 +39,3 @@ def test_mirror_images_of_hundreds(first):
             apart.append(str(error))
     assert compared >= 2000
     assert len(apart) <= 2, apart
-
-
-@pytest.mark.parametrize(
-    "seed", [3, 10, 17, 26, 31, 38, 39, *(pytest.param(k, marks=pytest.mark.slow) for k in (19, 21, 32))]
-)
-def test_time_stepping(seed):
-    """Half a period with impacts and friction: Moreau's scheme, of first order, comes near as its steps shrink."""
-    stepper = Stepper(scene_of(tables(seed)))
-    system, state = stepper.run.system, stepper.run.state
-    initial, count = PlanarMotion(state.q.copy(), state.v.copy()), 50
-    times = np.linspace(0.0, 0.5 * system.period, count + 1)
-    exact = positions(stepper, times)
-    errors = []
-    for steps in (1000, 4000):
-        path = time_stepping(system, initial, 0.5, steps)[:: steps // (2 * count)]
-        off = (path - exact) @ system.J[: system.contacts].T / system.play[: system.contacts]
-        errors.append(np.abs(off).max())
-    assert errors[1] <= 0.025
-    assert errors[1] <= 0.6 * errors[0]
