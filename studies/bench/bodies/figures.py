@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from vanedamp.studies.bench.methods.peers import PEERS
+from vanedamp.studies.bench.methods.scenes import charted
 from vanedamp.studies.figures import BLUE, GREY, RED, draw_grid, save, subplots
 
 
@@ -44,4 +46,34 @@ def bodies_figure(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         draw_grid(axes)
     left.legend()
     right.legend()
+    save(figure, path)
+
+
+def methods_figure(result: Mapping[str, Any], path: Path) -> None:
+    """Draw the error of every method over its cost, a panel a coefficient of friction."""
+    cases = sorted({row["friction"] for row in result["points"]}, reverse=True)
+    figure, panels = subplots(1, len(cases), size=(6.5 * len(cases), 5.2), sharey=True, squeeze=False)
+    styles = {label: (variant.colour, variant.marker) for label, (_, variant) in charted().items()}
+    styles |= {name: (peer.colour, peer.marker) for name, peer in PEERS.items()}
+    for axes, friction in zip(panels[0], cases, strict=True):
+        for label, (colour, marker) in styles.items():
+            mine = [
+                row for row in result["points"]
+                if row["method"] == label and row["friction"] == friction and row["error"] is not None
+            ]  # fmt: skip
+            if not mine:
+                continue
+            cost, error = [1e6 * row["seconds_per_period"] for row in mine], [row["error"] for row in mine]
+            spread = [[row["error"] - row["low"] for row in mine], [row["high"] - row["error"] for row in mine]]
+            axes.errorbar(
+                cost, error, spread, fmt=marker + "-", color=colour, lw=1.2, elinewidth=0.8,
+                ms=13 if marker == "*" else 5, label=label, zorder=3 if marker == "*" else 2,
+            )  # fmt: skip
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlabel("CPU time per period, µs")
+        axes.set_title(f"friction {friction:g}")
+        draw_grid(axes)
+    panels[0][0].set_ylabel("error of response and slip in two periods\n(median and quartiles over starts)")
+    panels[0][-1].legend()
     save(figure, path)

@@ -13,6 +13,7 @@ import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.bench.methods.peer_siconos_planar import run_block
 from vanedamp.studies.bench.methods.peers import Coupled, PeerRun, coupled, one_restitution, tracked
 
 
@@ -25,6 +26,8 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     if not scene.contact.rigid or any(damper.stiffness is not None for damper in scene.friction_damper):
         raise InputError("Siconos: its kernel has no law of a unilateral spring with a dashpot for Lagrangian systems")
     steps = round(setting)
+    if scene.planar:
+        return run_block(scene, periods, steps, samples)
     equations = coupled(scene, steps)
     simulation, structure, kept = _model(equations, periods)
     system, h = equations.system, equations.times.step

@@ -21,7 +21,7 @@ from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
 #: share of the free travel by which a body may overlap a wall, as for our methods
-_DEEPEST = 0.1
+DEEPEST = 0.1
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class PeerRun:
 class Peer(NamedTuple):
     """A program: module of studies, what to import, how to get it, whether its setting is a tolerance (or steps).
 
-    colour, marker: of its line in charts.
+    colour, marker: of its line in charts; planar: whether its set-up takes a body with extent.
     """
 
     module: str
@@ -52,12 +52,15 @@ class Peer(NamedTuple):
     tolerance: bool
     colour: str
     marker: str
+    planar: bool = False
 
 
 PEERS = {
     "SUNDIALS CVODE": Peer("peer_cvode", "sksundae", "pip install vanedamp[peers]", True, "#111827", "P"),
     "Exudyn": Peer("peer_exudyn", "exudyn", "pip install vanedamp[peers]", False, "#64748b", "X"),
-    "Siconos": Peer("peer_siconos", "siconos.kernel", "apt install python3-siconos", False, "#dc2626", "h"),
+    "Siconos": Peer(
+        "peer_siconos", "siconos.kernel", "apt install python3-siconos", False, "#dc2626", "h", planar=True
+    ),
 }
 
 
@@ -67,6 +70,8 @@ def run_peer(name: str, scene: Scene, periods: int, setting: float, samples: int
     Raises InputError where the peer is not installed or cannot express the scene.
     """
     peer = PEERS[name]
+    if scene.planar and not peer.planar:
+        raise InputError(f"{name}: this set-up takes sliders without springs only")
     try:
         import_module(peer.needs)
     except ImportError:
@@ -109,7 +114,7 @@ def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> 
     gaps = system.J @ q.T + system.rest[:, None]
     # no number is deeper than any
     deep = float(np.nan_to_num((-gaps / times.travel[:, None]).max(initial=0.0), nan=np.inf))
-    status = Status.OK if deep <= _DEEPEST else Status.PENETRATION
+    status = Status.OK if deep <= DEEPEST else Status.PENETRATION
     if not np.isfinite(q).all():
         status = Status.DIVERGED
     return PeerRun(
