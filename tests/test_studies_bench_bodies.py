@@ -5,6 +5,7 @@ import json
 
 from PIL import Image
 
+from vanedamp.studies.bench.bodies import methods
 from vanedamp.studies.bench.bodies.measure import Effort, print_summary, run_bodies
 
 
@@ -22,3 +23,17 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
             assert picture.size[0] > 1000
     print_summary(result)
     assert "time a period and impact" in capsys.readouterr().out
+
+
+def test_benchmark_of_methods_leaves_its_results(tmp_path, capsys):
+    result = methods.run_methods(tmp_path, methods.Effort(3, (500, 8000), (), (1e-8,), 4, 1))
+    assert json.loads((tmp_path / "bench_bodies_methods.json").read_text())["points"] == result["points"]
+    errors = {(row["method"], row["friction"], row["setting"]): row["error"] for row in result["points"]}
+    assert errors["exact engine", 0.4, 0] < 1e-8
+    assert errors["solve_ivp, DOP853 with events", 0.0, 1e-8] < 1e-5
+    assert errors["Moreau-Jean", 0.4, 8000] < errors["Moreau-Jean", 0.4, 500]
+    assert "sliders only" in result["absent"]["penalty, HHT"]
+    with Image.open(tmp_path / "bench_bodies_methods.png") as picture:
+        assert picture.size[0] > 1000
+    methods.print_methods(result)
+    assert "ratio" in capsys.readouterr().out

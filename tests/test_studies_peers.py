@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.files.toml_input import InputError
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.studies.bench.bodies.methods import block_scene
 from vanedamp.studies.bench.methods import peers
 from vanedamp.studies.bench.methods import scenes as method_scenes
 
@@ -85,3 +87,46 @@ def test_what_is_not_installed_is_said(monkeypatch):
     monkeypatch.setitem(peers.PEERS, "Exudyn", peers.PEERS["Exudyn"]._replace(needs="no_such_module"))
     with pytest.raises(InputError, match="not installed; pip install"):
         peers.run_peer("Exudyn", method_scenes.single(), 1, 100)
+
+
+def block(start=0.0, **changes):
+    """A block that is thrown about its cavity."""
+    return block_scene(0, 0.4).replace({"damper.0.position": start} | changes)
+
+
+def test_siconos_and_our_own_time_stepping_move_a_block_alike():
+    """One scheme, but contacts of its own geometry and a solver of its own, to that solver's tolerance."""
+    needs("Siconos")
+    scene = block()
+    ours = simulate(method_scenes.by(scene, method="moreau", steps_per_period=1000), samples_per_period=SAMPLES)
+    theirs = peers.run_peer("Siconos", scene, 2, 1000, SAMPLES)
+    samples = np.column_stack([ours.displacement, ours.body_displacement])
+    assert ours.impacts_per_period > 2
+    assert (np.abs(theirs.samples - samples) / np.ptp(samples, axis=0)).max() < 1e-4
+    assert theirs.penetration == pytest.approx(ours.penetration, rel=1e-3)
+
+
+def test_siconos_moves_a_block_as_the_exact_engine_does():
+    """Medians over starts: where two corners hit almost together, steps part from it at once."""
+    needs("Siconos")
+    errors = []
+    for start in (-4e-6, -2e-6, 0.0, 2e-6, 4e-6):
+        scene = block(start)
+        exact = simulate(scene, samples_per_period=SAMPLES)
+        samples = np.column_stack([exact.displacement, exact.body_displacement])
+        theirs = peers.run_peer("Siconos", scene, 2, 10_000, SAMPLES).samples
+        errors.append((np.abs(theirs - samples) / np.ptp(samples, axis=0)).max())
+    assert np.median(errors) < 0.03
+
+
+def test_bodies_that_a_peer_does_not_take_are_refused(monkeypatch):
+    with pytest.raises(InputError, match="Exudyn: this set-up takes sliders"):
+        peers.run_peer("Exudyn", block(), 1, 100)
+    monkeypatch.setitem(peers.PEERS, "Siconos", peers.PEERS["Siconos"]._replace(needs="numpy"))
+    for changes in ({"cavity.c1.rotation": 1.0}, {"damper.0.stiffness": 1e3}):
+        with pytest.raises(InputError, match="Siconos: this set-up knows no"):
+            peers.run_peer("Siconos", block(**changes), 1, 100)
+    two = block().to_dict()
+    two["damper"] = [two["damper"][0] | {"position": -1e-5}, two["damper"][0] | {"position": 1e-5}]
+    with pytest.raises(InputError, match="one block in one cavity"):
+        peers.run_peer("Siconos", validate(Scene, two, "scene"), 1, 100)

@@ -36,17 +36,18 @@ _COLUMNS = ("friction", "method", "setting", "status", "error", "low", "high", "
 
 @dataclass(frozen=True)
 class Effort:
-    """Starts that errors are medians of, steps a period, those of peers, tolerances; periods of a timed run."""
+    """Starts that errors are medians of, steps a period, those of peers, tolerances; periods and rounds of timed runs."""
 
     starts: int
     steps: tuple[int, ...]
     peers: tuple[int, ...]
     tolerances: tuple[float, ...]
     timed: int
+    rounds: int
 
 
-FULL = Effort(15, (200, 1000, 5000, 20_000, 100_000), (200, 1000, 5000, 20_000), (1e-4, 1e-6, 1e-8, 1e-10), 30)
-QUICK = Effort(3, (200, 5000), (200,), (1e-6,), 10)
+FULL = Effort(15, (200, 1000, 5000, 20_000, 100_000), (200, 1000, 5000, 20_000), (1e-4, 1e-6, 1e-8, 1e-10), 30, 4)
+QUICK = Effort(3, (200, 5000), (200,), (1e-6,), 10, 2)
 
 
 def block_scene(start: int, friction: float, periods: int = PERIODS) -> Scene:
@@ -137,9 +138,9 @@ def _point(
 
 
 def _seconds(scene: Scene, effort: Effort) -> float:
-    """Return the processor time of a period, s: the least of three, after one that loads compiled functions."""
+    """Return the processor time of a period after the first, which loads compiled functions, s: the least of rounds."""
     last = 3 if scene.solver.method == "solve_ivp" else max(effort.timed, 3)
-    return min(time_of_a_period(scene, (1, last)) for _ in range(4))
+    return min(time_of_a_period(scene, (1, last)) for _ in range(effort.rounds))
 
 
 def _price(effort: Effort) -> dict[str, dict[str, float]]:
