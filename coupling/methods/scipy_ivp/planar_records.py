@@ -29,8 +29,8 @@ class _Moment(NamedTuple):
 class PlanarRecorder:
     """Records of a run by an integrator.
 
-    watched, rates (1 + k, extent): displacement of the response and tilts, whose largest values are recorded, and their
-    rates on the extended state.
+    state: (u,) of the units; watched, speeds (1 + k, extent): displacement of the response and tilts, whose largest
+    values are recorded, and their rates on the extended state.
     """
 
     def __init__(self, free: Unforced, records: Records, steps: int, events: bool) -> None:
@@ -42,6 +42,8 @@ class PlanarRecorder:
         self.log: list[list[float]] = []
         of_bodies = len(records.peak), len(system.along)
         self.tilt, self.lifted = np.zeros(of_bodies), np.zeros(of_bodies)
+        self.sampled = np.zeros((len(records.samples), free.n))
+        self.shut, self.state = np.zeros((len(records.samples), free.u), np.int8), np.full(free.u, OPEN)
         self.tilts = np.flatnonzero(system.tilt >= 0)
         self.watched, self.speeds = np.zeros((2, 1 + len(self.tilts), free.extent))
         self.watched[0, free.q] = self.speeds[0, free.v] = system.response
@@ -83,6 +85,11 @@ class PlanarRecorder:
             x * cosine, x * sine, momentum * cosine, momentum * sine,
         ])  # fmt: skip
 
+    def start(self, y: np.ndarray) -> None:
+        """Take the first sample, once the states are known."""
+        if self.each:
+            self._sample(0, 0.0, y)
+
     def points(self, times: np.ndarray, y: np.ndarray) -> None:
         """Record peaks, samples and penetration at points of the grid."""
         free, system = self.free, self.system
@@ -107,10 +114,10 @@ class PlanarRecorder:
         self.tilt[self.period, self.tilts] = np.maximum(self.tilt[self.period, self.tilts], largest[1:])
         self.last = t, value, rate
 
-    def flight(self, duration: float, state: np.ndarray) -> None:
+    def flight(self, duration: float) -> None:
         """Add the duration of an arc to the time that bodies have spent off the floor."""
         stands = np.zeros(len(self.system.along), bool)
-        stands[self.system.body[self.on_floor & (state != OPEN)]] = True
+        stands[self.system.body[self.on_floor & (self.state != OPEN)]] = True
         lifted = ~stands & (self.system.tilt >= 0)
         self.lifted[self.period, lifted] += duration
 
@@ -119,6 +126,7 @@ class PlanarRecorder:
             q = y[self.free.q]
             x = self.watched[0] @ self.free.extended(t, y[: self.free.size])
             self.records.samples[index] = [x, *(q[self.system.along] - self.system.floor @ q)]
+            self.sampled[index], self.shut[index] = q, self.state != OPEN
 
     def impact(self, t: float, before: np.ndarray, impact: Impact) -> None:
         """Count and log an impact from velocities (N,)."""
@@ -133,9 +141,9 @@ class PlanarRecorder:
             self.records.collided[self.period] += 0.5 * speed[r] ** 2 / system.delassus[r, r]
             if self.keep:
                 moment = self.period * system.period + t
-                self.log.append(
-                    [moment, IMPACT, r, speed[r], after[r], impact.impulse[r], impact.impulse[u + r]]
-                )  # fmt: skip
+                loss = losses[r] + losses[u + r]
+                impulses = impact.impulse[r], impact.impulse[u + r]
+                self.log.append([moment, IMPACT, r, speed[r], after[r], *impulses, loss])
 
     def stopped(self, before: np.ndarray, after: np.ndarray) -> None:
         """Enter what the end of a chatter has taken."""
@@ -152,7 +160,7 @@ class PlanarRecorder:
         self.section(y)
 
     def section(self, y: np.ndarray) -> None:
-        """Record section and ledger at the start of a period, and its first sample."""
+        """Record section and ledger at the start of a period."""
         free, integrals = self.free, y[self.free.size :]
         counters, ledger = np.zeros(COUNTERS, np.int64), np.zeros(len(ENERGIES))
         counters[PERIOD] = self.period
@@ -162,5 +170,3 @@ class PlanarRecorder:
         extended = free.extended(0.0, y[: free.size])
         self.last = 0.0, self.watched @ extended, self.speeds @ extended
         self.before = integrals.copy()
-        if self.each and not self.period:
-            self._sample(0, 0.0, y)

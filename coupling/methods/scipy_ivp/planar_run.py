@@ -74,6 +74,7 @@ class PlanarIvpRun:
             self.record.section(self.y)
             if not self._decide():
                 return Status.UNDECIDED
+            self.record.start(self.y)
         with np.errstate(all="ignore"):
             while self.record.period < periods:
                 if self.events >= self.options.max_events:
@@ -91,7 +92,9 @@ class PlanarIvpRun:
         return Outcome(
             self.flat, record.records, record.period, self.events,
             _OPEN_LEDGER * max(self.options.rtol, _LEAST), numbers, log, max(record.deep, 0.0),
-            plane_of(self.system, record.tilt, record.lifted, self.options.linearisation),
+            plane_of(
+                self.system, record.tilt, record.lifted, record.sampled, record.shut, self.options.linearisation
+            ),
         )  # fmt: skip
 
     def final(self) -> None:
@@ -116,7 +119,7 @@ class PlanarIvpRun:
         self.record.points(arc.t, arc.y)
         if self.record.deep > self.options.penetration:
             return Status.PENETRATION
-        self.record.flight(arc.duration, self.state)
+        self.record.flight(arc.duration)
         self.time, self.y = self.time + arc.duration, arc.last
         if arc.event is None:
             self.order = np.zeros_like(self.order)
@@ -183,7 +186,7 @@ class PlanarIvpRun:
             motion = self._motion(closed, touch, slow)
         if motion is None:
             return False
-        self.motion, self.state = motion, motion.state
+        self.motion, self.state, self.record.state = motion, motion.state, motion.state
         watched = motion.order != NEVER
         self.guard, self.order = motion.guard[watched], motion.order[watched]
         self.record.turning(self.time, self.y)

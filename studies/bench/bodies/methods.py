@@ -36,7 +36,7 @@ _COLUMNS = ("friction", "method", "setting", "status", "error", "low", "high", "
 
 @dataclass(frozen=True)
 class Effort:
-    """Starts that errors are medians of, steps a period, those of peers, tolerances; periods and rounds of timed runs."""
+    """Starts that errors are medians of, steps a period, those of peers, tolerances; periods and rounds of timing."""
 
     starts: int
     steps: tuple[int, ...]
