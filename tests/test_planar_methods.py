@@ -1,10 +1,14 @@
 """Bodies with extent by every method that takes them: closed forms, orders, and agreement with the exact engine."""
 
 import math
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
+from pydantic.dataclasses import dataclass
 
+from tests.test_planar_surfaces import FOUR, HEIGHT, INCLINED, LENGTH, cavity_scene, rigid_cavity
 from tests.tools.planar import planar_scene, run_planar, still_table
 from tests.tools.planar_laws import scene_of, tables
 from vanedamp.coupling.methods import moreau, penalty, scipy_ivp
@@ -12,8 +16,10 @@ from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.response.evaluation import residual
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.waveform import Waveform, register
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.files.toml_input import InputError
+from vanedamp.files.toml_input import STRICT, InputError
+from vanedamp.rom.reduced import ReducedModel
 
 G = 9.81
 METHODS = {"moreau": moreau, "penalty": penalty, "solve_ivp": scipy_ivp}
@@ -225,3 +231,38 @@ def test_statuses_of_a_tilt_too_large():
         solver = {"method": method, "linearisation": 1e-9} | options
         scene = planar_scene(still_table(20.0) | {"solver": solver}, body)
         assert respond(scene).status is Status.TILTED
+
+
+@register
+@dataclass(frozen=True, config=STRICT)
+class SampledSine(Waveform):
+    """A sine that is known by its values only."""
+
+    shape: Literal["sampled sine"] = "sampled sine"
+
+    def values(self, angle):
+        return np.sin(angle)
+
+
+@pytest.mark.parametrize("method", ["moreau", "penalty"])
+def test_loads_of_a_waveform_act_across_the_cavity(tmp_path, method):
+    """A block that touches nothing lags behind a base that moves across, too: by a sine, or by the values of one."""
+    file = rigid_cavity(tmp_path / "rom.h5", INCLINED)
+    model = ReducedModel.load(file)
+    directions = np.array(model.directions)
+    directions[model.interface.index("all")] = [0.0, 1.0, 0.0]  # of the base
+    replace(model, directions=directions).save(file)
+    excitation = {"frequency": 29.0, "base_acceleration": 10.0, "at": "all"}
+    block = {"cavity": "c1", "shape": "block", "length": LENGTH, "height": HEIGHT, "mass": 0.05, "lift": 5.0}
+    runs = []
+    for signal in ({}, {"waveform": {"shape": "sampled sine"}}):
+        scene = cavity_scene(
+            file, FOUR, excitation=excitation | signal, solver={"method": method, "steps_per_period": 2000},
+            cavity=[{"name": "c1", "gap": 20.0, "play": 10.0} | FOUR], damper=[block],
+            time={"periods": 2, "transient": 0},
+        )  # fmt: skip
+        runs.append(respond(scene, samples_per_period=8))
+    assert runs[0].status is runs[1].status is Status.OK
+    lift = [run.in_plane.body_lift[:, 0] for run in runs]
+    assert np.ptp(lift[0]) > 1e-4
+    np.testing.assert_allclose(lift[1], lift[0], rtol=0, atol=1e-12)

@@ -40,7 +40,10 @@ def mixed(**changes):
     return data | changes
 
 
-@pytest.mark.parametrize("solver", [{}, {"method": "moreau", "steps_per_period": 2000}])
+@pytest.mark.parametrize(
+    "solver",
+    [{}, {"method": "moreau", "steps_per_period": 2000}, {"method": "solve_ivp", "steps_per_period": 100}],
+)
 def test_gaps_are_those_of_the_sampled_poses(solver):
     """In the frame of the cavity a corner is at the body's place, less its height times the tilt; so are its gaps."""
     response = simulate(validate(Scene, mixed(solver=solver), "scene"), samples_per_period=100)
@@ -89,7 +92,7 @@ def test_a_prescribed_base_carries_its_floors():
     assert np.ptp(response.displacement) == pytest.approx(4e-4, rel=1e-2)
 
 
-@pytest.mark.parametrize("solver", [{}, {"method": "moreau", "steps_per_period": 20000}])
+@pytest.mark.parametrize("solver", [{}, {"method": "moreau", "steps_per_period": 20000}, {"method": "solve_ivp"}])
 def test_losses_of_impacts_are_all_that_is_lost_in_flight(solver):
     """Without gravity and damping nothing takes energy but impacts, friction during them included."""
     thrown = BLOCK | {"lift": 3e-4, "velocity": 0.3, "lift_velocity": 0.1, "tilt": 2e-4, "tilt_rate": 1.0}

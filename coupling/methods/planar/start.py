@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid, time_grid
 from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem, planar_motion, planar_system
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import loads_of
+from vanedamp.coupling.system.assembly import Loads, assemble
 from vanedamp.coupling.system.system import System
 
 
@@ -17,13 +19,13 @@ def planar_start(scene: Scene, flat: System, steps: int) -> tuple[PlanarSystem, 
     Raises InputError for what bodies with extent do not allow.
     """
     system, signal = planar_system(scene, flat), scene.excitation.signal
-    coordinates = [*range(flat.modes), *system.along]
+    if signal is None:
+        return system, planar_motion(scene, flat, system), time_grid(flat, steps, _harmonics(flat, system))
+    sine = replace(scene, excitation=replace(scene.excitation, waveform=None))
+    level = -planar_system(sine, assemble(sine)).load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
+    times = time_grid(flat, steps, lambda angle: np.outer(signal.sampled(angle), level))
+    return system, planar_motion(scene, flat, system), times
 
-    def loads(angle: np.ndarray) -> np.ndarray:
-        if signal is None:
-            return (flat.phases(angle) @ system.load).real
-        load = np.zeros((len(angle), len(system.mass)))
-        load[:, coordinates] = loads_of(scene, signal)(angle)
-        return load
 
-    return system, planar_motion(scene, flat, system), time_grid(flat, steps, loads)
+def _harmonics(flat: System, system: PlanarSystem) -> Loads:
+    return lambda angle: (flat.phases(angle) @ system.load).real
