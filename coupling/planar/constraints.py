@@ -13,10 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.scene.bodies import Cavity, Damper
+from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import physical_scale
 from vanedamp.coupling.system.constraints import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, interface_row
+from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
@@ -47,7 +49,8 @@ class PlanarSystem(NamedTuple):
     delassus: np.ndarray  # (2u, 2u) J M^-1 J^T
     friction: np.ndarray  # (u,) coefficient of a contact
     limit: np.ndarray  # (u,) constant limit of a friction element, N; 0 for contacts
-    restitution: np.ndarray  # (u,)
+    restitution: np.ndarray  # (u,) or the coefficient from which the law takes it at a speed
+    restitution_at: int  # address of that law (system.restitution); 0: the coefficient at every speed
     play: np.ndarray  # (u,) m, the scale of a contact's gap
     body: np.ndarray  # (u,) number of the unit's body
     surface: np.ndarray  # (u,) int: place of its name in SURFACES
@@ -78,7 +81,7 @@ class _Unit(NamedTuple):
     slip: np.ndarray
     rest: float
     friction: float
-    restitution: float
+    element: Element
     play: float
     body: int
     surface: int
@@ -136,8 +139,9 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             mass[x + 1], weight[x + 1] = body.damper.mass, -body.damper.mass * across
             mass[x + 2] = body.damper.moment_of_inertia
     units: list[_Unit] = []
+    law = _Law(scene.contact, mass, n)
     for index, cavity in enumerate(scene.cavity):
-        units += _contacts(scene, cavity, walls[index], [body for body in bodies if owner[body.number] == index], size)
+        units += _contacts(law, cavity, walls[index], [body for body in bodies if owner[body.number] == index], size)
     for row in range(flat.friction_rows, len(flat.J)):
         if not flat.J[row, n:].any():
             gap = np.zeros(size)
@@ -145,7 +149,7 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             number = row - (len(flat.J) - len(scene.stop))
             units.append(
                 _Unit(
-                    gap, np.zeros(size), float(flat.rest[row]), 0.0, float(flat.restitution[row]),
+                    gap, np.zeros(size), float(flat.rest[row]), 0.0, Element(float(flat.restitution[row])),
                     float(flat.free_travel[row]), number, STOP,
                 )
             )  # fmt: skip
@@ -159,7 +163,9 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
                 functional[bodies[row].x] = 1.0
             surface, number = (FLOOR, row) if row < len(bodies) else (CASING, row - len(bodies))
             limit = float(flat.limit[row])
-            units.append(_Unit(np.zeros(size), functional, 0.0, 0.0, 0.0, np.inf, number, surface, limit=limit))
+            units.append(
+                _Unit(np.zeros(size), functional, 0.0, 0.0, Element(0.0), np.inf, number, surface, limit=limit)
+            )
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
     stiffness[:n, :n], damping[:n, :n] = np.diag(flat.stiffness[:n]), flat.damping[:n, :n]
@@ -173,12 +179,14 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     response[:n] = flat.response[:n]
     pushed = np.abs(weight) * flat.period + (np.abs(load) / np.maximum(flat.frequency, flat.omega)[:, None]).sum(axis=0)
     column = lambda name: np.array([getattr(unit, name) for unit in units])  # noqa: E731
+    restitution = np.array([unit.element.restitution for unit in units], float)
     return PlanarSystem(
         contacts=contacts, mass=mass, stiffness=stiffness, damping=damping, load=load, weight=weight,
         response=response, table=flat.table, frequency=flat.frequency, period=flat.period,
         speed=float((np.abs(J) @ (pushed / mass)).max(initial=0.0)), J=J,
         rest=column("rest").astype(float), delassus=(J / mass) @ J.T, friction=column("friction").astype(float),
-        limit=column("limit").astype(float), restitution=column("restitution").astype(float),
+        limit=column("limit").astype(float), restitution=restitution,
+        restitution_at=law_address(scene.contact, restitution[:contacts]),
         play=column("play").astype(float), body=column("body").astype(np.int64),
         surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
         along=np.array([body.x for body in bodies], np.int64),
@@ -209,7 +217,21 @@ def _walls(scene: Scene, basis: ModalBasis, index: int) -> _Walls:
     return _Walls((left, right, floor, ceiling), across + none, turn + none)
 
 
-def _contacts(scene: Scene, cavity: Cavity, walls: _Walls, bodies: list[_Body], size: int) -> list[_Unit]:
+class _Law(NamedTuple):
+    """The contact law, with the masses (N,) of the coordinates, the first n of which are modes."""
+
+    contact: ContactLaw
+    mass: np.ndarray
+    n: int
+
+    def element(self, normal: np.ndarray, restitution: float) -> Element:
+        """Return the element of a contact from its normal row; the structure's mass is that of its first mode."""
+        mobility = normal**2 / self.mass
+        mobility[1 : self.n] = 0.0
+        return self.contact.element(restitution, 1 / float(mobility.sum()))
+
+
+def _contacts(law: _Law, cavity: Cavity, walls: _Walls, bodies: list[_Body], size: int) -> list[_Unit]:
     """Contacts in a cavity, from left to right, in each body's walls, floor and ceiling."""
     units: list[_Unit] = []
     length, n = 2 * sum(body.a for body in bodies), len(walls.across)
@@ -217,14 +239,14 @@ def _contacts(scene: Scene, cavity: Cavity, walls: _Walls, bodies: list[_Body], 
     for place, body in enumerate(bodies):
         centre += body.a
         if place == 0:
-            units += _at_walls(cavity, walls, body, LEFT, -cavity.gap / 2 - length / 2, size, n)
+            units += _at_walls(law, cavity, walls, body, LEFT, -cavity.gap / 2 - length / 2, size, n)
         if place == len(bodies) - 1:
-            units += _at_walls(cavity, walls, body, RIGHT, cavity.gap / 2 + length / 2, size, n)
+            units += _at_walls(law, cavity, walls, body, RIGHT, cavity.gap / 2 + length / 2, size, n)
         if body.damper.shape != "slider":
             for surface in (FLOOR, CEILING):
-                units += _at_floor(cavity, walls, body, surface, centre, size, n)
+                units += _at_floor(law, cavity, walls, body, surface, centre, size, n)
         if place + 1 < len(bodies):
-            units += _between(scene, cavity, body, bodies[place + 1], size)
+            units += _between(law, cavity, body, bodies[place + 1], size)
         centre += body.a
     return units
 
@@ -238,7 +260,9 @@ def _point(body: _Body, a: float, b: float, size: int) -> tuple[np.ndarray, np.n
     return along, across
 
 
-def _at_walls(cavity: Cavity, walls: _Walls, body: _Body, surface: int, wall: float, size: int, n: int) -> list[_Unit]:
+def _at_walls(
+    law: _Law, cavity: Cavity, walls: _Walls, body: _Body, surface: int, wall: float, size: int, n: int
+) -> list[_Unit]:
     """Contacts with the left or the right wall, at `wall` (m) along the cavity."""
     sign = 1.0 if surface == LEFT else -1.0
     if body.damper.shape == "slider":
@@ -260,7 +284,7 @@ def _at_walls(cavity: Cavity, walls: _Walls, body: _Body, surface: int, wall: fl
                 across * extended,
                 cavity.gap / 2,
                 body.damper.friction * extended,
-                body.damper.restitution,
+                law.element(sign * along, body.damper.restitution),
                 cavity.gap,
                 body.number,
                 surface,
@@ -271,7 +295,7 @@ def _at_walls(cavity: Cavity, walls: _Walls, body: _Body, surface: int, wall: fl
 
 
 def _at_floor(
-    cavity: Cavity, walls: _Walls, body: _Body, surface: int, centre: float, size: int, n: int
+    law: _Law, cavity: Cavity, walls: _Walls, body: _Body, surface: int, centre: float, size: int, n: int
 ) -> list[_Unit]:
     """Contacts with floor or ceiling of a body whose centre is at `centre` (m) along the cavity."""
     below, play = surface == FLOOR, cavity.play or 0.0
@@ -291,7 +315,7 @@ def _at_floor(
                 along,
                 0.0 if below else play,
                 body.damper.friction,
-                body.damper.restitution,
+                law.element(sign * across, body.damper.restitution),
                 play,
                 body.number,
                 surface,
@@ -313,7 +337,7 @@ def _check_friction(units: list[_Unit], size: int, mass: np.ndarray) -> None:
             )
 
 
-def _between(scene: Scene, cavity: Cavity, left: _Body, right: _Body, size: int) -> list[_Unit]:
+def _between(law: _Law, cavity: Cavity, left: _Body, right: _Body, size: int) -> list[_Unit]:
     """Contacts of two neighbours: blocks face to face at the ends of the common height, discs at one point."""
     shapes = {left.damper.shape, right.damper.shape}
     if shapes == {"slider"}:
@@ -343,13 +367,14 @@ def _between(scene: Scene, cavity: Cavity, left: _Body, right: _Body, size: int)
     for height in heights:
         right_along, right_across = _point(right, -right.a, height - right.b, size)
         left_along, left_across = _point(left, left.a, height - left.b, size)
+        normal = right_along - left_along
         units.append(
             _Unit(
-                right_along - left_along,
+                normal,
                 (right_across - left_across) * (friction > 0.0),
                 0.0,
                 friction,
-                scene.contact.pair_restitution(*coefficients),
+                law.element(normal, law.contact.pair_restitution(*coefficients)),
                 cavity.gap,
                 left.number,
                 BODY,

@@ -26,7 +26,8 @@ from vanedamp.coupling.planar.contact_decisions import (
     span,
     speed_scale,
 )
-from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS
+from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
+from vanedamp.coupling.system.restitution import restitution_at
 
 #: energy that an impact may bring, as a share of what is in it, before it is solved again
 _GAIN = 1e-12
@@ -82,17 +83,17 @@ def _rebound(system, st, work, count, share, tiny):
     for p in range(count):
         r = work.listed[p]
         normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
-        work.speed[r] = normal + share * _restitution(system, st, r) * min(normal, 0.0)
+        work.speed[r] = normal + share * _restitution(system, st, work, r) * min(normal, 0.0)
         work.speed[u + r] = work.before_impact[u + r]
     return solve_rows(system, work, count, work.speed, 0.0) and not _brings_energy(system, st, work)
 
 
 @inlined
-def _restitution(system, st, r):
-    """Coefficient of a contact; an impact at the end of a collapse is plastic."""
+def _restitution(system, st, work, r):
+    """Coefficient of a contact at its speed of approach; an impact at the end of a collapse is plastic."""
     if st.time[0] - st.last_impact[r] < COLLAPSE * system.period:
         return 0.0
-    return system.restitution[r]
+    return restitution_at(system, r, -work.before_impact[r])
 
 
 @inlined
@@ -122,12 +123,10 @@ def _apply(system, st, work):
 
 @inlined
 def _account(system, st, work):
-    """Enter what the impulses took: of normal ones as impact loss, of tangential ones as friction, J."""
-    u = len(system.rest)
-    for r in range(2 * u):
+    """Enter what the impulses took, J: the loss of an impact is one, since shares of single rows may be negative."""
+    for r in range(len(work.impulse)):
         if work.impulse[r] != 0.0:
-            loss = -0.5 * work.impulse[r] * (work.before_impact[r] + row_speed(system, r, st.v))
-            st.ledger[IMPACT_LOSS if r < u else FRICTION] += loss
+            st.ledger[IMPACT_LOSS] -= 0.5 * work.impulse[r] * (work.before_impact[r] + row_speed(system, r, st.v))
 
 
 @inlined
@@ -217,8 +216,9 @@ def _step(system, st, work, count):
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
-        ahead = CHATTER * system.period * max(1.0 - system.restitution[r], 0.1)
-        work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
+        normal = row_speed(system, r, st.v)
+        ahead = CHATTER * system.period * max(1.0 - restitution_at(system, r, abs(normal)), 0.1)
+        work.speed[r] = normal + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
     return solve_rows(system, work, count, work.speed, 0.0)
 

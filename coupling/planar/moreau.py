@@ -32,6 +32,7 @@ from vanedamp.coupling.planar.contact_decisions import gap, row_speed
 from vanedamp.coupling.planar.recorder import note_tilts, record_section
 from vanedamp.coupling.response.recorder import cubic_peak
 from vanedamp.coupling.response.records import ENERGIES, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
+from vanedamp.coupling.system.restitution import restitution_at
 
 #: problems that a step may take, the last with all contacts at once
 _TURNS = 20
@@ -67,6 +68,7 @@ class SteppedMotion(NamedTuple):
     start: np.ndarray  # (2, N) coordinates and velocities as the step begins
     free: np.ndarray  # (2, N) right-hand side; velocities at the step's end with the impulses found so far
     before: np.ndarray  # (2u,) speeds as the step begins
+    slowest: np.ndarray  # (1,) speed below which a contact counts as at rest, m/s
     impulse: np.ndarray  # (2u,) of the step
     more: np.ndarray  # (2u,) that the present problem adds
     left: np.ndarray  # (2u,) its speeds, less what restitution asks for
@@ -81,7 +83,8 @@ def start_steps(system: PlanarSystem, initial: PlanarMotion, periods: int) -> St
         q=initial.q.copy(), v=initial.v.copy(), counters=np.zeros(COUNTERS, np.int64), ledger=np.zeros(len(ENERGIES)),
         deepest=np.zeros(1), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
         active=np.zeros(u, np.int64), speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u),
-        start=np.zeros((2, size)), free=np.zeros((2, size)), before=np.zeros(2 * u), impulse=np.zeros(2 * u),
+        start=np.zeros((2, size)), free=np.zeros((2, size)), before=np.zeros(2 * u), slowest=np.zeros(1),
+        impulse=np.zeros(2 * u),
         more=np.zeros(2 * u), left=np.zeros(2 * u), closed=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
     )  # fmt: skip
 
@@ -143,11 +146,12 @@ def _impulses(system, motion, mobility, turned, h):
         for i in range(len(free)):
             size += abs(system.J[r, i]) * max(abs(free[i]), abs(motion.v[i]))
         fastest = max(fastest, size)
+    motion.slowest[0] = _AT_REST * fastest
     for r in range(system.contacts):
         ahead = gap(system, r, motion.q) + 0.5 * h * motion.before[r]
         motion.closed[r] = 1 if ahead <= _ROUND_OFF * system.play[r] else 0
     for turn in range(_TURNS):
-        count = _list_units(system, motion, turn, _AT_REST * fastest)
+        count = _list_units(system, motion, turn)
         if count == 0:
             return True
         motion.counters[SOLVES] += 1
@@ -160,18 +164,16 @@ def _impulses(system, motion, mobility, turned, h):
                     free[i] += turned[i, r] * motion.more[r]
         approaching = False
         for r in range(system.contacts):
-            approaching = approaching or (
-                motion.closed[r] == 1 and row_speed(system, r, free) < -_AT_REST * fastest
-            )  # fmt: skip
+            approaching = approaching or (motion.closed[r] == 1 and row_speed(system, r, free) < -motion.slowest[0])
         if not approaching:
             return True
     return True
 
 
 @inlined
-def _list_units(system, motion, turn, slowest):
+def _list_units(system, motion, turn):
     """List the units that take part in a turn, with what Newton's law leaves of their speeds. Return their number."""
-    u, count, free = len(system.rest), 0, motion.free[1]
+    u, count, free, slowest = len(system.rest), 0, motion.free[1], motion.slowest[0]
     for r in range(u):
         if r < system.contacts:
             if motion.closed[r] == 0:
@@ -180,7 +182,7 @@ def _list_units(system, motion, turn, slowest):
             before = motion.before[r] if turn == 0 else now
             if turn < _TURNS - 1 and before > slowest and now > -slowest:
                 continue
-            motion.left[r] = now + system.restitution[r] * min(before, 0.0)
+            motion.left[r] = now + restitution_at(system, r, -before) * min(before, 0.0)
         motion.left[u + r] = row_speed(system, u + r, free)
         motion.listed[count] = r
         count += 1
@@ -257,13 +259,15 @@ def _account(system, times, motion, records, k, deepest):
         motion.ledger[EXCITATION] += 0.5 * (times.load[k, i] + times.load[k + 1, i]) * moved
         for j in range(len(q)):
             motion.ledger[VISCOUS] += 0.5 * system.damping[i, j] * (v[j] + motion.v[j]) * moved
+    hit = _collided(system, motion)
     for r in range(u):
         for row in (r, u + r):
             if motion.impulse[row] != 0.0:
                 moved = 0.0
                 for i in range(len(q)):
                     moved += system.J[row, i] * (motion.q[i] - q[i])
-                motion.ledger[IMPACT_LOSS if row < u else FRICTION] -= motion.impulse[row] / h * moved
+                lost = row < u or (hit and r < system.contacts)
+                motion.ledger[IMPACT_LOSS if lost else FRICTION] -= motion.impulse[row] / h * moved
         if r < system.contacts:
             deep = max(deep, -gap(system, r, motion.q) / system.play[r])
     motion.deepest[0] = max(motion.deepest[0], deep)
@@ -275,6 +279,15 @@ def _account(system, times, motion, records, k, deepest):
     if not size < _BOUND:
         return DIVERGED
     return PENETRATION if deep > deepest else DONE
+
+
+@inlined
+def _collided(system, motion):
+    """Whether a contact that approached has pushed in this step: what contacts take is then the loss of an impact."""
+    hit = False
+    for r in range(system.contacts):
+        hit = hit or (motion.impulse[r] > 0.0 and motion.before[r] < -motion.slowest[0])
+    return hit
 
 
 @inlined

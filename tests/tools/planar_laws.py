@@ -38,7 +38,7 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.planar.automaton import advance, begin
 from vanedamp.coupling.planar.constraints import PlanarSystem
 from vanedamp.coupling.planar.contact_flow import add_flow
-from vanedamp.coupling.response.records import IMPACT
+from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
 
@@ -54,6 +54,7 @@ PLACES, PERTURBATION, PARTED = 20, 1e-11, 1e-6
 LIMITS = {
     "penetration": 1e-9, "apart": 1e-8, "motion": 1e-8, "pull": 1e-5, "cone": 1e-5, "along_slip": 1e-8,
     "starts": 1e-5, "newton": 1e-9, "impulse": 1e-9, "momentum": 1e-8, "gain": 1e-9, "ledger": 1e-10,
+    "returns": 1e-10,
 }  # fmt: skip
 
 
@@ -73,6 +74,7 @@ class Worst:
     momentum: float = 0.0  # jump of the velocities that no impulses explain
     gain: float = 0.0  # energy that an impact brings
     ledger: float = 0.0
+    returns: float = 0.0  # energy that friction, dashpots or impacts give back from one event to the next
     scenes: int = 0
     steps: int = 0
     jams: int = 0  # impacts without a collision
@@ -369,6 +371,8 @@ class Checker:
         else:
             self._jump(v, after, np.zeros(2 * self.u), 0.0, where)
         self._ledger(after, where)
+        losses = [VISCOUS, FRICTION, IMPACT_LOSS]
+        worst.note("returns", (before.ledger - after.ledger)[losses].max() / self.flowed, where)
         self._settled(after, self._motion(after), where)
 
     def _between(self, state: np.ndarray, motion: Motion, path: np.ndarray, where: str) -> None:
