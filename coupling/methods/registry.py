@@ -81,8 +81,8 @@ def _begin_planar(scene: Scene, system: System, method: Method, records: Records
     if begin is None:
         able = [name for name, part in METHODS.all().items() if hasattr(part, "begin_planar")]
         raise InputError(
-            f"solver.method: {scene.solver.method} takes sliders only; bodies with extent, stiffness or dashpot are "
-            f"for {' or '.join(able)}"
+            f"solver.method: {scene.solver.method} takes sliders only, and no impacts of two phases; bodies with "
+            f'extent, stiffness or dashpot and contact.law = "{scene.contact.law}" are for {" or ".join(able)}'
         )
     run: Run = begin(scene, system, scene.solver, records, events)
     return run
@@ -91,7 +91,9 @@ def _begin_planar(scene: Scene, system: System, method: Method, records: Records
 def why_no_restart(scene: Scene) -> str | None:
     """Return why runs of the scene's method cannot begin with the state of another; None if they can."""
     if scene.planar:
-        return "runs with bodies that have an extent, stiffness or dashpot leave no state for another"
+        return (
+            "runs with bodies that have an extent, stiffness or dashpot, or with impacts of two phases, leave no state"
+        )
     return _why_not(scene.solver.method, "RESTARTS")
 
 

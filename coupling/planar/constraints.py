@@ -51,6 +51,7 @@ class PlanarSystem(NamedTuple):
     limit: np.ndarray  # (u,) constant limit of a friction element, N; 0 for contacts
     restitution: np.ndarray  # (u,) or the coefficient from which the law takes it at a speed
     restitution_at: int  # address of that law (system.restitution); 0: the coefficient at every speed
+    two_phases: bool  # whether impacts have a phase of compression and one of expansion
     play: np.ndarray  # (u,) m, the scale of a contact's gap
     body: np.ndarray  # (u,) number of the unit's body
     surface: np.ndarray  # (u,) int: place of its name in SURFACES
@@ -186,7 +187,7 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         speed=float((np.abs(J) @ (pushed / mass)).max(initial=0.0)), J=J,
         rest=column("rest").astype(float), delassus=(J / mass) @ J.T, friction=column("friction").astype(float),
         limit=column("limit").astype(float), restitution=restitution,
-        restitution_at=law_address(scene.contact, restitution[:contacts]),
+        restitution_at=law_address(scene.contact, restitution[:contacts]), two_phases=scene.contact.two_phases,
         play=column("play").astype(float), body=column("body").astype(np.int64),
         surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
         along=np.array([body.x for body in bodies], np.int64),

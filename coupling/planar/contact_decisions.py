@@ -81,11 +81,12 @@ def free_acceleration(system, work, q, v, time):
 
 
 @kernel
-def solve_rows(system, work, count, right, least):
+def solve_rows(system, work, count, right, least, bound):
     """Solve the problem of the listed units: accelerations (or speeds) right + G forces, forces in work.impulse (2u,).
 
     right: (2u,) without the unknown forces; least: what they are to be measured by, at least, per root of the
-    diagonal of G. Returns False if there is no solution, or none is found.
+    diagonal of G; bound: (u,) of friction, to which mu times the unknown normal force is added. Returns False if there
+    is no solution, or none is found.
     """
     u, problem, size = len(system.rest), work.lemke, 0
     scale = least
@@ -99,7 +100,7 @@ def solve_rows(system, work, count, right, least):
             size += 2
         if system.delassus[u + r, u + r] > 0.0:
             scale = max(scale, abs(right[u + r]) / math.sqrt(system.delassus[u + r, u + r]))
-            scale = max(scale, system.limit[r] * math.sqrt(system.delassus[u + r, u + r]))
+            scale = max(scale, bound[r] * math.sqrt(system.delassus[u + r, u + r]))
     for r in range(2 * u):
         work.impulse[r] = 0.0
     if size == 0:
@@ -117,15 +118,14 @@ def solve_rows(system, work, count, right, least):
         slip = 1.0 / math.sqrt(system.delassus[u + r, u + r]) if at_rest else 0.0
         first = i + 1 if contact else i  # the unknown of the friction to the right
         if contact:
-            problem.q[i] = _loaded(system, work, count, right, r) * normal / scale
+            problem.q[i] = _loaded(system, work, count, right, bound, r) * normal / scale
         if at_rest:
-            problem.q[first] = _loaded(system, work, count, right, u + r) * slip / scale
+            problem.q[first] = _loaded(system, work, count, right, bound, u + r) * slip / scale
             problem.matrix[first, first + 1] += 1.0
             problem.matrix[first + 1, first] -= 1.0
+            problem.q[first + 1] = 2.0 * bound[r] / (slip * scale)
             if contact:
                 problem.matrix[first + 1, i] += 2.0 * system.friction[r] * normal / slip
-            else:
-                problem.q[first + 1] = 2.0 * system.limit[r] / (slip * scale)
         for o in range(count):
             c, j = work.listed[o], work.place[o]
             other = c < system.contacts
@@ -156,20 +156,20 @@ def solve_rows(system, work, count, right, least):
             if work.way[p] != 0:
                 work.impulse[u + r] = -work.way[p] * system.friction[r] * work.impulse[r]
         if work.way[p] == 0 and rubs(system, r):
-            low = system.friction[r] * work.impulse[r] if contact else system.limit[r]
+            low = bound[r] + (system.friction[r] * work.impulse[r] if contact else 0.0)
             share = problem.z[i + 1 if contact else i] * scale / math.sqrt(system.delassus[u + r, u + r])
             work.impulse[u + r] = share - low
     return True
 
 
 @inlined
-def _loaded(system, work, count, right, row):
-    """What a row has without the unknowns: friction elements count from their lower bound."""
+def _loaded(system, work, count, right, bound, row):
+    """What a row has without the unknowns: friction counts from its lower bound."""
     u, total = len(system.rest), right[row]
     for p in range(count):
         c = work.listed[p]
-        if c >= system.contacts:
-            total -= system.delassus[row, u + c] * system.limit[c]
+        if bound[c] > 0.0:
+            total -= system.delassus[row, u + c] * bound[c]
     return total
 
 
@@ -222,7 +222,7 @@ def decide(system, st, work, scale):
         work.listed[count], work.way[count] = r, way if rubs(system, r) else 0
         count += 1
     terms = loaded_acceleration(system, work, st.q, st.v, st.time[0])
-    if not solve_rows(system, work, count, work.speed, terms):
+    if not solve_rows(system, work, count, work.speed, terms, system.limit):
         return False
     _classify(system, work, count, _NOTHING, work.verdict)
     doubts = 0
@@ -280,7 +280,7 @@ def _look_ahead(system, st, work, count):
     for p in range(count):
         work.first[p], work.doubt[p] = work.verdict[p], work.doubtful[p]
     terms = loaded_acceleration(system, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
-    if not solve_rows(system, work, count, work.speed, terms):
+    if not solve_rows(system, work, count, work.speed, terms, system.limit):
         return False
     _classify(system, work, count, _NEXT_TO_NOTHING, work.verdict)
     # which of contacts that depend on each other carry the force is decided for all of them together

@@ -5,6 +5,9 @@ other, and P_T stays within Coulomb's cone, at its edge where the contact still 
 coefficient for all contacts never brings energy; with friction, or with several coefficients, the law can (Kane's
 paradox). Then all coefficients are smaller by one factor, the largest that brings none.
 
+Poisson's law (Glocker and Pfeiffer 1995) is two such problems: one of compression, without restitution, and one of
+expansion, in which P_N exceeds k times that of compression only where v_N+ would be negative.
+
 A block that comes to lie rocks from corner to corner ever faster, and ends in finite time, as a ball does. Contacts
 that would part for less than CHATTER are closed together: they lose the speed with which they would part.
 """
@@ -46,6 +49,8 @@ def collide(system, st, rec, log, work):
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
+    if system.two_phases and not _compress(system, work, count, tiny):
+        return False
     if not _rebound(system, st, work, count, 1.0, tiny):
         low, high = 0.0, 1.0
         for _ in range(_HALVINGS):
@@ -79,13 +84,58 @@ def _list_shut(system, st, work):
 @kernel
 def _rebound(system, st, work, count, share, tiny):
     """Find impulses for this share of the coefficients. Returns False if there are none, or they bring energy."""
+    if system.two_phases:
+        return _expand(system, st, work, count, share) and not _brings_energy(system, st, work)
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
         normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
         work.speed[r] = normal + share * _restitution(system, st, work, r) * min(normal, 0.0)
         work.speed[u + r] = work.before_impact[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0) and not _brings_energy(system, st, work)
+    return solve_rows(system, work, count, work.speed, 0.0, system.limit) and not _brings_energy(system, st, work)
+
+
+@kernel
+def _compress(system, work, count, tiny):
+    """Find the impulses that stop the approach, and the speeds that they leave. Returns False if there are none."""
+    u = len(system.rest)
+    for p in range(count):
+        r = work.listed[p]
+        work.speed[r] = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
+        work.speed[u + r] = work.before_impact[u + r]
+    if not solve_rows(system, work, count, work.speed, 0.0, system.limit):
+        return False
+    for r in range(2 * u):
+        work.compression[r], work.compressed[r] = work.impulse[r], work.before_impact[r]
+        for o in range(2 * u):
+            work.compressed[r] += system.delassus[r, o] * work.impulse[o]
+    return True
+
+
+@kernel
+def _expand(system, st, work, count, share):
+    """Find the impulses of both phases: in expansion a contact has at least its coefficient's part of compression.
+
+    With that part as given, the rest is the same problem: the more than it and the speed complement each other.
+    Returns False if there are none.
+    """
+    u = len(system.rest)
+    for row in range(2 * u):
+        work.speed[row] = work.compressed[row]
+    for p in range(count):
+        r = work.listed[p]
+        given = share * _restitution(system, st, work, r) * work.compression[r]
+        work.bound[r] = system.friction[r] * given
+        work.least[r] = given
+        for row in range(2 * u):
+            work.speed[row] += system.delassus[row, r] * given
+    if not solve_rows(system, work, count, work.speed, 0.0, work.bound):
+        return False
+    for p in range(count):
+        r = work.listed[p]
+        work.impulse[r] += work.least[r] + work.compression[r]
+        work.impulse[u + r] += work.compression[u + r]
+    return True
 
 
 @inlined
@@ -220,7 +270,7 @@ def _step(system, st, work, count):
         ahead = CHATTER * system.period * max(1.0 - restitution_at(system, r, abs(normal)), 0.1)
         work.speed[r] = normal + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0)
+    return solve_rows(system, work, count, work.speed, 0.0, system.limit)
 
 
 @inlined

@@ -71,6 +71,8 @@ class SteppedMotion(NamedTuple):
     slowest: np.ndarray  # (1,) speed below which a contact counts as at rest, m/s
     impulse: np.ndarray  # (2u,) of the step
     more: np.ndarray  # (2u,) that the present problem adds
+    least: np.ndarray  # (u,) normal impulse that it asks for, at least: in expansion
+    approach: np.ndarray  # (u,) speed of approach before its impact, m/s
     left: np.ndarray  # (2u,) its speeds, less what restitution asks for
     closed: np.ndarray  # (u,) int: whether a contact takes part in the step
     listed: np.ndarray  # (u,) int: units of the problem
@@ -85,7 +87,8 @@ def start_steps(system: PlanarSystem, initial: PlanarMotion, periods: int) -> St
         active=np.zeros(u, np.int64), speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u),
         start=np.zeros((2, size)), free=np.zeros((2, size)), before=np.zeros(2 * u), slowest=np.zeros(1),
         impulse=np.zeros(2 * u),
-        more=np.zeros(2 * u), left=np.zeros(2 * u), closed=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
+        more=np.zeros(2 * u), least=np.zeros(u), approach=np.zeros(u),
+        left=np.zeros(2 * u), closed=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
     )  # fmt: skip
 
 
@@ -150,6 +153,13 @@ def _impulses(system, motion, mobility, turned, h):
     for r in range(system.contacts):
         ahead = gap(system, r, motion.q) + 0.5 * h * motion.before[r]
         motion.closed[r] = 1 if ahead <= _ROUND_OFF * system.play[r] else 0
+    if system.two_phases:
+        if not _two_phases(system, motion, mobility, h, _TOLERANCE * fastest):
+            return False
+        for r in range(2 * u):
+            if motion.impulse[r] != 0.0:
+                for i in range(len(free)):
+                    free[i] += turned[i, r] * motion.impulse[r]
     for turn in range(_TURNS):
         count = _list_units(system, motion, turn)
         if count == 0:
@@ -170,6 +180,40 @@ def _impulses(system, motion, mobility, turned, h):
     return True
 
 
+@kernel
+def _two_phases(system, motion, mobility, h, tolerance):
+    """Add the impulses of impacts, compression and expansion, which the loads of the step come after.
+
+    In one problem with the loads, what they press would expand as well: a body at rest would hop. Returns False if
+    they do not converge.
+    """
+    u = len(system.rest)
+    for turn in range(_TURNS):
+        count, approaching = 0, False
+        for r in range(system.contacts):
+            if motion.closed[r] == 0:
+                continue
+            motion.left[r], motion.left[u + r] = motion.before[r], motion.before[u + r]
+            for row in range(2 * u):
+                motion.left[r] += mobility[r, row] * motion.impulse[row]
+                motion.left[u + r] += mobility[u + r, row] * motion.impulse[row]
+            approaching = approaching or motion.left[r] < -motion.slowest[0]
+            if motion.left[r] <= motion.slowest[0] or turn == _TURNS - 1:
+                motion.listed[count], motion.approach[r] = r, -motion.left[r]
+                count += 1
+        if not approaching:
+            return True
+        for phase in range(2):
+            if not _gauss_seidel(system, motion, mobility, count, h, tolerance):
+                return False
+            for p in range(count):
+                r = motion.listed[p]
+                motion.impulse[r] += motion.more[r]
+                motion.impulse[u + r] += motion.more[u + r]
+                motion.least[r] = restitution_at(system, r, motion.approach[r]) * motion.more[r] if phase == 0 else 0.0
+    return True
+
+
 @inlined
 def _list_units(system, motion, turn):
     """List the units that take part in a turn, with what Newton's law leaves of their speeds. Return their number."""
@@ -179,10 +223,12 @@ def _list_units(system, motion, turn):
             if motion.closed[r] == 0:
                 continue
             now = row_speed(system, r, free)
-            before = motion.before[r] if turn == 0 else now
+            before = motion.before[r] if turn == 0 and not system.two_phases else now
             if turn < _TURNS - 1 and before > slowest and now > -slowest:
                 continue
-            motion.left[r] = now + restitution_at(system, r, -before) * min(before, 0.0)
+            motion.left[r] = now
+            if not system.two_phases:
+                motion.left[r] += restitution_at(system, r, -before) * min(before, 0.0)
         motion.left[u + r] = row_speed(system, u + r, free)
         motion.listed[count] = r
         count += 1
@@ -200,7 +246,7 @@ def _gauss_seidel(system, motion, mobility, count, h, tolerance):
         for p in range(count):
             r = motion.listed[p]
             if r < system.contacts:
-                largest = max(largest, _push(system, motion, mobility, count, r, 0.0, math.inf))
+                largest = max(largest, _push(system, motion, mobility, count, r, motion.least[r], math.inf))
                 bound = system.friction[r] * more[r]
                 low, high = -bound, bound
             else:

@@ -65,6 +65,10 @@ class Scratch(NamedTuple):
     speed: np.ndarray  # (2u,) right-hand side of a problem: accelerations or speeds of the rows
     before_impact: np.ndarray  # (2u,) speeds
     impulse: np.ndarray  # (2u,)
+    compression: np.ndarray  # (2u,) impulse of the phase of compression
+    compressed: np.ndarray  # (2u,) speeds after it
+    least: np.ndarray  # (u,) normal impulse of expansion that compression asks for
+    bound: np.ndarray  # (u,) friction that a listed unit has whatever its unknown normal force, N or N s
     before: np.ndarray  # (u,) int: states before the event
     listed: np.ndarray  # (u,) int: units of a problem
     way: np.ndarray  # (u,) int: direction in which a listed unit slips, 0: none yet
@@ -108,7 +112,8 @@ def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
     integers = iter(np.zeros((9, u), np.int64))
     return Scratch(
         free=np.zeros(size), terms=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u),
-        before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), before=next(integers), listed=next(integers),
+        before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), compression=np.zeros(2 * u), compressed=np.zeros(2 * u),
+        least=np.zeros(u), bound=np.zeros(u), before=next(integers), listed=next(integers),
         way=next(integers), place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
         doubt=next(integers), sliding=next(integers), span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
