@@ -127,7 +127,7 @@ def test_a_corner_that_slips_on_obeys_both_laws(velocity, restitution):
 
 
 def test_a_corner_that_sticks_tells_the_laws_apart():
-    """Compression stops both speeds; expansion keeps the slip at rest: v_N+ = k (v_N + (G_NT/G_TT) v_T)."""
+    """Compression stops both speeds; expansion keeps the slip at rest: v_N+ = -k (v_N - (G_NT/G_TT) v_T)."""
     k, mu = 0.5, 0.8
     body = tilted(mu, k, 0.05)
     impulse, before, after, g, loss, _ = corner_impact("poisson", body)

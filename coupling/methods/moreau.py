@@ -40,7 +40,7 @@ from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.system.assembly import InitialMotion, Loads, loads_of
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
-from vanedamp.files.toml_input import Real
+from vanedamp.files.toml_input import InputError, Real
 
 VARIANTS = (Variant("Moreau-Jean", "#c2410c", "o"),)
 WAVEFORMS = True
@@ -84,6 +84,11 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
     from vanedamp.coupling.planar import moreau as planar  # its kernels are loaded when they are wanted
 
     system, signal = planar_system(scene, flat), scene.excitation.signal
+    if np.isfinite(system.spring).any():
+        raise InputError(
+            f'contact.law: "{scene.contact.law}" of bodies with extent, stiffness or dashpot is for solver.method '
+            "exact, not moreau"
+        )
     coordinates = [*range(flat.modes), *system.along]
 
     def loads(angle: np.ndarray) -> np.ndarray:

@@ -51,6 +51,8 @@ class PlanarSystem(NamedTuple):
     limit: np.ndarray  # (u,) constant limit of a friction element, N; 0 for contacts
     restitution: np.ndarray  # (u,) or the coefficient from which the law takes it at a speed
     restitution_at: int  # address of that law (system.restitution); 0: the coefficient at every speed
+    spring: np.ndarray  # (u,) stiffness of a contact that yields, N/m; inf: rigid, and friction elements
+    dashpot: np.ndarray  # (u,) N s/m
     two_phases: bool  # whether impacts have a phase of compression and one of expansion
     play: np.ndarray  # (u,) m, the scale of a contact's gap
     body: np.ndarray  # (u,) number of the unit's body
@@ -111,6 +113,7 @@ class _Walls(NamedTuple):
     along: tuple[np.ndarray, ...]
     across: np.ndarray
     turn: np.ndarray
+    flexibility: tuple[float, float, float]  # residual, of left wall, right wall and floor across, m/N
 
 
 def planar_system(scene: Scene, flat: System) -> PlanarSystem:
@@ -150,7 +153,8 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             number = row - (len(flat.J) - len(scene.stop))
             units.append(
                 _Unit(
-                    gap, np.zeros(size), float(flat.rest[row]), 0.0, Element(float(flat.restitution[row])),
+                    gap, np.zeros(size), float(flat.rest[row]), 0.0,
+                    Element(float(flat.restitution[row]), float(flat.spring[row]), float(flat.dashpot[row])),
                     float(flat.free_travel[row]), number, STOP,
                 )
             )  # fmt: skip
@@ -180,14 +184,15 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     response[:n] = flat.response[:n]
     pushed = np.abs(weight) * flat.period + (np.abs(load) / np.maximum(flat.frequency, flat.omega)[:, None]).sum(axis=0)
     column = lambda name: np.array([getattr(unit, name) for unit in units])  # noqa: E731
-    restitution = np.array([unit.element.restitution for unit in units], float)
+    elements = np.reshape([unit.element for unit in units], (len(units), 3)).astype(float)
     return PlanarSystem(
         contacts=contacts, mass=mass, stiffness=stiffness, damping=damping, load=load, weight=weight,
         response=response, table=flat.table, frequency=flat.frequency, period=flat.period,
         speed=float((np.abs(J) @ (pushed / mass)).max(initial=0.0)), J=J,
         rest=column("rest").astype(float), delassus=(J / mass) @ J.T, friction=column("friction").astype(float),
-        limit=column("limit").astype(float), restitution=restitution,
-        restitution_at=law_address(scene.contact, restitution[:contacts]), two_phases=scene.contact.two_phases,
+        limit=column("limit").astype(float), restitution=elements[:, 0],
+        restitution_at=law_address(scene.contact, elements[:contacts, 0]), spring=elements[:, 1],
+        dashpot=elements[:, 2], two_phases=scene.contact.two_phases,
         play=column("play").astype(float), body=column("body").astype(np.int64),
         surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
         along=np.array([body.x for body in bodies], np.int64),
@@ -215,7 +220,8 @@ def _walls(scene: Scene, basis: ModalBasis, index: int) -> _Walls:
     across = basis.rows.get(f"{labels[2]}.normal", cavity.normal_motion * floor)
     turn = basis.rows.get(f"{labels[2]}.rotation", cavity.rotation * floor)
     ceiling = floor if cavity.ceiling is None else interface_row(basis, cavity.ceiling, f"cavity[{index}].ceiling")
-    return _Walls((left, right, floor, ceiling), across + none, turn + none)
+    at_left, at_right, below = (basis.flexibility.get(label, 0.0) for label in (*labels[:2], f"{labels[2]}.normal"))
+    return _Walls((left, right, floor, ceiling), across + none, turn + none, (at_left, at_right, below))
 
 
 class _Law(NamedTuple):
@@ -225,11 +231,11 @@ class _Law(NamedTuple):
     mass: np.ndarray
     n: int
 
-    def element(self, normal: np.ndarray, restitution: float) -> Element:
+    def element(self, normal: np.ndarray, restitution: float, flexibility: float) -> Element:
         """Return the element of a contact from its normal row; the structure's mass is that of its first mode."""
         mobility = normal**2 / self.mass
         mobility[1 : self.n] = 0.0
-        return self.contact.element(restitution, 1 / float(mobility.sum()))
+        return self.contact.element(restitution, 1 / float(mobility.sum()), flexibility)
 
 
 def _contacts(law: _Law, cavity: Cavity, walls: _Walls, bodies: list[_Body], size: int) -> list[_Unit]:
@@ -247,7 +253,7 @@ def _contacts(law: _Law, cavity: Cavity, walls: _Walls, bodies: list[_Body], siz
             for surface in (FLOOR, CEILING):
                 units += _at_floor(law, cavity, walls, body, surface, centre, size, n)
         if place + 1 < len(bodies):
-            units += _between(law, cavity, body, bodies[place + 1], size)
+            units += _between(law, cavity, walls, body, bodies[place + 1], size)
         centre += body.a
     return units
 
@@ -285,7 +291,7 @@ def _at_walls(
                 across * extended,
                 cavity.gap / 2,
                 body.damper.friction * extended,
-                law.element(sign * along, body.damper.restitution),
+                law.element(sign * along, body.damper.restitution, walls.flexibility[0 if surface == LEFT else 1]),
                 cavity.gap,
                 body.number,
                 surface,
@@ -316,7 +322,7 @@ def _at_floor(
                 along,
                 0.0 if below else play,
                 body.damper.friction,
-                law.element(sign * across, body.damper.restitution),
+                law.element(sign * across, body.damper.restitution, walls.flexibility[2]),
                 play,
                 body.number,
                 surface,
@@ -338,7 +344,7 @@ def _check_friction(units: list[_Unit], size: int, mass: np.ndarray) -> None:
             )
 
 
-def _between(law: _Law, cavity: Cavity, left: _Body, right: _Body, size: int) -> list[_Unit]:
+def _between(law: _Law, cavity: Cavity, walls: _Walls, left: _Body, right: _Body, size: int) -> list[_Unit]:
     """Contacts of two neighbours: blocks face to face at the ends of the common height, discs at one point."""
     shapes = {left.damper.shape, right.damper.shape}
     if shapes == {"slider"}:
@@ -375,7 +381,7 @@ def _between(law: _Law, cavity: Cavity, left: _Body, right: _Body, size: int) ->
                 (right_across - left_across) * (friction > 0.0),
                 0.0,
                 friction,
-                law.element(normal, law.contact.pair_restitution(*coefficients)),
+                law.element(normal, law.contact.pair_restitution(*coefficients), 0.5 * sum(walls.flexibility[:2])),
                 cavity.gap,
                 left.number,
                 BODY,

@@ -18,16 +18,19 @@ import math
 
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.impacts import COLLAPSE
-from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, PERIOD
+from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD
 from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import (
     AT_REST,
+    is_rigid,
     is_shut,
     loaded_acceleration,
     row_speed,
+    rubs,
     solve_rows,
     span,
     speed_scale,
+    yields,
 )
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
 from vanedamp.coupling.system.restitution import restitution_at
@@ -75,7 +78,7 @@ def _list_shut(system, st, work):
     """List the contacts whose gaps are zero. Returns how many they are."""
     count = ZERO
     for r in range(system.contacts):
-        if is_shut(system, st, r):
+        if is_rigid(system, r) and is_shut(system, st, r):
             work.listed[count], work.way[count] = r, 0
             count += 1
     return count
@@ -181,14 +184,19 @@ def _account(system, st, work):
 
 @inlined
 def _note(system, st, rec, log, work, r):
+    """Count and log an impact of a rigid contact."""
+    u, after = len(system.rest), row_speed(system, r, st.v)
+    note_impact(system, st, rec, log, r, work.before_impact[r], after, work.impulse[r], work.impulse[u + r])
+
+
+@inlined
+def note_impact(system, st, rec, log, r, before, after, normal, tangential):
     """Count an impact and log it: relative velocities, normal and tangential impulse."""
-    u = len(system.rest)
-    before = work.before_impact[r]
     st.last_impact[r] = st.time[0]
     st.counters[IMPACTS] += 1
     rec.impacts[st.counters[PERIOD]] += 1
     rec.collided[st.counters[PERIOD]] += 0.5 * before * before / system.delassus[r, r]
-    log_event(system, st, log, IMPACT, r, before, row_speed(system, r, st.v), work.impulse[r], work.impulse[u + r])
+    log_event(system, st, log, IMPACT, r, before, after, normal, tangential)
 
 
 @inlined
@@ -251,10 +259,10 @@ def _accelerate(system, st, work):
     u, largest = len(system.rest), 0.0
     for r in range(u):
         work.sliding[r] = 0
-        if r >= system.contacts:
+        if r >= system.contacts or (yields(system, r) and rubs(system, r) and st.state[r] < OPEN):
             slip = row_speed(system, u + r, st.v)
             work.sliding[r] = 0 if abs(slip) <= AT_REST * st.scale[0] else (1 if slip > 0.0 else -1)
-    loaded_acceleration(system, work, st.q, st.v, st.time[0])
+    loaded_acceleration(system, st, work, st.q, st.v, st.time[0])
     for r in range(2 * u):
         largest = max(largest, abs(work.speed[r]))
     return largest * CHATTER * system.period

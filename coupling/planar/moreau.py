@@ -106,7 +106,7 @@ def march(system, times, motion, records, log, inverse, turned, mobility, theta,
     h, steps, size = times.step, len(times.phase) - 1, len(motion.q)
     q, v, rhs, free = motion.start[0], motion.start[1], motion.free[0], motion.free[1]
     if motion.counters[PERIOD] == 0:
-        record_section(system, motion, records)
+        record_section(system, motion, records, 0.0)
     while motion.counters[PERIOD] < periods:
         for k in range(steps):
             for i in range(size):
@@ -130,7 +130,7 @@ def march(system, times, motion, records, log, inverse, turned, mobility, theta,
             if code != DONE:
                 return code
         motion.counters[PERIOD] += 1
-        record_section(system, motion, records)
+        record_section(system, motion, records, 0.0)
         if motion.counters[IMPACTS] >= budget:
             return EVENT_BUDGET
     return DONE

@@ -17,15 +17,15 @@ def plane_of(system: PlanarSystem, tilt: np.ndarray, lifted: np.ndarray, lineari
         (int(body), SURFACES[surface], int(corner))
         for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
     ]
-    return Plane(tilt, lifted, system.neglected, linearisation, places)
+    return Plane(tilt, lifted, system.neglected, linearisation, places, system.spring)
 
 
 @kernel
-def record_section(system, st, rec):
-    """Record section, energies and ledger at the start of a period."""
+def record_section(system, st, rec, springs):
+    """Record section, energies and ledger at the start of a period. springs: energy in those of contacts, J."""
     size, bodies, period = len(st.q), len(system.along), st.counters[PERIOD]
     entry, part = rec.section[period], rec.parts[period]
-    x, rate, momentum, energy = 0.0, 0.0, 0.0, 0.0
+    x, rate, momentum, energy = 0.0, 0.0, 0.0, springs
     for h in range(len(system.table)):
         x += system.table[h].real
         rate -= system.frequency[h] * system.table[h].imag

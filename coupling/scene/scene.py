@@ -147,11 +147,6 @@ class Scene:
                     f'cavity[{number}].play: missing; damper[{index}] with shape = "{damper.shape}" needs the free '
                     "travel across the cavity"
                 )
-        if not self.contact.rigid:
-            raise ValueError(
-                f'contact.law: "{self.contact.law}" is for sliders without springs; bodies with extent, stiffness or '
-                "dashpot take rigid contact"
-            )
         for index, friction_damper in enumerate(self.friction_damper):
             if friction_damper.stiffness is not None:
                 raise ValueError(

@@ -26,6 +26,7 @@ from vanedamp.coupling.numerics.codes import (
     EVENT_BUDGET,
     EVENTS,
     ILL_CONDITIONED,
+    LEAVING,
     LOGGED,
     NEEDS_FLOW,
     OPEN,
@@ -260,7 +261,8 @@ class Motion:
     def __init__(self, system: PlanarSystem, state: np.ndarray) -> None:
         n, u, e = len(system.mass), len(system.rest), len(system.frequency)
         units, contact = np.arange(u), np.arange(u) < system.contacts
-        closed = units[contact & (state < OPEN)]
+        yields = np.isfinite(system.spring)
+        closed, pressed = units[contact & ~yields & (state < OPEN)], units[yields & (state < OPEN)]
         sticks = units[(state == STICK) & ((system.friction > 0) | ~contact)]
         way = 1.0 * (state == SLIP_RIGHT) - (state == SLIP_LEFT)
         normal, slip = system.J[:u], system.J[u:]
@@ -274,11 +276,17 @@ class Motion:
         free[:, :n], free[:, n : 2 * n] = -system.stiffness, -system.damping
         free[:, 2 * n : 2 * n + e], free[:, 2 * n + e : -1] = system.load.real.T, -system.load.imag.T
         free[:, -1] = system.weight + slip.T @ slides
+        springs = np.zeros((2 * u, free.shape[1]))
+        springs[pressed, :n] = -system.spring[pressed, None] * normal[pressed]
+        springs[pressed, n : 2 * n] = -system.dashpot[pressed, None] * normal[pressed]
+        springs[pressed, -1] = -system.spring[pressed] * system.rest[pressed]
+        springs[u + pressed] = -(way * system.friction)[pressed, None] * springs[pressed]
+        free += system.J.T @ springs
         free /= system.mass[:, None]
         size = np.sqrt(np.maximum((rows**2 / system.mass).sum(axis=1), 1e-300))
         mobility = (rows / system.mass) @ system.J.T @ spread / size / size[:, None]
         forces = -(np.linalg.pinv(mobility, rcond=1e-9) / size[:, None] / size) @ rows @ free
-        self.force = spread @ forces
+        self.force = spread @ forces + springs
         self.force[u:, -1] += slides
         self.acceleration = free + (system.J.T @ spread @ forces) / system.mass[:, None]
         self.terms = np.abs(free) + (np.abs(system.J.T) @ np.abs(spread @ forces)) / system.mass[:, None]
@@ -318,6 +326,7 @@ class Checker:
         self.stepper, self.worst, self.label = Stepper(scene), Worst(scenes=1), label
         system = self.stepper.run.system
         self.system, self.u, self.contact = system, len(system.rest), np.arange(len(system.rest)) < system.contacts
+        self.rigid = self.contact & np.isinf(system.spring)
         self.motions: dict[bytes, Motion] = {}
         # what the loads could lend each coordinate: a body that lies still has the round-off of that
         lent = 0.5 * (np.abs(system.load) ** 2 / (system.mass * system.frequency[:, None] ** 2)).sum()
@@ -363,7 +372,8 @@ class Checker:
         self._between(before.state, motion, path, where)
         q, v = path[-1, :n], path[-1, n : 2 * n]
         gap = system.rest + system.J[: self.u] @ q
-        shut = self.contact & ((after.state != OPEN) | (gap <= SIMULTANEOUS * system.play))
+        shut = self.rigid & ((after.state != OPEN) | (gap <= SIMULTANEOUS * system.play))
+        hits = hits[self.rigid[hits[:, 2].astype(int)]]
         reach = np.abs(q).max() + np.abs(before.q).max() + system.period * self.fastest.max()
         worst.note("motion", np.abs(after.q - q).max() / reach, where)
         if len(hits):
@@ -384,7 +394,9 @@ class Checker:
         force = path @ motion.force.T
         # forces are differences of these, in a wedged block of those of its other contacts
         size = np.full(2 * u, (motion.size(path) @ np.abs(motion.force).T).max() + 1e-300)
-        open_, closed = self.contact & (state == OPEN), self.contact & (state != OPEN)
+        pressed = np.isfinite(system.spring) & (state < OPEN)  # a gap has the round-off of its play
+        size += 1e-7 * (system.spring * system.play)[pressed].max(initial=0.0)
+        open_, closed = self.contact & (state == OPEN), self.rigid & (state != OPEN)
         share = -gap / np.where(self.contact, system.play, 1.0)
         worst.note("penetration", share[:, open_].max(initial=0.0), where)
         worst.note("apart", np.abs(share[:, closed]).max(initial=0.0), where)
@@ -392,7 +404,14 @@ class Checker:
         sticks, slides = state == STICK, (state == SLIP_LEFT) | (state == SLIP_RIGHT)
         worst.note("apart", np.abs(slip[:, sticks]).max(initial=0.0) / self.speed, where)
         pushes, friction = force[:, :u], force[:, u:]
-        worst.note("pull", (-pushes / size[:u])[:, closed].max(initial=0.0), where)
+        worst.note("pull", (-pushes / size[:u])[:, self.contact & (state != OPEN)].max(initial=0.0), where)
+        leaves = state == LEAVING
+        stiff = np.where(leaves, system.spring, 0.0)  # that of others may be infinite
+        would = (
+            -(stiff * gap + system.dashpot * rate) / np.where(leaves, stiff, 1.0) / np.where(leaves, system.play, 1.0)
+        )
+        worst.note("pull", would[:, leaves].max(initial=0.0), where)
+        worst.note("penetration", -share[:, leaves].min(initial=0.0), where)
         beyond = np.abs(friction) - (system.friction * np.maximum(pushes, 0.0) + system.limit)
         worst.note("cone", (beyond / (size[u:] + size[:u])).max(initial=0.0), where)
         rubs = slides & ((system.friction > 0) | ~self.contact)
@@ -521,8 +540,11 @@ class Checker:
 
     def _energy(self, moment: Moment) -> float:
         system = self.system
+        pressed = np.isfinite(system.spring) & (moment.state < OPEN)
+        shift = (system.rest + system.J[: self.u] @ moment.q)[pressed]
         return float(
-            0.5 * (system.mass * moment.v**2).sum()
+            0.5 * (system.spring[pressed] * shift**2).sum()
+            + 0.5 * (system.mass * moment.v**2).sum()
             + 0.5 * moment.q @ system.stiffness @ moment.q
             - system.weight @ moment.q
         )
@@ -536,17 +558,17 @@ class Checker:
         self.worst.note("ledger", abs(closed) / self.flowed, where)
 
 
-def check_laws(seed: int, longest: int = LONGEST, law: str = "newton") -> tuple[Worst | None, int]:
+def check_laws(seed: int, longest: int = LONGEST, law: str | dict = "newton") -> tuple[Worst | None, int]:
     """Check a random scene. Returns the largest violations, None if it has no start, and the code of its end."""
     try:
-        scene = scene_of(tables(seed) | {"contact": {"law": law}})
+        scene = scene_of(tables(seed) | {"contact": law if isinstance(law, dict) else {"law": law}})
         checker = Checker(scene, f"seed {seed}")
     except InputError:
         return None, DONE
     return checker.run(longest), checker.stepper.code
 
 
-def laws_of(first: int, count: int, longest: int = LONGEST, law: str = "newton") -> tuple[Worst, Counter[int]]:
+def laws_of(first: int, count: int, longest: int = LONGEST, law: str | dict = "newton") -> tuple[Worst, Counter[int]]:
     """Check so many scenes. Returns the largest violations and how runs ended that gave up, by their codes."""
     largest, ends, seed = Worst(), Counter(), first
     while largest.scenes < count:
