@@ -22,6 +22,8 @@ from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
+#: the moment after which contacts are looked at again, in periods of the excitation or of the fastest contact
+_MOMENT = 1e-6
 #: coefficients of friction below this are none
 _SMOOTH = 1e-9
 
@@ -43,6 +45,7 @@ class PlanarSystem(NamedTuple):
     table: np.ndarray  # (e,) complex displacement of a base whose motion is the response, m
     frequency: np.ndarray  # (e,) rad/s
     period: float  # s
+    moment: float  # after which what an instant leaves open is looked at again, s
     speed: float  # that the loads give the rows within a period, m/s: a scale for round-off
     J: np.ndarray  # (2u, N)
     rest: np.ndarray  # (u,) gap at q = 0, m
@@ -185,9 +188,14 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     pushed = np.abs(weight) * flat.period + (np.abs(load) / np.maximum(flat.frequency, flat.omega)[:, None]).sum(axis=0)
     column = lambda name: np.array([getattr(unit, name) for unit in units])  # noqa: E731
     elements = np.reshape([unit.element for unit in units], (len(units), 3)).astype(float)
+    yields = np.isfinite(elements[:, 1])
+    mobility = (J[: len(units)][yields] ** 2 / mass).sum(axis=1)
+    fastest = np.sqrt((elements[yields, 1] * mobility).max(initial=0.0))
+    shortest = min(flat.period, 2 * np.pi / fastest) if fastest > 0.0 else flat.period
     return PlanarSystem(
         contacts=contacts, mass=mass, stiffness=stiffness, damping=damping, load=load, weight=weight,
         response=response, table=flat.table, frequency=flat.frequency, period=flat.period,
+        moment=_MOMENT * shortest,
         speed=float((np.abs(J) @ (pushed / mass)).max(initial=0.0)), J=J,
         rest=column("rest").astype(float), delassus=(J / mass) @ J.T, friction=column("friction").astype(float),
         limit=column("limit").astype(float), restitution=elements[:, 0],

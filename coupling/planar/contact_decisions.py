@@ -14,8 +14,8 @@ from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGH
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
 
-#: what is small beside the largest term, now and a moment later, and that moment, in periods
-_NOTHING, _NEXT_TO_NOTHING, _MOMENT = 1e-9, 1e-12, 1e-6
+#: what is small beside the largest term, now and a moment later
+_NOTHING, _NEXT_TO_NOTHING = 1e-9, 1e-12
 #: share of the speeds in a scene that is round-off
 AT_REST = 10 * ROUND_OFF
 _NORMAL, _SLIP = 1, 2
@@ -351,7 +351,7 @@ def loaded_acceleration(system, st, work, q, v, time):
 @kernel
 def _look_ahead(system, st, work, count):
     """Decide what was left open by the accelerations a moment later. Returns False if that cannot be solved."""
-    u, size, moment = len(system.rest), len(st.q), _MOMENT * system.period
+    u, size, moment = len(system.rest), len(st.q), system.moment
     for i in range(size):
         total = work.free[i]
         for r in range(2 * u):

@@ -136,13 +136,16 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     inner = allowed.T @ basis  # eta = inner sqrt(M) q
     own, loss = (inner @ oblique @ part @ inner.T for part in (stiffness, damping))
     preload = system.spring[pressed] * system.rest[pressed]
-    weight = system.weight / root + applied - push @ preload
+    weight = system.weight / root + applied
     eigenvalue, shape, project = _modes(own, loss, float(system.frequency[0]))
     count = e + len(eigenvalue)
     rate = np.r_[1j * system.frequency, eigenvalue]
     # constant part, of loads and of what constraints hold
     still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
     rest, rest_held = still @ weight, -still @ stiffness @ held
+    if len(pressed):  # a solution of its own: by the inverse, the large preload would leave its round-off
+        rest = rest - np.linalg.solve(own, inner @ oblique @ push @ preload)
+        weight = weight - push @ preload
     load = system.load / root
     wave = np.zeros((k, e), complex)
     for h, omega in enumerate(system.frequency):

@@ -88,7 +88,7 @@ def _list_shut(system, st, work):
 def _rebound(system, st, work, count, share, tiny):
     """Find impulses for this share of the coefficients. Returns False if there are none, or they bring energy."""
     if system.two_phases:
-        return _expand(system, st, work, count, share) and not _brings_energy(system, st, work)
+        return _expand(system, st, work, count, share, tiny) and not _brings_energy(system, st, work)
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
@@ -116,7 +116,7 @@ def _compress(system, work, count, tiny):
 
 
 @kernel
-def _expand(system, st, work, count, share):
+def _expand(system, st, work, count, share, tiny):
     """Find the impulses of both phases: in expansion a contact has at least its coefficient's part of compression.
 
     With that part as given, the rest is the same problem: the more than it and the speed complement each other.
@@ -124,7 +124,7 @@ def _expand(system, st, work, count, share):
     """
     u = len(system.rest)
     for row in range(2 * u):
-        work.speed[row] = work.compressed[row]
+        work.speed[row] = work.compressed[row] if abs(work.compressed[row]) > tiny else 0.0
     for p in range(count):
         r = work.listed[p]
         given = share * _restitution(system, st, work, r) * work.compression[r]
