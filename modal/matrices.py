@@ -144,8 +144,10 @@ class SystemMatrices:
         translations = self.movable_translations()
         return np.einsum("ij,ij->j", translations, self.mass @ translations)
 
-    def patch(self, label: str) -> Patch:
-        """Return the patch of that label. Raises MatricesError with the labels that exist."""
+    def patch(self, label: str | Sequence[str]) -> Patch:
+        """Return the patch of that label, or of several as one. Raises MatricesError with the labels that exist."""
+        if not isinstance(label, str):
+            return _merged([self.patch(one) for one in label])
         if label not in self.patches:
             raise MatricesError(f"no patch {label!r}; there are: {', '.join(sorted(self.patches)) or 'none'}")
         return self.patches[label]
@@ -197,6 +199,16 @@ class SystemMatrices:
         )
 
 
+def _merged(patches: Sequence[Patch]) -> Patch:
+    """Return several patches as one; a node that they share has the sum of its weights."""
+    if not patches:
+        raise MatricesError("patch: no label; name at least one")
+    nodes, places = np.unique(np.concatenate([patch.nodes for patch in patches]), return_inverse=True)
+    weights = np.bincount(places, np.concatenate([patch.weights for patch in patches]))
+    areas = np.array([patch.area for patch in patches])
+    return Patch(nodes, weights, areas @ [patch.normal for patch in patches] / areas.sum())
+
+
 def unit_direction(direction: Sequence[float] | np.ndarray) -> np.ndarray:
     """Return the direction (3,) scaled to length one. Raises MatricesError for a wrong shape or no length."""
     vector = np.asarray(direction, dtype=float)
@@ -205,7 +217,9 @@ def unit_direction(direction: Sequence[float] | np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def patch_average(matrices: SystemMatrices, patch_label: str, direction: Sequence[float] | np.ndarray) -> np.ndarray:
+def patch_average(
+    matrices: SystemMatrices, patch_label: str | Sequence[str], direction: Sequence[float] | np.ndarray
+) -> np.ndarray:
     """Return the functional w (N,) of the area-averaged displacement of a patch along a direction (of any length).
 
     w^T q = sum(weights * (q . direction)) / sum(weights). Raises MatricesError for an unknown patch or no direction.

@@ -47,8 +47,7 @@ def rigid_model(modes: Modes, mode: int, functional: np.ndarray, at: str, dampin
     """
     shape, frequency = modes.shapes[mode], modes.angular_frequencies[mode]
     displacement = float(functional @ shape)
-    # an average over a patch that moves has a displacement of the order of the shape's own
-    if abs(displacement) < 1e-9 * np.abs(functional).sum() * np.abs(shape).max() or displacement == 0.0:
+    if not _moves(displacement, functional, shape):
         found = f"mode {mode} ({modes.frequencies_hz[mode]:.5g} Hz)"
         raise CalibrationError(f"at: {found} does not move {at!r}; name another interface coordinate")
     if frequency <= 0.0:
@@ -62,6 +61,38 @@ def rigid_model(modes: Modes, mode: int, functional: np.ndarray, at: str, dampin
         at=at,
         frequency_hz=float(modes.frequencies_hz[mode]),
     )
+
+
+@dataclass(frozen=True)
+class CavityMotion:
+    """How one mode moves a cavity: what a rigid model of that mode knows of it.
+
+    along          displacement along the cavity, for unit displacement at the rigid model's interface coordinate
+    normal_motion  displacement across, for unit displacement along
+    rotation       rad/m, the same of the rotation
+    """
+
+    along: float
+    normal_motion: float
+    rotation: float
+
+
+def cavity_motion(shape: np.ndarray, motion: np.ndarray, functional: np.ndarray) -> CavityMotion | None:
+    """Return how a mode's shape (N,) moves a cavity; None where it does not move along it.
+
+    motion: functionals (N, 3) of the motion along, across and of the rotation, or (N, 2) without a rotation;
+    functional: (N,) of the rigid model's interface coordinate, which the mode moves.
+    """
+    along = motion[:, 0] @ shape
+    if not _moves(along, motion[:, 0], shape):
+        return None
+    normal_motion, *rotation = (motion[:, 1:].T @ shape / along).tolist()
+    return CavityMotion(float(along / (functional @ shape)), normal_motion, *(rotation or [0.0]))
+
+
+def _moves(displacement: float, functional: np.ndarray, shape: np.ndarray) -> bool:
+    """Say whether a displacement is one: that of a patch that moves is of the order of the shape's own."""
+    return abs(displacement) >= 1e-9 * np.abs(functional).sum() * np.abs(shape).max() and displacement != 0.0
 
 
 def fatigue_amplitude(

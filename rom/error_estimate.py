@@ -25,7 +25,7 @@ from scipy import linalg
 from vanedamp.files.errors import VanedampError
 from vanedamp.rom.contact_pulse import Collision, pulse, share_above
 from vanedamp.rom.dense_modes import spectrum
-from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.rom.truncation import massless, with_attachment_modes
 
 _WITHOUT_RESIDUAL: dict[str, Any] = {
@@ -92,13 +92,10 @@ def frf_errors(
     """Return the estimated relative error (f,) of a model's receptance matrix (Frobenius norm).
 
     richer: the same model with at least two blocks of quasi-static coordinates more. labels: the interface coordinates
-    that count (default: all); forces: those at which forces act (default: the same).
+    that count (default: all); forces: those at which forces act (default: the same). Rotations count as the
+    displacements that they are at the radius of gyration of their patch.
     """
-    rows = [richer.interface.index(label) for label in labels or richer.interface]
-    columns = [richer.interface.index(label) for label in forces or labels or richer.interface]
-    better = richer.receptance(frequencies_hz)[:, rows][:, :, columns]
-    errors = model.receptance(frequencies_hz)[:, rows][:, :, columns] - better
-    return np.linalg.norm(errors, axis=(1, 2)) / np.linalg.norm(better, axis=(1, 2))
+    return _errors(model.receptance(frequencies_hz), richer, frequencies_hz, labels, forces)
 
 
 def rigid_errors(
@@ -108,13 +105,31 @@ def rigid_errors(
     labels: Sequence[str] | None = None,
     forces: Sequence[str] | None = None,
 ) -> np.ndarray:
-    """Return the same (f,) of the rigid model: the first natural mode, in which every coordinate moves as `at`."""
+    """Return the same (f,) of the rigid model: the first natural mode, in which every coordinate moves as `at`.
+
+    Only rotations, and motions across beside those along, stand still.
+    """
     first = richer.projected(
         linalg.eigh(richer.stiffness, richer.mass, subset_by_index=[0, 0])[1],
-        fixed_interface_modes=0, free_modes=1, blocks=(),
+        fixed_interface_modes=0, free_modes=1, blocks=(), **_WITHOUT_RESIDUAL,
     )  # fmt: skip
-    rigid = replace(first, selection=np.tile(first.row(at), (len(first.interface), 1)), **_WITHOUT_RESIDUAL)
-    return frf_errors(rigid, richer, frequencies_hz, labels, forces)
+    companions = {label + suffix for label in richer.interface for suffix in (NORMAL, ROTATION)}
+    moves = (richer.lengths == 1.0) & [label not in companions for label in richer.interface]
+    rigid = np.outer(moves, moves) * first.frf(frequencies_hz, at, at)[:, None, None]
+    return _errors(rigid, richer, frequencies_hz, labels, forces)
+
+
+def _errors(
+    receptance: np.ndarray, richer: ReducedModel, frequencies_hz: Sequence[float] | np.ndarray,
+    labels: Sequence[str] | None, forces: Sequence[str] | None,
+) -> np.ndarray:  # fmt: skip
+    """Return the relative errors (f,) of receptances (f, k, k) against those of a richer model."""
+    rows = [richer.interface.index(label) for label in labels or richer.interface]
+    columns = [richer.interface.index(label) for label in forces or labels or richer.interface]
+    lengths = np.outer(richer.lengths[rows], richer.lengths[columns])
+    better = richer.receptance(frequencies_hz)[:, rows][:, :, columns]
+    errors = lengths * (receptance[:, rows][:, :, columns] - better)
+    return np.linalg.norm(errors, axis=(1, 2)) / np.linalg.norm(lengths * better, axis=(1, 2))
 
 
 def natural_ladder(

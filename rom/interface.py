@@ -11,13 +11,16 @@ from scipy import sparse
 from vanedamp.files import store
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal.matrices import Patch, SystemMatrices, patch_average, unit_direction
+from vanedamp.rom.reduced import NORMAL, ROTATION
 
 KINDS = ("average", "rigid", "node", "full")
 MOTIONS = ("translation", "rotation")
 # of the largest singular value: below it a functional, or a rigid motion of a patch, is a combination of the others
 _DEPENDENT = 1e-10
-# a mean normal shorter than this is that of a surface which faces everywhere
-_FLAT = 0.5
+# a mean normal shorter than this is that of a surface which faces everywhere, or that of several which face apart
+_FLAT, _ONE_WAY = 0.5, 0.9
+# sine of the least angle between the directions along and across that span a plane
+_APART = 0.5**0.5
 
 
 class InterfaceError(VanedampError):
@@ -29,7 +32,7 @@ class InterfaceCoordinate:
     """One displacement of a structure.
 
     label      its name in the reduced model
-    facets     the patch of the system matrices
+    facets     the patch of the system matrices, or several that are taken as one
     direction  three numbers, scaled to length one
     kind       "average": mean displacement over the area; the patch deforms freely, a load on it is a constant
                traction. "rigid": the patch moves as a rigid body, which stiffens the structure, and this is the
@@ -37,22 +40,28 @@ class InterfaceCoordinate:
                a patch of which every node is a boundary coordinate; the reduction keeps the lowest characteristic
                constraint modes of these (Castanier, Tan and Pierre 2001)
     motion     "translation", or "rotation": the small rotation about the direction through the centroid, rad
+    point      where the rigid motion of an average patch is taken, m; None: at its centroid, where it is the mean
 
     The motion of a patch that deforms is that of the rigid motion which fits it best over the area (least squares); its
     translation is the mean displacement. Raises InterfaceError or modal.matrices.MatricesError.
     """
 
     label: str
-    facets: str
+    facets: str | tuple[str, ...]
     direction: tuple[float, float, float]
     kind: str = "average"
     motion: str = "translation"
+    point: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.facets, str):
+            object.__setattr__(self, "facets", tuple(self.facets))
         if self.kind not in KINDS:
             raise InterfaceError(f"{self.label}: kind must be one of {', '.join(KINDS)}, not {self.kind!r}")
         if self.motion not in MOTIONS:
             raise InterfaceError(f"{self.label}: motion must be one of {', '.join(MOTIONS)}, not {self.motion!r}")
+        if self.point is not None and (self.kind, self.motion) != ("average", "translation"):
+            raise InterfaceError(f'{self.label}: a point is for the translation of a patch of kind "average"')
         if self.motion == "rotation" and self.kind == "node":
             raise InterfaceError(f'{self.label}: a node has no rotation; take kind "average" or "rigid"')
         object.__setattr__(self, "direction", tuple(unit_direction(self.direction).tolist()))
@@ -77,21 +86,79 @@ def patch_motions(
     ]
 
 
-def normal_direction(matrices: SystemMatrices, facets: str) -> tuple[float, float, float]:
+def plane_motion(
+    matrices: SystemMatrices,
+    label: str,
+    facets: str | Sequence[str],
+    along: Sequence[float] | np.ndarray,
+    across: Sequence[float] | np.ndarray,
+    kind: str = "patch",
+) -> list[InterfaceCoordinate]:
+    """Return the motion of a surface of a cavity in the plane of two directions: along, across and rotation.
+
+    "<label>" is the displacement along, "<label>.normal" the one in the plane across it, "<label>.rotation" the small
+    rotation that turns the first into the second. Those of a kind "patch" are the means over it and the rotation of
+    its best rigid motion (area-weighted least squares, an RBE3); a "cavity" is the same for all surfaces of a cavity,
+    with the displacements at the middle of its floor, its lowest place across; a "node" has no rotation. Raises
+    InterfaceError for directions that span no plane, and a "patch" that faces several ways.
+    """
+    first, second = unit_direction(along), unit_direction(across)
+    second = second - (second @ first) * first
+    if np.linalg.norm(second) < _APART:
+        angle = np.degrees(np.arcsin(np.linalg.norm(second)))
+        raise InterfaceError(
+            f"{label}: the direction across is at {angle:.0f} degrees to that along; give another `normal`, out of the "
+            "floor into the cavity"
+        )
+    second /= np.linalg.norm(second)
+    groups = (facets,) if isinstance(facets, str) else tuple(facets)
+    patch, point = matrices.patch(groups), None
+    known = any(matrices.patch(group).normal.any() for group in groups)
+    if kind == "patch" and known and np.linalg.norm(patch.normal) < _ONE_WAY:
+        raise InterfaceError(
+            f'{label}: {", ".join(groups)} faces several ways; take kind = "cavity" for all surfaces of a cavity, or '
+            "one entry for each surface"
+        )
+    if kind == "cavity":
+        offsets = matrices.coordinates[patch.nodes] - _centroid(matrices, patch)
+        middle = 0.5 * (np.min(offsets @ first) + np.max(offsets @ first))
+        point = _triple(_centroid(matrices, patch) + middle * first + np.min(offsets @ second) * second)
+    own, one = "node" if kind == "node" else "average", facets if isinstance(facets, str) else groups
+    motion = [
+        InterfaceCoordinate(label, one, _triple(first), own, point=point),
+        InterfaceCoordinate(label + NORMAL, one, _triple(second), own, point=point),
+    ]
+    if kind == "node":
+        return motion
+    axis = _triple(np.cross(first, second))
+    return [*motion, InterfaceCoordinate(label + ROTATION, one, axis, own, "rotation")]
+
+
+def normal_direction(matrices: SystemMatrices, facets: str | Sequence[str]) -> tuple[float, float, float]:
     """Return the normal of a patch of facets, with the same sign for walls that face each other.
 
     Its largest component is positive, the first of those within a tenth of the largest. Raises InterfaceError for a
     patch without a normal, such as a node set or a closed surface.
     """
+    normal = np.array(outward_normal(matrices, facets))
+    size = np.abs(normal)
+    return _triple(normal * np.sign(normal[np.argmax(size > 0.9 * size.max())]))
+
+
+def outward_normal(matrices: SystemMatrices, facets: str | Sequence[str]) -> tuple[float, float, float]:
+    """Return the unit normal of a patch of facets, out of the material. Raises InterfaceError for one without."""
     normal = _normal(matrices, facets)
     if not normal.any():
         raise InterfaceError(f"{facets!r} has no normal: it is a node set, or curves too much; give three numbers")
-    size = np.abs(normal)
-    x, y, z = (normal * np.sign(normal[np.argmax(size > 0.9 * size.max())])).tolist()
+    return _triple(normal)
+
+
+def _triple(vector: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
     return x, y, z
 
 
-def _normal(matrices: SystemMatrices, facets: str) -> np.ndarray:
+def _normal(matrices: SystemMatrices, facets: str | Sequence[str]) -> np.ndarray:
     """Return the unit normal (3,) of a patch; zeros where it has none."""
     normal = matrices.patch(facets).normal
     length = np.linalg.norm(normal)
@@ -107,6 +174,8 @@ class Interface:
     motions      (N, n) sparse, the motions q = motions @ y that supports and rigid patches leave to the structure
     full         (m,) sorted DOFs of the patches of kind "full" that can move
     normals      (k, 3) unit normals of the patches, out of the material; zeros where unknown
+    positions    (k, 3) m, where these motions are: the centroids of the patches, their nodes, or points of their own
+    arms         (k,) m, radii of gyration of the patches about the axes of rotations; zeros for displacements
     """
 
     coordinates: tuple[InterfaceCoordinate, ...]
@@ -114,11 +183,13 @@ class Interface:
     motions: sparse.csr_array
     full: np.ndarray
     normals: np.ndarray
+    positions: np.ndarray
+    arms: np.ndarray
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coordinates", tuple(self.coordinates))
-        object.__setattr__(self, "vectors", store.frozen(self.vectors))
-        object.__setattr__(self, "normals", store.frozen(self.normals))
+        for name in ("vectors", "normals", "positions", "arms"):
+            object.__setattr__(self, name, store.frozen(getattr(self, name)))
 
     @classmethod
     def on_patches(cls, matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> Interface:
@@ -137,7 +208,9 @@ class Interface:
         motions = _motions(matrices, {item.facets: item.label for item in coordinates if item.kind == "rigid"})
         _check_independent(labels, motions.T @ vectors)
         normals = np.array([_normal(matrices, coordinate.facets) for coordinate in coordinates])
-        return cls(tuple(coordinates), vectors, motions, _full_dofs(matrices, coordinates), normals)
+        positions = np.array([_position(matrices, coordinate) for coordinate in coordinates])
+        arms = np.array([_arm(matrices, coordinate) for coordinate in coordinates])
+        return cls(tuple(coordinates), vectors, motions, _full_dofs(matrices, coordinates), normals, positions, arms)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -159,31 +232,55 @@ class Interface:
 
 def _functional(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.ndarray:
     if coordinate.motion == "rotation":
-        return _rotation(matrices, coordinate)
-    if coordinate.kind != "node":
-        return patch_average(matrices, coordinate.facets, coordinate.direction)
-    patch = matrices.patch(coordinate.facets)
-    positions = matrices.coordinates[patch.nodes]
-    nearest = patch.nodes[np.argmin(np.linalg.norm(positions - _centroid(matrices, patch), axis=1))]
-    functional = np.zeros(matrices.size)
-    functional[3 * nearest : 3 * nearest + 3] = coordinate.direction
+        return _rotation(matrices, coordinate, np.array(coordinate.direction))
+    if coordinate.kind == "node":
+        nearest = _nearest(matrices, matrices.patch(coordinate.facets))
+        functional = np.zeros(matrices.size)
+        functional[3 * nearest : 3 * nearest + 3] = coordinate.direction
+        return functional
+    functional = patch_average(matrices, coordinate.facets, coordinate.direction)
+    if coordinate.point is not None:
+        # the rotation moves a point by (theta x offset) . direction = theta . (offset x direction)
+        offset = np.array(coordinate.point) - _centroid(matrices, matrices.patch(coordinate.facets))
+        functional = functional + _rotation(matrices, coordinate, np.cross(offset, coordinate.direction))
     return functional
 
 
-def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.ndarray:
-    """Return the functional (N,) of the rotation in a patch's best rigid motion. Raises InterfaceError without one."""
+def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate, axis: np.ndarray) -> np.ndarray:
+    """Return the functional (N,) of axis . theta, theta the rotation in a patch's best rigid motion.
+
+    axis: (3,) of any length. Raises InterfaceError for nodes whose motion does not tell it.
+    """
     patch = matrices.patch(coordinate.facets)
     offsets = matrices.coordinates[patch.nodes] - _centroid(matrices, patch)
     length = np.abs(offsets).max() or 1.0
     root = np.sqrt(np.maximum(np.repeat(patch.weights, 3), 0.0))
-    wanted = np.concatenate([np.zeros(3), coordinate.direction])
+    wanted = np.concatenate([np.zeros(3), axis])
     weighted = root[:, None] * rigid_motions(offsets / length)
     fit = wanted @ np.linalg.pinv(weighted, rcond=_DEPENDENT)
-    if not np.allclose(fit @ weighted, wanted, atol=1e-6):
+    if not np.allclose(fit @ weighted, wanted, atol=1e-6 * float(np.linalg.norm(axis))):
         raise InterfaceError(f"{coordinate.label}: the nodes of {coordinate.facets!r} have no rotation about that axis")
     functional = np.zeros((len(matrices.coordinates), 3))
     functional[patch.nodes] = (fit * root / length).reshape(-1, 3)
     return functional.ravel()
+
+
+def _position(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> np.ndarray:
+    """Return the place (3,) whose motion the coordinate is, m."""
+    patch = matrices.patch(coordinate.facets)
+    if coordinate.kind == "node":
+        return matrices.coordinates[_nearest(matrices, patch)]
+    return _centroid(matrices, patch) if coordinate.point is None else np.array(coordinate.point)
+
+
+def _arm(matrices: SystemMatrices, coordinate: InterfaceCoordinate) -> float:
+    """Return the radius of gyration, m, of a patch about the axis of its rotation; 0 for a displacement."""
+    if coordinate.motion != "rotation":
+        return 0.0
+    patch = matrices.patch(coordinate.facets)
+    offsets = matrices.coordinates[patch.nodes] - _centroid(matrices, patch)
+    squares = np.square(np.cross(offsets, coordinate.direction)).sum(axis=1)
+    return float(np.sqrt(patch.weights @ squares / patch.area))
 
 
 def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> np.ndarray:
@@ -197,7 +294,7 @@ def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordina
     return dofs
 
 
-def _motions(matrices: SystemMatrices, rigid: dict[str, str]) -> sparse.csr_array:
+def _motions(matrices: SystemMatrices, rigid: dict[str | tuple[str, ...], str]) -> sparse.csr_array:
     """Return columns for the free DOFs outside rigid patches, then up to six for every rigid patch."""
     free = np.zeros(matrices.size, dtype=bool)
     free[matrices.free] = True
@@ -232,6 +329,12 @@ def rigid_basis(offsets: np.ndarray) -> np.ndarray:
     length = np.abs(offsets).max() or 1.0
     left, singular, _ = np.linalg.svd(rigid_motions(offsets / length), full_matrices=False)
     return left[:, singular > _DEPENDENT * singular[0]]
+
+
+def _nearest(matrices: SystemMatrices, patch: Patch) -> int:
+    """Return the node of a patch nearest to its centroid."""
+    distances = np.linalg.norm(matrices.coordinates[patch.nodes] - _centroid(matrices, patch), axis=1)
+    return int(patch.nodes[np.argmin(distances)])
 
 
 def _centroid(matrices: SystemMatrices, patch: Patch) -> np.ndarray:

@@ -23,6 +23,9 @@ from vanedamp.rom.dense_modes import count_rigid_motions, modal_damping, spectru
 __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
 
 
+#: what follows the label of a displacement along a cavity in those of its motion across and of its rotation
+NORMAL, ROTATION = ".normal", ".rotation"
+
 _KIND = "reduced-model"
 # dimensions and units of the arrays, here and in the record
 _ARRAYS = {
@@ -33,6 +36,8 @@ _ARRAYS = {
     "directions": (("interface", "axis"), "1"),
     "base_load": (("row", "axis"), "kg"),
     "normals": (("interface", "axis"), "1"),
+    "positions": (("interface", "axis"), "m"),
+    "arms": (("interface",), "m"),
     "recovery": (("dof", "column"), "1"),
     "coordinates": (("node", "axis"), "m"),
     "residual_flexibility": (("interface", "force"), "m/N"),
@@ -54,6 +59,9 @@ class ReducedModel:
     directions                (k, 3) unit directions of these displacements; zeros when unknown
     normals                   (k, 3) unit normals, out of the material, of the facets they belong to; zeros where
                               unknown, None: all unknown
+    positions                 (k, 3) m, the places whose motion these are; None: unknown
+    arms                      (k,) m, of interface coordinates that are rotations (rad) the radius of gyration of their
+                              patch, zeros for displacements; None: all are displacements
     base_load                 (n, 3) kg, T^T M r, r the unit translation along x, y, z: a base acceleration a (3,) loads
                               the model with -base_load @ a, and q is then relative to the base; zeros when unknown
     damping_ratio             of every mode, if C was made from one; None for any other C
@@ -93,6 +101,8 @@ class ReducedModel:
     coordinates: np.ndarray | None = None
     residual_recovery: np.ndarray | None = None
     normals: np.ndarray | None = None
+    positions: np.ndarray | None = None
+    arms: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name, value in _checked(self).items():
@@ -200,6 +210,12 @@ class ReducedModel:
         """Return the complex receptance (f,), m/N: a displacement for a unit force, both at interface coordinates."""
         response, force = self._index(response_label), self._index(force_label)
         return self.receptance(frequencies_hz)[:, response, force]
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """(k,) m or 1, what makes displacements of the interface coordinates: the arms of rotations, 1 of others."""
+        arms = np.zeros(len(self.interface)) if self.arms is None else self.arms
+        return np.where(arms > 0.0, arms, 1.0)
 
     @property
     def modes(self) -> int:

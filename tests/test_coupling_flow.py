@@ -45,7 +45,7 @@ def random_system(seed, modes, bodies, labels, proportional=False):
     along = dict.fromkeys(rows, np.array([1.0, 0.0, 0.0]))
     unknown = dict.fromkeys(rows, np.zeros(3))
     stiffness = np.sort(rng.uniform(0.5, 25.0, modes))
-    system = assemble(scene, ModalBasis(stiffness, damping, np.zeros((modes, 3)), rows, along, unknown, {}))
+    system = assemble(scene, ModalBasis(stiffness, damping, np.zeros((modes, 3)), rows, along, unknown))
     # a base that moves at an angle of its own to each cavity
     shaken = 0.4j * system.of_bodies.mass * np.cos(np.maximum(np.arange(bodies) - 1, 0))
     return system._replace(load=np.r_[-1j * rng.uniform(-1.0, 1.0, modes), shaken][None], alike=False), rng

@@ -48,7 +48,7 @@ def bar(modes, hanger, masses, restitution, damping, stiffness=1e7):
     case = struck(1.0, restitution, excitation={"frequency": 50.0}).replace({"contact.stiffness": stiffness})
     bodies = [{"cavity": "c", "mass": mass, "restitution": restitution} for mass in masses]
     basis = ModalBasis(
-        omegas**2, matrix, np.zeros((modes, 3)), {"structure": shapes}, {"structure": np.array([1.0, 0.0, 0.0])}, {}, {}
+        omegas**2, matrix, np.zeros((modes, 3)), {"structure": shapes}, {"structure": np.array([1.0, 0.0, 0.0])}, {}
     )
     return assemble(case.replace({"damper": bodies, "excitation.force": 1.0}), basis)
 

@@ -17,7 +17,8 @@ def test_benchmark_leaves_its_results(tmp_path, capsys):
     # the block hits with one corner after the other
     assert float(rows[1]["impacts_per_period"]) > float(rows[0]["impacts_per_period"])
     assert float(rows[1]["tilt_max"]) > 1e-3 and rows[0]["tilt_max"] == ""
-    with Image.open(tmp_path / "bench_bodies.png") as picture:
-        assert picture.size[0] > 1000
+    for name in ("bench_bodies.png", "bench_bodies_motion.png"):
+        with Image.open(tmp_path / name) as picture:
+            assert picture.size[0] > 1000
     print_summary(result)
     assert "time a period and impact" in capsys.readouterr().out

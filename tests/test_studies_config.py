@@ -109,11 +109,23 @@ def test_open_choice_of_the_response_is_refused(tmp_path):
         (
             '"c1_floor"',
             '"c1_floor"\nkind = "mean"',
-            "interface.c1.kind: should be 'average', 'rigid', 'node' or 'full'",
+            "interface.c1.kind: should be 'average', 'rigid', 'node', 'full', 'patch' or 'cavity'",
         ),
         ('facets = "c1_floor"\n', "", "interface.c1.facets: missing"),
         ('c1_floor"\ndirection = [0, 1, 0]', 'c1_floor"\ndirection = [0, 0, 0]', f"interface.c1.direction: {THREE}"),
-        ('c1_floor"\ndirection = [0, 1, 0]', "c1_floor\"\ndirection = 'along'", f"interface.c1.direction: {THREE}"),
+        ('c1_floor"\ndirection = [0, 1, 0]', 'c1_floor"\ndirection = 3', f"interface.c1.direction: {THREE}"),
+        ('facets = "c1_floor"', "facets = []", "interface.c1.facets: expected a group, such as"),
+        ('facets = "c1_floor"', "facets = 3", "interface.c1.facets: expected a group, such as"),
+        (
+            'facets = "c1_floor"',
+            'facets = "c1_floor"\nnormal = "c1_floor"',
+            'interface.c1: normal: kind = "average" moves along its direction only; take kind = "patch"',
+        ),
+        (
+            'facets = "c1_floor"',
+            'facets = "c1_floor"\nkind = "patch"\nmotion = "rotation"',
+            'interface.c1: motion: kind = "patch" has the rotation in the plane besides; leave it out',
+        ),
         ("count = 10\ndirection = [0, 1, 0]", "count = 10\ndirection = [0, 1]", f"modes.direction: {THREE}"),
         ('["clamp"]', '"clamp"', "support.clamped: expected a list of facet groups"),
         ('["clamp"]', '{clamp = "w"}', "support.clamped: clamp: expected components out of 'xyz', not 'w'"),
@@ -162,6 +174,10 @@ def test_differing_damping_ratios_need_a_decision(tmp_path):
     [
         ('["clamp"]', '["clmp"]', "support.clamped: no facet group 'clmp' in the mesh; it has c1_floor, clamp"),
         ('"c1_floor"', '"c9"', "interface.c1.facets: no facet group 'c9' in the mesh; it has c1_floor, clamp"),
+        ('"c1_floor"', '["c1_floor", "c9"]', "interface.c1.facets: no facet group 'c9' in the mesh; it has"),
+        ('"c1_floor"', '["c1_floor", "rim"]', "interface.c1.facets: groups of several kinds (edge, facet), whose"),
+        ('c1_floor"\ndirection = [0, 1, 0]', 'c1_floor"\ndirection = "up"', "interface.c1.direction: no facet group"),
+        ('"c1_floor"', '"c1_floor"\nkind = "patch"\nnormal = "rim"', "interface.c1.normal: no facet group 'rim' in"),
         (
             "[material.default]",
             "[material.disk]",
@@ -172,7 +188,7 @@ def test_differing_damping_ratios_need_a_decision(tmp_path):
 def test_unknown_groups_list_those_that_exist(old, new, message, tmp_path):
     case = load(changed(CLUSTER, (old, new)), tmp_path)
     with pytest.raises(InputError) as refused:
-        case.check_groups(["clamp", "c1_floor"], ["airfoils"])
+        case.check_groups(["clamp", "c1_floor"], ["airfoils"], {"edge": ["rim"]})
     assert str(refused.value).startswith(message)
 
 

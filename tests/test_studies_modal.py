@@ -130,3 +130,38 @@ def test_reduction_of_a_structure_on_springs(tmp_path, capfd):
     assert main(["reduce", str(tmp_path / "case.toml"), "--json", "-", "--modes", "8"]) == 0
     reduced = json.loads(capfd.readouterr().out)
     assert reduced["frequency_hz"][:3] == pytest.approx(full["frequency_hz"][:3], rel=1e-6)
+
+
+def test_motion_of_a_cavity(tmp_path, capfd):
+    """As printed and in JSON, record and report: the keys that a scene's [[cavity]] takes."""
+    patch = ('facets = "tip"\ndirection = [0, 0, 1]', 'facets = "tip"\ndirection = [0, 0, 1]\nkind = "patch"')
+    result, _ = modal(tmp_path, capfd, patch)
+    motion = result["cavity"]["tip"]
+    assert motion["along"] == pytest.approx(1.0, rel=1e-12)
+    # a cantilever's first bending: the tip's slope is 1.3765 of deflection over length (Euler and Bernoulli); shear and
+    # the coarse mesh take some percent
+    assert motion["rotation"] == pytest.approx(-1.3765 / 0.1, rel=0.05)
+    # the tip lies above the beam's axis as much as below it
+    assert abs(motion["normal_motion"]) < 1e-3
+    assert main(["modal", str(tmp_path / "case.toml")]) == 0
+    printed = f"normal_motion = {motion['normal_motion']:.5g}, rotation = {motion['rotation']:.5g} rad/m"
+    assert f"cavity tip: moves by 1 of tip, {printed}" in capfd.readouterr().out
+    assert main(["calibrate", str(tmp_path / "case.toml"), "--json", str(tmp_path / "calibration.json")]) == 0
+    assert json.loads((tmp_path / "calibration.json").read_text())["cavity"] == {"tip": pytest.approx(motion)}
+    assert printed in capfd.readouterr().out
+    write_report(collect([str(tmp_path / "modes.h5")]), tmp_path / "report.html")
+    assert f"<td>{motion['rotation']:.5g}</td>" in (tmp_path / "report.html").read_text()
+
+
+def test_a_mode_that_leaves_a_cavity_alone_tells_nothing_of_it(tmp_path, capfd):
+    """A plane of motion that the bending of a symmetric mesh does not move."""
+    side = '[interface.side]\nfacets = "tip"\ndirection = [0, 1, 0]\nkind = "patch"\nnormal = [1, 0, 0]\n'
+    result, _ = modal(
+        tmp_path,
+        capfd,
+        ("count = 8", 'count = 8\nat = "tip"'),
+        ("thickness", "hexahedra = true\nthickness"),
+        ("[interface.tip]", side + "[interface.tip]"),
+    )
+    assert result["rigid"] is not None
+    assert result["cavity"] == {}

@@ -105,8 +105,9 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
     def march(motion: planar.SteppedMotion, log: np.ndarray, periods: int) -> int:
         return planar.march(system, times, motion, records, log, *matrices, theta, periods, budget, deepest)
 
-    motion = planar.start_steps(system, planar_motion(scene, flat, system), len(records.peak) - 1)
-    return SteppedRun(flat, march, motion, records, events, plane_of(system, motion.tilt, motion.lifted, np.inf))
+    motion = planar.start_steps(system, planar_motion(scene, flat, system), records)
+    plane = plane_of(system, motion.tilt, motion.lifted, motion.sampled, motion.shut, np.inf)
+    return SteppedRun(flat, march, motion, records, events, plane)
 
 
 def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import DONE, IMPACTS, LOGGED, PERIOD, SOLVES, STEPS
-from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome, Plane
+from vanedamp.coupling.response.evaluation import LOG_WIDTH, STATUS_OF, Outcome, Plane
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.system import System
@@ -41,7 +41,7 @@ class SteppedRun:
         self, system: System, march: March, motion: Stepped, records: Records, events: bool, plane: Plane | None = None
     ) -> None:
         self.system, self.march, self.motion, self.records, self.plane = system, march, motion, records, plane
-        self.log = np.zeros((_LOG if events else 0, 6 if plane is None else 7))
+        self.log = np.zeros((_LOG if events else 0, 6 if plane is None else LOG_WIDTH))
         self.chunks: list[np.ndarray] = []
 
     def advance_to(self, periods: int) -> Status:

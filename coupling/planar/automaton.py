@@ -43,7 +43,7 @@ from vanedamp.coupling.planar.contact_decisions import (
 from vanedamp.coupling.planar.event_functions import next_event
 from vanedamp.coupling.planar.impacts import collide, jam, log_event, note_impact
 from vanedamp.coupling.planar.quadrature import add_up, motion_at, response_at
-from vanedamp.coupling.planar.recorder import record_section
+from vanedamp.coupling.planar.recorder import put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS
 
 #: overlap, as a share of the play, beyond which round-off has lost a contact
@@ -154,19 +154,20 @@ def _press(system, st, rec, log):
             speed = row_speed(system, r, st.v)
             if speed < -AT_REST * st.scale[0]:
                 st.state[r] = SLIP_RIGHT  # decided next
-                st.pushed[r], st.pushed[len(system.rest) + r] = 0.0, 0.0
-                note_impact(system, st, rec, log, r, speed, 0.0, 0.0, 0.0)
+                st.pushed[r], st.pushed[len(system.rest) + r], st.lost[r] = 0.0, 0.0, 0.0
+                note_impact(system, st, rec, log, r, speed, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
 def _part(system, st, log, r):
     """End a contact that yields as its force vanishes: what its spring still holds is lost."""
     u, shift, speed = len(system.rest), gap(system, r, st.q), row_speed(system, r, st.v)
-    st.ledger[CONTACT] += 0.5 * system.spring[r] * shift * shift
+    left = 0.5 * system.spring[r] * shift * shift
+    st.ledger[CONTACT] += left
     st.state[r] = LEAVING if system.dashpot[r] > 0.0 and shift < 0.0 and speed > 0.0 else OPEN
     if st.state[r] == OPEN:
         _close(system, st, r)
-    log_event(system, st, log, DETACHES, r, 0.0, speed, st.pushed[r], st.pushed[u + r])
+    log_event(system, st, log, DETACHES, r, 0.0, speed, st.pushed[r], st.pushed[u + r], st.lost[r] + left)
 
 
 @inlined
@@ -215,13 +216,13 @@ def _log_changes(system, flows, st, log):
             now = STICK  # its force is at its bound, but others hold it
         st.known[i] = now
         if is_rigid(system, i) and was == OPEN and now != OPEN:
-            log_event(system, st, log, RESTS, i, 0.0, 0.0, 0.0, 0.0)
+            log_event(system, st, log, RESTS, i, 0.0, 0.0, 0.0, 0.0, 0.0)
         elif is_rigid(system, i) and was != OPEN and now == OPEN:
-            log_event(system, st, log, DETACHES, i, 0.0, row_speed(system, i, st.v), 0.0, 0.0)
+            log_event(system, st, log, DETACHES, i, 0.0, row_speed(system, i, st.v), 0.0, 0.0, 0.0)
         elif now == STICK and (was == SLIP_RIGHT or was == SLIP_LEFT):
-            log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0)
+            log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0, 0.0)
         elif was == STICK and (now == SLIP_RIGHT or now == SLIP_LEFT):
-            log_event(system, st, log, SLIPS, i, 0.0, row_speed(system, u + i, st.v), 0.0, 0.0)
+            log_event(system, st, log, SLIPS, i, 0.0, row_speed(system, u + i, st.v), 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -455,10 +456,6 @@ def _sample(system, flows, st, rec, work, tau):
         row = st.counters[PERIOD] * many + k
         if row < len(rec.samples):
             motion_at(system, flows, st, work, max(k * step - st.time[0], 0.0), q, v)
-            rec.samples[row, 0], _ = response_at(system, q, v, k * step)
-            for b in range(len(system.along)):
-                slip = q[system.along[b]]
-                for i in range(len(q)):
-                    slip -= system.floor[b, i] * q[i]
-                rec.samples[row, 1 + b] = slip
+            x, _ = response_at(system, q, v, k * step)
+            put_sample(system, st, rec, row, x, q, st.state, OPEN)
         k += 1

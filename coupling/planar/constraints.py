@@ -15,12 +15,13 @@ import numpy as np
 from vanedamp.coupling.scene.bodies import Cavity, Damper
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import physical_scale
+from vanedamp.coupling.system.assembly import base_acceleration, physical_scale
 from vanedamp.coupling.system.constraints import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, interface_row
 from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
+from vanedamp.rom.reduced import NORMAL, ROTATION
 
 #: the moment after which contacts are looked at again, in periods of the excitation or of the fastest contact
 _MOMENT = 1e-6
@@ -110,13 +111,23 @@ class _Body(NamedTuple):
         return (-self.a, -self.b), (self.a, -self.b), (self.a, self.b), (-self.a, self.b)
 
 
-class _Walls(NamedTuple):
-    """Motion (n,) of a cavity's surfaces: along it of left wall, right wall, floor and ceiling; across; rotation."""
+class _Surface(NamedTuple):
+    """Motion (n,) of a surface of a cavity, along and across at a place (x, y) of it, and its rotation.
 
-    along: tuple[np.ndarray, ...]
+    x, y: m, from the middle of the floor, along and across; None: that of the contact, wherever the surface is.
+    """
+
+    along: np.ndarray
     across: np.ndarray
     turn: np.ndarray
-    flexibility: tuple[float, float, float]  # residual, of left wall, right wall and floor across, m/N
+    x: float | None = 0.0
+    y: float | None = 0.0
+    labels: tuple[str, str, str] = ("", "", "")  # interface coordinates of these three motions; "": none
+
+    def motion(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the motion along and across, (n,) each, of the surface's point (x, y)."""
+        along = self.along if self.y is None else self.along - self.turn * (y - self.y)
+        return along, self.across if self.x is None else self.across + self.turn * (x - self.x)
 
 
 def planar_system(scene: Scene, flat: System) -> PlanarSystem:
@@ -131,7 +142,8 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         bodies.append(_Body(number, damper, size, a, b))
         size += 1 if damper.shape == "slider" else 3
     owner = [[cavity.name for cavity in scene.cavity].index(damper.cavity) for damper in scene.damper]
-    walls = [_walls(scene, basis, index) for index in range(len(scene.cavity))]
+    cavities = [_surfaces(scene, basis, index) for index in range(len(scene.cavity))]
+    base = base_acceleration(scene, basis)
     mass, weight = np.ones(size), np.zeros(size)
     load = np.zeros((len(flat.frequency), size), complex)
     load[:, :n] = flat.load[:, :n]
@@ -139,16 +151,20 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     for body in bodies:
         k, x = body.number, body.x
         mass[x], weight[x], load[:, x] = body.damper.mass, flat.weight[n + k], flat.load[:, n + k]
-        floor[k, :n], turn[k, :n] = walls[owner[k]].along[2], walls[owner[k]].turn
+        floor[k, :n], turn[k, :n] = cavities[owner[k]][FLOOR].along, cavities[owner[k]][FLOOR].turn
         if body.damper.shape != "slider":
             label = surface_labels(scene, owner[k])[2]
-            _, across = scene.gravity.components(basis.directions[label])
+            normal = basis.across(label)
+            _, across = scene.gravity.components(basis.directions[label], normal)
             mass[x + 1], weight[x + 1] = body.damper.mass, -body.damper.mass * across
+            if normal is not None:
+                load[:, x + 1] = -body.damper.mass * (base @ normal)
             mass[x + 2] = body.damper.moment_of_inertia
     units: list[_Unit] = []
-    law = _Law(scene.contact, mass, n)
+    law = _Law(scene.contact, basis, mass)
     for index, cavity in enumerate(scene.cavity):
-        units += _contacts(law, cavity, walls[index], [body for body in bodies if owner[body.number] == index], size)
+        inside = [body for body in bodies if owner[body.number] == index]
+        units += _contacts(law, cavity, cavities[index], inside, size)
     for row in range(flat.friction_rows, len(flat.J)):
         if not flat.J[row, n:].any():
             gap = np.zeros(size)
@@ -217,51 +233,104 @@ def _neglected(body: _Body, cavity: Cavity) -> float:
     return max(body.a, body.b) / 2 / min(cavity.gap, cavity.play or np.inf)
 
 
-def _walls(scene: Scene, basis: ModalBasis, index: int) -> _Walls:
-    """Motion of a cavity's surfaces; a rigid structure's one mode moves it as the cavity says."""
-    cavity, labels = scene.cavity[index], surface_labels(scene, index)
-    left, right, floor = (
-        interface_row(basis, label, f"cavity[{index}].{side}")
-        for label, side in zip(labels, ("left", "right", "floor"), strict=True)
-    )
+def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> tuple[_Surface, ...]:
+    """Return left wall, right wall, floor and ceiling of a cavity; a rigid structure's one mode moves them alike.
+
+    A surface whose label has no coordinates across and of rotation moves as the floor's rigid motion has it.
+    """
+    cavity, (left, right, below) = scene.cavity[index], surface_labels(scene, index)
+    labels, key = (left, right, below, cavity.ceiling or below), f"cavity[{index}]"
+    rows = [interface_row(basis, label, f"{key}.{SURFACES[side]}") for side, label in enumerate(labels)]
+    floor = rows[FLOOR]
+    for suffix, name in ((NORMAL, "normal_motion"), (ROTATION, "rotation")):
+        if getattr(cavity, name) and below + suffix in basis.rows:
+            raise InputError(f"{key}.{name}: the reduced model has '{below}{suffix}', which gives it; leave it out")
     none = np.zeros(len(basis.stiffness))
-    across = basis.rows.get(f"{labels[2]}.normal", cavity.normal_motion * floor)
-    turn = basis.rows.get(f"{labels[2]}.rotation", cavity.rotation * floor)
-    ceiling = floor if cavity.ceiling is None else interface_row(basis, cavity.ceiling, f"cavity[{index}].ceiling")
-    at_left, at_right, below = (basis.flexibility.get(label, 0.0) for label in (*labels[:2], f"{labels[2]}.normal"))
-    return _Walls((left, right, floor, ceiling), across + none, turn + none, (at_left, at_right, below))
+    across = basis.rows.get(below + NORMAL, cavity.normal_motion * floor) + none
+    turn = basis.rows.get(below + ROTATION, cavity.rotation * floor) + none
+    places = _places(basis, labels)
+    x_floor = 0.0 if places is None else places[FLOOR][0]
+    surfaces = []
+    for side, label in enumerate(labels):
+        x: float | None
+        y: float | None
+        x, y = (0.0, 0.0) if places is None else places[side]
+        own = label != below and label + NORMAL in basis.rows
+        if label != below and label + ROTATION in basis.rows and (places is None or not own):
+            raise InputError(
+                f"{key}.{SURFACES[side]}: '{label}' has a rotation, but '{label}' or '{below}' lacks its place or its "
+                'motion across; take kind = "patch" for both'
+            )
+        if not own:
+            x = x_floor
+        elif side != CEILING:
+            x = None  # a wall is touched on its plane, and a ceiling, wherever they are
+        if side == CEILING and label != below:
+            y = None
+        moves_across = basis.rows[label + NORMAL] if own else across
+        names = (
+            label,
+            (label if own else below) + NORMAL,
+            (label if label + ROTATION in basis.rows else below) + ROTATION,
+        )
+        first, second, third = (name if name in basis.rows else "" for name in names)
+        turns = basis.rows.get(label + ROTATION, turn)
+        surfaces.append(_Surface(rows[side], moves_across, turns, x, y, (first, second, third)))
+    return tuple(surfaces)
+
+
+def _places(basis: ModalBasis, labels: tuple[str, ...]) -> list[tuple[float, float]] | None:
+    """Return the places (x, y) of a cavity's surfaces, m from the middle of the floor; None where these are unknown.
+
+    labels: of left wall, right wall, floor and ceiling.
+    """
+    left, right, floor, _ = labels
+    across, along, at = basis.across(floor), basis.directions[floor], basis.positions
+    if across is None or not all(label in at for label in labels):
+        return None
+    middle = at[floor] if floor in (left, right) else 0.5 * (at[left] + at[right])
+    return [(float((at[label] - middle) @ along), float((at[label] - at[floor]) @ across)) for label in labels]
 
 
 class _Law(NamedTuple):
-    """The contact law, with the masses (N,) of the coordinates, the first n of which are modes."""
+    """The contact law at the walls of a structure, with the masses (N,) of the coordinates, modes first."""
 
     contact: ContactLaw
+    basis: ModalBasis
     mass: np.ndarray
-    n: int
 
     def element(self, normal: np.ndarray, restitution: float, flexibility: float) -> Element:
-        """Return the element of a contact from its normal row; the structure's mass is that of its first mode."""
+        """Return the element of a contact from its normal row (N,) and the residual flexibility of its wall, m/N.
+
+        The structure's mass is that of its first mode, the same for every number of modes.
+        """
         mobility = normal**2 / self.mass
-        mobility[1 : self.n] = 0.0
+        mobility[1 : len(self.basis.stiffness)] = 0.0
         return self.contact.element(restitution, 1 / float(mobility.sum()), flexibility)
 
+    def flexibility(self, surface: _Surface, is_wall: bool, lever: float = 0.0) -> float:
+        """Return the residual flexibility, m/N, of a surface against a force on it; lever: m, that turns it."""
+        moves, turns = surface.labels[0 if is_wall else 1], surface.labels[2]
+        shares = {moves: 1.0} | ({turns: lever} if turns and lever else {})
+        return self.basis.flexibility(shares) if moves else 0.0
 
-def _contacts(law: _Law, cavity: Cavity, walls: _Walls, bodies: list[_Body], size: int) -> list[_Unit]:
+
+def _contacts(law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], bodies: list[_Body], size: int) -> list[_Unit]:
     """Contacts in a cavity, from left to right, in each body's walls, floor and ceiling."""
     units: list[_Unit] = []
-    length, n = 2 * sum(body.a for body in bodies), len(walls.across)
+    length = 2 * sum(body.a for body in bodies)
     centre = -length / 2
     for place, body in enumerate(bodies):
         centre += body.a
         if place == 0:
-            units += _at_walls(law, cavity, walls, body, LEFT, -cavity.gap / 2 - length / 2, size, n)
+            units += _at_walls(law, cavity, surfaces, body, LEFT, -cavity.gap / 2 - length / 2, size)
         if place == len(bodies) - 1:
-            units += _at_walls(law, cavity, walls, body, RIGHT, cavity.gap / 2 + length / 2, size, n)
+            units += _at_walls(law, cavity, surfaces, body, RIGHT, cavity.gap / 2 + length / 2, size)
         if body.damper.shape != "slider":
             for surface in (FLOOR, CEILING):
-                units += _at_floor(law, cavity, walls, body, surface, centre, size, n)
+                units += _at_floor(law, cavity, surfaces, body, surface, centre, size)
         if place + 1 < len(bodies):
-            units += _between(law, cavity, walls, body, bodies[place + 1], size)
+            units += _between(law, cavity, surfaces, body, bodies[place + 1], size)
         centre += body.a
     return units
 
@@ -276,7 +345,7 @@ def _point(body: _Body, a: float, b: float, size: int) -> tuple[np.ndarray, np.n
 
 
 def _at_walls(
-    law: _Law, cavity: Cavity, walls: _Walls, body: _Body, surface: int, wall: float, size: int, n: int
+    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], body: _Body, surface: int, wall: float, size: int
 ) -> list[_Unit]:
     """Contacts with the left or the right wall, at `wall` (m) along the cavity."""
     sign = 1.0 if surface == LEFT else -1.0
@@ -290,16 +359,19 @@ def _at_walls(
     units = []
     for corner, a, b in points:
         along, across = _point(body, a, b, size)
-        along[:n] -= walls.along[0 if surface == LEFT else 1] - walls.turn * (body.b + b)
-        across[:n] -= walls.across + walls.turn * wall
-        extended = body.damper.shape != "slider"
+        extended, moving = body.damper.shape != "slider", surfaces[surface]
+        moved_along, moved_across = moving.motion(wall, body.b + b)
+        # a slider has no height: it meets the wall where the wall's motion is known
+        along[: len(moving.along)] -= moved_along if extended else moving.along
+        across[: len(moving.along)] -= moved_across
+        lever = 0.0 if moving.y is None or not extended else moving.y - body.b - b
         units.append(
             _Unit(
                 sign * along,
                 across * extended,
                 cavity.gap / 2,
                 body.damper.friction * extended,
-                law.element(sign * along, body.damper.restitution, walls.flexibility[0 if surface == LEFT else 1]),
+                law.element(sign * along, body.damper.restitution, law.flexibility(moving, True, lever)),
                 cavity.gap,
                 body.number,
                 surface,
@@ -310,7 +382,7 @@ def _at_walls(
 
 
 def _at_floor(
-    law: _Law, cavity: Cavity, walls: _Walls, body: _Body, surface: int, centre: float, size: int, n: int
+    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], body: _Body, surface: int, centre: float, size: int
 ) -> list[_Unit]:
     """Contacts with floor or ceiling of a body whose centre is at `centre` (m) along the cavity."""
     below, play = surface == FLOOR, cavity.play or 0.0
@@ -322,15 +394,20 @@ def _at_floor(
     units = []
     for corner, a, b in points:
         along, across = _point(body, a, b, size)
-        along[:n] -= walls.along[2 if below else 3] - walls.turn * (0.0 if below else 2 * body.b + play)
-        across[:n] -= walls.across + walls.turn * (centre + a)
+        moved_along, moved_across = surfaces[surface].motion(centre + a, 0.0 if below else 2 * body.b + play)
+        along[: len(moved_along)] -= moved_along
+        across[: len(moved_across)] -= moved_across
+        from_place = surfaces[surface].x
+        lever = 0.0 if from_place is None else centre + a - from_place
         units.append(
             _Unit(
                 sign * across,
                 along,
                 0.0 if below else play,
                 body.damper.friction,
-                law.element(sign * across, body.damper.restitution, walls.flexibility[2]),
+                law.element(
+                    sign * across, body.damper.restitution, law.flexibility(surfaces[surface], False, lever)
+                ),
                 play,
                 body.number,
                 surface,
@@ -352,7 +429,9 @@ def _check_friction(units: list[_Unit], size: int, mass: np.ndarray) -> None:
             )
 
 
-def _between(law: _Law, cavity: Cavity, walls: _Walls, left: _Body, right: _Body, size: int) -> list[_Unit]:
+def _between(
+    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], left: _Body, right: _Body, size: int
+) -> list[_Unit]:
     """Contacts of two neighbours: blocks face to face at the ends of the common height, discs at one point."""
     shapes = {left.damper.shape, right.damper.shape}
     if shapes == {"slider"}:
@@ -378,7 +457,7 @@ def _between(law: _Law, cavity: Cavity, walls: _Walls, left: _Body, right: _Body
         heights = [round_one.b]
     coefficients = left.damper.restitution, right.damper.restitution
     friction = 0.0 if shapes == {"slider"} else (left.damper.friction * right.damper.friction) ** 0.5
-    units = []
+    units, yields = [], 0.5 * sum(law.flexibility(surfaces[side], True) for side in (LEFT, RIGHT))
     for height in heights:
         right_along, right_across = _point(right, -right.a, height - right.b, size)
         left_along, left_across = _point(left, left.a, height - left.b, size)
@@ -389,7 +468,7 @@ def _between(law: _Law, cavity: Cavity, walls: _Walls, left: _Body, right: _Body
                 (right_across - left_across) * (friction > 0.0),
                 0.0,
                 friction,
-                law.element(normal, law.contact.pair_restitution(*coefficients), 0.5 * sum(walls.flexibility[:2])),
+                law.element(normal, law.contact.pair_restitution(*coefficients), yields),
                 cavity.gap,
                 left.number,
                 BODY,

@@ -184,28 +184,32 @@ def _account(system, st, work):
 
 @inlined
 def _note(system, st, rec, log, work, r):
-    """Count and log an impact of a rigid contact."""
-    u, after = len(system.rest), row_speed(system, r, st.v)
-    note_impact(system, st, rec, log, r, work.before_impact[r], after, work.impulse[r], work.impulse[u + r])
+    """Count and log an impact of a rigid contact, with the energy that it takes."""
+    u = len(system.rest)
+    before, after, loss = work.before_impact[r], row_speed(system, r, st.v), 0.0
+    for row in (r, u + r):
+        loss -= 0.5 * work.impulse[row] * (work.before_impact[row] + row_speed(system, row, st.v))
+    note_impact(system, st, rec, log, r, before, after, work.impulse[r], work.impulse[u + r], loss)
 
 
 @inlined
-def note_impact(system, st, rec, log, r, before, after, normal, tangential):
-    """Count an impact and log it: relative velocities, normal and tangential impulse."""
+def note_impact(system, st, rec, log, r, before, after, normal, tangential, loss):
+    """Count an impact and log it: relative velocities, normal and tangential impulse, the energy that they take."""
     st.last_impact[r] = st.time[0]
     st.counters[IMPACTS] += 1
     rec.impacts[st.counters[PERIOD]] += 1
     rec.collided[st.counters[PERIOD]] += 0.5 * before * before / system.delassus[r, r]
-    log_event(system, st, log, IMPACT, r, before, after, normal, tangential)
+    log_event(system, st, log, IMPACT, r, before, after, normal, tangential, loss)
 
 
 @inlined
-def log_event(system, st, log, kind, r, before, after, normal, tangential):
-    """One entry: time, kind, unit, relative velocities (m/s), impulses (N s)."""
+def log_event(system, st, log, kind, r, before, after, normal, tangential, loss):
+    """One entry: time, kind, unit, relative velocities (m/s), impulses (N s), energy (J)."""
     entry = log[st.counters[LOGGED]]
     st.counters[LOGGED] += 1
     entry[0] = st.counters[PERIOD] * system.period + st.time[0]
     entry[1], entry[2], entry[3], entry[4], entry[5], entry[6] = kind, r, before, after, normal, tangential
+    entry[7] = loss
 
 
 @kernel

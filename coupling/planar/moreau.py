@@ -29,9 +29,9 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.constraints import FLOOR, PlanarMotion, PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import gap, row_speed
-from vanedamp.coupling.planar.recorder import note_tilts, record_section
+from vanedamp.coupling.planar.recorder import note_tilts, put_sample, record_section
 from vanedamp.coupling.response.recorder import cubic_peak
-from vanedamp.coupling.response.records import ENERGIES, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
+from vanedamp.coupling.response.records import ENERGIES, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS, Records
 from vanedamp.coupling.system.restitution import restitution_at
 
 #: problems that a step may take, the last with all contacts at once
@@ -57,12 +57,15 @@ class SteppedMotion(NamedTuple):
     deepest: np.ndarray  # (1,) largest penetration relative to the play
     tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
     lifted: np.ndarray  # (periods + 1, b) time without an impulse at the floor, s
+    sampled: np.ndarray  # (samples, N) coordinates
+    shut: np.ndarray  # (samples, u) int: whether contacts carry force
 
     # changes with the contacts
     active: np.ndarray  # (u,) int: contacts that carry force
     speed: np.ndarray  # (u,) at the beginning of the present contact, m/s
     begun: np.ndarray  # (u,) time of that, s
     total: np.ndarray  # (2u,) impulse since then, N s
+    lost: np.ndarray  # (u,) energy that it took since then, J
 
     # scratch
     start: np.ndarray  # (2, N) coordinates and velocities as the step begins
@@ -78,16 +81,17 @@ class SteppedMotion(NamedTuple):
     listed: np.ndarray  # (u,) int: units of the problem
 
 
-def start_steps(system: PlanarSystem, initial: PlanarMotion, periods: int) -> SteppedMotion:
+def start_steps(system: PlanarSystem, initial: PlanarMotion, records: Records) -> SteppedMotion:
     """Return the motion at time zero."""
-    u, size, of_bodies = len(system.rest), len(system.mass), (periods + 1, len(system.along))
+    u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
+    samples = len(records.samples)
     return SteppedMotion(
         q=initial.q.copy(), v=initial.v.copy(), counters=np.zeros(COUNTERS, np.int64), ledger=np.zeros(len(ENERGIES)),
         deepest=np.zeros(1), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
-        active=np.zeros(u, np.int64), speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u),
+        sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),
+        active=np.zeros(u, np.int64), speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u),
         start=np.zeros((2, size)), free=np.zeros((2, size)), before=np.zeros(2 * u), slowest=np.zeros(1),
-        impulse=np.zeros(2 * u),
-        more=np.zeros(2 * u), least=np.zeros(u), approach=np.zeros(u),
+        impulse=np.zeros(2 * u), more=np.zeros(2 * u), least=np.zeros(u), approach=np.zeros(u),
         left=np.zeros(2 * u), closed=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
     )  # fmt: skip
 
@@ -314,6 +318,7 @@ def _account(system, times, motion, records, k, deepest):
                     moved += system.J[row, i] * (motion.q[i] - q[i])
                 lost = row < u or (hit and r < system.contacts)
                 motion.ledger[IMPACT_LOSS if lost else FRICTION] -= motion.impulse[row] / h * moved
+                motion.lost[r] -= motion.impulse[row] / h * moved
         if r < system.contacts:
             deep = max(deep, -gap(system, r, motion.q) / system.play[r])
     motion.deepest[0] = max(motion.deepest[0], deep)
@@ -355,7 +360,7 @@ def _follow_contacts(system, times, motion, records, log, k):
             motion.counters[IMPACTS] += 1
             records.impacts[p] += 1
             records.collided[p] += 0.5 * before * before / system.delassus[r, r]
-            motion.speed[r], motion.total[r], motion.total[u + r] = before, 0.0, 0.0
+            motion.speed[r], motion.total[r], motion.total[u + r], motion.lost[r] = before, 0.0, 0.0, 0.0
             motion.begun[r] = (p * (len(times.phase) - 1) + k) * times.step
         if pushed:
             motion.total[r] += motion.impulse[r]
@@ -363,7 +368,7 @@ def _follow_contacts(system, times, motion, records, log, k):
         elif motion.active[r] == 1 and motion.counters[LOGGED] < len(log):
             entry = log[motion.counters[LOGGED]]
             entry[0], entry[1], entry[2], entry[3] = motion.begun[r], IMPACT, r, motion.speed[r]
-            entry[4], entry[5], entry[6] = before, motion.total[r], motion.total[u + r]
+            entry[4], entry[5], entry[6], entry[7] = before, motion.total[r], motion.total[u + r], motion.lost[r]
             motion.counters[LOGGED] += 1
         motion.active[r] = 1 if pushed else 0
 
@@ -374,9 +379,6 @@ def _sample(system, times, motion, records, k):
     each = len(records.samples) // max(len(records.peak) - 1, 1)
     if each == 0 or k % ((len(times.phase) - 1) // each) != 0:
         return
-    row = records.samples[motion.counters[PERIOD] * each + k // ((len(times.phase) - 1) // each)]
-    row[0], _ = _response(system, times, k, motion.q, motion.v)
-    for b in range(len(system.along)):
-        row[1 + b] = motion.q[system.along[b]]
-        for i in range(len(motion.q)):
-            row[1 + b] -= system.floor[b, i] * motion.q[i]
+    row = motion.counters[PERIOD] * each + k // ((len(times.phase) - 1) // each)
+    x, _ = _response(system, times, k, motion.q, motion.v)
+    put_sample(system, motion, records, row, x, motion.q, motion.active, 0)

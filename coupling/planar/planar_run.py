@@ -20,7 +20,7 @@ from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem, pla
 from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
 from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.planar.state import new_guards, new_scratch, new_state
-from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
+from vanedamp.coupling.response.evaluation import LOG_WIDTH, STATUS_OF, Outcome
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
@@ -51,8 +51,8 @@ class PlanarRun:
         self.flows = empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
         self.all_modes = np.arange(modes)
-        self.state, self.guards = new_state(system, modes, initial, len(records.peak) - 1), new_guards(system, modes)
-        self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), 7))
+        self.state, self.guards = new_state(system, modes, initial, records), new_guards(system, modes)
+        self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), LOG_WIDTH))
         self.chunks: list[np.ndarray] = []
         self.begun = False
 
@@ -85,9 +85,10 @@ class PlanarRun:
         numbers = {"impacts": IMPACTS, "segments": SEGMENTS, "evaluations": EVALUATIONS}
         found = {name: int(counters[place]) for name, place in numbers.items()}
         found["subsystems"] = int(np.count_nonzero(self.flows.modes))
+        st = self.state
         return Outcome(
             self.flat, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER, found, self.chunks,
-            plane=plane_of(self.system, self.state.tilt, self.state.lifted, self.linearisation),
+            plane=plane_of(self.system, st.tilt, st.lifted, st.sampled, st.shut, self.linearisation),
         )  # fmt: skip
 
     def final(self) -> None:

@@ -98,12 +98,16 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
         state = st.state[r]
         if yields(system, r) and state < OPEN:
             rate = row_speed(system, r, v)
-            contact += system.dashpot[r] * rate * rate
+            taken = system.dashpot[r] * rate * rate
+            contact += taken
             for row in (r, u + r):
                 force = st.force[row]
                 for j in range(flows.modes[s]):
                     force += (flows.force[s, row, j] * st.amplitude[j] * (1.0 + work.turn[j])).real
                 st.pushed[row] += weight * force
+                if row >= u and (state == SLIP_RIGHT or state == SLIP_LEFT):
+                    taken -= force * row_speed(system, row, v)
+            st.lost[r] += weight * taken
         if (state == SLIP_RIGHT or state == SLIP_LEFT) and not flows.held[s, r]:
             slip, force = 0.0, st.force[u + r]
             for i in range(size):

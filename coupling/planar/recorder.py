@@ -1,23 +1,59 @@
-"""The recorder of runs with bodies in the plane, by every method: sections and ledger, tilts."""
+"""The recorder of runs with bodies in the plane, by every method: sections and ledger, tilts, samples."""
 
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import PERIOD
 from vanedamp.coupling.numerics.jit import inlined, kernel
-from vanedamp.coupling.planar.constraints import SURFACES, PlanarSystem
+from vanedamp.coupling.planar.constraints import FLOOR, SURFACES, PlanarSystem
 from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.records import STORED
+from vanedamp.coupling.response.response import PlanarSamples
 
 
-def plane_of(system: PlanarSystem, tilt: np.ndarray, lifted: np.ndarray, linearisation: float) -> Plane:
-    """Return the results in the plane of a run; tilt, lifted: (periods, b)."""
+def plane_of(
+    system: PlanarSystem,
+    tilt: np.ndarray,
+    lifted: np.ndarray,
+    sampled: np.ndarray,
+    shut: np.ndarray,
+    linearisation: float,
+) -> Plane:
+    """Return the results in the plane of a run.
+
+    tilt, lifted: (periods, b); sampled: (n, N) coordinates; shut: (n, u) whether contacts are closed.
+    """
     places = [
         (int(body), SURFACES[surface], int(corner))
         for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
     ]
-    return Plane(tilt, lifted, system.neglected, linearisation, places, system.spring)
+    samples = partial(_samples, system, sampled, shut, places)
+    return Plane(tilt, lifted, system.neglected, linearisation, places, samples, system.spring)
+
+
+def _samples(
+    system: PlanarSystem, sampled: np.ndarray, shut: np.ndarray, places: list[tuple[int, str, int]], x: np.ndarray
+) -> PlanarSamples:
+    """Return the first samples in the plane, as many as there are of the response x (n,)."""
+    q, contacts, extended = sampled[: len(x)], system.contacts, np.flatnonzero(system.tilt >= 0)
+    base = x - q @ system.response if system.table.any() else np.zeros(len(x))
+    gap = system.rest[:contacts] + q @ system.J[:contacts].T
+    rotation = q @ system.turn.T
+    lift, tilt, across = (np.full(rotation.shape, np.nan) for _ in range(3))
+    tilt[:, extended] = q[:, system.tilt[extended]] - rotation[:, extended]
+    first = system.along[0]
+    for body in extended:
+        stands = np.flatnonzero((system.body == body) & (system.surface == FLOOR))
+        lift[:, body] = gap[:, stands].mean(axis=1)
+        across[:, body] = -q[:, :first] @ system.J[stands, :first].mean(axis=0)
+    return PlanarSamples(
+        body_lift=lift, body_tilt=tilt, floor_along=base[:, None] + q @ system.floor.T, floor_across=across,
+        floor_rotation=rotation, contact_gap=gap, contact_closed=shut[: len(x), :contacts].astype(bool),
+        contacts=tuple(places[:contacts]),
+    )  # fmt: skip
 
 
 @kernel
@@ -56,6 +92,21 @@ def record_section(system, st, rec, springs):
     st.ledger[STORED] = energy
     for i in range(len(st.ledger)):
         rec.ledger[period, i] = st.ledger[i]
+
+
+@inlined
+def put_sample(system, st, rec, row, x, q, state, opened):
+    """Keep a sample of the response x and the coordinates q; state: (u,) of the contacts, `opened` where they are."""
+    rec.samples[row, 0] = x
+    for b in range(len(system.along)):
+        slip = q[system.along[b]]
+        for i in range(len(q)):
+            slip -= system.floor[b, i] * q[i]
+        rec.samples[row, 1 + b] = slip
+    for i in range(len(q)):
+        st.sampled[row, i] = q[i]
+    for r in range(system.contacts):
+        st.shut[row, r] = 0 if state[r] == opened else 1
 
 
 @inlined

@@ -10,7 +10,7 @@ from vanedamp.coupling.exact.root_search import DEGREE
 from vanedamp.coupling.numerics.codes import COUNTERS, OPEN
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
 from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
-from vanedamp.coupling.response.records import ENERGIES
+from vanedamp.coupling.response.records import ENERGIES, Records
 
 
 class PlanarState(NamedTuple):
@@ -32,9 +32,12 @@ class PlanarState(NamedTuple):
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
     pushed: np.ndarray  # (2u,) impulse of a contact that yields since it closed, N s
+    lost: np.ndarray  # (u,) what it has taken since then, J
     ledger: np.ndarray  # (6,) J
     tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
     lifted: np.ndarray  # (periods + 1, b) time off the floor, s
+    sampled: np.ndarray  # (samples, N) coordinates
+    shut: np.ndarray  # (samples, u) int: whether contacts are closed
     # of a segment
     amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
     bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
@@ -88,15 +91,16 @@ class Scratch(NamedTuple):
     wave: np.ndarray  # (m,) complex
 
 
-def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, periods: int) -> PlanarState:
+def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, records: Records) -> PlanarState:
     """Return the state at time zero."""
-    u, size, b = len(system.rest), len(system.mass), len(system.along)
+    u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
+    samples = len(records.samples)
     return PlanarState(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
         state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
         rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
-        ledger=np.zeros(len(ENERGIES)),
-        tilt=np.zeros((periods + 1, b)), lifted=np.zeros((periods + 1, b)),
+        lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
+        sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
     )  # fmt: skip
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.records import DETACHES, ENERGIES, EXCITATION, IMPACT, KINDS, STORED, VISCOUS, Records
-from vanedamp.coupling.response.response import Event, Response, Status, classify
+from vanedamp.coupling.response.response import Event, PlanarSamples, Response, Status, classify
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import InitialMotion
@@ -25,6 +25,8 @@ from vanedamp.coupling.system.transient import outlasted
 _CHUNK = 100
 #: share of the energy there is that counts as flow in any case
 _CARRIED = 1e-3
+#: columns of the log of bodies in the plane
+LOG_WIDTH = 8
 #: statuses of runs that came to their end
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
 
@@ -58,7 +60,8 @@ class Plane(NamedTuple):
 
     tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
     shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status
-    ok; places: body, side and corner by the row in the log; spring: stiffness of its contact, N/m, inf: rigid.
+    ok; places: body, side and corner by the row in the log; samples: those in the plane, from those of the response;
+    spring: stiffness of the contact of each row, N/m, inf: rigid.
     """
 
     tilt: np.ndarray
@@ -66,6 +69,7 @@ class Plane(NamedTuple):
     neglected: np.ndarray
     bound: float
     places: Sequence[tuple[int, str, int]]
+    samples: Callable[[np.ndarray], PlanarSamples]
     spring: np.ndarray
 
 
@@ -140,6 +144,8 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     if run.plane is not None:
         extent, tilted = _in_plane(run.plane, window, span)
         status = Status.TILTED if tilted and status in _USABLE else status
+        if samples:
+            extent["in_plane"] = run.plane.samples(records.samples[: done * samples, 0])
     return Response(
         status=status,
         frequency=scene.excitation.frequency,
@@ -191,13 +197,14 @@ def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any],
 
 
 def _events_in_plane(plane: Plane, chunks: Sequence[np.ndarray]) -> list[Event]:
-    """Return the events of a log of bodies in the plane: (k, 7), as of events_of and the tangential impulse."""
+    """Return the events of a log of bodies in the plane: as of events_of, tangential impulse and loss."""
     found = []
-    entries = np.concatenate(chunks) if chunks else np.zeros((0, 7))
+    entries = np.concatenate(chunks) if chunks else np.zeros((0, 8))
     _complete(plane.spring, entries)
-    for moment, kind, row, before, after, impulse, tangential in entries.tolist():
+    for moment, kind, row, before, after, *impulses, loss in entries.tolist():
         body, side, corner = plane.places[int(row)]
-        found.append(Event(moment, KINDS[int(kind)], body, side, before, after, impulse, corner, tangential))
+        normal, tangential = impulses
+        found.append(Event(moment, KINDS[int(kind)], body, side, before, after, normal, corner, tangential, loss))
     return found
 
 

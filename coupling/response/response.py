@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.files.store import Variable, save
+
+#: figures of each body in the plane
+_OF_BODIES = ("tilt_max", "lift_share", "linearisation")
 
 
 class Status(StrEnum):
@@ -47,7 +50,7 @@ class Event:
     side: "left", "right" (walls), "body" (the next body to the right), "floor", "ceiling"; "casing" for a friction
     damper, "stop" for a stop, whose number is then meant. Speeds are relative to the wall or body met; of bodies in the
     plane and at stops, those of the gap. corner: of a block, 0 to 3 against the clock from the lower left one; -1:
-    none.
+    none. loss: energy that the impulses of an impact take, J, which leaves out what completes a chatter.
     """
 
     time: float
@@ -59,6 +62,49 @@ class Event:
     impulse: float
     corner: int = -1
     tangential_impulse: float = 0.0
+    loss: float = 0.0
+
+
+class PlanarSamples(NamedTuple):
+    """Samples of bodies in the plane, at the times of Response.time (n,): b bodies, c contacts.
+
+    body_lift: (n, b) m, height of each body's centre above that of the body flat on its floor; body_tilt: (n, b) rad,
+    relative to the cavity, against the clock. floor_along, floor_across: (n, b) m, displacement of the floor under a
+    body, that of a base which is prescribed to move included; floor_rotation: (n, b) rad. contact_gap: (n, c) m;
+    contact_closed: (n, c) bool, of methods with time steps whether it carried force in the step before. Lift, tilt and
+    floor_across are nan for sliders. contacts: body, side and corner of each contact, as of an Event.
+    """
+
+    body_lift: np.ndarray
+    body_tilt: np.ndarray
+    floor_along: np.ndarray
+    floor_across: np.ndarray
+    floor_rotation: np.ndarray
+    contact_gap: np.ndarray
+    contact_closed: np.ndarray
+    contacts: tuple[tuple[int, str, int], ...]
+
+    def cut(self, kept: Any) -> PlanarSamples:
+        """Return the samples at some of the times, as numpy indexes them."""
+        arrays = {name: getattr(self, name)[kept] for name in self._fields[:-1]}
+        return self._replace(**arrays)
+
+    def variables(self) -> dict[str, Variable]:
+        """Return the variables of a file, with dimensions and units."""
+        units = {"body_tilt": "rad", "floor_rotation": "rad", "contact_closed": "1"}
+        variables = {
+            name: Variable(
+                np.asarray(values, np.int8 if values.dtype == bool else float),
+                ("time", "contact" if name.startswith("contact") else "damper"),
+                units.get(name, "m"),
+            )
+            for name, values in zip(self._fields[:-1], self[:-1], strict=True)
+        }
+        dampers, sides, corners = zip(*self.contacts, strict=True)
+        variables["contact_damper"] = Variable(np.array(dampers), ("contact",))
+        variables["contact_side"] = Variable(np.array(sides, object), ("contact",))
+        variables["contact_corner"] = Variable(np.array(corners), ("contact",))
+        return variables
 
 
 @dataclass(frozen=True)
@@ -77,7 +123,7 @@ class Response:
     before its figures are used; final: the state at its end, with which another run can begin, None for one
     that ended within a period, or whose method leaves none; tilt_max (rad), lift_share (of the time), linearisation:
     largest tilt of each body in its cavity, its share of the time off the floor, and what small tilts neglect over the
-    smallest play; None for sliders, and without bodies in the plane.
+    smallest play; None for sliders, and without bodies in the plane; in_plane: their samples, None without any.
     """
 
     status: Status
@@ -113,6 +159,7 @@ class Response:
     tilt_max: tuple[float | None, ...] | None = None
     lift_share: tuple[float | None, ...] | None = None
     linearisation: tuple[float | None, ...] | None = None
+    in_plane: PlanarSamples | None = None
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
@@ -124,7 +171,7 @@ class Response:
         )  # fmt: skip
         data: dict[str, Any] = {"status": self.status.value} | {name: getattr(self, name) for name in names}
         data["warnings"] = list(self.warnings)
-        for name in ("tilt_max", "lift_share", "linearisation"):
+        for name in _OF_BODIES:
             if (values := getattr(self, name)) is not None:
                 data[name] = list(values)
         if self.estimate is not None:
@@ -147,15 +194,19 @@ class Response:
             variables["time"] = Variable(self.time, ("time",), "s")
             variables["displacement"] = Variable(self.displacement, ("time",), "m")
             variables["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
+        if self.in_plane is not None:
+            variables |= self.in_plane.variables()
         if self.event_list:
             variables |= self._event_variables()
         attributes = {k: v for k, v in self.to_json().items() if v is not None}
+        for name in attributes.keys() & _OF_BODIES:
+            attributes[name] = np.array(attributes[name], float)  # None, of sliders, is nan
         save(path, "response", variables, attributes | {"provenance": provenance or {}})
 
     def _event_variables(self) -> dict[str, Variable]:
         units = {
             "time": "s", "relative_velocity_before": "m/s", "relative_velocity_after": "m/s", "impulse": "N s",
-            "tangential_impulse": "N s",
+            "tangential_impulse": "N s", "loss": "J",
         }  # fmt: skip
         return {
             f"event_{name}": Variable(
@@ -165,8 +216,8 @@ class Response:
         }
 
     def _event_fields(self) -> list[str]:
-        """Return the names of the fields of events; corner and tangential impulse are those of bodies in the plane."""
-        planar = {"corner", "tangential_impulse"}
+        """Return the names of the fields of events; some are those of bodies in the plane."""
+        planar = {"corner", "tangential_impulse", "loss"}
         return [name for name in Event.__dataclass_fields__ if self.tilt_max is not None or name not in planar]
 
 

@@ -106,18 +106,20 @@ class Gravity:
         if self.direction is not None and self.orientation_deg != 0.0:
             raise ValueError("give one of orientation_deg and direction")
 
-    def components(self, cavity: np.ndarray) -> tuple[float, float]:
+    def components(self, cavity: np.ndarray, normal: np.ndarray | None = None) -> tuple[float, float]:
         """Return the acceleration (m/s^2) along a cavity, positive to the right, and across it, pressing on its floor.
 
-        cavity: (3,) unit vector from its left wall to its right one; without meaning for gravity by an angle. Gravity
-        by a direction presses a body on its floor, whichever side that is.
+        cavity: (3,) unit vector from its left wall to its right one; normal: (3,) from its floor to its ceiling, None
+        where it is not known. Both are without meaning for gravity by an angle. Gravity by a direction presses a body
+        on its floor, whichever side that is unless the normal tells.
         """
         if self.direction is None:
             angle = math.radians(self.orientation_deg)
             along, across = -math.sin(angle), math.cos(angle)
         else:
             down = np.array(self.direction) / np.linalg.norm(self.direction)
-            along, across = float(down @ cavity), float(np.linalg.norm(np.cross(down, cavity)))
+            along = float(down @ cavity)
+            across = float(np.linalg.norm(np.cross(down, cavity)) if normal is None else -down @ normal)
         if abs(across) < 1e-15:  # upright is upright
             across = 0.0
         return self.acceleration * along, self.acceleration * across

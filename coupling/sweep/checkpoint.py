@@ -16,7 +16,7 @@ import numpy as np
 
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult
+from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, width_of
 from vanedamp.files.store import StoreError, Variable, clear_leftovers, digest, load, save
 from vanedamp.files.toml_input import InputError
 
@@ -29,7 +29,7 @@ class Checkpoint:
 
     def __init__(self, path: str | Path | None, scene: Scene, size: int, provenance: Mapping[str, Any]) -> None:
         """Take up the file's points. Raises InputError for a file of another sweep, or one that cannot be read."""
-        self.finished = SweepTable(size)
+        self.finished = SweepTable(size, width_of(scene))
         self._path = None if path is None else Path(path)
         self._belongs = {"scene": scene.to_dict(), "model": _models(scene), "provenance": dict(provenance)}
         self._next = 0.0
@@ -94,6 +94,11 @@ class Checkpoint:
                     f"{path}: the checkpoint of another {what}; nothing was done to it: move it away, or delete it to "
                     "start again"
                 )
+        if variables["values"].shape[1] != self.finished.values.shape[1]:
+            raise InputError(
+                f"{path}: the checkpoint of another version of the software, which kept other measures; nothing was "
+                "done to it: move it away, or delete it to start again"
+            )
         texts, states = (json.loads(entry) for entry in variables["texts_and_states"])
         self.finished.put(variables["point"], variables["values"], variables["codes"], texts)
         self.finished.states = {int(number): RestartState.from_list(state) for number, state in states.items()}

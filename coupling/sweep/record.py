@@ -12,7 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import FREQUENCY
-from vanedamp.coupling.sweep.worker import LOSSES, MEASURES
+from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.store import Variable, frozen, load, save
 from vanedamp.files.toml_input import validate
 
@@ -42,6 +42,9 @@ class Sweep:
     attached_mass_fraction  share of the bodies' mass that the structure feels; nan without bodies or motion
     energy_share          (*grid, 4) share of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another response.response.Status, or "error: ..." for a run that broke, without measures
+    in_plane              by the names of IN_PLANE, (*grid, bodies): largest tilt (rad), share of the time off the
+                          floor, what small tilts neglect over the smallest play; nan for sliders; empty for a scene
+                          of sliders
     peaks                 by the names of PEAKS: tops of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
                           undamped one, over the axes other than the frequency; empty for a sweep at one frequency
@@ -65,6 +68,7 @@ class Sweep:
     energy_residual: np.ndarray
     status: np.ndarray
     classification: np.ndarray
+    in_plane: Mapping[str, np.ndarray] = field(default_factory=dict)
     peaks: Mapping[str, np.ndarray] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -84,12 +88,14 @@ class Sweep:
         notes = {"warnings": list(self.provenance.get("warnings", ()))}
         notes |= {} if estimate is None else {"estimate": estimate}
         axes = {path: values.tolist() for path, values in self.axes.items()}
+        further = {**self.in_plane, **self.peaks}
+        units = self.units() | MEASURES | {name: (IN_PLANE | PEAKS)[name] for name in further}
         return (
-            {"axes": axes, "units": self.units() | MEASURES | {name: PEAKS[name] for name in self.peaks}}
+            {"axes": axes, "units": units}
             | {"loss": list(LOSSES)}
             | notes
             | {name: getattr(self, name).tolist() for name in names}
-            | {name: values.tolist() for name, values in self.peaks.items()}
+            | {name: values.tolist() for name, values in further.items()}
         )
 
     def save(self, path: str | Path) -> None:
@@ -101,6 +107,8 @@ class Sweep:
         variables["energy_share"] = Variable(self.energy_share, (*dims, "loss"))
         for name, unit in (MEASURES | {"status": "1", "classification": "1"}).items():
             variables[name] = Variable(getattr(self, name), dims, unit)
+        for name, values in self.in_plane.items():
+            variables[name] = Variable(values, (*dims, "damper"), IN_PLANE[name])
         others = tuple(_dimension(axis) for axis in self.axes if axis != FREQUENCY)
         variables |= {name: Variable(values, others, PEAKS[name]) for name, values in self.peaks.items()}
         attributes = {
@@ -120,6 +128,7 @@ class Sweep:
             axes={axis: frozen(array, array.dtype) for axis, array in axes.items()},
             **{name: frozen(values[name]) for name in (*MEASURES, "energy_share")},
             **{name: frozen(values[name], object) for name in ("status", "classification")},
+            in_plane={name: frozen(values[name]) for name in IN_PLANE if name in values},
             peaks={name: frozen(values[name]) for name in PEAKS if name in values},
             provenance=json.loads(attributes["provenance"]),
         )

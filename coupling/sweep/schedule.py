@@ -9,7 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 import numpy as np
 
 from vanedamp.coupling.sweep.grid import Grid, PointList
-from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points, tasks_of
+from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points, tasks_of, width_of
 from vanedamp.files.errors import VanedampError
 
 # few enough points that workers end together, and that a killed sweep loses little
@@ -100,7 +100,7 @@ def _one_by_one(grid: Grid | PointList, task: Task, lost: Future[TaskResult], ex
         known = len(task.points) == 1 and not lost.cancelled() and not isinstance(lost.exception(), BrokenExecutor)
         future = lost if known else _submit(grid, single, executor)
         error = future.exception()
-        results.append(future.result() if error is None else broken(error))
+        results.append(future.result() if error is None else broken(error, width_of(grid.base)))
         state = state if results[-1].final is None else results[-1].final
     texts = [text for result in results for text in result.texts]
     return TaskResult(np.concatenate([result.values for result in results]), texts, state if task.linked else None)

@@ -17,7 +17,7 @@ from vanedamp.coupling.sweep.grid import FREQUENCY, Grid, PointList, Points
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.coupling.sweep.schedule import _run
-from vanedamp.coupling.sweep.worker import COLUMNS, LOSSES, MEASURES, TEXTS, SweepTable
+from vanedamp.coupling.sweep.worker import COLUMNS, IN_PLANE, LOSSES, MEASURES, TEXTS, SweepTable, width_of
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_responses
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, validate
@@ -63,7 +63,7 @@ def run_list(
     progress: called with the number of points done.
     """
     listed = PointList(base, points)
-    finished = SweepTable(listed.size)
+    finished = SweepTable(listed.size, width_of(base))
     for task, rest, result in _run(listed, finished, executor):
         finished.add(task, result, bool(rest))
         if progress is not None:
@@ -73,12 +73,14 @@ def run_list(
 
 def _result(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Sweep:
     columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
+    of_bodies = np.reshape(finished.values[:, len(COLUMNS) :], (*grid.shape, len(IN_PLANE), -1))
     return Sweep(
         scene=grid.scene,
         axes={path: frozen(values, np.asarray(values).dtype) for path, values in grid.axes.items()},
         energy_share=frozen(np.stack([columns[name] for name in LOSSES], axis=-1)),
         **{name: frozen(columns[name]) for name in MEASURES},
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
+        in_plane={name: frozen(of_bodies[..., place, :]) for place, name in enumerate(IN_PLANE) if of_bodies.size},
         peaks=_peaks(grid),
         provenance=provenance
         | ({"warnings": list(grid.warnings)} if grid.warnings else {})

@@ -22,10 +22,12 @@ MEASURES = {
     "amplitude_harmonic": "m", "amplitude_undamped": "m", "amplitude_fixed": "m",
     "impacts_per_period": "1", "attached_mass_fraction": "1", "energy_residual": "1",
 }  # fmt: skip
+#: measures of each body in the plane and their units, each an array over the grid and the bodies
+IN_PLANE = {"tilt_max": "rad", "lift_share": "1", "linearisation": "1"}
 #: losses of energy, the last axis of `energy_share`
 LOSSES = ("viscous", "friction", "impact", "contact")
 TEXTS = ("status", "classification")
-#: all columns of a point: measures, then shares of the losses
+#: columns of every point: measures, then shares of the losses; behind them IN_PLANE, body by body
 COLUMNS = (*MEASURES, *LOSSES)
 _LINEAR = [COLUMNS.index(name) for name in ("amplitude_undamped", "amplitude_fixed")]
 _OF_RUN = [(name, place) for place, name in enumerate(MEASURES) if place not in _LINEAR]
@@ -51,7 +53,7 @@ class TaskResult(NamedTuple):
 def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> TaskResult:
     """Run some points, given by the values of the axes: the task of a worker."""
     maker, state = Points(base, choices), task.start
-    values = np.full((len(points), len(COLUMNS)), np.nan)
+    values = np.full((len(points), width_of(base)), np.nan)
     texts: list[tuple[str, str]] = []
     for row, point in zip(values, points, strict=True):
         final = _run(maker, point, state if task.linked else None, row, texts)
@@ -60,12 +62,17 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
     return TaskResult(values, texts, state if task.linked else None)
 
 
-def broken(error: BaseException) -> TaskResult:
+def width_of(base: Scene) -> int:
+    """Return the number of columns of a scene's points."""
+    return len(COLUMNS) + (len(IN_PLANE) * len(base.damper) if base.planar else 0)
+
+
+def broken(error: BaseException, width: int = len(COLUMNS)) -> TaskResult:
     """Return the result of a point whose run has broken, or has broken its worker."""
     text = " ".join(f"error: {type(error).__name__}: {error}".split())
     if isinstance(error, BrokenExecutor):
         text = "error: the worker process ended abruptly (killed, or out of memory)"
-    return TaskResult(np.full((1, len(COLUMNS)), np.nan), [(text, "")], None)
+    return TaskResult(np.full((1, width), np.nan), [(text, "")], None)
 
 
 class SweepTable:
@@ -75,8 +82,8 @@ class SweepTable:
     states: the state that the next run of an unfinished chain begins with.
     """
 
-    def __init__(self, size: int) -> None:
-        self.values = np.full((size, len(COLUMNS)), np.nan)
+    def __init__(self, size: int, width: int = len(COLUMNS)) -> None:
+        self.values = np.full((size, width), np.nan)
         self.codes = np.zeros((size, len(TEXTS)), np.int32)
         self.done = np.zeros(size, bool)
         self.states: dict[int, RestartState] = {}
@@ -125,7 +132,10 @@ def _run(
     for name, place in _OF_RUN:
         value = getattr(response, name)
         row[place] = np.nan if value is None else value
-    row[len(MEASURES) :] = _shares(response)
+    row[len(MEASURES) : len(COLUMNS)] = _shares(response)
+    of_bodies = np.reshape(row[len(COLUMNS) :], (len(IN_PLANE), -1))
+    for place, name in enumerate(IN_PLANE if of_bodies.size else ()):
+        of_bodies[place] = getattr(response, name)  # None, of sliders, is nan
     texts.append((response.status.value, response.classification))
     return response.final
 

@@ -43,11 +43,10 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     check_directions(scene, basis)
     at = forced_label(scene)
     response = interface_row(basis, at, "excitation.at")
-    base = share * (scene.excitation.base_acceleration or 0.0) * -1j * basis.directions[at]
+    base = base_acceleration(scene, basis)
     table = np.zeros((len(share), 1), complex)
     if isinstance(scene.structure, Prescribed):
         table = share * -1j * scene.structure.displacement_amplitude
-        base = -(frequency[:, None] ** 2) * table * basis.directions[at]
     force = share * -1j * response * force_amplitude(scene, basis, response) - base @ basis.base.T
     made = constraints_of(scene, basis, at)
     travel = made.free_travel.copy()
@@ -77,6 +76,16 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         restitution_at=law_address(scene.contact, made.restitution[made.friction_rows :]), free_travel=travel,
         left_body=made.left_body, right_body=made.right_body, moves_with_floor=made.moves_with_floor,
     )  # fmt: skip
+
+
+def base_acceleration(scene: Scene, basis: ModalBasis) -> np.ndarray:
+    """Return the complex amplitudes (e, 3) of the base's acceleration in the model's axes, m/s^2."""
+    excitation, direction = scene.excitation, basis.directions[forced_label(scene)]
+    share = np.array(list(excitation.shares.values()))[:, None]
+    if isinstance(scene.structure, Prescribed):
+        frequency = 2 * np.pi * excitation.frequency * np.array(list(excitation.shares))[:, None]
+        return np.asarray(-(frequency**2) * (share * -1j * scene.structure.displacement_amplitude) * direction)
+    return np.asarray(share * (excitation.base_acceleration or 0.0) * -1j * direction)
 
 
 def loads_of(scene: Scene, signal: Waveform) -> Loads:

@@ -1,7 +1,8 @@
 """Directions of cavities in space: those that a reduced model gives, and checks that they fit together.
 
-Left wall, right wall and floor of a cavity have one direction, that of the body's motion from the left wall to the
-right one. Along it the body feels gravity and the base's motion.
+Left wall, right wall, floor and ceiling of a cavity have one direction, that of the body's motion from the left wall to
+the right one. Along it the body feels gravity and the base's motion. Across it they have one, too, from the floor to
+the ceiling, where they have coordinates of that motion.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.modal_basis import ModalBasis
 from vanedamp.files.toml_input import InputError
+from vanedamp.rom.reduced import NORMAL
 
 #: degrees between the directions of one cavity's surfaces, for walls that open like a wedge, and off a wall's normal
 _PARALLEL, _ALONG = 5.0, 45.0
@@ -31,30 +33,48 @@ def check_directions(scene: Scene, basis: ModalBasis) -> None:
             "excitation.base_acceleration: the reduced model does not say how a base loads it (its base_load is zero); "
             "give it one, or excite by a force"
         )
-    labels = [label for cavity in scene.cavity for label in cavity.labels()]
+    labels = [label for cavity in scene.cavity for label in (*cavity.labels(), cavity.ceiling) if label]
     if not {str(label) for label in [scene.excitation.at, *labels]} <= set(basis.rows):
         return  # an unknown label is refused where its row is wanted
+    check_displacements(scene, basis.rotations)
     check_known(scene, basis.directions)
     check_surfaces(scene.cavity, basis.directions, basis.normals)
+    if scene.planar:
+        for index, cavity in enumerate(scene.cavity):
+            _check_across(cavity, f"cavity[{index}]", basis.directions, basis.normals)
 
 
 def check_known(scene: Scene, directions: Vectors) -> None:
     """Raise InputError where base acceleration or gravity need a direction that the reduced model does not know."""
     excitation, gravity = scene.excitation, scene.gravity
     reasons = ["excitation.base_acceleration"] if excitation.base_acceleration else []
-    wanted = {"excitation.at": excitation.at} if reasons else {}
+    wanted = [("excitation.at", str(excitation.at))] if reasons else []
     if gravity.direction is not None and gravity.acceleration:
         reasons.append("gravity.direction")
     if reasons:
         used = {damper.cavity for damper in scene.damper}
         cavities = [(index, cavity) for index, cavity in enumerate(scene.cavity) if cavity.name in used]
-        wanted |= {f"cavity[{index}].floor": cavity.labels()[2] for index, cavity in cavities}
-    for key, label in wanted.items():
-        if not directions[str(label)].any():
+        floors = [(f"cavity[{index}].floor", str(cavity.labels()[2])) for index, cavity in cavities]
+        wanted += floors + [(key, label + NORMAL) for key, label in floors if label + NORMAL in directions]
+    for key, label in wanted:
+        if not directions[label].any():
             raise InputError(
                 f"{key}: the reduced model knows no direction of '{label}', which {reasons[0]} needs; give the "
                 "interface coordinate a direction and reduce or import again"
             )
+
+
+def check_displacements(scene: Scene, rotations: frozenset[str]) -> None:
+    """Raise InputError where an angle stands for a displacement."""
+    keys: dict[str, str | None] = {"excitation.at": scene.excitation.at}
+    for index, cavity in enumerate(scene.cavity):
+        keys |= {f"cavity[{index}].{side}": getattr(cavity, side) for side in ("left", "right", "floor", "ceiling")}
+    for index, stop in enumerate(scene.stop):
+        keys |= {f"stop[{index}].at": stop.at, f"stop[{index}].to": stop.to}
+    keys |= {f"friction_damper[{index}].at": damper.at for index, damper in enumerate(scene.friction_damper)}
+    for key, label in keys.items():
+        if label in rotations:
+            raise InputError(f"{key}: '{label}' is a rotation (rad); name the interface coordinate of a displacement")
 
 
 def check_surfaces(cavities: Sequence[Cavity], directions: Vectors, normals: Vectors) -> None:
@@ -69,7 +89,9 @@ def check_surfaces(cavities: Sequence[Cavity], directions: Vectors, normals: Vec
 
 def _check_parallel(cavity: Cavity, key: str, directions: Vectors) -> None:
     left, right, floor = map(str, cavity.labels())
-    for side, label, other in (("right", right, left), ("left", left, floor), ("right", right, floor)):
+    ceiling = cavity.ceiling or floor
+    pairs = ("right", right, left), ("left", left, floor), ("right", right, floor), ("ceiling", ceiling, floor)
+    for side, label, other in pairs:
         angle = _angle(directions[label], directions[other])
         if angle > _PARALLEL:
             fault = "against" if angle > 180.0 - _PARALLEL else f"at {angle:.0f} degrees to"
@@ -103,6 +125,35 @@ def _check_walls(cavity: Cavity, key: str, directions: Vectors, normals: Vectors
                 f"{key}.{side}: along its direction {_format(directions[label])} '{label}' is the wall at the other "
                 f"end (its material's outward normal is {_format(normals[label])}): swap left and right, or turn the "
                 "directions of both walls and the floor round and reduce again"
+            )
+
+
+def _check_across(cavity: Cavity, key: str, directions: Vectors, normals: Vectors) -> None:
+    """Raise InputError for surfaces with several directions across, and a floor or ceiling on the other side.
+
+    The facets that make a floor look along its direction across, those of a ceiling against it.
+    """
+    left, right, floor = map(str, cavity.labels())
+    across = directions.get(floor + NORMAL, np.zeros(3))
+    labels = {"left": left, "right": right, "ceiling": cavity.ceiling or floor}
+    for side, label in labels.items():
+        own = directions.get(label + NORMAL, np.zeros(3))
+        angle = _angle(own, across)
+        if angle > _PARALLEL:
+            raise InputError(
+                f"{key}.{side}: across the cavity '{label}' points at {angle:.0f} degrees to '{floor}', {_format(own)} "
+                f"and {_format(across)}: all surfaces take the one `normal` out of the floor; mend the interface's and "
+                "reduce again"
+            )
+    for side, surface, sign in (("floor", floor, 1.0), ("ceiling", cavity.ceiling or floor, -1.0)):
+        if side == "ceiling" and surface == floor:
+            continue
+        angle = _angle(across, sign * normals[surface])
+        if angle > 90.0 - _ALONG:
+            raise InputError(
+                f"{key}.{side}: the facets of '{surface}' look along {_format(normals[surface])}, which is "
+                f"{angle:.0f} degrees off a {side}'s where the direction across is {_format(across)}; name the {side}, "
+                "or mend `normal`"
             )
 
 

@@ -119,7 +119,7 @@ def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> _Surfaces:
         interface_row(basis, label, f"cavity[{index}].{side}")
         for label, side in zip(labels, ("left", "right", "floor"), strict=True)
     )
-    yields = basis.flexibility.get(labels[0], 0.0), basis.flexibility.get(labels[1], 0.0)
+    yields = basis.flexibility({labels[0]: 1.0}), basis.flexibility({labels[1]: 1.0})
     return _Surfaces(labels, left, right, floor, yields)
 
 
@@ -179,7 +179,7 @@ def _stops(scene: Scene, basis: ModalBasis) -> list[_Row]:
         ends = [(stop.at or "structure", "at", 1.0)] + ([(stop.to, "to", -1.0)] if stop.to else [])
         towards = -1.0 if stop.side == "right" else 1.0
         gap = np.sum([towards * sign * interface_row(basis, label, f"stop[{i}].{key}") for label, key, sign in ends], 0)
-        yields = sum(basis.flexibility.get(label, 0.0) for label, _, _ in ends)
+        yields = sum(basis.flexibility({label: 1.0}) for label, _, _ in ends)
         # the mass is that of the first mode, as at the walls of cavities
         element = scene.contact.element(stop.restitution, 1 / max(float((gap[:1] ** 2).sum()), _LIGHT), yields)
         rows.append(_Row(gap, element=element, rest=stop.gap, free_travel=stop.gap))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -13,7 +14,7 @@ from vanedamp.coupling.system.reduced_model_file import file_stamp, reduced_mode
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.dense_modes import rounding
-from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.reduced import NORMAL, ReducedModel
 
 # share of a natural frequency that round-off of the stiffness may be worth
 _FREQUENCY_ERROR = 1e-3
@@ -24,8 +25,9 @@ class ModalBasis:
     """Modes of a structure without bodies.
 
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); base: (n, 3) load of an acceleration of the
-    base. By interface label: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), and residual
-    flexibility, m/N, which the modes lack.
+    base. By interface label, in one order: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), and
+    positions (3,), m, where they are known. rotations: labels of angles. residual: (k, k) m/N, flexibility of the
+    interface that the modes lack; None: nothing.
     """
 
     stiffness: np.ndarray
@@ -34,7 +36,25 @@ class ModalBasis:
     rows: dict[str, np.ndarray]
     directions: dict[str, np.ndarray]
     normals: dict[str, np.ndarray]
-    flexibility: dict[str, float]
+    positions: dict[str, np.ndarray] = field(default_factory=dict)
+    rotations: frozenset[str] = frozenset()
+    residual: np.ndarray | None = None
+
+    def across(self, label: str) -> np.ndarray | None:
+        """Return the direction (3,) of the motion across beside that of an interface label; None where unknown."""
+        direction = self.directions.get(label + NORMAL)
+        return direction if direction is not None and direction.any() else None
+
+    def flexibility(self, shares: Mapping[str, float]) -> float:
+        """Return the residual flexibility, m/N, of a displacement that is the sum of shares of interface coordinates.
+
+        shares: by label, such as 1 of a patch's motion across and x of its rotation for its point at x.
+        """
+        if self.residual is None:
+            return 0.0
+        places = [list(self.rows).index(label) for label in shares]
+        weights = np.array(list(shares.values()))
+        return float(weights @ self.residual[np.ix_(places, places)] @ weights)
 
 
 #: direction of the one axis that a structure without an interface has
@@ -61,11 +81,11 @@ def basis_of(scene: Scene) -> ModalBasis:
         root = np.sqrt(structure.mass)
         return ModalBasis(
             frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
-            frozen([root * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {}, {},
+            frozen([root * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {},
         )  # fmt: skip
     if isinstance(structure, Prescribed):
         none = np.zeros(0)
-        return ModalBasis(none, np.zeros((0, 0)), np.zeros((0, 3)), {"structure": none}, {"structure": _AXIS}, {}, {})
+        return ModalBasis(none, np.zeros((0, 0)), np.zeros((0, 3)), {"structure": none}, {"structure": _AXIS}, {})
     return _rom_basis(structure, file_stamp(structure.file))
 
 
@@ -101,8 +121,10 @@ def modal_basis(model: ReducedModel) -> ModalBasis:
     directions = dict(zip(model.interface, model.directions, strict=True))
     unknown = np.zeros((len(model.interface), 3))
     normals = dict(zip(model.interface, unknown if model.normals is None else model.normals, strict=True))
-    residual = model.residual_flexibility
-    own = np.zeros(len(model.interface)) if residual is None else np.diag(residual)
-    flexibility = dict(zip(model.interface, own.tolist(), strict=True))
     base = frozen(shapes.T @ model.base_load)
-    return ModalBasis(frozen(squares), frozen(damping), base, rows, directions, normals, flexibility)
+    places = {} if model.positions is None else dict(zip(model.interface, model.positions, strict=True))
+    arms = np.zeros(len(model.interface)) if model.arms is None else model.arms
+    rotations = frozenset(label for label, arm in zip(model.interface, arms, strict=True) if arm > 0.0)
+    return ModalBasis(
+        frozen(squares), frozen(damping), base, rows, directions, normals, places, rotations, model.residual_flexibility
+    )  # fmt: skip

@@ -74,6 +74,8 @@ def project(
         damping_ratio=matrices.damping_ratio,
         directions=dict(zip(interface.labels, interface.directions, strict=True)),
         normals=interface.normals,
+        positions=interface.positions,
+        arms=interface.arms,
         base_load=recovery.T @ (matrices.mass @ matrices.rigid_translations()),
         fixed_interface_modes=fixed_interface_modes,
         free_modes=free_modes,

@@ -64,6 +64,7 @@ class Calibration:
             "first_bending": self.analysis.first_bending,
             "frequency_hz": self.analysis.modes.frequencies_hz.tolist(),
             "rigid": asdict(self.rigid),
+            "cavity": {label: asdict(motion) for label, motion in self.analysis.cavities.items()},
             "damping": self._damping(),
             "excitation": self._excitation(),
             "tuning": None if self.tuning is None else _tuning_json(self.tuning, self.case),
@@ -89,8 +90,8 @@ class Calibration:
                 "mac_after": Variable(tuning.mac_after, ("target",)),
                 "sensitivity": Variable(tuning.sensitivities, ("target", "part")),
             }
-        attributes = {name: result[name] for name in ("first_bending", "rigid", "damping", "excitation")}
-        attributes = {name: value for name, value in attributes.items() if value is not None}
+        attributes = {name: result[name] for name in ("first_bending", "rigid", "cavity", "damping", "excitation")}
+        attributes = {name: value for name, value in attributes.items() if value not in (None, {})}
         attributes |= {"versions": versions(), "provenance": dict(self.analysis.structure.matrices.provenance)}
         save(path, "calibration", variables, attributes)
 

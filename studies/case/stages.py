@@ -24,12 +24,19 @@ from vanedamp.modal.measurements import read_shapes
 from vanedamp.modal.mesh_import import convert
 from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import ParticipationError, effective_masses, first_bending
-from vanedamp.modal.rigid_model import RigidModel, fatigue_amplitude, rigid_model
+from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.stress import HotSpot, hot_spot
 from vanedamp.modal.units import doubts
 from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
 from vanedamp.rom.error_estimate import LadderError, choose, frequency_grid, rigid_errors
-from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, normal_direction
+from vanedamp.rom.interface import (
+    Interface,
+    InterfaceCoordinate,
+    InterfaceError,
+    normal_direction,
+    outward_normal,
+    plane_motion,
+)
 from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.calibration_tables import CalibrationTable
@@ -86,20 +93,38 @@ def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
 def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
     """Return the case's interface coordinates on its matrices, all of them or those named."""
     tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
-    coordinates = [
-        InterfaceCoordinate(label, table.facets, _direction(label, table, matrices), table.kind, table.motion)
-        for label, table in tables.items()
-    ]
+    coordinates = [item for label, table in tables.items() for item in _coordinates(label, table, matrices)]
     return Interface.on_patches(matrices, coordinates)
 
 
-def _direction(label: str, table: InterfaceTable, matrices: SystemMatrices) -> tuple[float, float, float]:
-    if table.direction != "normal":
-        return table.direction
+def _coordinates(label: str, table: InterfaceTable, matrices: SystemMatrices) -> list[InterfaceCoordinate]:
+    """Return the interface coordinates of a table: one, or those of a motion in a plane."""
+    direction = _direction(label, "direction", table.direction, table, matrices)
+    if not table.planar:
+        return [InterfaceCoordinate(label, table.facets, direction, table.kind, table.motion)]
+    normal = table.normal
+    if normal is None:
+        try:
+            normal = outward_normal(matrices, table.facets)
+        except InterfaceError:
+            raise InputError(
+                f"interface.{label}.normal: missing; give the direction across, out of the floor into the cavity, or "
+                "the floor's facet group"
+            ) from None
+    across = _direction(label, "normal", normal, table, matrices)
+    return plane_motion(matrices, label, table.facets, direction, across, table.kind)
+
+
+def _direction(
+    label: str, key: str, given: tuple[float, float, float] | str, table: InterfaceTable, matrices: SystemMatrices
+) -> tuple[float, float, float]:
+    """Return a direction of a table: numbers, "normal" for its facets' own, or the normal of a facet group."""
+    if not isinstance(given, str):
+        return given
     try:
-        return normal_direction(matrices, table.facets)
+        return normal_direction(matrices, table.facets) if given == "normal" else outward_normal(matrices, given)
     except InterfaceError as error:
-        raise InputError(f"interface.{label}.direction: {error}") from None
+        raise InputError(f"interface.{label}.{key}: {error}") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +135,7 @@ class ModalAnalysis:
     first_bending   index of the mode that carries most mass along `direction`, or is most like the case's shape; None
                     when a free structure, or a range of frequencies, has no such mode
     rigid           that mode as one mass on a spring, at its interface coordinate; None without either
+    cavities        how that mode moves the case's cavities, those interface coordinates that move across, too, by label
     functional      (N,) that coordinate; None without
     amplitude       m, displacement there at which the mode's stress reaches a share of the fatigue strength; None
                     without one
@@ -123,6 +149,7 @@ class ModalAnalysis:
     effective_mass: np.ndarray
     first_bending: int | None
     rigid: RigidModel | None
+    cavities: dict[str, CavityMotion]
     functional: np.ndarray | None
     amplitude: float | None
     hot_spot: HotSpot | None
@@ -139,6 +166,7 @@ class ModalAnalysis:
             "residual": self.modes.residuals.tolist(),
             "first_bending": self.first_bending,
             "rigid": None if self.rigid is None else asdict(self.rigid),
+            "cavity": {label: asdict(motion) for label, motion in self.cavities.items()},
             "warnings": list(self.warnings),
             "wall_time_s": self.wall_time_s,
         }
@@ -173,9 +201,8 @@ class ModalAnalysis:
             **mesh,
         }
         result = self.to_json()
-        attributes = {
-            name: result[name] for name in ("first_bending", "rigid", "fatigue") if result.get(name) is not None
-        }
+        kept = ("first_bending", "rigid", "cavity", "fatigue")
+        attributes = {name: result[name] for name in kept if result.get(name) not in (None, {})}
         attributes |= {"vtk_cell_type": cell_type, "versions": versions()}
         self.modes.save(path, variables, attributes)
 
@@ -185,6 +212,7 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
     label, functional, rigid, amplitude, spot = case.response_label, None, None, None, None
+    cavities: dict[str, CavityMotion] = {}
     if label is not None:
         functional = _functional(case, matrices, label)
     modes = _modes(case, matrices, functional)
@@ -196,14 +224,24 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     if label is not None and functional is not None and bending is not None:
         warnings += _rivals(modes, bending, functional, label)
         rigid = rigid_model(modes, bending, functional, label, case.damping_ratio)
+        cavities = _cavities(case, matrices, modes.shapes[bending], functional)
         strengths = case.strengths(structure.solid.domain.volumes)
         if strengths:
             spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
             amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
     return ModalAnalysis(
-        structure, modes, effective_masses(modes, matrices), bending, rigid, functional, amplitude, spot, table.share,
-        warnings, time.perf_counter() - started,
+        structure, modes, effective_masses(modes, matrices), bending, rigid, cavities, functional, amplitude, spot,
+        table.share, warnings, time.perf_counter() - started,
     )  # fmt: skip
+
+
+def _cavities(
+    case: Case, matrices: SystemMatrices, shape: np.ndarray, functional: np.ndarray
+) -> dict[str, CavityMotion]:
+    """Return how a mode's shape moves the case's cavities, without those that it does not move along."""
+    planar = [label for label, table in case.interface.items() if table.planar]
+    motions = {label: cavity_motion(shape, interface(case, matrices, [label]).vectors, functional) for label in planar}
+    return {label: motion for label, motion in motions.items() if motion is not None}
 
 
 def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) -> Modes:

@@ -210,19 +210,55 @@ class ModesTable:
             raise ValueError("min_frequency: expected a max_frequency above it, the two ends of a range")
 
 
+def _groups(facets: Any) -> Any:
+    """Return a list of groups as a tuple, a single group as it is."""
+    if isinstance(facets, str):
+        return facets
+    if not isinstance(facets, list | tuple) or not facets or not all(isinstance(group, str) for group in facets):
+        raise ValueError("expected a group, such as 'c1_floor', or a list of groups")
+    return tuple(facets)
+
+
 @dataclass(frozen=True, config=STRICT)
 class InterfaceTable:
     """One interface coordinate: the displacement of a group along a direction, or its rotation about it.
 
-    `facets` names a facet group, or else a group of edges or points (a node set), whose average is that of its nodes.
-    The direction of a cavity's walls and floor is that from its left wall to its right one; "normal" takes the facets'
-    own (rom.interface.normal_direction).
+    `facets` names a facet group, or else a group of edges or points (a node set), whose average is that of its nodes;
+    a list is taken as one group. The direction of a cavity's walls and floor is that from its left wall to its right
+    one; "normal" takes the facets' own (rom.interface.normal_direction), the name of a facet group its outward normal.
+
+    kind "patch" and "cavity" give three coordinates, of the motion in a plane, and "node" with a `normal` the first two
+    of them (rom.interface.plane_motion). `normal` is the direction across, out of the floor into the cavity, or a facet
+    group with that outward normal; by default the facets' own.
     """
 
-    facets: str
-    direction: Annotated[Direction | Literal["normal"], Field(union_mode="left_to_right")]
-    kind: Literal["average", "rigid", "node", "full"] = "average"
+    facets: Annotated[str | tuple[str, ...], BeforeValidator(_groups)]
+    direction: Annotated[Direction | str, Field(union_mode="left_to_right")]
+    kind: Literal["average", "rigid", "node", "full", "patch", "cavity"] = "average"
     motion: Literal["translation", "rotation"] = "translation"
+    normal: Annotated[Direction | str, Field(union_mode="left_to_right")] | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind in ("patch", "cavity") and self.motion == "rotation":
+            raise ValueError(f'motion: kind = "{self.kind}" has the rotation in the plane besides; leave it out')
+        if self.normal is not None and self.kind not in ("patch", "cavity", "node"):
+            raise ValueError(f'normal: kind = "{self.kind}" moves along its direction only; take kind = "patch"')
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The groups of `facets`."""
+        return (self.facets,) if isinstance(self.facets, str) else self.facets
+
+    @property
+    def planar(self) -> bool:
+        """Whether it moves across its direction, too."""
+        return self.kind in ("patch", "cavity") or self.normal is not None
+
+    @property
+    def guides(self) -> dict[str, str]:
+        """The facet groups that give directions, by key."""
+        given = {"direction": self.direction, "normal": self.normal}
+        return {key: group for key, group in given.items() if isinstance(group, str) and group != "normal"}
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -312,7 +348,8 @@ class Case:
     @property
     def facet_groups(self) -> set[str]:
         """Every group that supports and interfaces name."""
-        return {*self.support.clamped, *self.support.elastic, *(table.facets for table in self.interface.values())}
+        named = [group for table in self.interface.values() for group in (*table.groups, *table.guides.values())]
+        return {*self.support.clamped, *self.support.elastic, *named}
 
     def check_groups(
         self, facets: Iterable[str], volumes: Iterable[str], lower: Mapping[str, Iterable[str]] | None = None
@@ -325,7 +362,17 @@ class Case:
         for group in self.support.elastic:
             _check_group(f"support.elastic.{group}", group, surfaces)
         for label, table in self.interface.items():
-            _check_group(f"interface.{label}.facets", table.facets, known)
+            for group in table.groups:
+                _check_group(f"interface.{label}.facets", group, known)
+            # a facet group weighs its nodes by area, others each by one
+            kinds = {kind for kind, names in known.items() if set(table.groups) & set(names)}
+            if len(kinds) > 1:
+                raise InputError(
+                    f"interface.{label}.facets: groups of several kinds ({', '.join(sorted(kinds))}), whose nodes have "
+                    "no common weights; take groups of one kind"
+                )
+            for key, group in table.guides.items():
+                _check_group(f"interface.{label}.{key}", group, surfaces)
         for group in self.material:
             if group != "default":
                 _check_group(f"material.{group}", group, {"volume": [*volumes, "default"]})

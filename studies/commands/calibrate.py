@@ -42,6 +42,8 @@ def run(arguments: Namespace) -> None:
 
 def _print_summary(result: Mapping[str, Any]) -> None:
     """Print what was tuned, the rigid model and the excitation."""
+    from vanedamp.studies.commands.support.messages import print_cavities
+
     tuning = result["tuning"]
     if tuning:
         print("target/Hz      before         after          MAC")
@@ -60,6 +62,7 @@ def _print_summary(result: Mapping[str, Any]) -> None:
         f"rigid model at {rigid['at']}: {rigid['frequency_hz']:.2f} Hz, mass {rigid['mass']:.5g} kg, "
         f"stiffness {rigid['stiffness']:.5g} N/m, damping {rigid['damping']:.4g} N s/m"
     )
+    print_cavities(result)
     if excitation:
         spot = excitation["hot_spot"]
         place = ", ".join(f"{value:.4g}" for value in spot["coordinates"])

@@ -51,6 +51,8 @@ def run(arguments: Namespace) -> None:
 
 def _print_summary(result: Mapping[str, Any]) -> None:
     """Print modes, effective masses and the rigid model."""
+    from vanedamp.studies.commands.support.messages import print_cavities
+
     print("mode  frequency/Hz   effective mass x, y, z / kg        residual")
     rows = zip(result["frequency_hz"], result["effective_mass"], result["residual"], strict=True)
     for index, (frequency, masses, residual) in enumerate(rows):
@@ -64,6 +66,7 @@ def _print_summary(result: Mapping[str, Any]) -> None:
             f"rigid model at {rigid['at']}: mass {rigid['mass']:.5g} kg, stiffness {rigid['stiffness']:.5g} N/m, "
             f"damping {rigid['damping']:.4g} N s/m"
         )
+        print_cavities(result)
     if "fatigue" in result:
         fatigue = result["fatigue"]
         print(f"amplitude at {fatigue['share']:.0%} of the fatigue strength: {fatigue['amplitude']:.4g} m")

@@ -11,11 +11,14 @@ from vanedamp.studies.commands.support.arguments import add_input, add_json, add
 from vanedamp.studies.terminal import progress
 
 if TYPE_CHECKING:
+    from vanedamp.coupling.sweep.grid import Grid
     from vanedamp.coupling.sweep.record import Sweep
     from vanedamp.studies.report.forced_response import ForcedResponse
 
 ORDER = 80
 SUMMARY = "a run at every point of the scene's [sweep] grid"
+#: samples a period of the run at the peak
+_SAMPLES = 200
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -24,6 +27,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_output(parser, "SWEEP.h5")
     add_json(parser)
     add_workers(parser)
+    parser.add_argument(
+        "--peak", metavar="RESPONSE.h5",
+        help="run the point with the highest mean once more and keep its events and samples, for the report",
+    )  # fmt: skip
     parser.add_argument(
         "--resume", action="store_true",
         help="resume from the checkpoint, or fail; without it, resume if there is a checkpoint, otherwise start",
@@ -39,7 +46,7 @@ def run(arguments: Namespace) -> None:
     from vanedamp.studies.workers import workers
 
     checkpoint = checkpoint_file(arguments.output)
-    outputs = check_outputs(arguments, beside=checkpoint)
+    outputs = check_outputs(arguments, beside=checkpoint, peak=(".h5",))
     if arguments.resume and (checkpoint is None or not checkpoint.exists()):
         raise InputError(
             "--resume: name the result with -o, its checkpoint lies beside it"
@@ -53,12 +60,20 @@ def run(arguments: Namespace) -> None:
     from vanedamp.coupling.sweep.grid import grid
     from vanedamp.coupling.sweep.sweep import sweep
     from vanedamp.files.provenance import versions
-    from vanedamp.studies.commands.support.budget import check_sweep
+    from vanedamp.studies.commands.support.budget import check_run, check_sweep
     from vanedamp.studies.report.forced_response import forced_responses
 
     check_sweep(scene, arguments.workers)
+    if arguments.peak is not None:
+        check_run(scene, _SAMPLES)
+        scene.solver.check_samples(_SAMPLES)
     # processes are slow to start: a bad grid or the checkpoint of another sweep is reported first
     points, provenance = grid(scene), {"versions": versions()}
+    if arguments.peak is not None and points.along is not None:
+        raise InputError(
+            "--peak: a point of this sweep begins with the state of its neighbour (continuation.direction) and cannot "
+            'run once more by itself; take "independent", or leave --peak out'
+        )
     resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
     print_model_order(arguments.input, points.estimate, points.warnings)
     resonance = print_resonance(arguments.input, points.base)
@@ -68,6 +83,8 @@ def run(arguments: Namespace) -> None:
     if arguments.output:
         result.save(arguments.output)
     seconds = time.perf_counter() - started
+    if arguments.peak is not None:
+        _run_peak(points, result, arguments.peak, arguments.input)
     # times are not kept in the result, which is the same however it came about
     speed = {
         "points_resumed": resumed, "wall_time_s": seconds, "points_per_second": (points.size - resumed) / seconds
@@ -81,6 +98,29 @@ def run(arguments: Namespace) -> None:
     if arguments.json != "-":
         _print_summary(result, responses)
         print(f"{points.size} points, {resumed} of them from the checkpoint, in {seconds:.1f} s")
+
+
+def _run_peak(points: Grid, result: Sweep, path: str, source: str) -> None:
+    """Run the point with the highest mean of those that are ok, and write its response."""
+    import numpy as np
+
+    from vanedamp.coupling.engine import simulate
+    from vanedamp.coupling.sweep.grid import Points
+    from vanedamp.studies.commands.support.messages import print_note
+    from vanedamp.studies.headline import format_value
+
+    mean = np.where(result.status == "ok", result.amplitude_mean, -np.inf)
+    index = int(np.argmax(mean))
+    if not np.isfinite(mean.flat[index]):
+        print_note(source, f"--peak: no point is ok, {path} was not written")
+        return
+    values = points.values(index)
+    scene = Points(points.base, points.choices).scene(values)
+    with progress("peak") as report:
+        response = simulate(scene, events=True, samples_per_period=_SAMPLES, progress=report)
+    response.save(path, {"versions": result.provenance.get("versions", {}), "scene": scene.to_dict()})
+    at = ", ".join(f"{axis} = {format_value(value)}" for axis, value in values.items())
+    print_note(source, f"--peak: {path} is the run at {at}")
 
 
 def _print_summary(result: Sweep, responses: Sequence[ForcedResponse]) -> None:

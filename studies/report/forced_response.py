@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +25,8 @@ class ForcedResponse:
     undamped, fixed    linear amplitudes at the points, of all that have any
     damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks
     energy_share       (n, 4) of viscous, friction, impact and contact loss
+    in_plane           by the names of coupling.sweep.worker.IN_PLANE, (n, bodies), nan for sliders; empty without
+                       bodies in the plane
     headline           figures and sentence of the curve
     source             the file it comes from
     """
@@ -40,6 +43,7 @@ class ForcedResponse:
     attached_mass_fraction: np.ndarray
     impacts_per_period: np.ndarray
     energy_share: np.ndarray
+    in_plane: Mapping[str, np.ndarray]
     headline: Headline
     source: str = ""
 
@@ -106,6 +110,9 @@ def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> For
         undamped=undamped,
         fixed=fixed,
         energy_share=frozen(np.where(ok[:, None], sweep.energy_share[point], np.nan)),
+        in_plane={
+            key: frozen(np.where(ok[:, None], values[point], np.nan)) for key, values in sweep.in_plane.items()
+        },
         headline=headline(
             x, cut["damped_mean"], cut["damped_max"], cut["attached_mass_fraction"], undamped, fixed, tops,
             axis == FREQUENCY,

@@ -14,6 +14,7 @@ from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
 from vanedamp.studies.report.forced_response import ForcedResponse
 
 _LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626", "contact": "#2563eb"}
+_DASHES = ("solid", "dash", "dot", "dashdot")  # of bodies
 _PANELS = 3  # energy panels side by side
 
 
@@ -83,6 +84,37 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
     figure.update_yaxes(title_text="share of the energy lost, %", col=1)
     _finish(figure, responses, height=400 * rows)
     return figure.update_xaxes(title_font_size=11) if columns == _PANELS else figure
+
+
+def plane_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
+    """Draw largest tilt, share of the time off the floor and what small tilts neglect, of each body in the plane."""
+    figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    for response, colour in zip(responses, _cycle(responses), strict=True):
+        for body, name in bodies_in_plane(response):
+            dash = _DASHES[body % len(_DASHES)]
+            panels = (
+                (1e3 * response.in_plane["tilt_max"], "%{y:.4g} mrad"), (response.in_plane["lift_share"], "%{y:.3f}"),
+                (100 * response.in_plane["linearisation"], "%{y:.2g} %"),
+            )  # fmt: skip
+            for row, (values, shown) in enumerate(panels, start=1):
+                figure.add_scatter(
+                    x=response.x, y=values[:, body], name=name, mode="lines+markers", marker={"size": 4},
+                    line={"color": colour, "width": 1.6, "dash": dash}, legendgroup=name, showlegend=row == 1,
+                    hovertemplate=f"{name}: {shown}<extra></extra>", row=row, col=1,
+                )  # fmt: skip
+    figure.update_yaxes(rangemode="tozero")
+    for row, title in enumerate(("largest tilt, mrad", "time off the floor", "neglected, %"), start=1):
+        figure.update_yaxes(title_text=title, row=row, col=1)
+    return _finish(figure, responses, height=720)
+
+
+def bodies_in_plane(response: ForcedResponse) -> list[tuple[int, str]]:
+    """Return numbers, from 0, and names of the bodies with extent of a response."""
+    if not response.in_plane:
+        return []
+    extended = np.flatnonzero(np.isfinite(response.in_plane["tilt_max"]).any(axis=0)).tolist()
+    several = response.in_plane["tilt_max"].shape[1] > 1
+    return [(body, f"{response.name}, body {body + 1}" if several else response.name) for body in extended]
 
 
 def _cycle(responses: Sequence[ForcedResponse]) -> list[str]:

@@ -14,9 +14,10 @@ import plotly.graph_objects as go
 import plotly.offline
 
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import digest, replacing
+from vanedamp.files.store import csv_text, digest, replacing
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.report.charts import Chart, chart
+from vanedamp.studies.report.motion import Motion
 from vanedamp.studies.report.results import Results, Section, sections
 
 _FOLDER = Path(__file__).parent
@@ -49,6 +50,13 @@ class Page:
         self.charts[kind] += 1
         return chart(name, figure, header, rows, files)
 
+    def motion(self, motion: Motion, files: Iterable[str]) -> Chart:
+        """Return the player of a motion for the template's macro `plot`."""
+        name = f"motion-{self.charts['motion']}"
+        self.charts["motion"] += 1
+        html = self.environment.get_template("motion.html").render(name=name, data=motion.to_json())
+        return Chart(name, html, csv_text(motion.header(), motion.rows()), tuple(files))
+
     def parts(self, file: str, study: str) -> str:
         """Return the sections of the results that stand within the section of a file, as HTML."""
         return replace(self, study=study).blocks(self.results.parts(file))
@@ -74,6 +82,7 @@ def write_report(results: Results, path: str | Path) -> None:
     scenes = {names[file]: _flat(result.scene) for file, result in by_file.items() if result.scene is not None}
     html = page.environment.get_template("report.html").render(
         plotly=plotly.offline.get_plotlyjs() if page.charts else None,
+        player=(_FOLDER / "motion.js").read_text(encoding="utf-8") if page.charts["motion"] else None,
         blocks=blocks,
         provenance=_provenance(results),
         scenes=scenes,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,15 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from vanedamp.coupling.response.response import PlanarSamples
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import frozen, load
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.motion import Motion, motion_of
+from vanedamp.studies.report.plane_history import ImpactsAtPlace, hits_in_plane, impacts_by_place, samples_in_plane
 
-_MOST_PERIODS = 200  # in a page: the last of a run
+_MOST_PERIODS, _MOST_SAMPLES = 200, 10_000  # in a page: the last of a run
 _SHOWN_PERIODS = 25
 
 
@@ -28,6 +31,9 @@ class History:
     time          (n,) s, as sampled; displacement (n,) m at excitation.at
     bodies        (n, dampers) m, relative to their cavities
     impacts       (m,) s; struck: (m,) number of the body of each, -1: the structure's on a stop
+    plane         samples of bodies in the plane; None for sliders and for files without them
+    hits          time (s) and place, as of an event, of the impacts of bodies in the plane
+    by_place      those of the evaluated periods by contact
     measures      plain figures and energies of the run, as `vanedamp run --json` has them
     scene         what was run; None if the file does not say
     """
@@ -37,6 +43,9 @@ class History:
     bodies: np.ndarray
     impacts: np.ndarray
     struck: np.ndarray
+    plane: PlanarSamples | None
+    hits: list[tuple[float, tuple[int, str, int]]]
+    by_place: list[ImpactsAtPlace]
     measures: Mapping[str, Any]
     provenance: Mapping[str, Any]
     scene: Scene | None
@@ -49,12 +58,16 @@ class History:
         kinds = values.get("event_kind", np.array([], dtype=object)) == "impact"
         struck = np.where(values.get("event_side", "") == "stop", -1, values.get("event_damper", -1))
         energy = json.loads(attributes.pop("energy", "{}"))
+        begin = attributes.get("transient", 0) / attributes["frequency"]
         return cls(
             time=frozen(values.get("time", [])),
             displacement=frozen(values.get("displacement", [])),
             bodies=frozen(values.get("body_displacement", np.zeros((0, 0)))),
             impacts=frozen(np.asarray(values.get("event_time", []))[kinds]),
             struck=frozen(np.atleast_1d(struck)[kinds] if len(kinds) else [], int),
+            plane=samples_in_plane(values),
+            hits=hits_in_plane(values),
+            by_place=impacts_by_place(values, begin),
             measures=attributes | {"energy": energy},
             provenance=provenance,
             scene=validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None,
@@ -67,21 +80,35 @@ class History:
 
     def late(self) -> History:
         """Return the last periods only, as many as a page carries."""
-        begin = self.time[-1] - _MOST_PERIODS * self.period
+        begin = max(self.time[-1] - _MOST_PERIODS * self.period, self.time[-_MOST_SAMPLES:][0])
         kept, hit = self.time >= begin, self.impacts >= begin
-        return History(
-            self.time[kept], self.displacement[kept], self.bodies[kept], self.impacts[hit], self.struck[hit],
-            self.measures, self.provenance, self.scene,
+        plane = None if self.plane is None else self.plane.cut(kept)
+        return replace(
+            self, time=self.time[kept], displacement=self.displacement[kept], bodies=self.bodies[kept],
+            impacts=self.impacts[hit], struck=self.struck[hit], plane=plane,
         )  # fmt: skip
 
+    def header(self) -> list[str]:
+        """Return the names of the columns of `rows`."""
+        kinds = ["body"] if self.plane is None else ["body", "lift", "tilt"]
+        return ["time", "displacement", *(f"{kind}_{k + 1}" for kind in kinds for k in range(self.bodies.shape[1]))]
+
     def rows(self) -> Iterator[list[float]]:
-        """Yield time, displacement and those of the bodies."""
-        yield from np.column_stack([self.time, self.displacement, self.bodies]).tolist()
+        """Yield time and displacement, and those of the bodies: along, in the plane lift and tilt as well."""
+        plane = [] if self.plane is None else [self.plane.body_lift, self.plane.body_tilt]
+        yield from np.column_stack([self.time, self.displacement, self.bodies, *plane]).tolist()
+
+    def motion(self) -> Motion | None:
+        """Return what the player of the page shows; None without samples in the plane."""
+        if self.plane is None or self.scene is None:
+            return None
+        return motion_of(self.scene, self.time, self.displacement, self.bodies, self.plane, self.hits)
 
 
 def history_figure(history: History) -> go.Figure:
     """Draw the displacement with a mark at every impact, above the bodies' places between the walls."""
-    rows = 2 if history.bodies.shape[1] else 1
+    panels = _planar_panels(history)
+    rows = 2 + len(panels) if history.bodies.shape[1] else 1
     figure = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     milliseconds = 1e3 * history.time
     figure.add_scatter(
@@ -108,16 +135,37 @@ def history_figure(history: History) -> go.Figure:
             x=milliseconds, y=1e6 * history.bodies[:, body], name=f"body {body + 1} in its cavity",
             line={"color": colour, "width": 1.2}, hovertemplate="%{y:.4g} µm", row=2, col=1,
         )  # fmt: skip
-    for wall in _walls(history.scene) if rows == 2 else ():
+        for row, (_, values, unit) in enumerate(panels, start=3):
+            if np.isfinite(values[:, body]).any():
+                figure.add_scatter(
+                    x=milliseconds, y=values[:, body], line={"color": colour, "width": 1.2}, showlegend=False,
+                    hovertemplate=f"body {body + 1}: %{{y:.4g}} {unit}<extra></extra>", row=row, col=1,
+                )  # fmt: skip
+    for wall in _walls(history.scene) if rows > 1 else ():
         figure.add_hline(y=1e6 * wall, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=2, col=1)
     figure.update_yaxes(title_text="displacement, µm", row=1, col=1)
-    if rows == 2:
+    if rows > 1:
         figure.update_yaxes(title_text="relative to the cavity, µm", row=2, col=1)
+    for row, (title, _, _) in enumerate(panels, start=3):
+        figure.update_yaxes(title_text=title, row=row, col=1)
     end = milliseconds[-1]
-    figure.update_xaxes(range=[end - 1e3 * _SHOWN_PERIODS * history.period, end], hoverformat=".6g")
+    begin = max(end - 1e3 * _SHOWN_PERIODS * history.period, milliseconds[0])
+    figure.update_xaxes(range=[begin, end], hoverformat=".6g")
     figure.update_xaxes(title_text="time, ms", row=rows, col=1)
     figure.update_layout(hovermode="x unified")
     return dressed(figure, height=280 * rows)
+
+
+def _planar_panels(history: History) -> list[tuple[str, np.ndarray, str]]:
+    """Return title, values (n, bodies) and unit of further panels for bodies in the plane."""
+    if history.plane is None:
+        return []
+    lift, tilt = 1e6 * history.plane.body_lift, 1e3 * history.plane.body_tilt.copy()
+    if history.scene is not None:
+        discs = np.array([damper.radius is not None for damper in history.scene.damper])
+        if np.isfinite(tilt[:, ~discs]).any():  # beside the turns of discs, tilts would not show
+            tilt[:, discs] = np.nan
+    return [("above the floor, µm", lift, "µm"), ("tilt, mrad", tilt, "mrad")]
 
 
 def _stops(scene: Scene | None) -> list[float]:

@@ -7,6 +7,7 @@ import numpy as np
 from vanedamp.coupling.methods import moreau
 from vanedamp.coupling.planar.constraints import planar_motion, planar_system
 from vanedamp.coupling.planar.planar_run import PlanarRun
+from vanedamp.coupling.response.evaluation import LOG_WIDTH
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
@@ -19,8 +20,8 @@ class Run(PlanarRun):
     status = None
 
     def events(self, kind):
-        """Entries of the log of one kind (k, 7)."""
-        log = np.concatenate(self.chunks) if self.chunks else np.zeros((0, 7))
+        """Entries of the log of one kind (k, LOG_WIDTH)."""
+        log = np.concatenate(self.chunks) if self.chunks else np.zeros((0, LOG_WIDTH))
         return log[log[:, 1] == kind]
 
 

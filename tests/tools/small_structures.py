@@ -1,5 +1,7 @@
 """Small structures with known answers, as system matrices."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import sparse
 
@@ -79,3 +81,14 @@ def _along_x(nodes, element, count):
     columns = np.tile(3 * nodes, 3).ravel()
     values = np.tile(element.ravel(), len(nodes))
     return sparse.csr_array((values, (rows, columns)), shape=(3 * count, 3 * count))
+
+
+def turned(matrices, rotation):
+    """The structure turned in space by a rotation (3, 3); its supports hold whole nodes."""
+    turn = sparse.kron(sparse.identity(len(matrices.coordinates)), rotation)
+    patches = {
+        name: Patch(patch.nodes, patch.weights, rotation @ patch.normal) for name, patch in matrices.patches.items()
+    }
+    stiffness, mass = ((turn @ matrix @ turn.T).tocsr() for matrix in (matrices.stiffness, matrices.mass))
+    coordinates = matrices.coordinates @ rotation.T
+    return replace(matrices, stiffness=stiffness, mass=mass, coordinates=coordinates, patches=patches)

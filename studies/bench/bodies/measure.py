@@ -68,8 +68,12 @@ def body_scene(ratio: float, shape: str, periods: int, transient: int, **body: A
 
 
 def run_bodies(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure, write bench_bodies.json, .csv and .png into a folder, and return the content of the JSON."""
+    """Measure, write bench_bodies.json, .csv and .png into a folder, and return the content of the JSON.
+
+    bench_bodies_motion.png has frames of the block at its peak.
+    """
     from vanedamp.studies.bench.bodies.figures import bodies_figure
+    from vanedamp.studies.bench.bodies.motion_figure import block_motion, motion_figure
 
     started, rows = time.perf_counter(), []
     for shape in SHAPES:
@@ -86,6 +90,9 @@ def run_bodies(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     write_json(folder / "bench_bodies.json", result)
     write_csv(folder / "bench_bodies.csv", _COLUMNS, [[row[name] for name in _COLUMNS] for row in rows])
     bodies_figure(rows, folder / "bench_bodies.png")
+    peak = max((row for row in rows if row["shape"] == "block"), key=lambda row: row["amplitude"])
+    motion = block_motion(body_scene(peak["ratio"], "block", effort.periods, effort.transient))
+    motion_figure(motion, folder / "bench_bodies_motion.png")
     return result
 
 

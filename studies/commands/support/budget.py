@@ -15,6 +15,8 @@ from vanedamp.studies.workers import available_cores
 _RUN = 2.5e-3
 #: bytes of a period's record, of a sample of one channel, and of a finished point
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
+#: further channels of a body in the plane: its coordinates, its floor's motion, its contacts
+_IN_PLANE = 20
 #: at most: points of a sweep, bytes of a run, s of a command
 MOST_POINTS, MOST_BYTES, MOST_SECONDS = 1_000_000, 8e9, 30 * 86400.0
 
@@ -22,6 +24,7 @@ MOST_POINTS, MOST_BYTES, MOST_SECONDS = 1_000_000, 8e9, 30 * 86400.0
 def check_run(scene: Scene, samples: int = 0) -> None:
     """Refuse a run whose records fill the memory, or that takes a month. Raises InputError."""
     periods, channels = scene.time.simulated, 2 * (1 + len(scene.damper) + len(scene.friction_damper))
+    channels += _IN_PLANE * len(scene.damper) if scene.planar else 0
     sampled = _SAMPLE * samples * channels * periods
     for key, name, needed in (("time.periods", "periods", _RECORD * periods), ("--samples", "samples", sampled)):
         if needed > MOST_BYTES:

@@ -28,3 +28,12 @@ def print_warnings(source: str, warnings: Iterable[str]) -> None:
     """Print warnings about an input file."""
     for warning in warnings:
         print_note(source, f"warning: {warning}")
+
+
+def print_cavities(result: Mapping[str, Any]) -> None:
+    """Print how the rigid model's mode moves the cavities, with the keys of [[cavity]]."""
+    for label, motion in result["cavity"].items():
+        print(
+            f"cavity {label}: moves by {motion['along']:.4g} of {result['rigid']['at']}, normal_motion = "
+            f"{motion['normal_motion']:.5g}, rotation = {motion['rotation']:.5g} rad/m"
+        )

@@ -58,5 +58,6 @@ def _analysis(file: str, record: tuple[dict[str, Any], dict[str, Any]], page: Pa
         "sum": values["effective_mass"].sum(axis=0),
         "movable_mass": values["movable_mass"],
         "rigid": json.loads(attributes["rigid"]) if "rigid" in attributes else None,
+        "cavities": json.loads(attributes.get("cavity", "{}")),
         "fatigue": json.loads(attributes["fatigue"]) if "fatigue" in attributes else None,
     }

@@ -28,7 +28,12 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 def _reduction(file: str, model: ReducedModel) -> dict[str, Any]:
     return {
         "file": file,
-        "interface": [(label, model.contact_mass(label)) for label in model.interface],
+        "interface": model.interface,
+        "masses": [
+            (label, model.contact_mass(label))
+            for label, length in zip(model.interface, model.lengths, strict=True)
+            if length == 1.0
+        ],
         "modes": model.modes,
         "frequencies": model.natural_frequencies_hz,
         "damping_ratio": model.damping_ratio,

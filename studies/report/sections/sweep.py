@@ -13,7 +13,13 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import LOSSES
 from vanedamp.studies.report.charts import Chart
 from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, model_name
-from vanedamp.studies.report.forced_response_charts import energy_figure, mistuning_figure, responses_figure
+from vanedamp.studies.report.forced_response_charts import (
+    bodies_in_plane,
+    energy_figure,
+    mistuning_figure,
+    plane_figure,
+    responses_figure,
+)
 from vanedamp.studies.report.map_chart import map_axes, map_figure, map_rows
 from vanedamp.studies.report.page import Page, format_setting
 from vanedamp.studies.report.results import Result
@@ -86,11 +92,27 @@ def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
 
 def _group(responses: Sequence[ForcedResponse], page: Page) -> dict[str, Any]:
     axis, sources = responses[0].axis, [response.source for response in responses]
-    charts = {
+    charts: dict[str, Chart | None] = {
         kind: page.chart(kind, figure(responses), ("response", axis, *columns), _table(responses, columns), sources)
         for kind, (figure, columns) in _CHARTS.items()
     }
+    charts["plane"] = _plane_chart(responses, page)
     return charts | {"axis": axis, "units": responses[0].units, "rows": [_key_figures(r) for r in responses]}
+
+
+def _plane_chart(responses: Sequence[ForcedResponse], page: Page) -> Chart | None:
+    """Return tilt and lift of the bodies in the plane; None without any."""
+    planar = [response for response in responses if bodies_in_plane(response)]
+    if not planar:
+        return None
+    rows = (
+        [response.name, x, body + 1, *(float(values[at, body]) for values in response.in_plane.values())]
+        for response in planar
+        for body, _ in bodies_in_plane(response)
+        for at, x in enumerate(response.x.tolist())
+    )
+    header = ("response", planar[0].axis, "body", *planar[0].in_plane)
+    return page.chart("plane", plane_figure(planar), header, rows, [response.source for response in planar])
 
 
 def _table(responses: Sequence[ForcedResponse], columns: Sequence[str]) -> Iterator[list[Any]]:

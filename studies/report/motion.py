@@ -1,0 +1,376 @@
+"""Motion of bodies in their cavities as it is drawn: outlines, walls and contacts, frame by frame.
+
+Plays are micrometres where bodies are millimetres: displacements, tilts and free travels are drawn `factor` times as
+large. A corner moves by (x - theta b, y + theta a), as in the equations of motion, so that it is drawn on a surface if
+and only if its gap is zero.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.response.response import PlanarSamples
+from vanedamp.coupling.scene.bodies import Cavity
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.studies.report.charts import COLOURS
+
+#: periods that are drawn, the last of a run; frames of each at most
+_PERIODS, _MOST_FRAMES = 3, 200
+#: share of a period for which a contact shows that it was hit
+_FLASH = 0.03
+#: free travels as drawn, over the bodies' length and height, and the cavity's own motion over their length
+_ALONG, _ACROSS, _SWING = 0.35, 0.6, 0.25
+#: width of the widest cavity's bodies in units of a drawing, and thickness of walls
+_WIDTH, _WALL = 100.0, 9.0
+#: of a contact in a frame
+OPEN, CLOSED, HIT = range(3)
+#: corners from the centre, against the clock from the lower left one, in half lengths and half heights
+_CORNERS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+#: sides of a disc, and of a slider
+_SIDES = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "floor": (0.0, -1.0), "ceiling": (0.0, 1.0)}
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """A body as drawn in n frames, in units of the drawing, y upwards.
+
+    outline: (n, 4, 2) corners of a block or slider; (n, 2, 2) centre of a disc and a point of its rim
+    along, lift (m), tilt (rad): (n,) in the cavity, as sampled; nan of a slider
+    """
+
+    number: int
+    shape: str
+    half: tuple[float, float]
+    outline: np.ndarray
+    along: np.ndarray
+    lift: np.ndarray
+    tilt: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMotion:
+    """A contact as drawn: body, side and corner as of an event, points (n, 2), light (n,) OPEN, CLOSED or HIT."""
+
+    place: tuple[int, str, int]
+    points: np.ndarray
+    light: np.ndarray
+
+
+class CeilingPart(NamedTuple):
+    """The ceiling above a body: its ends along the cavity, and heights (n, 2) there."""
+
+    ends: tuple[float, float]
+    heights: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class CavityMotion:
+    """A cavity as drawn, in the frame of its floor, whose middle is at (0, 0).
+
+    left, right: (n, 2) faces of the walls at the height of the floor and at `height`; ceiling: parts above each body,
+    empty without play; shift: (n, 3) displacement of the floor's middle, and rotation (rad)
+    """
+
+    name: str
+    left: np.ndarray
+    right: np.ndarray
+    ceiling: list[CeilingPart]
+    shift: np.ndarray
+    height: float
+    bodies: list[BodyMotion]
+    contacts: list[ContactMotion]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Frames of the last periods of a run.
+
+    time: (n,) periods; each: frames a period; displacement: (n,) m, of the response; factor: by which free travels are
+    exaggerated beside the bodies; swing: the same for the motion of the cavities; scale: units of the drawing a metre
+    """
+
+    time: np.ndarray
+    each: int
+    displacement: np.ndarray
+    factor: float
+    swing: float
+    scale: float
+    cavities: list[CavityMotion]
+    sampled: int
+
+    @property
+    def periods(self) -> float:
+        """Number of periods that are drawn."""
+        return len(self.time) / self.each
+
+    @property
+    def has_sliders(self) -> bool:
+        """Whether there are bodies whose drawn size means nothing."""
+        return any(body.shape == "slider" for cavity in self.cavities for body in cavity.bodies)
+
+    @property
+    def first(self) -> int:
+        """The frame to begin with: the first with a hit, or else with a closed contact."""
+        light = np.max([contact.light for cavity in self.cavities for contact in cavity.contacts], axis=0)
+        return int(np.argmax(light == light.max()))
+
+    def to_json(self) -> str:
+        """Return what the player of the page (motion.js) needs, y downwards."""
+        data = {
+            "time": _short(self.time, 4), "each": self.each, "first": self.first,
+            "displacement": _short(1e6 * self.displacement, 3), "cavities": [_drawn(each) for each in self.cavities],
+        }  # fmt: skip
+        return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+    def rows(self) -> Iterator[list[float]]:
+        """Yield time (periods) and displacement, then along, lift and tilt of each body."""
+        bodies = [body for cavity in self.cavities for body in cavity.bodies]
+        columns = [part for body in bodies for part in (body.along, body.lift, body.tilt)]
+        yield from np.column_stack([self.time, self.displacement, *columns]).tolist()
+
+    def header(self) -> list[str]:
+        """Return the names of the columns of `rows`."""
+        numbers = [body.number + 1 for cavity in self.cavities for body in cavity.bodies]
+        parts = [f"body_{number}_{part}" for number in numbers for part in ("along", "lift", "tilt")]
+        return ["period", "displacement", *parts]
+
+
+def motion_of(
+    scene: Scene,
+    time: np.ndarray,
+    displacement: np.ndarray,
+    along: np.ndarray,
+    plane: PlanarSamples,
+    impacts: list[tuple[float, tuple[int, str, int]]],
+) -> Motion:
+    """Return the last periods of a run.
+
+    time: (t,) s; displacement: (t,) m; along: (t, b) m in the cavity; impacts: time (s) and place as of an event.
+    """
+    period = 1.0 / scene.excitation.frequency
+    sampled = round(period / (time[1] - time[0])) if len(time) > 1 else 1
+    stride = -(-sampled // _MOST_FRAMES)
+    frames = slice(max(len(time) // sampled - _PERIODS, 0) * sampled, None, stride)
+    plane = plane.cut(frames)
+    time, kinds, half = time[frames], _kinds(scene, plane), _half_extents(scene)
+    factor = _factor(scene, half)
+    widths = [sum(2 * half[k][0] for k in _inside(scene, cavity)) for cavity in scene.cavity]
+    swing = min(factor, _rounded(_SWING * max(widths) / max(np.abs(plane.floor_along).max(), 1e-300)))
+    draw = _Drawing(scene, plane, along[frames], kinds, half, factor, swing, _WIDTH / max(widths))
+    light = np.where(plane.contact_closed, CLOSED, OPEN)
+    for moment, place in impacts:
+        recent = (time >= moment) & (time < moment + _FLASH * period)
+        struck = np.array([other == place for other in plane.contacts])
+        light[recent[:, None] & struck] = HIT
+    cavities = [draw.cavity(cavity, light) for cavity in scene.cavity if _inside(scene, cavity)]
+    return Motion(
+        time / period, sampled // stride, displacement[frames], factor, swing, draw.scale, cavities, sampled,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawing:
+    """What all cavities of a drawing share."""
+
+    scene: Scene
+    plane: PlanarSamples
+    along: np.ndarray
+    kinds: list[str]
+    half: list[tuple[float, float]]
+    factor: float
+    swing: float
+    scale: float
+
+    def cavity(self, cavity: Cavity, light: np.ndarray) -> CavityMotion:
+        """Draw a cavity and its bodies, which stand from left to right. light: (n, contacts)."""
+        inside = _inside(self.scene, cavity)
+        length = sum(2 * self.half[k][0] for k in inside)
+        bodies, places, ceiling, at = [], [], [], -length / 2
+        for k in inside:
+            places.append(at + self.half[k][0])
+            bodies.append(self._body(k, places[-1]))
+            at += 2 * self.half[k][0]
+        highest = max(2 * self.half[k][1] for k in inside)
+        if cavity.play is not None:
+            for k, place in zip(inside, places, strict=True):
+                a, b = self.half[k]
+                heights = 2 * b + self.factor * (cavity.play + self._ceiling(cavity.play, k))
+                ceiling.append(CeilingPart((self.scale * (place - a), self.scale * (place + a)), self.scale * heights))
+            highest += self.factor * cavity.play
+        walls = [self._wall(cavity, inside, side, highest) for side in ("left", "right")]
+        k = inside[0]
+        rotation = self.plane.floor_rotation[:, k]
+        across = np.nan_to_num(self.plane.floor_across[:, k]) - rotation * places[0]
+        shift = self.swing * np.column_stack([self.scale * self.plane.floor_along[:, k], self.scale * across, rotation])
+        contacts = [
+            ContactMotion(place, self._points(number, bodies), light[:, number])
+            for number, place in enumerate(self.plane.contacts)
+            if place[1] != "stop" and any(body.number == place[0] for body in bodies)
+        ]
+        left, right = (
+            self.scale * (sign * (length + self.factor * cavity.gap) / 2 + self.factor * wall)
+            for sign, wall in zip((-1, 1), walls, strict=True)
+        )
+        return CavityMotion(cavity.name, left, right, ceiling, shift, self.scale * highest, bodies, contacts)
+
+    def _pose(self, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return along, lift and tilt (n,) of a body in the frame of its floor: at its centre, not at its foot."""
+        b = 0.0 if self.kinds[k] == "slider" else self.half[k][1]
+        along = self.along[:, k] + b * self.plane.floor_rotation[:, k]
+        return along, np.nan_to_num(self.plane.body_lift[:, k]), np.nan_to_num(self.plane.body_tilt[:, k])
+
+    def _body(self, k: int, place: float) -> BodyMotion:
+        along, lift, tilt = self._pose(k)
+        a, b = self.half[k]
+        centre = np.column_stack([place + self.factor * along, b + self.factor * lift])
+        turn = self.factor * tilt[:, None]
+        if self.kinds[k] == "disc":
+            rim = a * np.hstack([-np.sin(turn), np.cos(turn)])
+            outline = np.stack([centre, centre + rim], axis=1)
+        else:
+            outline = centre[:, None, :] + _turned(turn, _CORNERS * (a, b))
+        return BodyMotion(
+            k, self.kinds[k], (self.scale * a, self.scale * b), self.scale * outline, self.along[:, k],
+            self.plane.body_lift[:, k], self.plane.body_tilt[:, k],
+        )  # fmt: skip
+
+    def _moved(self, k: int, side: str, play: float) -> list[np.ndarray]:
+        """Return by how much a surface has moved towards its outside, relative to the floor: (n,) at each contact.
+
+        That is its gap less what the body's pose leaves of the play; corners in the order of their height, or from
+        left to right.
+        """
+        along, lift, tilt = self._pose(k)
+        across, sign = side == "ceiling", -1.0 if side == "left" else 1.0
+        moved = {}
+        for number, (body, at, corner) in enumerate(self.plane.contacts):
+            if (body, at) == (k, side):
+                a, b = _CORNERS[corner] * self.half[k] if corner >= 0 else (0.0, 0.0)
+                place = lift + a * tilt if across else along - b * tilt
+                moved[a if across else b] = self.plane.contact_gap[:, number] - play + sign * place
+        return [moved[point] for point in sorted(moved)]
+
+    def _ceiling(self, play: float, k: int) -> np.ndarray:
+        """Return by how much the ceiling above a body has risen relative to the floor, (n, 2) at the body's ends."""
+        moved = self._moved(k, "ceiling", play) or [np.zeros(len(self.along))]
+        return np.column_stack([moved[0], moved[-1]])
+
+    def _wall(self, cavity: Cavity, inside: list[int], side: str, height: float) -> np.ndarray:
+        """Return by how much a wall has moved along relative to the floor, (n, 2) at the floor and at a height."""
+        k = inside[0 if side == "left" else -1]
+        sign = -1.0 if side == "left" else 1.0
+        moved = self._moved(k, side, cavity.gap / 2)
+        slope = (moved[-1] - moved[0]) / max(2 * self.half[k][1], 1e-300)
+        return sign * np.column_stack([moved[0], moved[0] + slope * height])
+
+    def _points(self, number: int, bodies: list[BodyMotion]) -> np.ndarray:
+        """Return the point of a body at which a contact acts (n, 2)."""
+        k, side, corner = self.plane.contacts[number]
+        place = next(i for i, body in enumerate(bodies) if body.number == k)
+        body = bodies[place]
+        centre = body.outline[:, 0] if body.shape == "disc" else body.outline.mean(axis=1)
+        if corner >= 0:
+            return body.outline[:, corner]
+        if side != "body":
+            return centre + np.array(_SIDES[side]) * body.half
+        other = bodies[place + 1]
+        heights = _heights(body, other)
+        upper = sum(each == self.plane.contacts[number] for each in self.plane.contacts[:number])
+        point = np.array([body.half[0], heights[upper] - body.half[1]])
+        turn = self.factor * np.nan_to_num(body.tilt)[:, None] * (body.shape == "block")
+        return centre + _turned(turn, point[None])[:, 0]
+
+
+def _turned(turn: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return points (k, 2) of a body turned by small angles (n, 1): (n, k, 2)."""
+    return points + np.stack([-turn * points[:, 1], turn * points[:, 0]], axis=2)
+
+
+def _heights(body: BodyMotion, other: BodyMotion) -> list[float]:
+    """Return the heights at which neighbours touch, as planar.constraints has them: discs at one, faces at two."""
+    discs = [each.half[1] for each in (body, other) if each.shape == "disc"]
+    if discs or body.shape == "slider":
+        return discs[:1] or [body.half[1]]
+    return [0.0, 2 * min(body.half[1], other.half[1])]
+
+
+def _inside(scene: Scene, cavity: Cavity) -> list[int]:
+    """Return the numbers of the bodies in a cavity."""
+    return [k for k, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
+
+
+def _kinds(scene: Scene, plane: PlanarSamples) -> list[str]:
+    """Return as what each body ran: a body without tilt is a slider, whatever the scene's shape allows."""
+    return [
+        "slider" if np.isnan(tilt).any() else "block" if damper.radius is None else "disc"
+        for damper, tilt in zip(scene.damper, plane.body_tilt.T, strict=True)
+    ]
+
+
+def _half_extents(scene: Scene) -> list[tuple[float, float]]:
+    """Return half length and half height of every body; those without any are drawn like the others."""
+    extents = [damper.half_extent for damper in scene.damper]
+    known = [extent for extent in extents if extent[0] > 0.0]
+    a, b = np.mean(known, axis=0) if known else np.array([1.5, 1.0]) * max(cavity.gap for cavity in scene.cavity)
+    return [extent if extent[0] > 0.0 else (float(a), float(b)) for extent in extents]
+
+
+def _factor(scene: Scene, half: list[tuple[float, float]]) -> float:
+    """Return by how much free travels are exaggerated: as much as the drawing bears."""
+    bounds = []
+    for cavity in scene.cavity:
+        inside = _inside(scene, cavity)
+        if inside:
+            bounds.append(_ALONG * sum(2 * half[k][0] for k in inside) / cavity.gap)
+            bounds.append(_ACROSS * min(2 * half[k][1] for k in inside) / (cavity.play or 1e-300))
+    return max(_rounded(min(bounds)), 1.0)
+
+
+def _rounded(value: float) -> float:
+    """Return a number of two digits not above a value."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return float(f"{math.floor(value / unit) * unit:.2g}")
+
+
+def _drawn(cavity: CavityMotion) -> dict[str, Any]:
+    """Return a cavity for the player: shapes, and one entry a frame of what moves."""
+    down = np.array([1.0, -1.0])
+    shift = cavity.shift * (1.0, -1.0, -180.0 / math.pi)
+    reach = np.abs(shift[:, 0]).max() + _WALL + 2.0
+    low = np.abs(shift[:, 1]).max() + _WALL + 2.0
+    left, right = float(cavity.left.min()) - reach, float(cavity.right.max()) + reach
+    return {
+        "name": cavity.name, "wall": _WALL, "height": round(cavity.height, 2),
+        "box": [round(value, 2) for value in (left, -cavity.height - low, right - left, cavity.height + 2 * low)],
+        "left": _short(cavity.left, 2), "right": _short(cavity.right, 2), "shift": _short(shift, 3),
+        "ceiling": [{"ends": part.ends, "heights": _short(part.heights, 2)} for part in cavity.ceiling],
+        "bodies": [
+            {
+                "number": body.number + 1, "shape": body.shape, "colour": COLOURS[body.number % len(COLOURS)],
+                "radius": round(body.half[0], 2), "outline": _short((body.outline * down).reshape(len(shift), -1), 2),
+                "along": _short(1e6 * body.along, 3), "lift": _short(1e6 * body.lift, 3),
+                "tilt": _short(1e3 * body.tilt, 4),
+            }
+            for body in cavity.bodies
+        ],
+        "contacts": [
+            {
+                "points": _short(contact.points * down, 2), "light": "".join(map(str, contact.light.tolist())),
+                "normal": _short(np.array(_SIDES.get(contact.place[1], (0.0, 0.0))) * down, 0),
+            }
+            for contact in cavity.contacts
+        ],
+    }  # fmt: skip
+
+
+def _short(values: np.ndarray, digits: int) -> Any:
+    """Return numbers with some digits behind the point as lists, None for nan."""
+    if np.isnan(values).any():
+        return None
+    return (np.round(values, digits) + 0.0).tolist()
