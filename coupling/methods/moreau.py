@@ -40,10 +40,11 @@ from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.system.assembly import InitialMotion, Loads, loads_of
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System
-from vanedamp.files.toml_input import InputError, Real
+from vanedamp.files.toml_input import Real
 
 VARIANTS = (Variant("Moreau-Jean", "#c2410c", "o"),)
 WAVEFORMS = True
+PLANAR_LAWS = ("two_phases", "depends_on_speed")
 
 #: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
 _TURNS, _ROUND_OFF = 20, 1e-12
@@ -84,11 +85,6 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
     from vanedamp.coupling.planar import moreau as planar  # its kernels are loaded when they are wanted
 
     system, signal = planar_system(scene, flat), scene.excitation.signal
-    if np.isfinite(system.spring).any():
-        raise InputError(
-            f'contact.law: "{scene.contact.law}" of bodies with extent, stiffness or dashpot is for solver.method '
-            "exact, not moreau"
-        )
     coordinates = [*range(flat.modes), *system.along]
 
     def loads(angle: np.ndarray) -> np.ndarray:

@@ -84,6 +84,15 @@ def _begin_planar(scene: Scene, system: System, method: Method, records: Records
             f"solver.method: {scene.solver.method} takes sliders only, and no impacts of two phases; bodies with "
             f'extent, stiffness or dashpot and contact.law = "{scene.contact.law}" are for {" or ".join(able)}'
         )
+    law = scene.contact
+    asked = {"yields": not law.rigid, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
+    wanted = {name for name, needs in asked.items() if needs}
+    if not wanted <= set(getattr(method, "PLANAR_LAWS", ())):
+        able = [name for name, part in METHODS.all().items() if wanted <= set(getattr(part, "PLANAR_LAWS", ()))]
+        raise InputError(
+            f'contact.law: "{law.law}" of bodies with extent, stiffness or dashpot, and of impacts in two phases, is '
+            f"for solver.method {' or '.join(able)}, not {scene.solver.method}"
+        )
     run: Run = begin(scene, system, scene.solver, records, events)
     return run
 
