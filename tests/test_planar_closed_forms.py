@@ -8,7 +8,7 @@ import pytest
 from tests.tools.planar import ledger, planar_run, still_table
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.planar.constraints import LEFT
-from vanedamp.coupling.response.records import DETACHES, FRICTION, IMPACT, SLIPS, STICKS
+from vanedamp.coupling.response.records import DETACHES, FRICTION, IMPACT, IMPACT_LOSS, SLIPS, STICKS
 from vanedamp.coupling.response.response import Status
 
 G = 9.81
@@ -122,6 +122,11 @@ def test_an_oblique_impact_of_a_sphere(angle, measured):
     restitution = run.state.v[0] / along
     assert restitution == pytest.approx(1 - mu * (1 + k) / math.tan(math.radians(angle)), rel=1e-12)
     assert restitution == pytest.approx(measured, rel=0.02)
+    # the loss of an impact is one entry, that of its slip included
+    spin = 0.4 * mass * radius**2 * run.state.v[2] ** 2
+    lost = 0.5 * (mass * (normal**2 * (1 - k * k) + along**2 * (1 - restitution**2)) - spin)
+    assert run.state.ledger[IMPACT_LOSS] == pytest.approx(lost, rel=1e-12)
+    assert run.state.ledger[FRICTION] == 0.0
 
 
 def test_below_that_angle_the_sphere_rolls_off():

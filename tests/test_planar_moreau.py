@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic.dataclasses import dataclass
 
-from tests.tools.planar import planar_scene, run_planar, still_table
+from tests.tools.planar import planar_scene, run_planar, still_table, witness
 from vanedamp.coupling.methods import moreau
 from vanedamp.coupling.response.evaluation import residual
 from vanedamp.coupling.response.records import EXCITATION, FRICTION, IMPACT_LOSS, STORED, VISCOUS, new_records
@@ -38,15 +38,6 @@ FIRST_ORDER = {
         1.2,
     ),
 }  # fmt: skip
-
-
-def witness(scene, periods, steps, samples=0, **options):
-    """The run of a scene by time stepping, with its status."""
-    flat = assemble(scene)
-    records = new_records(flat, periods, samples)
-    taken = moreau.Options(steps_per_period=steps, **options)
-    run = moreau.begin_planar(scene, flat, taken, records, True)
-    return run, run.advance_to(periods)
 
 
 def imbalance(run, periods):

@@ -12,6 +12,13 @@ def test_laws():
     assert worst.impacts >= 3000
 
 
+def test_laws_of_impacts_in_two_phases():
+    worst, ends = laws_of(0, 60, law="poisson")
+    assert not ends
+    assert worst.steps >= 4000
+    assert worst.impacts >= 3000
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(10_000, 14_000, 400))
 def test_laws_of_thousands(first):

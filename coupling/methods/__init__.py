@@ -53,5 +53,6 @@ class Method(Protocol):
         options: an instance of Options; initial: the motion at time zero; records: room for all periods, to be filled
         (response.recorder); events: whether to keep a log of them. Raises InputError for an impossible scene.
         A method that takes bodies in the plane (coupling.planar) also has begin_planar(scene, system, options, records,
-        events), system with all of them as sliders.
+        events), system with all of them as sliders; and PLANAR_LAWS, what it takes there beside rigid contacts of one
+        restitution: "yields", springs; "two_phases", Poisson's law; "depends_on_speed".
         """

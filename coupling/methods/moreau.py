@@ -44,6 +44,7 @@ from vanedamp.files.toml_input import Real
 
 VARIANTS = (Variant("Moreau-Jean", "#c2410c", "o"),)
 WAVEFORMS = True
+PLANAR_LAWS = ("two_phases", "depends_on_speed")
 
 #: problems that a step may take, the last with all contacts at once, and the share of a speed that is round-off
 _TURNS, _ROUND_OFF = 20, 1e-12

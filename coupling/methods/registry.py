@@ -81,8 +81,17 @@ def _begin_planar(scene: Scene, system: System, method: Method, records: Records
     if begin is None:
         able = [name for name, part in METHODS.all().items() if hasattr(part, "begin_planar")]
         raise InputError(
-            f"solver.method: {scene.solver.method} takes sliders only; bodies with extent, stiffness or dashpot are "
-            f"for {' or '.join(able)}"
+            f"solver.method: {scene.solver.method} takes sliders only, and no impacts of two phases; bodies with "
+            f'extent, stiffness or dashpot and contact.law = "{scene.contact.law}" are for {" or ".join(able)}'
+        )
+    law = scene.contact
+    asked = {"yields": not law.rigid, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
+    wanted = {name for name, needs in asked.items() if needs}
+    if not wanted <= set(getattr(method, "PLANAR_LAWS", ())):
+        able = [name for name, part in METHODS.all().items() if wanted <= set(getattr(part, "PLANAR_LAWS", ()))]
+        raise InputError(
+            f'contact.law: "{law.law}" of bodies with extent, stiffness or dashpot, and of impacts in two phases, is '
+            f"for solver.method {' or '.join(able)}, not {scene.solver.method}"
         )
     run: Run = begin(scene, system, scene.solver, records, events)
     return run
@@ -91,7 +100,9 @@ def _begin_planar(scene: Scene, system: System, method: Method, records: Records
 def why_no_restart(scene: Scene) -> str | None:
     """Return why runs of the scene's method cannot begin with the state of another; None if they can."""
     if scene.planar:
-        return "runs with bodies that have an extent, stiffness or dashpot leave no state for another"
+        return (
+            "runs with bodies that have an extent, stiffness or dashpot, or with impacts of two phases, leave no state"
+        )
     return _why_not(scene.solver.method, "RESTARTS")
 
 

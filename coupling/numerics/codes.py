@@ -25,8 +25,8 @@ FORCE, VELOCITY, POSITION = np.arange(3)
 # rows hold it
 OUT, FREE, AT_LOW, AT_HIGH, DEPENDENT = np.arange(5)
 # meaning of an event function: a force reaches its bound (AT_LOW, AT_HIGH); a slip stops; a gap closes; a gap that was
-# left under compression opens, or closes again because its spring would push
-STOPS, CLOSES, OPENS, RECLOSES = np.arange(10, 14)
+# left under compression opens, or closes again because its spring would push; a normal force vanishes
+STOPS, CLOSES, OPENS, RECLOSES, PARTS = np.arange(10, 15)
 
 # status of an event function: a bound of its second derivative is known; its expansion; its first root
 BOUNDED, EXPANDED, ROOT = np.arange(20, 23)

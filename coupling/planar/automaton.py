@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
     AT_ONCE,
@@ -12,23 +13,38 @@ from vanedamp.coupling.numerics.codes import (
     EVENT_BUDGET,
     EVENTS,
     FLOW,
+    LEAVING,
     LOG_FULL,
     LOGGED,
     NEEDS_FLOW,
     OPEN,
+    OPENS,
+    PARTS,
     PERIOD,
+    RECLOSES,
     SLIP_LEFT,
     SLIP_RIGHT,
     STICK,
+    TOUCHING,
     UNDECIDED,
 )
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import AT_REST, decide, gap, is_shut, row_speed, rubs, speed_scale
+from vanedamp.coupling.planar.contact_decisions import (
+    AT_REST,
+    decide,
+    gap,
+    is_rigid,
+    is_shut,
+    row_speed,
+    rubs,
+    speed_scale,
+    yields,
+)
 from vanedamp.coupling.planar.event_functions import next_event
-from vanedamp.coupling.planar.impacts import collide, jam, log_event
+from vanedamp.coupling.planar.impacts import collide, jam, log_event, note_impact
 from vanedamp.coupling.planar.quadrature import add_up, motion_at, response_at
 from vanedamp.coupling.planar.recorder import put_sample, record_section
-from vanedamp.coupling.response.records import DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS
+from vanedamp.coupling.response.records import CONTACT, DETACHES, IMPACT_LOSS, RESTS, SLIPS, STICKS
 
 #: overlap, as a share of the play, beyond which round-off has lost a contact
 _LOST = 1e-7
@@ -39,6 +55,8 @@ _TINY = 1e-150
 _OVER = 1e-9
 #: share of all forces by which one may break its law
 _BROKEN = 1e-6
+#: share of the play that is round-off of a gap, over the share by which a force may break its law
+_ROUGH = 1e-6
 
 
 @entry
@@ -48,6 +66,7 @@ def begin(system, st, rec, log, work):
     st.scale[0] = max(speed_scale(system, st.v), system.speed)
     if _approaches(system, st) and not collide(system, st, rec, log, work):
         return False
+    _press(system, st, rec, log)
     if not _settle(system, st, rec, log, work):
         return False
     st.counters[FLOW] = -1
@@ -80,7 +99,7 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
         if st.counters[LOGGED] + 4 * len(system.rest) >= len(log):
             return LOG_FULL
         if st.counters[PERIOD] == 0 and st.time[0] == 0.0:
-            record_section(system, st, rec)
+            record_section(system, st, rec, _spring_energy(system, st))
         tau, who = next_event(system, flows, st, guards, all_modes)
         if tau > 0.0:
             add_up(system, flows, st, rec, work, tau)
@@ -91,6 +110,10 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
             for r in range(len(st.fresh)):
                 st.fresh[r] = 0
             st.counters[AT_ONCE] = 0
+        if who == -2:
+            st.time[0] += tau
+            _phase(system, st)
+            continue
         if who < 0:
             st.counters[PERIOD] += 1
             st.time[0] = 0.0
@@ -98,7 +121,7 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
                 st.last_impact[r] -= system.period
             _phase(system, st)
             _snap(system, flows, st, st.counters[FLOW])
-            record_section(system, st, rec)
+            record_section(system, st, rec, _spring_energy(system, st))
             continue
         st.counters[EVENTS] += 1
         st.counters[AT_ONCE] += 1
@@ -117,20 +140,56 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
 def _approaches(system, st):
     """Whether a contact that is closed approaches, by more than round-off."""
     for r in range(system.contacts):
-        if is_shut(system, st, r) and row_speed(system, r, st.v) < -AT_REST * st.scale[0]:
+        if is_rigid(system, r) and is_shut(system, st, r) and row_speed(system, r, st.v) < -AT_REST * st.scale[0]:
             return True
     return False
+
+
+@kernel
+def _press(system, st, rec, log):
+    """Begin the contacts that yield, are closed and approach."""
+    for r in range(system.contacts):
+        touches = yields(system, r) and (st.state[r] == OPEN or st.state[r] == TOUCHING)
+        if touches and gap(system, r, st.q) <= SIMULTANEOUS * system.play[r]:
+            speed = row_speed(system, r, st.v)
+            if speed < -AT_REST * st.scale[0]:
+                st.state[r] = SLIP_RIGHT  # decided next
+                st.pushed[r], st.pushed[len(system.rest) + r], st.lost[r] = 0.0, 0.0, 0.0
+                note_impact(system, st, rec, log, r, speed, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def _part(system, st, log, r):
+    """End a contact that yields as its force vanishes: what its spring still holds is lost."""
+    u, shift, speed = len(system.rest), gap(system, r, st.q), row_speed(system, r, st.v)
+    left = 0.5 * system.spring[r] * shift * shift
+    st.ledger[CONTACT] += left
+    st.state[r] = LEAVING if system.dashpot[r] > 0.0 and shift < 0.0 and speed > 0.0 else OPEN
+    if st.state[r] == OPEN:
+        _close(system, st, r)
+    log_event(system, st, log, DETACHES, r, 0.0, speed, st.pushed[r], st.pushed[u + r], st.lost[r] + left)
 
 
 @inlined
 def _happen(system, st, rec, log, work, r, what):
     """The event of unit r. Returns False if it cannot be decided."""
     st.scale[0] = max(st.scale[0], speed_scale(system, st.v))
+    for i in range(len(system.rest)):
+        work.before[i] = st.state[i]
     if what == CLOSES:
         _close(system, st, r)
+    elif what == PARTS and yields(system, r):
+        _part(system, st, log, r)
+    elif what == OPENS:
+        st.state[r] = OPEN
+        _close(system, st, r)
+    elif what == RECLOSES:
+        st.state[r] = SLIP_RIGHT  # decided next; the ledger has taken the energy that the spring has
+        st.ledger[CONTACT] -= 0.5 * system.spring[r] * gap(system, r, st.q) ** 2
     # at any event another gap may be closed as well, within the resolution of gaps
     if _approaches(system, st) and not collide(system, st, rec, log, work):
         return False
+    _press(system, st, rec, log)
     if not _settle(system, st, rec, log, work):
         return False
     for i in range(len(system.rest)):
@@ -156,9 +215,9 @@ def _log_changes(system, flows, st, log):
         if (now == SLIP_RIGHT or now == SLIP_LEFT) and flows.held[st.counters[FLOW], i] and rubs(system, i):
             now = STICK  # its force is at its bound, but others hold it
         st.known[i] = now
-        if i < system.contacts and was == OPEN and now != OPEN:
+        if is_rigid(system, i) and was == OPEN and now != OPEN:
             log_event(system, st, log, RESTS, i, 0.0, 0.0, 0.0, 0.0, 0.0)
-        elif i < system.contacts and was != OPEN and now == OPEN:
+        elif is_rigid(system, i) and was != OPEN and now == OPEN:
             log_event(system, st, log, DETACHES, i, 0.0, row_speed(system, i, st.v), 0.0, 0.0, 0.0)
         elif now == STICK and (was == SLIP_RIGHT or was == SLIP_LEFT):
             log_event(system, st, log, STICKS, i, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -212,7 +271,7 @@ def _snap(system, flows, st, s):
             for i in range(size):
                 st.v[i] -= flows.snap_rate[s, i, r] * st.rate[r]
     for r in range(system.contacts):
-        st.rate[r] = gap(system, r, st.q) if st.state[r] != OPEN else 0.0
+        st.rate[r] = gap(system, r, st.q) if is_rigid(system, r) and st.state[r] != OPEN else 0.0
     for r in range(system.contacts):
         if st.rate[r] != 0.0:
             for i in range(size):
@@ -226,7 +285,7 @@ def _snap(system, flows, st, s):
 def _at_rest(system, st, row):
     """Whether contacts hold a row: the gap of a closed contact, the slip of one that sticks."""
     u = len(system.rest)
-    return st.state[row] != OPEN and row < system.contacts if row < u else st.state[row - u] == STICK
+    return st.state[row] != OPEN and is_rigid(system, row) if row < u else st.state[row - u] == STICK
 
 
 @kernel
@@ -266,6 +325,9 @@ def _holds(system, flows, st):
     A decision that has mistaken the forces of contacts that depend on each other is found here, and is no answer.
     """
     s, u, largest = st.counters[FLOW], len(system.rest), 0.0
+    for r in range(system.contacts):
+        if yields(system, r) and st.state[r] < OPEN:  # round-off of its gap
+            largest = max(largest, _ROUGH * system.spring[r] * system.play[r])
     for check in range(2):
         for r in range(u):
             normal, slip, size = st.force[r], st.force[u + r], abs(st.force[r]) + abs(st.force[u + r])
@@ -360,6 +422,16 @@ def _begin_segment(system, flows, st):
             largest = max(largest, abs(system.J[r, i]))
         swing = max(swing, part * largest)
     st.scale[0] = max(swing, system.speed)
+
+
+@inlined
+def _spring_energy(system, st):
+    """Return the energy in the springs of closed contacts, J."""
+    energy = 0.0
+    for r in range(system.contacts):
+        if yields(system, r) and st.state[r] < OPEN:
+            energy += 0.5 * system.spring[r] * gap(system, r, st.q) ** 2
+    return energy
 
 
 @inlined

@@ -13,14 +13,18 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.scene.bodies import Cavity, Damper
+from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import base_acceleration, physical_scale
 from vanedamp.coupling.system.constraints import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, interface_row
+from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import NORMAL, ROTATION
 
+#: the moment after which contacts are looked at again, in periods of the excitation or of the fastest contact
+_MOMENT = 1e-6
 #: coefficients of friction below this are none
 _SMOOTH = 1e-9
 
@@ -42,13 +46,18 @@ class PlanarSystem(NamedTuple):
     table: np.ndarray  # (e,) complex displacement of a base whose motion is the response, m
     frequency: np.ndarray  # (e,) rad/s
     period: float  # s
+    moment: float  # after which what an instant leaves open is looked at again, s
     speed: float  # that the loads give the rows within a period, m/s: a scale for round-off
     J: np.ndarray  # (2u, N)
     rest: np.ndarray  # (u,) gap at q = 0, m
     delassus: np.ndarray  # (2u, 2u) J M^-1 J^T
     friction: np.ndarray  # (u,) coefficient of a contact
     limit: np.ndarray  # (u,) constant limit of a friction element, N; 0 for contacts
-    restitution: np.ndarray  # (u,)
+    restitution: np.ndarray  # (u,) or the coefficient from which the law takes it at a speed
+    restitution_at: int  # address of that law (system.restitution); 0: the coefficient at every speed
+    spring: np.ndarray  # (u,) stiffness of a contact that yields, N/m; inf: rigid, and friction elements
+    dashpot: np.ndarray  # (u,) N s/m
+    two_phases: bool  # whether impacts have a phase of compression and one of expansion
     play: np.ndarray  # (u,) m, the scale of a contact's gap
     body: np.ndarray  # (u,) number of the unit's body
     surface: np.ndarray  # (u,) int: place of its name in SURFACES
@@ -79,7 +88,7 @@ class _Unit(NamedTuple):
     slip: np.ndarray
     rest: float
     friction: float
-    restitution: float
+    element: Element
     play: float
     body: int
     surface: int
@@ -113,6 +122,7 @@ class _Surface(NamedTuple):
     turn: np.ndarray
     x: float | None = 0.0
     y: float | None = 0.0
+    labels: tuple[str, str, str] = ("", "", "")  # interface coordinates of these three motions; "": none
 
     def motion(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the motion along and across, (n,) each, of the surface's point (x, y)."""
@@ -151,9 +161,10 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
                 load[:, x + 1] = -body.damper.mass * (base @ normal)
             mass[x + 2] = body.damper.moment_of_inertia
     units: list[_Unit] = []
+    law = _Law(scene.contact, basis, mass)
     for index, cavity in enumerate(scene.cavity):
         inside = [body for body in bodies if owner[body.number] == index]
-        units += _contacts(scene, cavity, cavities[index], inside, size)
+        units += _contacts(law, cavity, cavities[index], inside, size)
     for row in range(flat.friction_rows, len(flat.J)):
         if not flat.J[row, n:].any():
             gap = np.zeros(size)
@@ -161,7 +172,8 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             number = row - (len(flat.J) - len(scene.stop))
             units.append(
                 _Unit(
-                    gap, np.zeros(size), float(flat.rest[row]), 0.0, float(flat.restitution[row]),
+                    gap, np.zeros(size), float(flat.rest[row]), 0.0,
+                    Element(float(flat.restitution[row]), float(flat.spring[row]), float(flat.dashpot[row])),
                     float(flat.free_travel[row]), number, STOP,
                 )
             )  # fmt: skip
@@ -175,7 +187,9 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
                 functional[bodies[row].x] = 1.0
             surface, number = (FLOOR, row) if row < len(bodies) else (CASING, row - len(bodies))
             limit = float(flat.limit[row])
-            units.append(_Unit(np.zeros(size), functional, 0.0, 0.0, 0.0, np.inf, number, surface, limit=limit))
+            units.append(
+                _Unit(np.zeros(size), functional, 0.0, 0.0, Element(0.0), np.inf, number, surface, limit=limit)
+            )
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
     stiffness[:n, :n], damping[:n, :n] = np.diag(flat.stiffness[:n]), flat.damping[:n, :n]
@@ -189,12 +203,20 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     response[:n] = flat.response[:n]
     pushed = np.abs(weight) * flat.period + (np.abs(load) / np.maximum(flat.frequency, flat.omega)[:, None]).sum(axis=0)
     column = lambda name: np.array([getattr(unit, name) for unit in units])  # noqa: E731
+    elements = np.reshape([unit.element for unit in units], (len(units), 3)).astype(float)
+    yields = np.isfinite(elements[:, 1])
+    mobility = (J[: len(units)][yields] ** 2 / mass).sum(axis=1)
+    fastest = np.sqrt((elements[yields, 1] * mobility).max(initial=0.0))
+    shortest = min(flat.period, 2 * np.pi / fastest) if fastest > 0.0 else flat.period
     return PlanarSystem(
         contacts=contacts, mass=mass, stiffness=stiffness, damping=damping, load=load, weight=weight,
         response=response, table=flat.table, frequency=flat.frequency, period=flat.period,
+        moment=_MOMENT * shortest,
         speed=float((np.abs(J) @ (pushed / mass)).max(initial=0.0)), J=J,
         rest=column("rest").astype(float), delassus=(J / mass) @ J.T, friction=column("friction").astype(float),
-        limit=column("limit").astype(float), restitution=column("restitution").astype(float),
+        limit=column("limit").astype(float), restitution=elements[:, 0],
+        restitution_at=law_address(scene.contact, elements[:contacts, 0]), spring=elements[:, 1],
+        dashpot=elements[:, 2], two_phases=scene.contact.two_phases,
         play=column("play").astype(float), body=column("body").astype(np.int64),
         surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
         along=np.array([body.x for body in bodies], np.int64),
@@ -246,7 +268,14 @@ def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> tuple[_Surface, ..
         if side == CEILING and label != below:
             y = None
         moves_across = basis.rows[label + NORMAL] if own else across
-        surfaces.append(_Surface(rows[side], moves_across, basis.rows.get(label + ROTATION, turn), x, y))
+        names = (
+            label,
+            (label if own else below) + NORMAL,
+            (label if label + ROTATION in basis.rows else below) + ROTATION,
+        )
+        first, second, third = (name if name in basis.rows else "" for name in names)
+        turns = basis.rows.get(label + ROTATION, turn)
+        surfaces.append(_Surface(rows[side], moves_across, turns, x, y, (first, second, third)))
     return tuple(surfaces)
 
 
@@ -263,9 +292,30 @@ def _places(basis: ModalBasis, labels: tuple[str, ...]) -> list[tuple[float, flo
     return [(float((at[label] - middle) @ along), float((at[label] - at[floor]) @ across)) for label in labels]
 
 
-def _contacts(
-    scene: Scene, cavity: Cavity, surfaces: tuple[_Surface, ...], bodies: list[_Body], size: int
-) -> list[_Unit]:
+class _Law(NamedTuple):
+    """The contact law at the walls of a structure, with the masses (N,) of the coordinates, modes first."""
+
+    contact: ContactLaw
+    basis: ModalBasis
+    mass: np.ndarray
+
+    def element(self, normal: np.ndarray, restitution: float, flexibility: float) -> Element:
+        """Return the element of a contact from its normal row (N,) and the residual flexibility of its wall, m/N.
+
+        The structure's mass is that of its first mode, the same for every number of modes.
+        """
+        mobility = normal**2 / self.mass
+        mobility[1 : len(self.basis.stiffness)] = 0.0
+        return self.contact.element(restitution, 1 / float(mobility.sum()), flexibility)
+
+    def flexibility(self, surface: _Surface, is_wall: bool, lever: float = 0.0) -> float:
+        """Return the residual flexibility, m/N, of a surface against a force on it; lever: m, that turns it."""
+        moves, turns = surface.labels[0 if is_wall else 1], surface.labels[2]
+        shares = {moves: 1.0} | ({turns: lever} if turns and lever else {})
+        return self.basis.flexibility(shares) if moves else 0.0
+
+
+def _contacts(law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], bodies: list[_Body], size: int) -> list[_Unit]:
     """Contacts in a cavity, from left to right, in each body's walls, floor and ceiling."""
     units: list[_Unit] = []
     length = 2 * sum(body.a for body in bodies)
@@ -273,14 +323,14 @@ def _contacts(
     for place, body in enumerate(bodies):
         centre += body.a
         if place == 0:
-            units += _at_walls(cavity, surfaces, body, LEFT, -cavity.gap / 2 - length / 2, size)
+            units += _at_walls(law, cavity, surfaces, body, LEFT, -cavity.gap / 2 - length / 2, size)
         if place == len(bodies) - 1:
-            units += _at_walls(cavity, surfaces, body, RIGHT, cavity.gap / 2 + length / 2, size)
+            units += _at_walls(law, cavity, surfaces, body, RIGHT, cavity.gap / 2 + length / 2, size)
         if body.damper.shape != "slider":
             for surface in (FLOOR, CEILING):
-                units += _at_floor(cavity, surfaces, body, surface, centre, size)
+                units += _at_floor(law, cavity, surfaces, body, surface, centre, size)
         if place + 1 < len(bodies):
-            units += _between(scene, cavity, body, bodies[place + 1], size)
+            units += _between(law, cavity, surfaces, body, bodies[place + 1], size)
         centre += body.a
     return units
 
@@ -295,7 +345,7 @@ def _point(body: _Body, a: float, b: float, size: int) -> tuple[np.ndarray, np.n
 
 
 def _at_walls(
-    cavity: Cavity, surfaces: tuple[_Surface, ...], body: _Body, surface: int, wall: float, size: int
+    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], body: _Body, surface: int, wall: float, size: int
 ) -> list[_Unit]:
     """Contacts with the left or the right wall, at `wall` (m) along the cavity."""
     sign = 1.0 if surface == LEFT else -1.0
@@ -314,13 +364,14 @@ def _at_walls(
         # a slider has no height: it meets the wall where the wall's motion is known
         along[: len(moving.along)] -= moved_along if extended else moving.along
         across[: len(moving.along)] -= moved_across
+        lever = 0.0 if moving.y is None or not extended else moving.y - body.b - b
         units.append(
             _Unit(
                 sign * along,
                 across * extended,
                 cavity.gap / 2,
                 body.damper.friction * extended,
-                body.damper.restitution,
+                law.element(sign * along, body.damper.restitution, law.flexibility(moving, True, lever)),
                 cavity.gap,
                 body.number,
                 surface,
@@ -331,7 +382,7 @@ def _at_walls(
 
 
 def _at_floor(
-    cavity: Cavity, surfaces: tuple[_Surface, ...], body: _Body, surface: int, centre: float, size: int
+    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], body: _Body, surface: int, centre: float, size: int
 ) -> list[_Unit]:
     """Contacts with floor or ceiling of a body whose centre is at `centre` (m) along the cavity."""
     below, play = surface == FLOOR, cavity.play or 0.0
@@ -346,13 +397,17 @@ def _at_floor(
         moved_along, moved_across = surfaces[surface].motion(centre + a, 0.0 if below else 2 * body.b + play)
         along[: len(moved_along)] -= moved_along
         across[: len(moved_across)] -= moved_across
+        from_place = surfaces[surface].x
+        lever = 0.0 if from_place is None else centre + a - from_place
         units.append(
             _Unit(
                 sign * across,
                 along,
                 0.0 if below else play,
                 body.damper.friction,
-                body.damper.restitution,
+                law.element(
+                    sign * across, body.damper.restitution, law.flexibility(surfaces[surface], False, lever)
+                ),
                 play,
                 body.number,
                 surface,
@@ -374,7 +429,9 @@ def _check_friction(units: list[_Unit], size: int, mass: np.ndarray) -> None:
             )
 
 
-def _between(scene: Scene, cavity: Cavity, left: _Body, right: _Body, size: int) -> list[_Unit]:
+def _between(
+    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], left: _Body, right: _Body, size: int
+) -> list[_Unit]:
     """Contacts of two neighbours: blocks face to face at the ends of the common height, discs at one point."""
     shapes = {left.damper.shape, right.damper.shape}
     if shapes == {"slider"}:
@@ -400,17 +457,18 @@ def _between(scene: Scene, cavity: Cavity, left: _Body, right: _Body, size: int)
         heights = [round_one.b]
     coefficients = left.damper.restitution, right.damper.restitution
     friction = 0.0 if shapes == {"slider"} else (left.damper.friction * right.damper.friction) ** 0.5
-    units = []
+    units, yields = [], 0.5 * sum(law.flexibility(surfaces[side], True) for side in (LEFT, RIGHT))
     for height in heights:
         right_along, right_across = _point(right, -right.a, height - right.b, size)
         left_along, left_across = _point(left, left.a, height - left.b, size)
+        normal = right_along - left_along
         units.append(
             _Unit(
-                right_along - left_along,
+                normal,
                 (right_across - left_across) * (friction > 0.0),
                 0.0,
                 friction,
-                scene.contact.pair_restitution(*coefficients),
+                law.element(normal, law.contact.pair_restitution(*coefficients), yields),
                 cavity.gap,
                 left.number,
                 BODY,

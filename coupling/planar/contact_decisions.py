@@ -10,15 +10,17 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF, SIMULTANEOUS
-from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, TOUCHING
+from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, TOUCHING
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
 
-#: what is small beside the largest term, now and a moment later, and that moment, in periods
-_NOTHING, _NEXT_TO_NOTHING, _MOMENT = 1e-9, 1e-12, 1e-6
+#: what is small beside the largest term, now and a moment later
+_NOTHING, _NEXT_TO_NOTHING = 1e-9, 1e-12
 #: share of the speeds in a scene that is round-off
 AT_REST = 10 * ROUND_OFF
 _NORMAL, _SLIP = 1, 2
+#: what a contact that yields and touches without speed does
+_RESTS, _PRESSED, _OPENS = 1, 2, 3
 
 
 @inlined
@@ -34,6 +36,25 @@ def row_speed(system, row, v):
 def gap(system, unit, q):
     """Gap of a contact, m."""
     return system.rest[unit] + row_speed(system, unit, q)
+
+
+@inlined
+def yields(system, unit):
+    """Whether a unit is a contact with a spring."""
+    return system.spring[unit] < math.inf
+
+
+@inlined
+def is_rigid(system, unit):
+    """Whether a unit is a contact without a spring."""
+    return unit < system.contacts and system.spring[unit] == math.inf
+
+
+@inlined
+def spring_force(system, unit, q, v):
+    """Return the force of spring and dashpot of a closed contact, N; they never pull."""
+    force = system.spring[unit] * gap(system, unit, q) + system.dashpot[unit] * row_speed(system, unit, v)
+    return max(-force, 0.0)
 
 
 @inlined
@@ -81,25 +102,26 @@ def free_acceleration(system, work, q, v, time):
 
 
 @kernel
-def solve_rows(system, work, count, right, least):
+def solve_rows(system, work, count, right, least, bound):
     """Solve the problem of the listed units: accelerations (or speeds) right + G forces, forces in work.impulse (2u,).
 
     right: (2u,) without the unknown forces; least: what they are to be measured by, at least, per root of the
-    diagonal of G. Returns False if there is no solution, or none is found.
+    diagonal of G; bound: (u,) of friction, to which mu times the unknown normal force is added. Returns False if there
+    is no solution, or none is found.
     """
     u, problem, size = len(system.rest), work.lemke, 0
     scale = least
     for p in range(count):
         r = work.listed[p]
         work.place[p] = size
-        if r < system.contacts:
+        if is_rigid(system, r):
             scale = max(scale, abs(right[r]) / math.sqrt(system.delassus[r, r]))
             size += 3 if work.way[p] == 0 and system.friction[r] > 0.0 else 1
         else:
             size += 2
         if system.delassus[u + r, u + r] > 0.0:
             scale = max(scale, abs(right[u + r]) / math.sqrt(system.delassus[u + r, u + r]))
-            scale = max(scale, system.limit[r] * math.sqrt(system.delassus[u + r, u + r]))
+            scale = max(scale, bound[r] * math.sqrt(system.delassus[u + r, u + r]))
     for r in range(2 * u):
         work.impulse[r] = 0.0
     if size == 0:
@@ -111,24 +133,23 @@ def solve_rows(system, work, count, right, least):
             problem.matrix[i, j] = 0.0
     for p in range(count):
         r, i = work.listed[p], work.place[p]
-        contact = r < system.contacts
+        contact = is_rigid(system, r)
         at_rest = work.way[p] == 0 and rubs(system, r)
         normal = 1.0 / math.sqrt(system.delassus[r, r]) if contact else 0.0
         slip = 1.0 / math.sqrt(system.delassus[u + r, u + r]) if at_rest else 0.0
         first = i + 1 if contact else i  # the unknown of the friction to the right
         if contact:
-            problem.q[i] = _loaded(system, work, count, right, r) * normal / scale
+            problem.q[i] = _loaded(system, work, count, right, bound, r) * normal / scale
         if at_rest:
-            problem.q[first] = _loaded(system, work, count, right, u + r) * slip / scale
+            problem.q[first] = _loaded(system, work, count, right, bound, u + r) * slip / scale
             problem.matrix[first, first + 1] += 1.0
             problem.matrix[first + 1, first] -= 1.0
+            problem.q[first + 1] = 2.0 * bound[r] / (slip * scale)
             if contact:
                 problem.matrix[first + 1, i] += 2.0 * system.friction[r] * normal / slip
-            else:
-                problem.q[first + 1] = 2.0 * system.limit[r] / (slip * scale)
         for o in range(count):
             c, j = work.listed[o], work.place[o]
-            other = c < system.contacts
+            other = is_rigid(system, c)
             free = work.way[o] == 0 and rubs(system, c)
             if other:
                 weight = 1.0 / math.sqrt(system.delassus[c, c])
@@ -150,26 +171,26 @@ def solve_rows(system, work, count, right, least):
         return False
     for p in range(count):
         r, i = work.listed[p], work.place[p]
-        contact = r < system.contacts
+        contact = is_rigid(system, r)
         if contact:
             work.impulse[r] = problem.z[i] * scale / math.sqrt(system.delassus[r, r])
             if work.way[p] != 0:
                 work.impulse[u + r] = -work.way[p] * system.friction[r] * work.impulse[r]
         if work.way[p] == 0 and rubs(system, r):
-            low = system.friction[r] * work.impulse[r] if contact else system.limit[r]
+            low = bound[r] + (system.friction[r] * work.impulse[r] if contact else 0.0)
             share = problem.z[i + 1 if contact else i] * scale / math.sqrt(system.delassus[u + r, u + r])
             work.impulse[u + r] = share - low
     return True
 
 
 @inlined
-def _loaded(system, work, count, right, row):
-    """What a row has without the unknowns: friction elements count from their lower bound."""
+def _loaded(system, work, count, right, bound, row):
+    """What a row has without the unknowns: friction counts from its lower bound."""
     u, total = len(system.rest), right[row]
     for p in range(count):
         c = work.listed[p]
-        if c >= system.contacts:
-            total -= system.delassus[row, u + c] * system.limit[c]
+        if bound[c] > 0.0:
+            total -= system.delassus[row, u + c] * bound[c]
     return total
 
 
@@ -180,7 +201,7 @@ def _classify(system, work, count, nothing, verdict):
     for p in range(count):
         r, i = work.listed[p], work.place[p]
         work.doubtful[p] = 0
-        contact = r < system.contacts
+        contact = is_rigid(system, r)
         if contact and problem.z[i] <= nothing:
             verdict[p] = OPEN if problem.w[i] > nothing else TOUCHING
             work.doubtful[p] = _NORMAL if problem.w[i] <= nothing else 0
@@ -190,7 +211,9 @@ def _classify(system, work, count, nothing, verdict):
             verdict[p] = SLIP_RIGHT
         else:
             first = i + 1 if contact else i
-            if problem.z[first] <= nothing:
+            # a spring without force has no friction: both bounds are one, and the acceleration tells
+            left = problem.w[first + 1] <= nothing and problem.z[first + 1] > nothing
+            if problem.z[first] <= nothing and not left:
                 verdict[p] = SLIP_RIGHT
                 work.doubtful[p] = _SLIP if problem.w[first] <= nothing else 0
             elif problem.w[first + 1] <= nothing:
@@ -208,10 +231,18 @@ def decide(system, st, work, scale):
     """
     u, count = len(system.rest), 0
     for r in range(u):
-        work.before[r], work.sliding[r] = st.state[r], 0
+        work.sliding[r], work.resting[r] = 0, 0
         slip = row_speed(system, u + r, st.v)
         way = 0 if abs(slip) <= AT_REST * scale else (1 if slip > 0.0 else -1)
-        if r >= system.contacts:
+        if yields(system, r):
+            if not _is_pressed(system, st, work, r, AT_REST * scale):
+                continue
+            if way != 0 or not rubs(system, r):
+                st.state[r] = SLIP_LEFT if way < 0 and rubs(system, r) else SLIP_RIGHT
+                work.sliding[r] = way if rubs(system, r) else 0
+                continue
+            st.state[r] = STICK
+        elif r >= system.contacts:
             if way != 0:
                 st.state[r] = SLIP_RIGHT if way > 0 else SLIP_LEFT
                 work.sliding[r] = way
@@ -221,11 +252,11 @@ def decide(system, st, work, scale):
             continue
         work.listed[count], work.way[count] = r, way if rubs(system, r) else 0
         count += 1
-    terms = loaded_acceleration(system, work, st.q, st.v, st.time[0])
-    if not solve_rows(system, work, count, work.speed, terms):
+    terms = loaded_acceleration(system, st, work, st.q, st.v, st.time[0])
+    if not solve_rows(system, work, count, work.speed, terms, work.bound):
         return False
     _classify(system, work, count, _NOTHING, work.verdict)
-    doubts = 0
+    doubts = _press_or_open(system, work, count, _NOTHING * terms)
     for p in range(count):
         doubts += work.doubtful[p]
     if doubts > 0:
@@ -240,22 +271,72 @@ def decide(system, st, work, scale):
         if doubts > 0 and work.doubtful[p] == _SLIP and _may_stick(system, work, p):
             st.state[r] = STICK
     for r in range(u):
+        if work.resting[r] == _OPENS or work.resting[r] == _RESTS:
+            st.state[r] = OPEN if work.resting[r] == _OPENS else TOUCHING
+            st.other[r] = st.state[r]
         st.fresh[r] = 1
     return True
 
 
 @inlined
-def loaded_acceleration(system, work, q, v, time):
-    """Accelerations of the rows (work.speed) without contact forces, with those of friction elements that slide.
+def _is_pressed(system, st, work, r, slow):
+    """Whether a contact that yields is closed, for all that its gap and speed tell.
 
-    Returns the size of the terms that they are sums of, per root of the diagonal of G: what is far below is round-off.
+    One that touches without speed has no force yet, and is marked: its acceleration decides.
+    """
+    if st.state[r] < OPEN:
+        return True
+    if st.state[r] == LEAVING:
+        return False
+    rate = row_speed(system, r, st.v)
+    if gap(system, r, st.q) > SIMULTANEOUS * system.play[r] or rate > slow:
+        st.state[r] = OPEN
+        return False
+    if rate >= -slow:
+        work.resting[r] = _RESTS
+    return True
+
+
+@kernel
+def _press_or_open(system, work, count, nothing):
+    """Decide by accelerations whether contacts that touch without speed are pressed. Returns how many stay in doubt."""
+    u, doubts = len(system.rest), 0
+    for r in range(system.contacts):
+        if work.resting[r] == _RESTS:
+            acceleration = work.speed[r]
+            for row in range(2 * u):
+                acceleration += system.delassus[r, row] * work.impulse[row]
+            if abs(acceleration) <= nothing * math.sqrt(system.delassus[r, r]):
+                doubts += 1
+            else:
+                work.resting[r] = _PRESSED if acceleration < 0.0 else _OPENS
+    for p in range(count):
+        if work.resting[work.listed[p]] == _OPENS:
+            work.verdict[p], work.doubtful[p] = OPEN, 0
+    return doubts
+
+
+@inlined
+def loaded_acceleration(system, st, work, q, v, time):
+    """Accelerations of the rows (work.speed) without unknown forces: with those of springs, and of units that slide.
+
+    Sets the bounds of friction that are known (work.bound). Returns the size of the terms that accelerations are sums
+    of, per root of the diagonal of G: what is far below is round-off.
     """
     u = len(system.rest)
     free_acceleration(system, work, q, v, time)
-    for r in range(system.contacts, u):
+    for r in range(u):
+        work.bound[r] = system.limit[r]
+        if yields(system, r) and st.state[r] < OPEN:
+            force = spring_force(system, r, q, v)
+            work.bound[r] = system.friction[r] * force
+            for i in range(len(q)):
+                part = system.J[r, i] * force / system.mass[i]
+                work.free[i] += part
+                work.terms[i] += abs(part)
         if work.sliding[r] != 0:
             for i in range(len(q)):
-                work.free[i] -= work.sliding[r] * system.limit[r] * system.J[u + r, i] / system.mass[i]
+                work.free[i] -= work.sliding[r] * work.bound[r] * system.J[u + r, i] / system.mass[i]
     largest = 0.0
     for r in range(2 * u):
         work.speed[r] = row_speed(system, r, work.free)
@@ -270,7 +351,7 @@ def loaded_acceleration(system, work, q, v, time):
 @kernel
 def _look_ahead(system, st, work, count):
     """Decide what was left open by the accelerations a moment later. Returns False if that cannot be solved."""
-    u, size, moment = len(system.rest), len(st.q), _MOMENT * system.period
+    u, size, moment = len(system.rest), len(st.q), system.moment
     for i in range(size):
         total = work.free[i]
         for r in range(2 * u):
@@ -279,8 +360,8 @@ def _look_ahead(system, st, work, count):
         work.ahead[1, i] = st.v[i] + moment * total
     for p in range(count):
         work.first[p], work.doubt[p] = work.verdict[p], work.doubtful[p]
-    terms = loaded_acceleration(system, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
-    if not solve_rows(system, work, count, work.speed, terms):
+    terms = loaded_acceleration(system, st, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
+    if not solve_rows(system, work, count, work.speed, terms, work.bound):
         return False
     _classify(system, work, count, _NEXT_TO_NOTHING, work.verdict)
     # which of contacts that depend on each other carry the force is decided for all of them together
@@ -291,6 +372,7 @@ def _look_ahead(system, st, work, count):
         sure = work.doubt[p] == 0 and not (carriers and work.verdict[p] == TOUCHING)
         if sure or (work.doubt[p] == _SLIP and work.verdict[p] >= OPEN):
             work.verdict[p], work.doubtful[p] = work.first[p], work.doubt[p]
+    _press_or_open(system, work, count, _NEXT_TO_NOTHING * terms)
     return True
 
 
@@ -305,7 +387,7 @@ def _stick_in_doubt(system, work, count):
     u, found = len(system.rest), 0
     for p in range(count):
         r = work.listed[p]
-        if work.verdict[p] < OPEN and r < system.contacts:
+        if work.verdict[p] < OPEN and is_rigid(system, r):
             found = span(system, work, r, found)
     for p in range(count):
         if work.verdict[p] == STICK:

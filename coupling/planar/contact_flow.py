@@ -4,7 +4,8 @@ The forces of closed contacts keep their gaps (and the slips of those that stick
 presses on them, with the friction of slipping ones in the direction of their normal forces, W_N - sigma mu W_T, so that
 the projection of the accelerations is oblique. Only what is stretched, xi = B q with B a basis of the rows of stiffness
 and damping, moves by a differential equation of its own, whose modes are complex and may grow; everything else follows
-by quadrature. Every coordinate is then  constant + linear + quadratic + Re sum_j c_j exp(lambda_j t).
+by quadrature. A closed contact that yields is a spring and a dashpot whose force has the direction W_N - sigma mu W_T.
+Every coordinate is then  constant + linear + quadratic + Re sum_j c_j exp(lambda_j t).
 
 All is computed in coordinates sqrt(M) q, where the mass matrix is one.
 """
@@ -52,7 +53,7 @@ class ContactFlows(NamedTuple):
 def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
     """Room for `capacity` flows."""
     size, u, e = len(system.mass), len(system.rest), len(system.frequency)
-    m = e + 2 * _rank(system)
+    m = e + 2 * len(_stretched(system, np.flatnonzero(np.isfinite(system.spring))))
     z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
     return ContactFlows(
@@ -85,12 +86,14 @@ def add_flow(flows: ContactFlows, system: PlanarSystem, state: np.ndarray) -> Co
 _ROOM = 2**28
 
 
-def _stretched(system: PlanarSystem) -> np.ndarray:
-    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q."""
+def _stretched(system: PlanarSystem, pressed: np.ndarray) -> np.ndarray:
+    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, with some contacts as springs."""
     root = np.sqrt(system.mass)
     matrix = system.stiffness / root / root[:, None]
     size = np.sqrt(np.abs(np.diag(matrix)).max(initial=0.0))
-    both = np.vstack([matrix, size * system.damping / root / root[:, None]])
+    rows = system.J[pressed] / root
+    rows *= (size**2 or 1.0) / np.linalg.norm(rows, axis=1)[:, None]
+    both = np.vstack([matrix, size * system.damping / root / root[:, None], rows])
     touched = np.flatnonzero(both.any(axis=0))
     if not len(touched):
         return np.zeros((0, len(root)))
@@ -100,16 +103,14 @@ def _stretched(system: PlanarSystem) -> np.ndarray:
     return basis
 
 
-def _rank(system: PlanarSystem) -> int:
-    return len(_stretched(system))
-
-
 def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) -> None:
     u, e, size = len(system.rest), len(system.frequency), len(system.mass)
     root = np.sqrt(system.mass)
     rows = system.J / root
     units = np.arange(u)
-    closed = np.flatnonzero((state < OPEN) & (units < system.contacts))
+    yields = np.isfinite(system.spring)
+    closed = np.flatnonzero((state < OPEN) & (units < system.contacts) & ~yields)
+    pressed = np.flatnonzero((state < OPEN) & yields)
     stick = np.flatnonzero((state == STICK) & ((system.friction > 0) | (units >= system.contacts)))
     way = (state == SLIP_RIGHT).astype(float) - (state == SLIP_LEFT)
     kept = np.r_[closed, u + stick]
@@ -120,7 +121,10 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     applied = -(way * system.limit)[slides] @ rows[u + slides]
     carried, oblique = _forces(constraints, wrench)
     stiffness, damping = (part / root / root[:, None] for part in (system.stiffness, system.damping))
-    basis = _stretched(system)
+    push = (rows[pressed] - drag[pressed, None] * rows[u + pressed]).T
+    spring, dashpot = (part[pressed, None] * rows[pressed] for part in (system.spring, system.dashpot))
+    stiffness, damping = stiffness + push @ spring, damping + push @ dashpot
+    basis = _stretched(system, pressed)
     allowed = np.eye(len(basis))
     if len(basis) and len(constraints):
         # both are orthonormal: singular values are sines, and what constraints hold has none above round-off
@@ -131,6 +135,7 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     held[np.abs(held) < 1e-15] = 0.0
     inner = allowed.T @ basis  # eta = inner sqrt(M) q
     own, loss = (inner @ oblique @ part @ inner.T for part in (stiffness, damping))
+    preload = system.spring[pressed] * system.rest[pressed]
     weight = system.weight / root + applied
     eigenvalue, shape, project = _modes(own, loss, float(system.frequency[0]))
     count = e + len(eigenvalue)
@@ -138,6 +143,9 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     # constant part, of loads and of what constraints hold
     still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
     rest, rest_held = still @ weight, -still @ stiffness @ held
+    if len(pressed):  # a solution of its own: by the inverse, the large preload would leave its round-off
+        rest = rest - np.linalg.solve(own, inner @ oblique @ push @ preload)
+        weight = weight - push @ preload
     load = system.load / root
     wave = np.zeros((k, e), complex)
     for h, omega in enumerate(system.frequency):
@@ -147,6 +155,10 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     net[:, :e] += load.T
     net_constant, net_held = weight - stiffness @ inner.T @ rest, -stiffness @ (held + inner.T @ rest_held)
     motion = (oblique @ net) / rate**2
+    bend, bend_held = oblique @ net_constant, oblique @ net_held
+    if len(pressed):  # the forces of stiff contacts nearly cancel: of what they stretch, more is known than their sum
+        motion += inner.T @ (eta - inner @ motion)
+        bend, bend_held = bend - inner.T @ inner @ bend, bend_held - inner.T @ inner @ bend_held
     # a coordinate that constraints hold is at rest, not at round-off
     motion[np.abs(motion) <= 1e-15 * np.abs(net / rate**2).max(axis=0, initial=0.0)] = 0.0
     flows.key[s], flows.modes[s] = state, count
@@ -161,13 +173,21 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     turned = system.J @ flows.motion[s, :, :count]
     terms = np.abs(system.J) @ np.abs(flows.motion[s, :, :count])
     flows.rows[s, :, :count] = np.where(np.abs(turned) <= 1e-14 * terms, 0, turned)
-    flows.bend[s], flows.bend_held[s] = oblique @ net_constant / root, oblique @ net_held / root[:, None] * root
+    flows.bend[s], flows.bend_held[s] = bend / root, bend_held / root[:, None] * root
     flows.force[s], flows.force_constant[s], flows.force_held[s] = 0.0, 0.0, 0.0
     for part, target in ((net, flows.force[s, :, :count]), (net_constant, flows.force_constant[s])):
         _spread(target, carried @ part, closed, stick, drag, u)
     _spread(flows.force_held[s], carried @ net_held * root, closed, stick, drag, u)
+    strained = inner.T @ eta
+    for part, target in (
+        (-spring @ strained - dashpot @ (strained * rate), flows.force[s, :, :count]),
+        (-preload - spring @ inner.T @ rest, flows.force_constant[s]),
+        (-spring @ (held + inner.T @ rest_held) * root, flows.force_held[s]),
+    ):
+        target[pressed] = part
+        target[u + pressed] -= (drag[pressed] * part.T).T
     flows.force_constant[s, u + slides] = -(way * system.limit)[slides]
-    touching = np.flatnonzero((state != OPEN) & (units < system.contacts))
+    touching = np.flatnonzero((state != OPEN) & (units < system.contacts) & ~yields)
     flows.snap[s], flows.snap_rate[s] = 0.0, 0.0
     flows.snap[s][:, touching] = np.linalg.pinv(rows[touching], rcond=_DEPENDENT) / root[:, None]
     still_rows = np.r_[touching, u + stick]

@@ -15,8 +15,12 @@ from vanedamp.coupling.numerics.codes import (
     EXPANDED,
     FLOW,
     FORCE,
+    LEAVING,
     OPEN,
+    OPENS,
+    PARTS,
     POSITION,
+    RECLOSES,
     ROOT,
     SEGMENTS,
     SLIP_LEFT,
@@ -27,19 +31,26 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
-from vanedamp.coupling.planar.contact_decisions import AT_REST, rubs
+from vanedamp.coupling.planar.contact_decisions import AT_REST, rubs, yields
 
 #: round-off of a sum, relative to the sum of its terms' sizes; what is small beside the bound of a derivative
 _ROUND_OFF, _NOTHING = 4.0 * 2.0**-52, 1e-9
 #: what counts as zero where contacts have just been decided: of a gap, as a share of the play; of a speed
 _ZERO = 1e-12
+#: exponent of the growth of modes until the period's end above which the search looks less far
+_GROWN = 20.0
 
 
 @inlined
 def next_event(system, flows, st, guards, all_modes):
-    """Time to the next event and its function, or to the period's end and -1."""
+    """Time to the next event and its function, to the period's end and -1, or to a time without an event and -2.
+
+    The last where modes grow so much until the period's end that bounds for all of it say nothing.
+    """
     s = st.counters[FLOW]
-    left = max(system.period - st.time[0], 0.0)
+    left, last = max(system.period - st.time[0], 0.0), -1
+    if flows.growth[s] * left > _GROWN:
+        left, last = 1.0 / flows.growth[s], -2
     shortest = RESOLUTION * system.period
     eigenvalue, awake = flows.eigenvalue[s], all_modes[: flows.modes[s]]
     grows = math.exp(flows.growth[s] * left)
@@ -51,7 +62,7 @@ def next_event(system, flows, st, guards, all_modes):
             if guards.no_root_before[i] < tau:
                 k, tau = i, guards.no_root_before[i]
         if k < 0:
-            return left, -1
+            return left, last
         if guards.status[k] == ROOT:
             return (tau if tau > shortest else 0.0), k
         if guards.status[k] == BOUNDED:
@@ -79,8 +90,12 @@ def _watch(system, flows, st, guards, s, grows):
         if r < system.contacts:
             if state == OPEN:
                 count = _add(system, flows, st, guards, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
+            elif state == LEAVING:
+                count = _add(system, flows, st, guards, s, r, POSITION, OPENS, -1.0, 0.0, grows, count)
+                on_gap, on_rate = system.spring[r], system.dashpot[r]
+                count = _add(system, flows, st, guards, s, r, POSITION, RECLOSES, on_gap, on_rate, grows, count)
             elif state != TOUCHING:
-                count = _add(system, flows, st, guards, s, r, FORCE, AT_LOW, 1.0, 0.0, grows, count)
+                count = _add(system, flows, st, guards, s, r, FORCE, PARTS, 1.0, 0.0, grows, count)
         if state == STICK and rubs(system, r):
             bound = system.friction[r]
             count = _add(system, flows, st, guards, s, r, FORCE, AT_HIGH, bound, -1.0, grows, count)
@@ -96,14 +111,17 @@ def _watch(system, flows, st, guards, s, grows):
 def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows, k):
     """Add an event function: a gap, a slip's speed, or forces, the normal row and the slip row times these factors.
 
-    Returns the number of functions so far. One whose force never comes near its bound is left out.
+    Where a contact is leaving, it is the gap and its rate times them. Returns the number of functions so far. One whose
+    force never comes near its bound is left out.
     """
     u, size, modes = len(system.rest), len(st.q), flows.modes[s]
-    k0, k1, k2, noise = 0.0, 0.0, 0.0, 0.0
+    k0, k1, k2, noise, leaves, unit = 0.0, 0.0, 0.0, 0.0, False, 1.0
     if order == FORCE:
         k0 = on_normal * st.force[r] + on_slip * st.force[u + r] + system.limit[r]
         noise = abs(on_normal * st.force[r]) + abs(on_slip * st.force[u + r]) + system.limit[r]
-    elif order == POSITION:
+        if yields(system, r):  # its force is a small difference of displacements
+            noise += abs(on_normal) * system.spring[r] * system.play[r]
+    elif what == CLOSES:
         k0, noise = system.rest[r], abs(system.rest[r])
         for i in range(size):
             part = system.J[r, i] * st.q[i]
@@ -111,6 +129,15 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
             noise += abs(part)
             k1 += system.J[r, i] * st.v[i]
             k2 += system.J[r, i] * st.bend[i]
+    elif order == POSITION:
+        leaves, unit = True, abs(on_normal)
+        k0, noise = on_normal * system.rest[r], abs(on_normal * system.rest[r])
+        for i in range(size):
+            part, speed = on_normal * system.J[r, i] * st.q[i], on_slip * system.J[r, i] * st.v[i]
+            k0 += part + speed
+            noise += abs(part) + abs(speed)
+            k1 += system.J[r, i] * (on_normal * st.v[i] + on_slip * st.bend[i])
+            k2 += on_normal * system.J[r, i] * st.bend[i]
     else:
         for i in range(size):
             part = on_slip * system.J[u + r, i] * st.v[i]
@@ -126,6 +153,9 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
             g = on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]
         elif order == POSITION:
             g = flows.rows[s, r, j]
+            if leaves:
+                k1 += on_slip * (g * st.amplitude[j] * rate * rate).real
+                g *= on_normal + on_slip * rate
         else:
             g = on_slip * flows.rows[s, u + r, j] * rate
         g *= st.amplitude[j]
@@ -154,9 +184,11 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
     guards.noise[k] = _ROUND_OFF * (noise + swing)
     falls = first < -_NOTHING * second_bound * system.period
     if order == POSITION:
-        falls = falls and first < -AT_REST * st.scale[0]
+        falls = falls and first < -AT_REST * st.scale[0] * unit
     zero = (
-        _NOTHING * (noise + swing) if order == FORCE else _ZERO * (system.play[r] if order == POSITION else st.scale[0])
+        _NOTHING * (noise + swing)
+        if order == FORCE
+        else _ZERO * (system.play[r] * unit if order == POSITION else st.scale[0])
     )
     if st.fresh[r] != 0 and not falls and value <= zero:
         guards.no_root_before[k] = _leave(

@@ -5,6 +5,9 @@ other, and P_T stays within Coulomb's cone, at its edge where the contact still 
 coefficient for all contacts never brings energy; with friction, or with several coefficients, the law can (Kane's
 paradox). Then all coefficients are smaller by one factor, the largest that brings none.
 
+Poisson's law (Glocker and Pfeiffer 1995) is two such problems: one of compression, without restitution, and one of
+expansion, in which P_N exceeds k times that of compression only where v_N+ would be negative.
+
 A block that comes to lie rocks from corner to corner ever faster, and ends in finite time, as a ball does. Contacts
 that would part for less than CHATTER are closed together: they lose the speed with which they would part.
 """
@@ -15,18 +18,22 @@ import math
 
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.impacts import COLLAPSE
-from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, PERIOD
+from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD
 from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import (
     AT_REST,
+    is_rigid,
     is_shut,
     loaded_acceleration,
     row_speed,
+    rubs,
     solve_rows,
     span,
     speed_scale,
+    yields,
 )
-from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS
+from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
+from vanedamp.coupling.system.restitution import restitution_at
 
 #: energy that an impact may bring, as a share of what is in it, before it is solved again
 _GAIN = 1e-12
@@ -45,6 +52,8 @@ def collide(system, st, rec, log, work):
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
+    if system.two_phases and not _compress(system, work, count, tiny):
+        return False
     if not _rebound(system, st, work, count, 1.0, tiny):
         low, high = 0.0, 1.0
         for _ in range(_HALVINGS):
@@ -69,7 +78,7 @@ def _list_shut(system, st, work):
     """List the contacts whose gaps are zero. Returns how many they are."""
     count = ZERO
     for r in range(system.contacts):
-        if is_shut(system, st, r):
+        if is_rigid(system, r) and is_shut(system, st, r):
             work.listed[count], work.way[count] = r, 0
             count += 1
     return count
@@ -78,21 +87,66 @@ def _list_shut(system, st, work):
 @kernel
 def _rebound(system, st, work, count, share, tiny):
     """Find impulses for this share of the coefficients. Returns False if there are none, or they bring energy."""
+    if system.two_phases:
+        return _expand(system, st, work, count, share, tiny) and not _brings_energy(system, st, work)
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
         normal = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
-        work.speed[r] = normal + share * _restitution(system, st, r) * min(normal, 0.0)
+        work.speed[r] = normal + share * _restitution(system, st, work, r) * min(normal, 0.0)
         work.speed[u + r] = work.before_impact[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0) and not _brings_energy(system, st, work)
+    return solve_rows(system, work, count, work.speed, 0.0, system.limit) and not _brings_energy(system, st, work)
+
+
+@kernel
+def _compress(system, work, count, tiny):
+    """Find the impulses that stop the approach, and the speeds that they leave. Returns False if there are none."""
+    u = len(system.rest)
+    for p in range(count):
+        r = work.listed[p]
+        work.speed[r] = work.before_impact[r] if abs(work.before_impact[r]) > tiny else 0.0
+        work.speed[u + r] = work.before_impact[u + r]
+    if not solve_rows(system, work, count, work.speed, 0.0, system.limit):
+        return False
+    for r in range(2 * u):
+        work.compression[r], work.compressed[r] = work.impulse[r], work.before_impact[r]
+        for o in range(2 * u):
+            work.compressed[r] += system.delassus[r, o] * work.impulse[o]
+    return True
+
+
+@kernel
+def _expand(system, st, work, count, share, tiny):
+    """Find the impulses of both phases: in expansion a contact has at least its coefficient's part of compression.
+
+    With that part as given, the rest is the same problem: the more than it and the speed complement each other.
+    Returns False if there are none.
+    """
+    u = len(system.rest)
+    for row in range(2 * u):
+        work.speed[row] = work.compressed[row] if abs(work.compressed[row]) > tiny else 0.0
+    for p in range(count):
+        r = work.listed[p]
+        given = share * _restitution(system, st, work, r) * work.compression[r]
+        work.bound[r] = system.friction[r] * given
+        work.least[r] = given
+        for row in range(2 * u):
+            work.speed[row] += system.delassus[row, r] * given
+    if not solve_rows(system, work, count, work.speed, 0.0, work.bound):
+        return False
+    for p in range(count):
+        r = work.listed[p]
+        work.impulse[r] += work.least[r] + work.compression[r]
+        work.impulse[u + r] += work.compression[u + r]
+    return True
 
 
 @inlined
-def _restitution(system, st, r):
-    """Coefficient of a contact; an impact at the end of a collapse is plastic."""
+def _restitution(system, st, work, r):
+    """Coefficient of a contact at its speed of approach; an impact at the end of a collapse is plastic."""
     if st.time[0] - st.last_impact[r] < COLLAPSE * system.period:
         return 0.0
-    return system.restitution[r]
+    return restitution_at(system, r, -work.before_impact[r])
 
 
 @inlined
@@ -122,26 +176,30 @@ def _apply(system, st, work):
 
 @inlined
 def _account(system, st, work):
-    """Enter what the impulses took: of normal ones as impact loss, of tangential ones as friction, J."""
-    u = len(system.rest)
-    for r in range(2 * u):
+    """Enter what the impulses took, J: the loss of an impact is one, since shares of single rows may be negative."""
+    for r in range(len(work.impulse)):
         if work.impulse[r] != 0.0:
-            loss = -0.5 * work.impulse[r] * (work.before_impact[r] + row_speed(system, r, st.v))
-            st.ledger[IMPACT_LOSS if r < u else FRICTION] += loss
+            st.ledger[IMPACT_LOSS] -= 0.5 * work.impulse[r] * (work.before_impact[r] + row_speed(system, r, st.v))
 
 
 @inlined
 def _note(system, st, rec, log, work, r):
-    """Count an impact and log it: relative velocities, normal and tangential impulse, the energy that they take."""
+    """Count and log an impact of a rigid contact, with the energy that it takes."""
     u = len(system.rest)
     before, after, loss = work.before_impact[r], row_speed(system, r, st.v), 0.0
     for row in (r, u + r):
         loss -= 0.5 * work.impulse[row] * (work.before_impact[row] + row_speed(system, row, st.v))
+    note_impact(system, st, rec, log, r, before, after, work.impulse[r], work.impulse[u + r], loss)
+
+
+@inlined
+def note_impact(system, st, rec, log, r, before, after, normal, tangential, loss):
+    """Count an impact and log it: relative velocities, normal and tangential impulse, the energy that they take."""
     st.last_impact[r] = st.time[0]
     st.counters[IMPACTS] += 1
     rec.impacts[st.counters[PERIOD]] += 1
     rec.collided[st.counters[PERIOD]] += 0.5 * before * before / system.delassus[r, r]
-    log_event(system, st, log, IMPACT, r, before, after, work.impulse[r], work.impulse[u + r], loss)
+    log_event(system, st, log, IMPACT, r, before, after, normal, tangential, loss)
 
 
 @inlined
@@ -205,10 +263,10 @@ def _accelerate(system, st, work):
     u, largest = len(system.rest), 0.0
     for r in range(u):
         work.sliding[r] = 0
-        if r >= system.contacts:
+        if r >= system.contacts or (yields(system, r) and rubs(system, r) and st.state[r] < OPEN):
             slip = row_speed(system, u + r, st.v)
             work.sliding[r] = 0 if abs(slip) <= AT_REST * st.scale[0] else (1 if slip > 0.0 else -1)
-    loaded_acceleration(system, work, st.q, st.v, st.time[0])
+    loaded_acceleration(system, st, work, st.q, st.v, st.time[0])
     for r in range(2 * u):
         largest = max(largest, abs(work.speed[r]))
     return largest * CHATTER * system.period
@@ -220,10 +278,11 @@ def _step(system, st, work, count):
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
-        ahead = CHATTER * system.period * max(1.0 - system.restitution[r], 0.1)
-        work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
+        normal = row_speed(system, r, st.v)
+        ahead = CHATTER * system.period * max(1.0 - restitution_at(system, r, abs(normal)), 0.1)
+        work.speed[r] = normal + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0)
+    return solve_rows(system, work, count, work.speed, 0.0, system.limit)
 
 
 @inlined

@@ -10,12 +10,13 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.numerics.codes import FLOW, OPEN, PERIOD, SLIP_LEFT, SLIP_RIGHT
+from vanedamp.coupling.numerics.codes import FLOW, LEAVING, OPEN, PERIOD, SLIP_LEFT, SLIP_RIGHT
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.planar.constraints import FLOOR
+from vanedamp.coupling.planar.contact_decisions import row_speed, yields
 from vanedamp.coupling.planar.recorder import note_tilts
-from vanedamp.coupling.response.records import EXCITATION, FRICTION, VISCOUS
+from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, VISCOUS
 
 _TURN = 1.5
 _NODES, _WEIGHTS = (tuple(part.tolist()) for part in np.polynomial.legendre.leggauss(8))
@@ -72,7 +73,8 @@ def add_up(system, flows, st, rec, work, tau):
 @inlined
 def _on_floor(system, st, b):
     for r in range(system.contacts):
-        if system.body[r] == b and system.surface[r] == FLOOR and st.state[r] != OPEN:
+        shut = st.state[r] != OPEN and st.state[r] != LEAVING
+        if shut and system.body[r] == b and system.surface[r] == FLOOR:
             return True
     return False
 
@@ -91,9 +93,21 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
         for k in range(size):
             damper += system.damping[i, k] * v[k]
         loss += v[i] * damper
-    friction = 0.0
+    friction, contact = 0.0, 0.0
     for r in range(u):
         state = st.state[r]
+        if yields(system, r) and state < OPEN:
+            rate = row_speed(system, r, v)
+            taken = system.dashpot[r] * rate * rate
+            contact += taken
+            for row in (r, u + r):
+                force = st.force[row]
+                for j in range(flows.modes[s]):
+                    force += (flows.force[s, row, j] * st.amplitude[j] * (1.0 + work.turn[j])).real
+                st.pushed[row] += weight * force
+                if row >= u and (state == SLIP_RIGHT or state == SLIP_LEFT):
+                    taken -= force * row_speed(system, row, v)
+            st.lost[r] += weight * taken
         if (state == SLIP_RIGHT or state == SLIP_LEFT) and not flows.held[s, r]:
             slip, force = 0.0, st.force[u + r]
             for i in range(size):
@@ -110,6 +124,7 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
     st.ledger[EXCITATION] += weight * power
     st.ledger[VISCOUS] += weight * loss
     st.ledger[FRICTION] += weight * friction
+    st.ledger[CONTACT] += weight * contact
     rec.harmonic[period] += weight * x * back
     rec.momentum[period] += weight * momentum * back
     rec.square[period] += weight * x * x

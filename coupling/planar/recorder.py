@@ -31,7 +31,7 @@ def plane_of(
         for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
     ]
     samples = partial(_samples, system, sampled, shut, places)
-    return Plane(tilt, lifted, system.neglected, linearisation, places, samples)
+    return Plane(tilt, lifted, system.neglected, linearisation, places, samples, system.spring)
 
 
 def _samples(
@@ -57,11 +57,11 @@ def _samples(
 
 
 @entry
-def record_section(system, st, rec):
-    """Record section, energies and ledger at the start of a period."""
+def record_section(system, st, rec, springs):
+    """Record section, energies and ledger at the start of a period. springs: energy in those of contacts, J."""
     size, bodies, period = len(st.q), len(system.along), st.counters[PERIOD]
     entry, part = rec.section[period], rec.parts[period]
-    x, rate, momentum, energy = 0.0, 0.0, 0.0, 0.0
+    x, rate, momentum, energy = 0.0, 0.0, 0.0, springs
     for h in range(len(system.table)):
         x += system.table[h].real
         rate -= system.frequency[h] * system.table[h].imag

@@ -21,7 +21,8 @@ class PlanarState(NamedTuple):
     time: np.ndarray  # (1,) within the period, s
     q: np.ndarray  # (N,)
     v: np.ndarray  # (N,)
-    # (u,) int: OPEN; TOUCHING, closed but others carry its force; STICK, SLIP_LEFT or SLIP_RIGHT, as which a closed
+    # (u,) int: OPEN; LEAVING, a contact that yields and has ended before its gap is open; TOUCHING, closed but others
+    # carry its force, or nothing presses it; STICK, SLIP_LEFT or SLIP_RIGHT, as which a closed
     # contact without friction counts. A friction element sticks or slips
     state: np.ndarray
     other: np.ndarray  # (u,) int: states that move alike, with forces at their bounds where `state` shares them
@@ -30,6 +31,8 @@ class PlanarState(NamedTuple):
     rate: np.ndarray  # (2u,) speeds of rows, scratch
     scale: np.ndarray  # (1,) of the speeds in the scene, m/s: their round-off is relative to it
     last_impact: np.ndarray  # (u,) time of the last impact, counted from the period's start, s
+    pushed: np.ndarray  # (2u,) impulse of a contact that yields since it closed, N s
+    lost: np.ndarray  # (u,) what it has taken since then, J
     ledger: np.ndarray  # (6,) J
     tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity in each period, rad
     lifted: np.ndarray  # (periods + 1, b) time off the floor, s
@@ -46,7 +49,8 @@ class Guards(NamedTuple):
 
     unit: np.ndarray  # (k,) int
     order: np.ndarray  # (k,) int: POSITION, VELOCITY or FORCE of exact.root_search
-    # (k,) int: CLOSES, a gap; STOPS, a slip; AT_LOW, AT_HIGH, a force at its bound
+    # (k,) int: CLOSES, OPENS, a gap; STOPS, a slip; PARTS, a normal force vanishes; RECLOSES, it would push again;
+    # AT_LOW, AT_HIGH, friction at its bound
     what: np.ndarray
     status: np.ndarray  # (k,) int
     k0: np.ndarray
@@ -67,6 +71,10 @@ class Scratch(NamedTuple):
     speed: np.ndarray  # (2u,) right-hand side of a problem: accelerations or speeds of the rows
     before_impact: np.ndarray  # (2u,) speeds
     impulse: np.ndarray  # (2u,)
+    compression: np.ndarray  # (2u,) impulse of the phase of compression
+    compressed: np.ndarray  # (2u,) speeds after it
+    least: np.ndarray  # (u,) normal impulse of expansion that compression asks for
+    bound: np.ndarray  # (u,) friction that a listed unit has whatever its unknown normal force, N or N s
     before: np.ndarray  # (u,) int: states before the event
     listed: np.ndarray  # (u,) int: units of a problem
     way: np.ndarray  # (u,) int: direction in which a listed unit slips, 0: none yet
@@ -75,7 +83,8 @@ class Scratch(NamedTuple):
     doubtful: np.ndarray  # (u,) int: whether the normal force (1) or the slip (2) was not decided
     first: np.ndarray  # (u,) int: verdict now, while that a moment later is sought
     doubt: np.ndarray  # (u,) int: doubtful now
-    sliding: np.ndarray  # (u,) int: direction in which a friction element slides
+    sliding: np.ndarray  # (u,) int: direction in which a unit slides whose friction is known
+    resting: np.ndarray  # (u,) int: whether a contact that yields touches without speed, and what it does then
     span: np.ndarray  # (N, N) orthonormal basis of rows
     lemke: Lemke
     turn: np.ndarray  # (m,) complex
@@ -89,8 +98,8 @@ def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, records: 
     return PlanarState(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=initial.q.copy(), v=initial.v.copy(),
         state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
-        rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), ledger=np.zeros(len(ENERGIES)),
-        tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
+        rate=np.zeros(2 * u), scale=np.zeros(1), last_impact=np.full(u, -np.inf), pushed=np.zeros(2 * u),
+        lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
         sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
     )  # fmt: skip
@@ -109,11 +118,13 @@ def new_guards(system: PlanarSystem, modes: int) -> Guards:
 def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
     """Return scratch space for a scene."""
     u, size = len(system.rest), len(system.mass)
-    integers = iter(np.zeros((9, u), np.int64))
+    integers = iter(np.zeros((10, u), np.int64))
     return Scratch(
         free=np.zeros(size), terms=np.zeros(size), ahead=np.zeros((2, size)), speed=np.zeros(2 * u),
-        before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), before=next(integers), listed=next(integers),
+        before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), compression=np.zeros(2 * u), compressed=np.zeros(2 * u),
+        least=np.zeros(u), bound=np.zeros(u), before=next(integers), listed=next(integers),
         way=next(integers), place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
-        doubt=next(integers), sliding=next(integers), span=np.zeros((size, size)), lemke=new_lemke(3 * u),
+        doubt=next(integers), sliding=next(integers), resting=next(integers),
+        span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
     )  # fmt: skip

@@ -5,7 +5,6 @@ Every method leaves the same records behind, so that figures of different method
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -61,7 +60,8 @@ class Plane(NamedTuple):
 
     tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
     shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status
-    ok; places: body, side and corner by the row in the log; samples: those in the plane, from those of the response.
+    ok; places: body, side and corner by the row in the log; samples: those in the plane, from those of the response;
+    spring: stiffness of the contact of each row, N/m, inf: rigid.
     """
 
     tilt: np.ndarray
@@ -70,6 +70,7 @@ class Plane(NamedTuple):
     bound: float
     places: Sequence[tuple[int, str, int]]
     samples: Callable[[np.ndarray], PlanarSamples]
+    spring: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -198,7 +199,9 @@ def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any],
 def _events_in_plane(plane: Plane, chunks: Sequence[np.ndarray]) -> list[Event]:
     """Return the events of a log of bodies in the plane: as of events_of, tangential impulse and loss."""
     found = []
-    for moment, kind, row, before, after, *impulses, loss in itertools.chain(*(chunk.tolist() for chunk in chunks)):
+    entries = np.concatenate(chunks) if chunks else np.zeros((0, 8))
+    _complete(plane.spring, entries)
+    for moment, kind, row, before, after, *impulses, loss in entries.tolist():
         body, side, corner = plane.places[int(row)]
         normal, tangential = impulses
         found.append(Event(moment, KINDS[int(kind)], body, side, before, after, normal, corner, tangential, loss))
@@ -260,7 +263,7 @@ def events_of(system: System, chunks: Sequence[np.ndarray]) -> list[Event]:
     """Return the events of a compiled log: chunks of entries time, kind, row, velocity before and after, impulse."""
     events = []
     entries = np.concatenate(chunks) if chunks else np.zeros((0, 6))
-    _complete(system, entries)
+    _complete(system.spring, entries)
     places = [_place(system, row) for row in range(len(system.J))] if len(entries) else []
     for entry in entries:
         body, side = places[int(entry[2])]
@@ -271,17 +274,17 @@ def events_of(system: System, chunks: Sequence[np.ndarray]) -> list[Event]:
     return events
 
 
-def _complete(system: System, entries: np.ndarray) -> None:
+def _complete(spring: np.ndarray, entries: np.ndarray) -> None:
     """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end brought."""
     begun: dict[int, np.ndarray] = {}
     for entry in entries:
         kind, row = int(entry[1]), int(entry[2])
-        if not np.isfinite(system.spring[row]):
+        if not np.isfinite(spring[row]):
             continue
         if kind == IMPACT:
             begun[row] = entry
         elif kind == DETACHES and row in begun:
-            begun[row][4:6] = entry[4:6]
+            begun[row][4:] = entry[4:]
 
 
 def _place(system: System, row: int) -> tuple[int, str]:

@@ -134,8 +134,8 @@ class Scene:
 
     @property
     def planar(self) -> bool:
-        """Whether a body moves in the plane of its cavity, or has a spring of its own."""
-        return any(damper.planar for damper in self.damper)
+        """Whether it is for coupling.planar: a body with extent or a spring of its own, or impacts of two phases."""
+        return self.contact.two_phases or any(damper.planar for damper in self.damper)
 
     def _check_plane(self) -> None:
         """Raise ValueError where a scene with planar bodies lacks or has something that they cannot do with."""
@@ -147,16 +147,11 @@ class Scene:
                     f'cavity[{number}].play: missing; damper[{index}] with shape = "{damper.shape}" needs the free '
                     "travel across the cavity"
                 )
-        if self.contact.law != "newton":
-            raise ValueError(
-                f'contact.law: "{self.contact.law}" is for sliders without springs; bodies with extent, stiffness or '
-                'dashpot take "newton"'
-            )
         for index, friction_damper in enumerate(self.friction_damper):
             if friction_damper.stiffness is not None:
                 raise ValueError(
-                    f"friction_damper[{index}].stiffness: beside bodies with extent, stiffness or dashpot a friction "
-                    "damper is rigid; leave it out"
+                    f"friction_damper[{index}].stiffness: beside bodies with extent, stiffness or dashpot, and with "
+                    "impacts of two phases, a friction damper is rigid; leave it out"
                 )
 
     def _check_contact(self, key: str, restitution: float, mass: float) -> None:

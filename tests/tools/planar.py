@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.methods import moreau
 from vanedamp.coupling.planar.constraints import planar_motion, planar_system
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.evaluation import LOG_WIDTH
@@ -53,6 +54,15 @@ def run_planar(scene, periods, events=10**7, samples=0):
     run = open_run(scene, periods, events, samples)
     run.status = run.advance_to(periods)
     return run
+
+
+def witness(scene, periods, steps, samples=0, **options):
+    """The run of a scene by time stepping, with its status."""
+    flat = assemble(scene)
+    records = new_records(flat, periods, samples)
+    taken = moreau.Options(steps_per_period=steps, **options)
+    run = moreau.begin_planar(scene, flat, taken, records, True)
+    return run, run.advance_to(periods)
 
 
 def planar_run(data, *bodies, periods, events=10**7, **cavity):

@@ -3,7 +3,7 @@
 Between events the motion is computed again, by matrix exponentials of the equations of motion with the forces of the
 contacts' states. Run as a script, it looks at many scenes and prints the largest violations:
 
-    .venv/bin/python -m tests.tools.planar_laws [FIRST_SEED [SCENES]]
+    .venv/bin/python -m tests.tools.planar_laws [FIRST_SEED [SCENES [LAW]]]
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from vanedamp.coupling.numerics.codes import (
     EVENT_BUDGET,
     EVENTS,
     ILL_CONDITIONED,
+    LEAVING,
     LOGGED,
     NEEDS_FLOW,
     OPEN,
@@ -38,7 +39,7 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.planar.automaton import advance, begin
 from vanedamp.coupling.planar.constraints import PlanarSystem
 from vanedamp.coupling.planar.contact_flow import add_flow
-from vanedamp.coupling.response.records import IMPACT
+from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
 
@@ -54,6 +55,7 @@ PLACES, PERTURBATION, PARTED = 20, 1e-11, 1e-6
 LIMITS = {
     "penetration": 1e-9, "apart": 1e-8, "motion": 1e-8, "pull": 1e-5, "cone": 1e-5, "along_slip": 1e-8,
     "starts": 1e-5, "newton": 1e-9, "impulse": 1e-9, "momentum": 1e-8, "gain": 1e-9, "ledger": 1e-10,
+    "returns": 1e-10,
 }  # fmt: skip
 
 
@@ -73,6 +75,7 @@ class Worst:
     momentum: float = 0.0  # jump of the velocities that no impulses explain
     gain: float = 0.0  # energy that an impact brings
     ledger: float = 0.0
+    returns: float = 0.0  # energy that friction, dashpots or impacts give back from one event to the next
     scenes: int = 0
     steps: int = 0
     jams: int = 0  # impacts without a collision
@@ -258,7 +261,8 @@ class Motion:
     def __init__(self, system: PlanarSystem, state: np.ndarray) -> None:
         n, u, e = len(system.mass), len(system.rest), len(system.frequency)
         units, contact = np.arange(u), np.arange(u) < system.contacts
-        closed = units[contact & (state < OPEN)]
+        yields = np.isfinite(system.spring)
+        closed, pressed = units[contact & ~yields & (state < OPEN)], units[yields & (state < OPEN)]
         sticks = units[(state == STICK) & ((system.friction > 0) | ~contact)]
         way = 1.0 * (state == SLIP_RIGHT) - (state == SLIP_LEFT)
         normal, slip = system.J[:u], system.J[u:]
@@ -272,11 +276,17 @@ class Motion:
         free[:, :n], free[:, n : 2 * n] = -system.stiffness, -system.damping
         free[:, 2 * n : 2 * n + e], free[:, 2 * n + e : -1] = system.load.real.T, -system.load.imag.T
         free[:, -1] = system.weight + slip.T @ slides
+        springs = np.zeros((2 * u, free.shape[1]))
+        springs[pressed, :n] = -system.spring[pressed, None] * normal[pressed]
+        springs[pressed, n : 2 * n] = -system.dashpot[pressed, None] * normal[pressed]
+        springs[pressed, -1] = -system.spring[pressed] * system.rest[pressed]
+        springs[u + pressed] = -(way * system.friction)[pressed, None] * springs[pressed]
+        free += system.J.T @ springs
         free /= system.mass[:, None]
         size = np.sqrt(np.maximum((rows**2 / system.mass).sum(axis=1), 1e-300))
         mobility = (rows / system.mass) @ system.J.T @ spread / size / size[:, None]
         forces = -(np.linalg.pinv(mobility, rcond=1e-9) / size[:, None] / size) @ rows @ free
-        self.force = spread @ forces
+        self.force = spread @ forces + springs
         self.force[u:, -1] += slides
         self.acceleration = free + (system.J.T @ spread @ forces) / system.mass[:, None]
         self.terms = np.abs(free) + (np.abs(system.J.T) @ np.abs(spread @ forces)) / system.mass[:, None]
@@ -316,6 +326,7 @@ class Checker:
         self.stepper, self.worst, self.label = Stepper(scene), Worst(scenes=1), label
         system = self.stepper.run.system
         self.system, self.u, self.contact = system, len(system.rest), np.arange(len(system.rest)) < system.contacts
+        self.rigid = self.contact & np.isinf(system.spring)
         self.motions: dict[bytes, Motion] = {}
         # what the loads could lend each coordinate: a body that lies still has the round-off of that
         lent = 0.5 * (np.abs(system.load) ** 2 / (system.mass * system.frequency[:, None] ** 2)).sum()
@@ -361,7 +372,8 @@ class Checker:
         self._between(before.state, motion, path, where)
         q, v = path[-1, :n], path[-1, n : 2 * n]
         gap = system.rest + system.J[: self.u] @ q
-        shut = self.contact & ((after.state != OPEN) | (gap <= SIMULTANEOUS * system.play))
+        shut = self.rigid & ((after.state != OPEN) | (gap <= SIMULTANEOUS * system.play))
+        hits = hits[self.rigid[hits[:, 2].astype(int)]]
         reach = np.abs(q).max() + np.abs(before.q).max() + system.period * self.fastest.max()
         worst.note("motion", np.abs(after.q - q).max() / reach, where)
         if len(hits):
@@ -369,6 +381,8 @@ class Checker:
         else:
             self._jump(v, after, np.zeros(2 * self.u), 0.0, where)
         self._ledger(after, where)
+        losses = [VISCOUS, FRICTION, IMPACT_LOSS]
+        worst.note("returns", (before.ledger - after.ledger)[losses].max() / self.flowed, where)
         self._settled(after, self._motion(after), where)
 
     def _between(self, state: np.ndarray, motion: Motion, path: np.ndarray, where: str) -> None:
@@ -380,7 +394,9 @@ class Checker:
         force = path @ motion.force.T
         # forces are differences of these, in a wedged block of those of its other contacts
         size = np.full(2 * u, (motion.size(path) @ np.abs(motion.force).T).max() + 1e-300)
-        open_, closed = self.contact & (state == OPEN), self.contact & (state != OPEN)
+        pressed = np.isfinite(system.spring) & (state < OPEN)  # a gap has the round-off of its play
+        size += 1e-7 * (system.spring * system.play)[pressed].max(initial=0.0)
+        open_, closed = self.contact & (state == OPEN), self.rigid & (state != OPEN)
         share = -gap / np.where(self.contact, system.play, 1.0)
         worst.note("penetration", share[:, open_].max(initial=0.0), where)
         worst.note("apart", np.abs(share[:, closed]).max(initial=0.0), where)
@@ -388,7 +404,14 @@ class Checker:
         sticks, slides = state == STICK, (state == SLIP_LEFT) | (state == SLIP_RIGHT)
         worst.note("apart", np.abs(slip[:, sticks]).max(initial=0.0) / self.speed, where)
         pushes, friction = force[:, :u], force[:, u:]
-        worst.note("pull", (-pushes / size[:u])[:, closed].max(initial=0.0), where)
+        worst.note("pull", (-pushes / size[:u])[:, self.contact & (state != OPEN)].max(initial=0.0), where)
+        leaves = state == LEAVING
+        stiff = np.where(leaves, system.spring, 0.0)  # that of others may be infinite
+        would = (
+            -(stiff * gap + system.dashpot * rate) / np.where(leaves, stiff, 1.0) / np.where(leaves, system.play, 1.0)
+        )
+        worst.note("pull", would[:, leaves].max(initial=0.0), where)
+        worst.note("penetration", -share[:, leaves].min(initial=0.0), where)
         beyond = np.abs(friction) - (system.friction * np.maximum(pushes, 0.0) + system.limit)
         worst.note("cone", (beyond / (size[u:] + size[:u])).max(initial=0.0), where)
         rubs = slides & ((system.friction > 0) | ~self.contact)
@@ -429,7 +452,7 @@ class Checker:
         motion: Motion,
         where: str,
     ) -> None:
-        """Newton's law, impulses that push and stay in their cones, no gain of energy."""
+        """The law of impact, impulses that push and stay in their cones, no gain of energy."""
         system, u, worst = self.system, self.u, self.worst
         impulse = np.zeros(2 * u)
         for hit in hits:
@@ -452,28 +475,63 @@ class Checker:
             self._jump(v, after, impulse, self._moment(after, motion) / speed, where)
             worst.note("gain", -lost / there, where)
             return
-        inside = shut & (system.friction > 0) & (np.abs(tangential) < system.friction * normal - 1e-9 * size)
+        worst.note("gain", -lost / there, where)
+        # impacts of one contact as good as at once end a collapse without rebound
+        collapsed = after.time - self.last <= 10 * COLLAPSE * system.period
+        if system.two_phases:
+            self._phases(first, impulse, shut, collapsed, (size, speed), where)
+        else:
+            self._newton(first, then, impulse, shut, collapsed, (size, speed), where)
+        allowed = self._moment(after, motion) / speed
+        caught = np.any(shut & (then[:u] > 1e-13 * speed) & (then[:u] < allowed * speed))
+        self._jump(v, after, impulse, allowed if caught else 0.0, where)
+        self.last[hits[:, 2].astype(int)] = after.time
+
+    def _coulomb(self, impulse, then, shut, sizes, where) -> None:
+        """Contacts do not approach after impulses; friction within its cone stops a slip, and is against one."""
+        system, u, worst, (size, speed) = self.system, self.u, self.worst, sizes
+        normal, tangential = impulse[:u], impulse[u:]
+        beyond = np.abs(tangential) - system.friction * np.maximum(normal, 0.0)
+        worst.note("impulse", (-normal).max(initial=0.0) / size, where)
+        worst.note("impulse", beyond.max() / size, where)
+        inside = shut & (system.friction > 0) & (beyond < -1e-9 * size)
         worst.note("newton", np.abs(then[u:][inside]).max(initial=0.0) / speed, where)
         worst.note("impulse", (tangential * then[u:])[shut].max(initial=0.0) / (size * speed), where)
-        approach = np.maximum(-first[:u], 0.0)
         worst.note("newton", (-then[:u])[shut].max(initial=0.0) / speed, where)
-        worst.note("gain", -lost / there, where)
-        target, pushes = system.restitution * approach, shut & (normal > 1e-9 * size)
+
+    def _phases(self, first, impulse, shut, collapsed, sizes, where) -> None:
+        """Poisson's law: of the impulses of compression, and of what expansion adds to them."""
+        system, u, (size, speed) = self.system, self.u, sizes
+        compression = self.stepper.run.scratch.compression
+        between = first + system.delassus @ compression
+        self._coulomb(compression, between, shut, sizes, where)
+        held = shut & (compression[:u] > 1e-9 * size)
+        self.worst.note("newton", np.abs(between[:u][held]).max(initial=0.0) / speed, where)
+        expansion, then = impulse - compression, first + system.delassus @ impulse
+        self._coulomb(expansion, then, shut, sizes, where)
+        asked = np.where(collapsed, 0.0, system.restitution * compression[:u])
+        judged = shut & (asked > 1e-6 * size)
+        share = min((expansion[:u][judged] / asked[judged]).min(initial=1.0), 1.0)
+        self.worst.reduced += share < 1.0 - 1e-6
+        more = np.abs(expansion[:u] - share * asked)
+        apart = shut & (then[:u] > 1e-9 * speed) & ~collapsed
+        self.worst.note("newton", more[apart].max(initial=0.0) / size, where)
+
+    def _newton(self, first, then, impulse, shut, collapsed, sizes, where) -> None:
+        """Newton's law in Moreau's form."""
+        system, u, worst, (size, speed) = self.system, self.u, self.worst, sizes
+        self._coulomb(impulse, then, shut, sizes, where)
+        target, pushes = system.restitution * np.maximum(-first[:u], 0.0), shut & (impulse[:u] > 1e-9 * size)
         first_hit = np.argmax(np.where(pushes, target, -1.0))
         if pushes[first_hit] and then[first_hit] < target[first_hit] - 1e-9 * speed:
             # one share of all coefficients: with more the impact would bring energy, or a wedged block has no solution
             target = target * max(then[first_hit] / target[first_hit], 0.0)
             worst.reduced += 1
-        # impacts of one contact as good as at once end a collapse without rebound
-        judged = (shut | pushes) & (after.time - self.last > 10 * COLLAPSE * system.period)
+        judged = (shut | pushes) & ~collapsed
         short = target - then[:u]
         if judged[pushes].all():
             worst.note("newton", short[judged].max(initial=0.0) / speed, where)
             worst.note("newton", np.abs(short[pushes]).max(initial=0.0) / speed, where)
-        allowed = self._moment(after, motion) / speed
-        caught = np.any(shut & (then[:u] > 1e-13 * speed) & (then[:u] < allowed * speed))
-        self._jump(v, after, impulse, allowed if caught else 0.0, where)
-        self.last[hits[:, 2].astype(int)] = after.time
 
     def _moment(self, now: Moment, motion: Motion) -> float:
         """Speed that counts as chatter."""
@@ -482,8 +540,11 @@ class Checker:
 
     def _energy(self, moment: Moment) -> float:
         system = self.system
+        pressed = np.isfinite(system.spring) & (moment.state < OPEN)
+        shift = (system.rest + system.J[: self.u] @ moment.q)[pressed]
         return float(
-            0.5 * (system.mass * moment.v**2).sum()
+            0.5 * (system.spring[pressed] * shift**2).sum()
+            + 0.5 * (system.mass * moment.v**2).sum()
             + 0.5 * moment.q @ system.stiffness @ moment.q
             - system.weight @ moment.q
         )
@@ -497,21 +558,21 @@ class Checker:
         self.worst.note("ledger", abs(closed) / self.flowed, where)
 
 
-def check_laws(seed: int, longest: int = LONGEST) -> tuple[Worst | None, int]:
+def check_laws(seed: int, longest: int = LONGEST, law: str | dict = "newton") -> tuple[Worst | None, int]:
     """Check a random scene. Returns the largest violations, None if it has no start, and the code of its end."""
     try:
-        scene = scene_of(tables(seed))
+        scene = scene_of(tables(seed) | {"contact": law if isinstance(law, dict) else {"law": law}})
         checker = Checker(scene, f"seed {seed}")
     except InputError:
         return None, DONE
     return checker.run(longest), checker.stepper.code
 
 
-def laws_of(first: int, count: int, longest: int = LONGEST) -> tuple[Worst, Counter[int]]:
+def laws_of(first: int, count: int, longest: int = LONGEST, law: str | dict = "newton") -> tuple[Worst, Counter[int]]:
     """Check so many scenes. Returns the largest violations and how runs ended that gave up, by their codes."""
     largest, ends, seed = Worst(), Counter(), first
     while largest.scenes < count:
-        worst, code = check_laws(seed, longest)
+        worst, code = check_laws(seed, longest, law)
         if worst is not None:
             largest.merge(worst)
             ends[int(code)] += code not in (DONE, EVENT_BUDGET)
@@ -592,12 +653,12 @@ def _image_of(system: PlanarSystem, image: PlanarSystem) -> tuple[np.ndarray, np
     return place, sign
 
 
-def main(first: int = 0, count: int = 200) -> None:
+def main(first: int = 0, count: int = 200, law: str = "newton") -> None:
     """Print the largest violations and the seeds of what fails."""
     largest, seed, failed = Worst(), first, []
     while largest.scenes < count:
         try:
-            worst, code = check_laws(seed)
+            worst, code = check_laws(seed, law=law)
         except AssertionError as error:
             worst, code = Worst(scenes=1), DONE
             failed.append(str(error))
@@ -612,4 +673,4 @@ def main(first: int = 0, count: int = 200) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(*map(int, sys.argv[1:3]), *sys.argv[3:])

@@ -17,6 +17,7 @@ from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.constraints import PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import gap, row_speed
+from vanedamp.coupling.system.restitution import restitution_at
 
 #: problems that a step may take, the last with all contacts at once
 _TURNS = 20
@@ -85,11 +86,19 @@ def _impulses(system, motion, mobility, turned, h):
         for i in range(len(free)):
             size += abs(system.J[r, i]) * max(abs(free[i]), abs(motion.v[i]))
         fastest = max(fastest, size)
+    motion.slowest[0] = _AT_REST * fastest
     for r in range(system.contacts):
         ahead = gap(system, r, motion.q) + 0.5 * h * motion.before[r]
         motion.closed[r] = 1 if ahead <= _ROUND_OFF * system.play[r] else 0
+    if system.two_phases:
+        if not _two_phases(system, motion, mobility, h, _TOLERANCE * fastest):
+            return False
+        for r in range(2 * u):
+            if motion.impulse[r] != 0.0:
+                for i in range(len(free)):
+                    free[i] += turned[i, r] * motion.impulse[r]
     for turn in range(_TURNS):
-        count = _list_units(system, motion, turn, _AT_REST * fastest)
+        count = _list_units(system, motion, turn)
         if count == 0:
             return True
         motion.counters[SOLVES] += 1
@@ -102,27 +111,61 @@ def _impulses(system, motion, mobility, turned, h):
                     free[i] += turned[i, r] * motion.more[r]
         approaching = False
         for r in range(system.contacts):
-            approaching = approaching or (
-                motion.closed[r] == 1 and row_speed(system, r, free) < -_AT_REST * fastest
-            )  # fmt: skip
+            approaching = approaching or (motion.closed[r] == 1 and row_speed(system, r, free) < -motion.slowest[0])
         if not approaching:
             return True
     return True
 
 
+@kernel
+def _two_phases(system, motion, mobility, h, tolerance):
+    """Add the impulses of impacts, compression and expansion, which the loads of the step come after.
+
+    In one problem with the loads, what they press would expand as well: a body at rest would hop. Returns False if
+    they do not converge.
+    """
+    u = len(system.rest)
+    for turn in range(_TURNS):
+        count, approaching = 0, False
+        for r in range(system.contacts):
+            if motion.closed[r] == 0:
+                continue
+            motion.left[r], motion.left[u + r] = motion.before[r], motion.before[u + r]
+            for row in range(2 * u):
+                motion.left[r] += mobility[r, row] * motion.impulse[row]
+                motion.left[u + r] += mobility[u + r, row] * motion.impulse[row]
+            approaching = approaching or motion.left[r] < -motion.slowest[0]
+            if motion.left[r] <= motion.slowest[0] or turn == _TURNS - 1:
+                motion.listed[count], motion.approach[r] = r, -motion.left[r]
+                count += 1
+        if not approaching:
+            return True
+        for phase in range(2):
+            if not _gauss_seidel(system, motion, mobility, count, h, tolerance):
+                return False
+            for p in range(count):
+                r = motion.listed[p]
+                motion.impulse[r] += motion.more[r]
+                motion.impulse[u + r] += motion.more[u + r]
+                motion.least[r] = restitution_at(system, r, motion.approach[r]) * motion.more[r] if phase == 0 else 0.0
+    return True
+
+
 @inlined
-def _list_units(system, motion, turn, slowest):
+def _list_units(system, motion, turn):
     """List the units that take part in a turn, with what Newton's law leaves of their speeds. Return their number."""
-    u, count, free = len(system.rest), 0, motion.free[1]
+    u, count, free, slowest = len(system.rest), 0, motion.free[1], motion.slowest[0]
     for r in range(u):
         if r < system.contacts:
             if motion.closed[r] == 0:
                 continue
             now = row_speed(system, r, free)
-            before = motion.before[r] if turn == 0 else now
+            before = motion.before[r] if turn == 0 and not system.two_phases else now
             if turn < _TURNS - 1 and before > slowest and now > -slowest:
                 continue
-            motion.left[r] = now + system.restitution[r] * min(before, 0.0)
+            motion.left[r] = now
+            if not system.two_phases:
+                motion.left[r] += restitution_at(system, r, -before) * min(before, 0.0)
         motion.left[u + r] = row_speed(system, u + r, free)
         motion.listed[count] = r
         count += 1
@@ -140,7 +183,7 @@ def _gauss_seidel(system, motion, mobility, count, h, tolerance):
         for p in range(count):
             r = motion.listed[p]
             if r < system.contacts:
-                largest = max(largest, _push(system, motion, mobility, count, r, 0.0, math.inf))
+                largest = max(largest, _push(system, motion, mobility, count, r, motion.least[r], math.inf))
                 bound = system.friction[r] * more[r]
                 low, high = -bound, bound
             else:

@@ -28,7 +28,6 @@ from vanedamp.coupling.response.records import (
     FRICTION,
     IMPACT,
     IMPACT_LOSS,
-    STORED,
     VISCOUS,
     Records,
 )
@@ -65,8 +64,11 @@ class SteppedMotion(NamedTuple):
     start: np.ndarray  # (2, N) coordinates and velocities as the step begins
     free: np.ndarray  # (2, N) right-hand side; velocities at the step's end with the impulses found so far
     before: np.ndarray  # (2u,) speeds as the step begins
+    slowest: np.ndarray  # (1,) speed below which a contact counts as at rest, m/s
     impulse: np.ndarray  # (2u,) of the step
     more: np.ndarray  # (2u,) that the present problem adds
+    least: np.ndarray  # (u,) normal impulse that it asks for, at least: in expansion
+    approach: np.ndarray  # (u,) speed of approach before its impact, m/s
     left: np.ndarray  # (2u,) its speeds, less what restitution asks for
     closed: np.ndarray  # (u,) int: whether a contact takes part in the step
     listed: np.ndarray  # (u,) int: units of the problem
@@ -84,8 +86,9 @@ def start_steps(
         sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),
         spring=np.zeros(u) if spring is None else spring,
         active=np.zeros(u, np.int64), speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u),
-        start=np.zeros((2, size)), free=np.zeros((2, size)), before=np.zeros(2 * u), impulse=np.zeros(2 * u),
-        more=np.zeros(2 * u), left=np.zeros(2 * u), closed=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
+        start=np.zeros((2, size)), free=np.zeros((2, size)), before=np.zeros(2 * u), slowest=np.zeros(1),
+        impulse=np.zeros(2 * u), more=np.zeros(2 * u), least=np.zeros(u), approach=np.zeros(u),
+        left=np.zeros(2 * u), closed=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
     )  # fmt: skip
 
 
@@ -102,13 +105,11 @@ def _response(system, times, k, q, v):
 @inlined
 def record_start(system, motion, records):
     """Record section, energies and ledger at the start of a period, those of contact springs included."""
-    springs, p = 0.0, motion.counters[PERIOD]
+    springs = 0.0
     for r in range(system.contacts):
         if motion.spring[r] > 0.0:
             springs += 0.5 * motion.spring[r] * min(gap(system, r, motion.q), 0.0) ** 2
-    record_section(system, motion, records)
-    records.parts[p, 0] += springs
-    records.ledger[p, STORED] += springs
+    record_section(system, motion, records, springs)
 
 
 @inlined
@@ -133,13 +134,14 @@ def account_step(system, times, motion, records, k, deepest):
         motion.ledger[EXCITATION] += 0.5 * (times.load[k, i] + times.load[k + 1, i]) * moved
         for j in range(len(q)):
             motion.ledger[VISCOUS] += 0.5 * system.damping[i, j] * (v[j] + motion.v[j]) * moved
+    hit = _collided(system, motion)
     for r in range(u):
         for row in (r, u + r):
             if motion.impulse[row] != 0.0:
                 moved = 0.0
                 for i in range(len(q)):
                     moved += system.J[row, i] * (motion.q[i] - q[i])
-                motion.ledger[_loss_of(motion, row, u)] -= motion.impulse[row] / h * moved
+                motion.ledger[_loss_of(system, motion, r, row, hit)] -= motion.impulse[row] / h * moved
                 motion.lost[r] -= motion.impulse[row] / h * moved
         if r < system.contacts:
             now = gap(system, r, motion.q)
@@ -159,11 +161,21 @@ def account_step(system, times, motion, records, k, deepest):
 
 
 @inlined
-def _loss_of(motion, row, u):
+def _collided(system, motion):
+    """Whether a rigid contact that approached has pushed in this step: what contacts take is then an impact's loss."""
+    hit = False
+    for r in range(system.contacts):
+        pushed = motion.impulse[r] > 0.0 and motion.spring[r] == 0.0
+        hit = hit or (pushed and motion.before[r] < -motion.slowest[0])
+    return hit
+
+
+@inlined
+def _loss_of(system, motion, unit, row, hit):
     """Return the entry of the ledger for what the force of a row takes."""
-    if row >= u:
-        return FRICTION
-    return CONTACT if motion.spring[row] > 0.0 else IMPACT_LOSS
+    if row == unit:
+        return CONTACT if motion.spring[unit] > 0.0 else IMPACT_LOSS
+    return IMPACT_LOSS if hit and unit < system.contacts else FRICTION
 
 
 @inlined

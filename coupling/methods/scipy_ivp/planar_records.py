@@ -38,7 +38,7 @@ class PlanarRecorder:
         self.free, self.system, self.records, self.keep = free, system, records, events
         self.each, self.steps, self.count = records.samples_per_period, steps, _COUNT
         self.period, self.impacts, self.deep = 0, 0, 0.0
-        self.impact_loss, self.impact_friction = 0.0, 0.0
+        self.impact_loss = 0.0
         self.log: list[list[float]] = []
         of_bodies = len(records.peak), len(system.along)
         self.tilt, self.lifted = np.zeros(of_bodies), np.zeros(of_bodies)
@@ -133,8 +133,7 @@ class PlanarRecorder:
         system, u = self.system, self.free.u
         speed, after = system.J @ before, system.J @ impact.v
         losses = -0.5 * impact.impulse * (speed + after)
-        self.impact_loss += float(losses[:u].sum())
-        self.impact_friction += float(losses[u:].sum())
+        self.impact_loss += float(losses.sum())
         for r in np.flatnonzero(impact.impulse[: system.contacts] > ROUND_OFF * impact.impulse.max()):
             self.impacts += 1
             self.records.impacts[self.period] += 1
@@ -164,9 +163,9 @@ class PlanarRecorder:
         free, integrals = self.free, y[self.free.size :]
         counters, ledger = np.zeros(COUNTERS, np.int64), np.zeros(len(ENERGIES))
         counters[PERIOD] = self.period
-        ledger[[EXCITATION, VISCOUS]] = integrals[[_EXCITATION, _VISCOUS]]
-        ledger[FRICTION], ledger[IMPACT_LOSS] = integrals[_FRICTION] + self.impact_friction, self.impact_loss
-        record_section(self.system, _Moment(counters, y[free.q].copy(), y[free.v].copy(), ledger), self.records)
+        ledger[[EXCITATION, VISCOUS, FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
+        ledger[IMPACT_LOSS] = self.impact_loss
+        record_section(self.system, _Moment(counters, y[free.q].copy(), y[free.v].copy(), ledger), self.records, 0.0)
         extended = free.extended(0.0, y[: free.size])
         self.last = 0.0, self.watched @ extended, self.speeds @ extended
         self.before = integrals.copy()

@@ -30,6 +30,8 @@ class ContactLaw:
     law: str
     #: whether a closed gap is a constraint with impacts, not a spring
     rigid: ClassVar[bool] = True
+    #: whether the restitution is that of impulses, of expansion to compression (Poisson), not of speeds (Newton)
+    two_phases: ClassVar[bool] = False
 
     @property
     def title(self) -> str:

@@ -14,13 +14,14 @@ from vanedamp.coupling.scene.contact_laws.compliant import Compliant
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw
 from vanedamp.coupling.scene.contact_laws.massless import Massless
 from vanedamp.coupling.scene.contact_laws.newton import Newton
+from vanedamp.coupling.scene.contact_laws.poisson import Poisson
 from vanedamp.coupling.scene.contact_laws.viscoelastic import Viscoelastic
 from vanedamp.files.variants import Variants
 
 LAWS = Variants("contact law", ContactLaw, "law", "vanedamp.contact_laws")
 #: adds a law; may decorate its class
 register = LAWS.register
-for _law in (Newton, Compliant, Massless, Viscoelastic):
+for _law in (Newton, Poisson, Compliant, Massless, Viscoelastic):
     register(_law)
 
 #: type of a scene's `contact`

@@ -91,11 +91,13 @@ class Coupled(NamedTuple):
 
 
 def one_restitution(name: str, scene: Scene) -> None:
-    """Refuse, for a peer, a law whose restitution depends on the speed. Raises InputError."""
+    """Refuse, for a peer, a law whose restitution depends on the speed or is one of impulses. Raises InputError."""
     if scene.contact.depends_on_speed:
         raise InputError(
             f"{name}: contact.law {scene.contact.law} has another restitution at every speed; its contacts have one"
         )
+    if scene.contact.two_phases:
+        raise InputError(f"{name}: contact.law {scene.contact.law} has impacts of two phases; its contacts have one")
 
 
 def coupled(scene: Scene, steps: int) -> Coupled:
