@@ -43,6 +43,7 @@ class ContactFlows(NamedTuple):
     force: np.ndarray  # (s, 2u, m)
     force_constant: np.ndarray  # (s, 2u)
     force_held: np.ndarray  # (s, 2u, N)
+    self_stress: np.ndarray  # (s, 2u, 2u): projector of forces on those that balance each other
     snap: np.ndarray  # (s, N, u): displacement that closes gaps of closed contacts
     snap_rate: np.ndarray  # (s, N, 2u): velocity that stops their gaps and the slips that stick
     held: np.ndarray  # (s, u) whether constraints hold the slip of a unit that counts as slipping
@@ -59,8 +60,8 @@ def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
         key=np.zeros((capacity, u), np.int64), modes=np.zeros(capacity, np.int64), eigenvalue=z(m),
         project=z(m, 2 * size), offset=z(m), in_phase=z(m, e), in_quadrature=z(m, e), motion=z(size, m),
         rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
-        force_held=f(2 * u, size), snap=f(size, u), snap_rate=f(size, 2 * u), held=np.zeros((capacity, u), np.bool_),
-        growth=f(),
+        force_held=f(2 * u, size), self_stress=f(2 * u, 2 * u), snap=f(size, u), snap_rate=f(size, 2 * u),
+        held=np.zeros((capacity, u), np.bool_), growth=f(),
     )  # fmt: skip
 
 
@@ -167,6 +168,13 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
         _spread(target, carried @ part, closed, stick, drag, u)
     _spread(flows.force_held[s], carried @ net_held * root, closed, stick, drag, u)
     flows.force_constant[s, u + slides] = -(way * system.limit)[slides]
+    flows.self_stress[s] = 0.0
+    if len(kept):
+        lever = np.linalg.norm(wrench, axis=0)
+        balanced = null_space(wrench / lever, rcond=_DEPENDENT)
+        spread = np.zeros((2 * u, len(kept)))
+        _spread(spread, balanced @ balanced.T / lever[:, None] * lever, closed, stick, drag, u)
+        flows.self_stress[s][:, kept] = spread
     touching = np.flatnonzero((state != OPEN) & (units < system.contacts))
     flows.snap[s], flows.snap_rate[s] = 0.0, 0.0
     flows.snap[s][:, touching] = np.linalg.pinv(rows[touching], rcond=_DEPENDENT) / root[:, None]

@@ -30,6 +30,8 @@ from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS
 
 #: energy that an impact may bring, as a share of what is in it, before it is solved again
 _GAIN = 1e-12
+#: factor of the coefficients below which it is zero: of a wedged block, whose contacts cannot part all together
+_WEDGED = 1e-6
 #: bisections of the factor of the coefficients
 _HALVINGS = 40
 #: share by which friction is short of its bound where a contact sticks
@@ -53,7 +55,7 @@ def collide(system, st, rec, log, work):
                 low = middle
             else:
                 high = middle
-        if not _rebound(system, st, work, count, low, tiny):
+        if not _rebound(system, st, work, count, low if low > _WEDGED else 0.0, tiny):
             return False
     _apply(system, st, work)
     for p in range(count):
@@ -166,14 +168,17 @@ def _catch(system, st, work, count, tiny):
         near = near or tiny < row_speed(system, work.listed[p], st.v) < slow
     if not near:
         return True
-    if not _step(system, st, work, count):
-        return False
+    if not _step(system, st, work, count, 0.1):
+        # steps of several lengths may ask a wedged block to part: one length has a solution
+        _accelerate(system, st, work)
+        if not _step(system, st, work, count, 1.0):
+            return False
     near = False
     for p in range(count):
         r = work.listed[p]
         near = near or (work.impulse[r] > 0.0 and row_speed(system, r, st.v) > tiny)
     if near:
-        _stop(system, st, work, count, tiny, slow)
+        _stop(system, st, work, count, tiny, slow, 1.0 - _EDGE)
     return True
 
 
@@ -186,7 +191,7 @@ def jam(system, st, rec, log, work):
     u, count = len(system.rest), _list_shut(system, st, work)
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     slow = _FAR * _accelerate(system, st, work)
-    if not _step(system, st, work, count):
+    if not _step(system, st, work, count, 1.0):
         return False
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
@@ -195,7 +200,7 @@ def jam(system, st, rec, log, work):
         if work.impulse[work.listed[p]] > 0.0:
             _note(system, st, rec, log, work, work.listed[p])
     _account(system, st, work)
-    _stop(system, st, work, count, tiny, slow)
+    _stop(system, st, work, count, tiny, slow, math.inf)
     return True
 
 
@@ -215,20 +220,26 @@ def _accelerate(system, st, work):
 
 
 @inlined
-def _step(system, st, work, count):
-    """Find the impulses (work.impulse) of a step of Moreau's scheme of length CHATTER. Returns if there are any."""
+def _step(system, st, work, count, shortest):
+    """Find the impulses (work.impulse) of a step of Moreau's scheme of length CHATTER. Returns if there are any.
+
+    shortest: share of the step to which a contact's restitution shortens it at most.
+    """
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
-        ahead = CHATTER * system.period * max(1.0 - system.restitution[r], 0.1)
+        ahead = CHATTER * system.period * max(1.0 - system.restitution[r], shortest)
         work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
     return solve_rows(system, work, count, work.speed, 0.0)
 
 
 @inlined
-def _stop(system, st, work, count, tiny, slow):
-    """Stop the contacts that push (work.impulse), those that stick with their slips, and whom that drives together."""
+def _stop(system, st, work, count, tiny, slow, most):
+    """Stop the contacts that push (work.impulse), those that stick with their slips, and whom that drives together.
+
+    most: share of its bound below which friction counts as that of a contact that sticks.
+    """
     u, found, loss = len(system.rest), 0, 0.0
     for i in range(len(st.v)):
         loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
@@ -237,7 +248,7 @@ def _stop(system, st, work, count, tiny, slow):
         normal = work.impulse[r]
         if normal > 0.0:
             found = _stop_row(system, st, work, r, found)
-            sticks = abs(work.impulse[u + r]) < (1.0 - _EDGE) * system.friction[r] * normal
+            sticks = abs(work.impulse[u + r]) < most * system.friction[r] * normal
             if sticks and abs(row_speed(system, u + r, st.v)) < slow:
                 found = _stop_row(system, st, work, u + r, found)
     again = found > 0

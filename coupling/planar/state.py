@@ -39,6 +39,8 @@ class PlanarState(NamedTuple):
     amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
     bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
     force: np.ndarray  # (2u,) constant part of the forces, N
+    # (2u,) self-stress of contacts that depend on each other, N: what their forces have beside the least ones
+    prestress: np.ndarray
 
 
 class Guards(NamedTuple):
@@ -78,6 +80,10 @@ class Scratch(NamedTuple):
     sliding: np.ndarray  # (u,) int: direction in which a friction element slides
     span: np.ndarray  # (N, N) orthonormal basis of rows
     lemke: Lemke
+    split: Lemke  # the problem with friction split in two (contact_decisions._solve_split)
+    part: np.ndarray  # (4u,) int: kind of each of its unknowns
+    column: np.ndarray  # (4u,) int: the unknown of `lemke` that it belongs to
+    attempt: np.ndarray  # (1,) int: how often a decision has been made anew
     turn: np.ndarray  # (m,) complex
     wave: np.ndarray  # (m,) complex
 
@@ -93,6 +99,7 @@ def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, records: 
         tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
         sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
+        prestress=np.zeros(2 * u),
     )  # fmt: skip
 
 
@@ -115,5 +122,7 @@ def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
         before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), before=next(integers), listed=next(integers),
         way=next(integers), place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
         doubt=next(integers), sliding=next(integers), span=np.zeros((size, size)), lemke=new_lemke(3 * u),
+        split=new_lemke(4 * u), part=np.zeros(4 * u, np.int64), column=np.zeros(4 * u, np.int64),
+        attempt=np.zeros(1, np.int64),
         turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
     )  # fmt: skip

@@ -198,6 +198,7 @@ class Moment:
     v: np.ndarray
     state: np.ndarray
     ledger: np.ndarray
+    prestress: np.ndarray  # of contacts that depend on each other
 
 
 class Stepper:
@@ -248,7 +249,7 @@ class Stepper:
         phase = float(st.time[0])
         return Moment(
             int(st.counters[PERIOD]) * self.run.system.period + phase, phase, st.q.copy(), st.v.copy(),
-            st.state.copy(), st.ledger.copy(),
+            st.state.copy(), st.ledger.copy(), st.prestress.copy(),
         )  # fmt: skip
 
 
@@ -358,7 +359,7 @@ class Checker:
         path = motion.path(before, span)
         self.fastest = np.maximum(self.fastest, np.abs(path[:, n : 2 * n]).max(axis=0))
         self.speed = (np.abs(system.J) @ self.fastest).max()
-        self._between(before.state, motion, path, where)
+        self._between(before, motion, path, where)
         q, v = path[-1, :n], path[-1, n : 2 * n]
         gap = system.rest + system.J[: self.u] @ q
         shut = self.contact & ((after.state != OPEN) | (gap <= SIMULTANEOUS * system.play))
@@ -371,13 +372,16 @@ class Checker:
         self._ledger(after, where)
         self._settled(after, self._motion(after), where)
 
-    def _between(self, state: np.ndarray, motion: Motion, path: np.ndarray, where: str) -> None:
+    def _between(self, before: Moment, motion: Motion, path: np.ndarray, where: str) -> None:
         """Walls, forces within their bounds and friction against slip on the way."""
-        system, u, n, worst = self.system, self.u, motion.n, self.worst
+        system, u, n, worst, state = self.system, self.u, motion.n, self.worst, before.state
         gap = system.rest + path[:, :n] @ system.J[:u].T
         slip = path[:, n : 2 * n] @ system.J[u:].T
         rate = path[:, n : 2 * n] @ system.J[:u].T
-        force = path @ motion.force.T
+        force = path @ motion.force.T + before.prestress
+        balance = (system.J.T @ before.prestress) / np.sqrt(system.mass)
+        pressed = np.abs(system.J.T) @ np.abs(before.prestress) / np.sqrt(system.mass)
+        worst.note("pull", np.abs(balance).max() / max(pressed.max(), 1e-300), where)
         # forces are differences of these, in a wedged block of those of its other contacts
         size = np.full(2 * u, (motion.size(path) @ np.abs(motion.force).T).max() + 1e-300)
         open_, closed = self.contact & (state == OPEN), self.contact & (state != OPEN)
