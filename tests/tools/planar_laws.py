@@ -12,6 +12,7 @@ import math
 import sys
 from collections import Counter
 from dataclasses import dataclass, fields
+from pathlib import Path
 
 import numpy as np
 from scipy.linalg import expm
@@ -41,6 +42,7 @@ from vanedamp.coupling.planar.contact_flow import add_flow
 from vanedamp.coupling.response.records import IMPACT
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.reduced import ReducedModel
 
 #: points at which the motion between two events is looked at
 POINTS = 12
@@ -161,6 +163,57 @@ def tables(seed: int) -> dict:
         "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": between(1e-3, 0.1)},
         "initial": {"displacement": float(rng.uniform(-1, 1)), "velocity": float(rng.uniform(-1, 1))},
     }
+
+
+def crowd(seed: int, folder: Path) -> dict:
+    """Tables of a random scene whose structure has stops, friction dampers and sliders in cavities of their own, too.
+
+    It is rigid or a reduced model, which is written to `folder`.
+    """
+    rng = np.random.default_rng([seed, 16])
+    between = lambda low, high: float(np.exp(rng.uniform(math.log(low), math.log(high))))  # noqa: E731
+    data = tables(seed)
+    excitation = {key: data["excitation"][key] for key in ("frequency", "harmonic") if key in data["excitation"]}
+    data["excitation"] = excitation | {"force": between(0.05, 0.5)}
+    start = float(rng.uniform(-1, 1))
+    for number in range(rng.integers(1, 3)):
+        gap, side = between(0.05, 1.0), ("left", "right")[rng.integers(2)]
+        data.setdefault("stop", []).append({"side": side, "gap": abs(start) + gap, "restitution": float(rng.random())})
+        gap = between(0.05, 2.0)
+        data["cavity"].append({"name": f"s{number}", "gap": gap})
+        slider = {"cavity": f"s{number}", "mass": between(0.01, 0.3), "restitution": float(rng.random())}
+        slider |= {"normal_load": between(1e-3, 0.1), "friction": float(rng.choice([0.0, rng.uniform(0.1, 0.6)]))}
+        data["damper"].append(slider | {"position": gap * float(rng.uniform(-0.5, 0.5))})
+    data["friction_damper"] = [
+        {"normal_force": between(0.02, 0.3), "friction": float(rng.uniform(0.1, 0.6))} for _ in range(rng.integers(3))
+    ]
+    if rng.random() < 0.5:
+        structure = {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": between(1e-3, 0.1)}
+        return data | {
+            "structure": structure,
+            "initial": {"displacement": start, "velocity": float(rng.uniform(-1, 1))},
+        }
+    modes = int(rng.integers(1, 5))
+    omega = np.r_[1.0, np.sort(rng.uniform(1.5, 6.0, modes - 1))]
+    labels = ["a", "b", "a.normal", "a.rotation", "b.normal", "b.rotation"]
+    shapes = rng.uniform(-0.3, 0.3, (len(labels), modes)) * [[1.0], [1.0], [1.0], [0.5], [1.0], [0.5]]
+    shapes[:2, 0] = rng.uniform(0.7, 1.0, 2)
+    model = ReducedModel.from_matrices(
+        mass=np.eye(modes), stiffness=np.diag(omega**2), damping_ratio=between(1e-3, 0.1),
+        interface=dict(zip(labels, shapes, strict=True)), directions=dict.fromkeys(labels, (0.0, 1.0, 0.0)),
+        base_load=np.zeros((modes, 3)),
+    )  # fmt: skip
+    model.save(folder / f"crowd-{seed}.h5")
+    data.pop("initial", None)
+    data["structure"] = {"model": "rom", "file": str(folder / f"crowd-{seed}.h5")}
+    data["excitation"]["at"] = "a"
+    for number, cavity in enumerate(data["cavity"]):
+        cavity.pop("normal_motion", None)
+        cavity.pop("rotation", None)
+        cavity["floor"] = labels[number % 2]
+    for stop in data["stop"]:
+        stop |= {"at": labels[rng.integers(2)]}
+    return data
 
 
 def scene_of(data: dict) -> Scene:
@@ -501,10 +554,13 @@ class Checker:
         self.worst.note("ledger", abs(closed) / self.flowed, where)
 
 
-def check_laws(seed: int, longest: int = LONGEST) -> tuple[Worst | None, int]:
-    """Check a random scene. Returns the largest violations, None if it has no start, and the code of its end."""
+def check_laws(seed: int, longest: int = LONGEST, data: dict | None = None) -> tuple[Worst | None, int]:
+    """Check a random scene, or that of other tables.
+
+    Returns the largest violations, None if it has no start, and the code of its end.
+    """
     try:
-        scene = scene_of(tables(seed))
+        scene = scene_of(tables(seed) if data is None else data)
         checker = Checker(scene, f"seed {seed}")
     except InputError:
         return None, DONE
