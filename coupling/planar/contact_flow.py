@@ -47,6 +47,9 @@ class ContactFlows(NamedTuple):
     snap: np.ndarray  # (s, N, u): displacement that closes gaps of closed contacts
     snap_rate: np.ndarray  # (s, N, 2u): velocity that stops their gaps and the slips that stick
     held: np.ndarray  # (s, u) whether constraints hold the slip of a unit that counts as slipping
+    drag: np.ndarray  # (s, N, m): C G of the damping matrix and the speeds G of each mode
+    loss: np.ndarray  # (s, m, m): G^T C G
+    loss_apart: np.ndarray  # (s, m, m): G^T C conj G
     growth: np.ndarray  # (s,) largest rate of growth, 1/s
 
 
@@ -61,7 +64,7 @@ def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
         project=z(m, 2 * size), offset=z(m), in_phase=z(m, e), in_quadrature=z(m, e), motion=z(size, m),
         rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
         force_held=f(2 * u, size), self_stress=f(2 * u, 2 * u), snap=f(size, u), snap_rate=f(size, 2 * u),
-        held=np.zeros((capacity, u), np.bool_), growth=f(),
+        held=np.zeros((capacity, u), np.bool_), drag=z(size, m), loss=z(m, m), loss_apart=z(m, m), growth=f(),
     )  # fmt: skip
 
 
@@ -182,6 +185,10 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     flows.snap_rate[s][:, still_rows] = np.linalg.pinv(rows[still_rows], rcond=_DEPENDENT) / root[:, None]
     free = rows[u:] - rows[u:] @ np.linalg.pinv(constraints, rcond=_DEPENDENT) @ constraints
     flows.held[s] = np.linalg.norm(free, axis=1) <= _DEPENDENT * np.linalg.norm(rows[u:], axis=1)
+    speeds = flows.motion[s, :, :count] * rate
+    drag = system.damping @ speeds
+    flows.drag[s, :, :count] = drag
+    flows.loss[s, :count, :count], flows.loss_apart[s, :count, :count] = speeds.T @ drag, speeds.T @ drag.conj()
     flows.growth[s] = max(eigenvalue.real.max(initial=0.0), 0.0)
 
 

@@ -85,6 +85,11 @@ class Scratch(NamedTuple):
     column: np.ndarray  # (4u,) int: the unknown of `lemke` that it belongs to
     attempt: np.ndarray  # (1,) int: how often a decision has been made anew
     turn: np.ndarray  # (m,) complex
+    # of integrals in closed form (exponential_integrals)
+    moment: np.ndarray  # (3, m) complex: integrals of t^k exp(lambda t)
+    pair: np.ndarray  # (2, m, m) complex: of products of exponentials, and of one with the conjugate of the other
+    constant: np.ndarray  # (4, 3): powers of t in each signal
+    signal: np.ndarray  # (4, m) complex: exponentials in each signal
     wave: np.ndarray  # (m,) complex
 
 
@@ -124,5 +129,6 @@ def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
         doubt=next(integers), sliding=next(integers), span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         split=new_lemke(4 * u), part=np.zeros(4 * u, np.int64), column=np.zeros(4 * u, np.int64),
         attempt=np.zeros(1, np.int64),
-        turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
+        moment=np.zeros((3, modes), complex), pair=np.zeros((2, modes, modes), complex), constant=np.zeros((4, 3)),
+        signal=np.zeros((4, modes), complex), turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
     )  # fmt: skip
