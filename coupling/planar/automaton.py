@@ -146,7 +146,7 @@ def _happen(system, st, rec, log, work, r, what):
         return False
     for i in range(len(system.rest)):
         changed = work.before[i] != st.state[i] or st.other[i] != st.state[i]
-        if changed or st.prestress[i] != 0.0:
+        if changed or st.prestress[i] != 0.0 or st.prestress[len(system.rest) + i] != 0.0:
             st.counters[FLOW] = -1
     return True
 

@@ -3,7 +3,8 @@
 Newton's law in Moreau's form (Moreau 1988): after the impact v_N + k v_N- >= 0 and the impulse P_N >= 0 complement each
 other, and P_T stays within Coulomb's cone, at its edge where the contact still slips. Without friction one
 coefficient for all contacts never brings energy; with friction, or with several coefficients, the law can (Kane's
-paradox). Then all coefficients are smaller by one factor, the largest that brings none.
+paradox). Then all coefficients are smaller by one factor, the largest that brings none; it is zero for a wedged block
+whose contacts cannot part.
 
 A block that comes to lie rocks from corner to corner ever faster, and ends in finite time, as a ball does. Contacts
 that would part for less than CHATTER are closed together: they lose the speed with which they would part.
