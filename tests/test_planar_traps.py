@@ -57,6 +57,7 @@ def test_an_oblique_impact_brings_no_energy(restitution, tilt):
     pytest.param(10930, id="the least of several possible forces would make a contact pull"),
     pytest.param(20864, id="three blocks in a corner share forces in many ways"),
     pytest.param(21998, id="an impact of a wedged block in a row, which no restitution lets part"),
+    pytest.param(28789, id="the same while other contacts touch with speeds of round-off"),
     pytest.param(29676, id="the end of a chatter of a wedged block"),
     pytest.param(30171, id="the same with coefficients that differ"),
 ])  # fmt: skip

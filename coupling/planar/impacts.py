@@ -56,7 +56,9 @@ def collide(system, st, rec, log, work):
                 low = middle
             else:
                 high = middle
-        if not _rebound(system, st, work, count, low if low > _WEDGED else 0.0, tiny):
+        # without rebound the speeds as they are, round-off included, always have a solution
+        wedged = low <= _WEDGED
+        if not _rebound(system, st, work, count, 0.0 if wedged else low, 0.0 if wedged else tiny):
             return False
     _apply(system, st, work)
     for p in range(count):
