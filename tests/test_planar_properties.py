@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.tools.planar_laws import image_parts, laws_of
+from tests.tools.planar_laws import check_laws, crowd, image_parts, laws_of
+from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET
 
 
 def test_laws():
@@ -17,6 +18,17 @@ def test_laws_of_impacts_in_two_phases():
     assert not ends
     assert worst.steps >= 4000
     assert worst.impacts >= 3000
+
+
+@pytest.mark.parametrize("first", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(20, 1000, 140))])
+def test_laws_beside_stops_friction_dampers_and_sliders(first, tmp_path):
+    """On rigid structures and reduced models of one to four modes, whose cavities move across and turn."""
+    impacts = 0
+    for seed in range(first, first + (20 if first == 0 else 140)):
+        worst, code = check_laws(seed, data=crowd(seed, tmp_path))
+        assert code in (DONE, EVENT_BUDGET), f"code {code} (seed {seed})"
+        impacts += worst.impacts if worst is not None else 0
+    assert impacts >= 1000
 
 
 @pytest.mark.slow

@@ -53,11 +53,25 @@ def test_an_oblique_impact_brings_no_energy(restitution, tilt):
     pytest.param(75, id="a chatter ends and no state changes"),
     pytest.param(118, id="a force of round-off at the end of contact"),
     pytest.param(1724, id="a closed gap with a speed of round-off"),
+    pytest.param(12595, id="contacts that depend on each other take two of their solutions by halves"),
+    pytest.param(10930, id="the least of several possible forces would make a contact pull"),
+    pytest.param(20864, id="three blocks in a corner share forces in many ways"),
+    pytest.param(21998, id="an impact of a wedged block in a row, which no restitution lets part"),
+    pytest.param(28789, id="the same while other contacts touch with speeds of round-off"),
+    pytest.param(29676, id="the end of a chatter of a wedged block"),
+    pytest.param(30171, id="the same with coefficients that differ"),
 ])  # fmt: skip
 def test_scenes_that_broke_a_law(seed):
     worst, code = check_laws(seed)
     assert worst.steps > 0
     assert code in (DONE, EVENT_BUDGET)
+
+
+def test_a_wedged_block_whose_slip_ends_a_moment_later():
+    """Its slip is round-off, and in its direction no forces are possible: it stops, and slips the other way."""
+    worst, code = check_laws(14899, longest=20)
+    assert worst.steps == 20
+    assert code == EVENT_BUDGET
 
 
 def test_a_block_at_rest_in_a_corner():

@@ -16,6 +16,8 @@ from vanedamp.coupling.numerics.jit import entry, kernel
 
 #: entries of the tableau below this are round-off, for problems scaled to numbers of size one
 _PIVOT = 1e-11
+#: share of its terms by which a row of a solution may be wrong
+_RESIDUAL = 1e-9
 #: covering vectors that are tried, and the ratio that spreads their entries
 _ATTEMPTS, _GOLDEN = 4, 0.6180339887498949
 
@@ -40,16 +42,17 @@ def new_lemke(k: int) -> Lemke:
 
 
 @entry
-def solve_lemke(problem, k):
+def solve_lemke(problem, k, first):
     """Solve the problem of the first k unknowns in place (z, w). Returns False if the method finds no solution.
 
     M and q should have numbers of size one: round-off is judged by that. Where it makes a wrong choice among ties,
-    another covering vector leads past them.
+    another covering vector leads past them, or to another one of several solutions.
+    first: number of the covering vector to begin with, 0 or more.
     """
-    attempt = 0
-    while attempt < _ATTEMPTS and not _solve(problem, k, attempt):
+    attempt, last = first, first + _ATTEMPTS
+    while attempt < last and not (_solve(problem, k, attempt) and _fits(problem, k)):
         attempt += 1
-    return attempt < _ATTEMPTS
+    return attempt < last
 
 
 @kernel
@@ -100,6 +103,20 @@ def _solve(problem, k, attempt):
         if leaving < 0:
             return False
     return False
+
+
+@kernel
+def _fits(problem, k):
+    """Whether w = M z + q: pivots of round-off may have spoilt a solution."""
+    for i in range(k):
+        error, size = problem.q[i] - problem.w[i], abs(problem.q[i]) + abs(problem.w[i])
+        for j in range(k):
+            part = problem.matrix[i, j] * problem.z[j]
+            error += part
+            size += abs(part)
+        if abs(error) > _RESIDUAL * max(size, 1.0):
+            return False
+    return True
 
 
 @kernel

@@ -50,6 +50,10 @@ from vanedamp.coupling.response.records import CONTACT, DETACHES, IMPACT_LOSS, R
 _LOST = 1e-7
 #: events at one instant after which contacts are said to be undecided, for each unit
 _AT_ONCE = 20
+#: events at one instant after which a decision that repeats itself is made anew, for each unit
+_REPEATED = 4
+#: how often a decision is made anew where its forces break their laws
+_ATTEMPTS = 4
 _TINY = 1e-150
 #: share of its terms that a force may be beyond its bound
 _OVER = 1e-9
@@ -84,13 +88,19 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
             st.counters[FLOW] = s
             _enter(system, flows, st)
             _begin_segment(system, flows, st)
-            if not _shares(system, flows, st):
+            shared = _shares(system, flows, st)
+            if not shared and (work.attempt[0] == 0 or not _holds_prestressed(system, flows, st, work)):
                 for r in range(len(st.state)):
                     st.state[r] = st.other[r]
                 st.counters[FLOW] = -1
                 continue
-            if not _holds(system, flows, st):
-                return UNDECIDED
+            if shared and not _holds(system, flows, st) and not _holds_prestressed(system, flows, st, work):
+                work.attempt[0] += 1
+                if work.attempt[0] > _ATTEMPTS or not decide(system, st, work, st.scale[0]):
+                    return UNDECIDED
+                st.counters[FLOW] = -1
+                continue
+            work.attempt[0] = 0
             _log_changes(system, flows, st, log)
         else:
             _begin_segment(system, flows, st)
@@ -125,6 +135,7 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
             continue
         st.counters[EVENTS] += 1
         st.counters[AT_ONCE] += 1
+        work.attempt[0] = st.counters[AT_ONCE] // (_REPEATED * len(system.rest))
         st.time[0] += tau
         _phase(system, st)
         if st.counters[AT_ONCE] > _AT_ONCE * len(system.rest):
@@ -193,7 +204,8 @@ def _happen(system, st, rec, log, work, r, what):
     if not _settle(system, st, rec, log, work):
         return False
     for i in range(len(system.rest)):
-        if work.before[i] != st.state[i] or st.other[i] != st.state[i]:
+        changed = work.before[i] != st.state[i] or st.other[i] != st.state[i]
+        if changed or st.prestress[i] != 0.0 or st.prestress[len(system.rest) + i] != 0.0:
             st.counters[FLOW] = -1
     return True
 
@@ -252,6 +264,8 @@ def _find(flows, st):
 def _enter(system, flows, st):
     """Stop what the contacts hold, and enter what that takes from the motion."""
     s, size, loss = st.counters[FLOW], len(st.q), 0.0
+    for r in range(len(st.prestress)):
+        st.prestress[r] = 0.0
     for i in range(size):
         loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
     _snap(system, flows, st, s)
@@ -346,6 +360,25 @@ def _holds(system, flows, st):
     return True
 
 
+@kernel
+def _holds_prestressed(system, flows, st, work):
+    """Let contacts that depend on each other have the forces of the decision. Returns whether those obey their laws.
+
+    Without it they have the least ones, which may pull, or exceed the friction, where others would do.
+    """
+    s, many = st.counters[FLOW], len(st.force)
+    for r in range(many):
+        work.speed[r] = work.impulse[r] - st.force[r]
+        for j in range(flows.modes[s]):
+            work.speed[r] -= (flows.force[s, r, j] * st.amplitude[j]).real
+    for r in range(many):
+        st.prestress[r] = 0.0
+        for k in range(many):
+            st.prestress[r] += flows.self_stress[s, r, k] * work.speed[k]
+        st.force[r] += st.prestress[r]
+    return _holds(system, flows, st)
+
+
 @inlined
 def _rests_open(system, st, r):
     """Whether the gap of an open contact is zero and stays so but for accelerations."""
@@ -408,7 +441,7 @@ def _begin_segment(system, flows, st):
         for k in range(size):
             st.bend[i] += flows.bend_held[s, i, k] * st.q[k]
     for r in range(len(st.force)):
-        st.force[r] = flows.force_constant[s, r]
+        st.force[r] = flows.force_constant[s, r] + st.prestress[r]
         for k in range(size):
             st.force[r] += flows.force_held[s, r, k] * st.q[k]
     swing = 0.0

@@ -21,6 +21,8 @@ AT_REST = 10 * ROUND_OFF
 _NORMAL, _SLIP = 1, 2
 #: what a contact that yields and touches without speed does
 _RESTS, _PRESSED, _OPENS = 1, 2, 3
+#: unknowns of a contact beside _NORMAL: friction to the right, to the left, and the speed that it leaves
+_RIGHT, _LEFT, _SPEED = 3, 4, 5
 
 
 @inlined
@@ -127,6 +129,27 @@ def solve_rows(system, work, count, right, least, bound):
     if size == 0:
         return True
     scale = scale if scale > 0.0 else 1.0
+    _set_up(system, work, count, right, bound, scale, size)
+    if not solve_lemke(problem, size, work.attempt[0]) and not _solve_split(system, work, count, size):
+        return False
+    for p in range(count):
+        r, i = work.listed[p], work.place[p]
+        contact = is_rigid(system, r)
+        if contact:
+            work.impulse[r] = problem.z[i] * scale / math.sqrt(system.delassus[r, r])
+            if work.way[p] != 0:
+                work.impulse[u + r] = -work.way[p] * system.friction[r] * work.impulse[r]
+        if work.way[p] == 0 and rubs(system, r):
+            low = bound[r] + (system.friction[r] * work.impulse[r] if contact else 0.0)
+            share = problem.z[i + 1 if contact else i] * scale / math.sqrt(system.delassus[u + r, u + r])
+            work.impulse[u + r] = share - low
+    return True
+
+
+@inlined
+def _set_up(system, work, count, right, bound, scale, size):
+    """Set up the problem (work.lemke) in numbers of size one."""
+    u, problem = len(system.rest), work.lemke
     for i in range(size):
         problem.q[i] = 0.0
         for j in range(size):
@@ -167,19 +190,75 @@ def solve_rows(system, work, count, right, least, bound):
                     problem.matrix[i, k] += normal * weight * system.delassus[r, u + c]
                 if at_rest:
                     problem.matrix[first, k] += slip * weight * system.delassus[u + r, u + c]
-    if not solve_lemke(problem, size):
-        return False
+
+
+@kernel
+def _solve_split(system, work, count, size):
+    """Solve the problem that is set up (work.lemke) by splitting each friction force in two, to the right and left.
+
+    In this form, with an unknown more, Lemke's method finds a solution wherever the right-hand sides of contacts that
+    do not slip yet are speeds or accelerations of one motion (Stewart and Trinkle 1996; Anitescu and Potra 1997); in
+    the other not always. Returns False if it finds none.
+    """
+    one, two, part, of = work.lemke, work.split, work.part, work.column
+    many = 0
     for p in range(count):
         r, i = work.listed[p], work.place[p]
-        contact = is_rigid(system, r)
-        if contact:
-            work.impulse[r] = problem.z[i] * scale / math.sqrt(system.delassus[r, r])
-            if work.way[p] != 0:
-                work.impulse[u + r] = -work.way[p] * system.friction[r] * work.impulse[r]
+        if is_rigid(system, r):
+            part[many], of[many] = _NORMAL, i
+            many += 1
+            i += 1
         if work.way[p] == 0 and rubs(system, r):
-            low = bound[r] + (system.friction[r] * work.impulse[r] if contact else 0.0)
-            share = problem.z[i + 1 if contact else i] * scale / math.sqrt(system.delassus[u + r, u + r])
-            work.impulse[u + r] = share - low
+            for kind in (_RIGHT, _LEFT, _SPEED):
+                part[many], of[many] = kind, i
+                many += 1
+    for a in range(many):
+        row, way = of[a], -1.0 if part[a] == _LEFT else 1.0
+        if part[a] == _SPEED:
+            two.q[a] = 0.5 * one.q[row + 1]
+        else:
+            two.q[a] = one.q[row]
+            for b in range(many):
+                if part[b] == _SPEED:
+                    two.q[a] += 0.5 * one.matrix[row, of[b]] * one.q[of[b] + 1]
+            two.q[a] *= way
+        for b in range(many):
+            column, total = of[b], 0.0
+            if part[a] == _SPEED:
+                if part[b] == _NORMAL:
+                    total = 0.5 * one.matrix[row + 1, column]
+                elif (part[b] == _RIGHT or part[b] == _LEFT) and column == row:
+                    total = -1.0
+            elif part[b] == _SPEED:
+                total = 1.0 if column == row and part[a] != _NORMAL else 0.0
+            else:
+                total = one.matrix[row, column]
+                if part[b] == _NORMAL and b + 1 < many and part[b + 1] == _RIGHT:
+                    # without the friction at its lower bound
+                    total += 0.5 * one.matrix[column + 2, column] * one.matrix[row, column + 1]
+                total *= -way if part[b] == _LEFT else way
+            two.matrix[a, b] = total
+    if not solve_lemke(two, many, 0):
+        return False
+    for a in range(many):
+        if part[a] == _NORMAL:
+            one.z[of[a]], one.w[of[a]] = two.z[a], two.w[a]
+    for a in range(many):
+        if part[a] == _SPEED:
+            first = of[a]
+            bound = two.q[a]
+            if a >= 3 and part[a - 3] == _NORMAL:
+                bound += two.matrix[a, a - 3] * two.z[a - 3]
+            one.z[first] = max(bound + two.z[a - 2] - two.z[a - 1], 0.0)
+            one.w[first + 1] = max(bound - two.z[a - 2] + two.z[a - 1], 0.0)
+    for a in range(many):
+        if part[a] == _SPEED:
+            first, speed = of[a], one.q[of[a]]
+            for j in range(size):
+                if j != first + 1:
+                    speed += one.matrix[first, j] * one.z[j]
+            # to the left as far as the friction is at its right bound
+            one.w[first], one.z[first + 1] = max(speed, 0.0), max(-speed, 0.0)
     return True
 
 
@@ -369,8 +448,8 @@ def _look_ahead(system, st, work, count):
     for p in range(count):
         carriers = carriers or work.doubt[p] == _NORMAL
     for p in range(count):
-        sure = work.doubt[p] == 0 and not (carriers and work.verdict[p] == TOUCHING)
-        if sure or (work.doubt[p] == _SLIP and work.verdict[p] >= OPEN):
+        sure = work.doubt[p] == 0 or (work.doubt[p] == _SLIP and work.verdict[p] >= OPEN)
+        if sure and not (carriers and (work.verdict[p] == TOUCHING or work.attempt[0] > 0)):
             work.verdict[p], work.doubtful[p] = work.first[p], work.doubt[p]
     _press_or_open(system, work, count, _NEXT_TO_NOTHING * terms)
     return True

@@ -44,9 +44,13 @@ class ContactFlows(NamedTuple):
     force: np.ndarray  # (s, 2u, m)
     force_constant: np.ndarray  # (s, 2u)
     force_held: np.ndarray  # (s, 2u, N)
+    self_stress: np.ndarray  # (s, 2u, 2u): projector of forces on those that balance each other
     snap: np.ndarray  # (s, N, u): displacement that closes gaps of closed contacts
     snap_rate: np.ndarray  # (s, N, 2u): velocity that stops their gaps and the slips that stick
     held: np.ndarray  # (s, u) whether constraints hold the slip of a unit that counts as slipping
+    drag: np.ndarray  # (s, N, m): C G of the damping matrix and the speeds G of each mode
+    loss: np.ndarray  # (s, m, m): G^T C G
+    loss_apart: np.ndarray  # (s, m, m): G^T C conj G
     growth: np.ndarray  # (s,) largest rate of growth, 1/s
 
 
@@ -60,8 +64,8 @@ def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
         key=np.zeros((capacity, u), np.int64), modes=np.zeros(capacity, np.int64), eigenvalue=z(m),
         project=z(m, 2 * size), offset=z(m), in_phase=z(m, e), in_quadrature=z(m, e), motion=z(size, m),
         rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
-        force_held=f(2 * u, size), snap=f(size, u), snap_rate=f(size, 2 * u), held=np.zeros((capacity, u), np.bool_),
-        growth=f(),
+        force_held=f(2 * u, size), self_stress=f(2 * u, 2 * u), snap=f(size, u), snap_rate=f(size, 2 * u),
+        held=np.zeros((capacity, u), np.bool_), drag=z(size, m), loss=z(m, m), loss_apart=z(m, m), growth=f(),
     )  # fmt: skip
 
 
@@ -187,6 +191,13 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
         target[pressed] = part
         target[u + pressed] -= (drag[pressed] * part.T).T
     flows.force_constant[s, u + slides] = -(way * system.limit)[slides]
+    flows.self_stress[s] = 0.0
+    if len(kept):
+        lever = np.linalg.norm(wrench, axis=0)
+        balanced = null_space(wrench / lever, rcond=_DEPENDENT)
+        spread = np.zeros((2 * u, len(kept)))
+        _spread(spread, balanced @ balanced.T / lever[:, None] * lever, closed, stick, drag, u)
+        flows.self_stress[s][:, kept] = spread
     touching = np.flatnonzero((state != OPEN) & (units < system.contacts) & ~yields)
     flows.snap[s], flows.snap_rate[s] = 0.0, 0.0
     flows.snap[s][:, touching] = np.linalg.pinv(rows[touching], rcond=_DEPENDENT) / root[:, None]
@@ -194,6 +205,10 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     flows.snap_rate[s][:, still_rows] = np.linalg.pinv(rows[still_rows], rcond=_DEPENDENT) / root[:, None]
     free = rows[u:] - rows[u:] @ np.linalg.pinv(constraints, rcond=_DEPENDENT) @ constraints
     flows.held[s] = np.linalg.norm(free, axis=1) <= _DEPENDENT * np.linalg.norm(rows[u:], axis=1)
+    speeds = flows.motion[s, :, :count] * rate
+    drag = system.damping @ speeds
+    flows.drag[s, :, :count] = drag
+    flows.loss[s, :count, :count], flows.loss_apart[s, :count, :count] = speeds.T @ drag, speeds.T @ drag.conj()
     flows.growth[s] = max(eigenvalue.real.max(initial=0.0), 0.0)
 
 

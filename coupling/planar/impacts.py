@@ -3,7 +3,8 @@
 Newton's law in Moreau's form (Moreau 1988): after the impact v_N + k v_N- >= 0 and the impulse P_N >= 0 complement each
 other, and P_T stays within Coulomb's cone, at its edge where the contact still slips. Without friction one
 coefficient for all contacts never brings energy; with friction, or with several coefficients, the law can (Kane's
-paradox). Then all coefficients are smaller by one factor, the largest that brings none.
+paradox). Then all coefficients are smaller by one factor, the largest that brings none; it is zero for a wedged block
+whose contacts cannot part.
 
 Poisson's law (Glocker and Pfeiffer 1995) is two such problems: one of compression, without restitution, and one of
 expansion, in which P_N exceeds k times that of compression only where v_N+ would be negative.
@@ -37,6 +38,8 @@ from vanedamp.coupling.system.restitution import restitution_at
 
 #: energy that an impact may bring, as a share of what is in it, before it is solved again
 _GAIN = 1e-12
+#: factor of the coefficients below which it is zero: of a wedged block, whose contacts cannot part all together
+_WEDGED = 1e-6
 #: bisections of the factor of the coefficients
 _HALVINGS = 40
 #: share by which friction is short of its bound where a contact sticks
@@ -62,7 +65,9 @@ def collide(system, st, rec, log, work):
                 low = middle
             else:
                 high = middle
-        if not _rebound(system, st, work, count, low, tiny):
+        # without rebound the speeds as they are, round-off included, always have a solution
+        wedged = low <= _WEDGED
+        if not _rebound(system, st, work, count, 0.0 if wedged else low, 0.0 if wedged else tiny):
             return False
     _apply(system, st, work)
     for p in range(count):
@@ -224,14 +229,17 @@ def _catch(system, st, work, count, tiny):
         near = near or tiny < row_speed(system, work.listed[p], st.v) < slow
     if not near:
         return True
-    if not _step(system, st, work, count):
-        return False
+    if not _step(system, st, work, count, 0.1):
+        # steps of several lengths may ask a wedged block to part: one length has a solution
+        _accelerate(system, st, work)
+        if not _step(system, st, work, count, 1.0):
+            return False
     near = False
     for p in range(count):
         r = work.listed[p]
         near = near or (work.impulse[r] > 0.0 and row_speed(system, r, st.v) > tiny)
     if near:
-        _stop(system, st, work, count, tiny, slow)
+        _stop(system, st, work, count, tiny, slow, 1.0 - _EDGE)
     return True
 
 
@@ -244,7 +252,7 @@ def jam(system, st, rec, log, work):
     u, count = len(system.rest), _list_shut(system, st, work)
     tiny = AT_REST * max(speed_scale(system, st.v), st.scale[0])
     slow = _FAR * _accelerate(system, st, work)
-    if not _step(system, st, work, count):
+    if not _step(system, st, work, count, 1.0):
         return False
     for r in range(2 * u):
         work.before_impact[r] = row_speed(system, r, st.v)
@@ -253,7 +261,7 @@ def jam(system, st, rec, log, work):
         if work.impulse[work.listed[p]] > 0.0:
             _note(system, st, rec, log, work, work.listed[p])
     _account(system, st, work)
-    _stop(system, st, work, count, tiny, slow)
+    _stop(system, st, work, count, tiny, slow, math.inf)
     return True
 
 
@@ -273,21 +281,27 @@ def _accelerate(system, st, work):
 
 
 @inlined
-def _step(system, st, work, count):
-    """Find the impulses (work.impulse) of a step of Moreau's scheme of length CHATTER. Returns if there are any."""
+def _step(system, st, work, count, shortest):
+    """Find the impulses (work.impulse) of a step of Moreau's scheme of length CHATTER. Returns if there are any.
+
+    shortest: share of the step to which a contact's restitution shortens it at most.
+    """
     u = len(system.rest)
     for p in range(count):
         r = work.listed[p]
         normal = row_speed(system, r, st.v)
-        ahead = CHATTER * system.period * max(1.0 - restitution_at(system, r, abs(normal)), 0.1)
+        ahead = CHATTER * system.period * max(1.0 - restitution_at(system, r, abs(normal)), shortest)
         work.speed[r] = normal + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
     return solve_rows(system, work, count, work.speed, 0.0, system.limit)
 
 
 @inlined
-def _stop(system, st, work, count, tiny, slow):
-    """Stop the contacts that push (work.impulse), those that stick with their slips, and whom that drives together."""
+def _stop(system, st, work, count, tiny, slow, most):
+    """Stop the contacts that push (work.impulse), those that stick with their slips, and whom that drives together.
+
+    most: share of its bound below which friction counts as that of a contact that sticks.
+    """
     u, found, loss = len(system.rest), 0, 0.0
     for i in range(len(st.v)):
         loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
@@ -296,7 +310,7 @@ def _stop(system, st, work, count, tiny, slow):
         normal = work.impulse[r]
         if normal > 0.0:
             found = _stop_row(system, st, work, r, found)
-            sticks = abs(work.impulse[u + r]) < (1.0 - _EDGE) * system.friction[r] * normal
+            sticks = abs(work.impulse[u + r]) < most * system.friction[r] * normal
             if sticks and abs(row_speed(system, u + r, st.v)) < slow:
                 found = _stop_row(system, st, work, u + r, found)
     again = found > 0

@@ -1,7 +1,8 @@
-"""Integrals of a segment: energies, harmonics, peaks, the largest tilt; by Gauss's rule on pieces of it.
+"""Integrals of a segment: energies, harmonics, peaks, the largest tilt.
 
-The integrands are products of the motion's own exponentials and parabolas: on pieces in which the fastest mode turns by
-no more than _TURN the rule of eight points leaves out 1e-15 of them.
+The integrands are products of the motion's own exponentials and parabolas. With few modes Gauss's rule of eight points
+is quick: on pieces in which the fastest mode turns by no more than _TURN it leaves out 1e-15 of them. With many the
+pieces are short, and the integrals in closed form quicker (exponential_integrals).
 """
 
 from __future__ import annotations
@@ -15,10 +16,16 @@ from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_on
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.planar.constraints import FLOOR
 from vanedamp.coupling.planar.contact_decisions import row_speed, yields
+from vanedamp.coupling.planar.exponential_integrals import integrate, response_after, set_up
 from vanedamp.coupling.planar.recorder import note_tilts
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, VISCOUS
 
 _TURN = 1.5
+#: modes from which on the integrals are taken in closed form, where none is slower than this share of the excitation:
+#: in such a mode closed forms are differences of large numbers
+_MANY, _SLOW = 6, 0.01
+#: steps to a peak, and their size, as a share of a piece, at which it is found: its height is off by the square
+_STEPS, _FINE = 50, 1e-9
 _NODES, _WEIGHTS = (tuple(part.tolist()) for part in np.polynomial.legendre.leggauss(8))
 
 
@@ -44,15 +51,23 @@ def motion_at(system, flows, st, work, t, q, v):
 def add_up(system, flows, st, rec, work, tau):
     """Add a segment of length tau to ledger and records; st is at its start."""
     s, period = st.counters[FLOW], st.counters[PERIOD]
-    fastest = 0.0
+    fastest, slowest = 0.0, math.inf
     for j in range(flows.modes[s]):
         rate = flows.eigenvalue[s, j]
         fastest = max(fastest, abs(rate.real) + abs(rate.imag))
-    pieces = max(1, math.ceil(tau * fastest / _TURN))
-    h, q, v = tau / pieces, work.ahead[0], work.ahead[1]
+        slowest = min(slowest, abs(rate.real) + abs(rate.imag))
     x0, rate0 = response_at(system, st.q, st.v, st.time[0])
     rec.peak[period] = max(rec.peak[period], abs(x0))
     note_tilts(system, st, st.q, period)
+    for b in range(len(system.along)):
+        if system.tilt[b] >= 0 and not _on_floor(system, st, b):
+            st.lifted[period, b] += tau
+    many = flows.modes[s] >= _MANY and slowest > _SLOW * system.frequency[0]
+    if many and not _is_sprung(system, st):
+        _add_closed_forms(system, flows, st, rec, work, tau, math.ceil(tau * fastest / _TURN), x0, rate0)
+        return
+    pieces = max(1, math.ceil(tau * fastest / _TURN))
+    h, q, v = tau / pieces, work.ahead[0], work.ahead[1]
     for piece in range(pieces):
         for node in range(len(_NODES)):
             t = h * (piece + 0.5 * (1.0 + _NODES[node]))
@@ -65,9 +80,45 @@ def add_up(system, flows, st, rec, work, tau):
         if rate0 * rate1 < 0.0:
             rec.peak[period] = max(rec.peak[period], _extremum(system, flows, st, work, q, v, end - h, end, rate0))
         rate0 = rate1
-    for b in range(len(system.along)):
-        if system.tilt[b] >= 0 and not _on_floor(system, st, b):
-            st.lifted[period, b] += tau
+
+
+@kernel
+def _add_closed_forms(system, flows, st, rec, work, tau, pieces, x0, rate0):
+    """Add the integrals of a segment, and its peaks: of the response on pieces, of tilts as often as it turns."""
+    period, q, v = st.counters[PERIOD], work.ahead[0], work.ahead[1]
+    set_up(system, flows, st, work, tau)
+    integrate(system, flows, st, rec, work, tau)
+    turns = max(1, math.ceil(tau * system.frequency[0] / _TURN))
+    for piece in range(turns):
+        for node in range(len(_NODES)):
+            motion_at(system, flows, st, work, tau / turns * (piece + 0.5 * (1.0 + _NODES[node])), q, v)
+            note_tilts(system, st, q, period)
+    pieces = max(1, pieces)
+    h = tau / pieces
+    for piece in range(pieces):
+        x1, rate1, _ = response_after(flows, st, work, h * (piece + 1))
+        rec.peak[period] = max(rec.peak[period], abs(x1))
+        if rate0 * rate1 < 0.0:
+            low, high, t = h * piece, h * (piece + 1), h * (piece + 0.5)
+            for _ in range(_STEPS):  # Newton's method, held between the bounds
+                x, rate, bend = response_after(flows, st, work, t)
+                low, high = (t, high) if (rate > 0.0) == (rate0 > 0.0) else (low, t)
+                step = t - rate / bend if bend != 0.0 else low
+                step = step if low < step < high else 0.5 * (low + high)
+                if abs(step - t) <= _FINE * h:
+                    break
+                t = step
+            rec.peak[period] = max(rec.peak[period], abs(x))
+        rate0 = rate1
+
+
+@inlined
+def _is_sprung(system, st):
+    """Whether a contact that yields is closed: its force has integrals of its own."""
+    sprung = False
+    for r in range(system.contacts):
+        sprung = sprung or (yields(system, r) and st.state[r] < OPEN)
+    return sprung
 
 
 @inlined

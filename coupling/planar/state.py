@@ -42,6 +42,8 @@ class PlanarState(NamedTuple):
     amplitude: np.ndarray  # (m,) complex; the first e are the phases of the harmonics
     bend: np.ndarray  # (N,) constant part of the coordinates' acceleration
     force: np.ndarray  # (2u,) constant part of the forces, N
+    # (2u,) self-stress of contacts that depend on each other, N: what their forces have beside the least ones
+    prestress: np.ndarray
 
 
 class Guards(NamedTuple):
@@ -87,7 +89,16 @@ class Scratch(NamedTuple):
     resting: np.ndarray  # (u,) int: whether a contact that yields touches without speed, and what it does then
     span: np.ndarray  # (N, N) orthonormal basis of rows
     lemke: Lemke
+    split: Lemke  # the problem with friction split in two (contact_decisions._solve_split)
+    part: np.ndarray  # (4u,) int: kind of each of its unknowns
+    column: np.ndarray  # (4u,) int: the unknown of `lemke` that it belongs to
+    attempt: np.ndarray  # (1,) int: how often a decision has been made anew
     turn: np.ndarray  # (m,) complex
+    # of integrals in closed form (exponential_integrals)
+    moment: np.ndarray  # (3, m) complex: integrals of t^k exp(lambda t)
+    pair: np.ndarray  # (2, m, m) complex: of products of exponentials, and of one with the conjugate of the other
+    constant: np.ndarray  # (4, 3): powers of t in each signal
+    signal: np.ndarray  # (4, m) complex: exponentials in each signal
     wave: np.ndarray  # (m,) complex
 
 
@@ -102,6 +113,7 @@ def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, records: 
         lost=np.zeros(u), ledger=np.zeros(len(ENERGIES)), tilt=np.zeros(of_bodies), lifted=np.zeros(of_bodies),
         sampled=np.zeros((samples, size)), shut=np.zeros((samples, u), np.int8),
         amplitude=np.zeros(modes, complex), bend=np.zeros(size), force=np.zeros(2 * u),
+        prestress=np.zeros(2 * u),
     )  # fmt: skip
 
 
@@ -126,5 +138,8 @@ def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
         way=next(integers), place=next(integers), verdict=next(integers), doubtful=next(integers), first=next(integers),
         doubt=next(integers), sliding=next(integers), resting=next(integers),
         span=np.zeros((size, size)), lemke=new_lemke(3 * u),
-        turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
+        split=new_lemke(4 * u), part=np.zeros(4 * u, np.int64), column=np.zeros(4 * u, np.int64),
+        attempt=np.zeros(1, np.int64),
+        moment=np.zeros((3, modes), complex), pair=np.zeros((2, modes, modes), complex), constant=np.zeros((4, 3)),
+        signal=np.zeros((4, modes), complex), turn=np.zeros(modes, complex), wave=np.zeros(modes, complex),
     )  # fmt: skip

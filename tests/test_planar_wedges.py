@@ -1,0 +1,128 @@
+"""Blocks wedged in their cavity, and impacts in which Newton's law would bring energy (Kane's paradox)."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from tests.tools.planar import Run, ledger, open_run, planar_run, planar_scene, still_table
+from vanedamp.coupling.numerics.codes import OPEN
+from vanedamp.coupling.planar.constraints import CEILING, FLOOR, PlanarMotion
+from vanedamp.coupling.response.records import IMPACT, new_records
+from vanedamp.coupling.response.response import Status
+
+#: half length and half height of a block, m; its play, m
+A, B, PLAY = 0.01, 0.04, 1e-4
+
+
+def leaning(mu, steep):
+    """A run of a block that leans from its lower left corner to its upper right one, on a slope to the left."""
+    table = still_table(10.0)
+    table["gravity"] |= {"orientation_deg": math.degrees(math.atan(steep))}
+    block = {"shape": "block", "length": 2 * A, "height": 2 * B, "mass": 1.3, "friction": mu, "restitution": 0.0}
+    return planar_run(table, block | {"tilt": PLAY / (2 * A)}, periods=1, play=PLAY)
+
+
+@pytest.mark.parametrize("mu", [1.2 * A / B, 1.5 * A / B, 2.0 * A / B])
+def test_a_block_that_leans_within_its_friction_cones_stays(mu):
+    """On a slope on which friction at the floor would not hold it, mu < tan < mu^2 b/a.
+
+    The line through both corners, a/b from the normal, lies within both cones of friction; with
+    N' (up to) m g cos (mu b/a - 1)/2 at the ceiling, friction holds up to that slope and no motion is possible.
+    """
+    run = leaning(mu, 0.5 * (mu + mu * mu * B / A))
+    assert run.status is Status.OK
+    np.testing.assert_allclose(run.state.v, 0.0, atol=1e-12)
+    np.testing.assert_allclose(run.state.q, [0.0, PLAY / 2, PLAY / (2 * A)], atol=1e-12 * PLAY)
+    closed = run.state.state != OPEN
+    assert {(int(run.system.surface[r]), int(run.system.corner[r])) for r in np.flatnonzero(closed)} == {
+        (FLOOR, 0), (CEILING, 2),
+    }  # fmt: skip
+    assert abs(ledger(run)) <= 1e-12
+
+
+def test_it_slides_where_the_line_is_outside_the_cones():
+    mu = 0.8 * A / B
+    run = leaning(mu, 1.5 * mu)
+    assert run.status is Status.OK
+    assert run.state.q[0] < -1e-3
+
+
+def test_on_a_steeper_slope_it_slides_with_both_corners():
+    """The other motion there: N' = m g cos (mu b/a - 1)/2, and m x'' = m g (sin - cos mu^2 b/a)."""
+    mu = 1.5 * A / B
+    steep = 1.5 * mu * mu * B / A
+    run = leaning(mu, steep)
+    cosine = 1 / math.hypot(1.0, steep)
+    rate = 9.81 * cosine * (steep - mu * mu * B / A)
+    stays = bool(np.all(np.abs(run.state.v) < 1e-9))
+    assert run.status is Status.OK
+    assert stays or run.state.q[0] == pytest.approx(-0.5 * rate * 0.1**2, rel=1e-9)
+
+
+def test_unequal_restitution_brings_no_energy():
+    """A block lies on the floor and hits it with one corner, with friction and coefficients that differ.
+
+    Newton's law in Moreau's form would bring energy to some; then all coefficients are smaller by one factor.
+    """
+    rng = np.random.default_rng(5)
+    gains = 0
+    for _ in range(100):
+        mu, slower = float(rng.uniform(0.2, 0.5)), float(rng.uniform(-0.3, 0.1))
+        block = {
+            "shape": "block", "length": 0.02, "height": 0.02 * float(rng.uniform(1.0, 2.0)), "mass": 0.7,
+            "friction": mu, "restitution": 1.0, "velocity": float(rng.uniform(-0.1, 0.1)),
+            "lift_velocity": -(1.0 + slower) / 2, "tilt_rate": float(rng.choice([-1, 1])) * (1.0 - slower) / 0.02,
+        }  # fmt: skip
+        opened = open_run(planar_scene(still_table(100.0, gravity=0.0), block), 1, 10**6)
+        u = len(opened.system.rest)
+        floor = np.flatnonzero(opened.system.surface == FLOOR)
+        coefficients = np.where(np.arange(u) == floor[0], *rng.permutation([0.1, 0.9]))
+        system = opened.system._replace(restitution=coefficients)
+        v = opened.state.v.copy()
+        run = Run(opened.flat, system, PlanarMotion(opened.state.q, v), new_records(opened.flat, 1, 0), True, 1)
+        before = system.J @ v
+        run.advance_to(1)
+        hits = [hit for hit in run.events(IMPACT) if hit[0] == 0.0]
+        lost = run.state.ledger[1:5].sum()
+        assert lost >= -1e-12 * (0.5 * system.mass @ v**2)
+        plain = newton(system, floor, before)
+        assert plain is not None
+        gain = plain @ (before + 0.5 * system.delassus @ plain)
+        if gain > 1e-9:
+            gains += 1
+            assert all(hit[4] < -(1 - 1e-9) * coefficients[int(hit[2])] * hit[3] for hit in hits if hit[5] > 1e-9)
+    assert gains >= 3
+
+
+def newton(system, contacts, before):
+    """Return impulses (2u,) of Newton's law in Moreau's form, by trying every state of every contact; None: none."""
+    u = len(system.rest)
+    for states in itertools.product("0-=+", repeat=len(contacts)):  # no impulse, slip to the left, none, to the right
+        rows, columns = [], []
+        for r, state in zip(contacts, states, strict=True):
+            if state != "0":
+                push = np.zeros(2 * u)
+                push[r], push[u + r] = 1.0, {"-": 1.0, "=": 0.0, "+": -1.0}[state] * system.friction[r]
+                rows.append(r)
+                columns.append(push)
+            if state == "=":
+                rows.append(u + r)
+                columns.append(np.eye(2 * u)[u + r])
+        target = before.copy()
+        target[contacts] *= 1.0 + system.restitution[contacts]
+        impulse = np.zeros(2 * u)
+        if rows:
+            spread = np.array(columns).T
+            matrix = (system.delassus @ spread)[rows]
+            impulse = spread @ np.linalg.lstsq(matrix, -target[rows], rcond=1e-9)[0]
+        after = target + system.delassus @ impulse
+        fits = np.abs(after[rows]).max(initial=0.0) <= 1e-9 and np.all(after[contacts] >= -1e-9)
+        fits = fits and np.all(impulse[contacts] >= -1e-12)
+        fits = fits and np.all(np.abs(impulse[u + contacts]) <= system.friction[contacts] * impulse[contacts] + 1e-12)
+        for r, state in zip(contacts, states, strict=True):
+            fits = fits and not (state == "-" and after[u + r] > 1e-9) and not (state == "+" and after[u + r] < -1e-9)
+        if fits:
+            return impulse
+    return None
