@@ -7,7 +7,7 @@ import pytest
 
 from tests.tools.planar import ledger, planar_run, still_table
 from vanedamp.coupling.exact.event_functions import CHATTER
-from vanedamp.coupling.planar.constraints import LEFT
+from vanedamp.coupling.planar.constraints import CEILING, LEFT
 from vanedamp.coupling.response.records import DETACHES, FRICTION, IMPACT, SLIPS, STICKS
 from vanedamp.coupling.response.response import Status
 
@@ -134,6 +134,26 @@ def test_below_that_angle_the_sphere_rolls_off():
     }  # fmt: skip
     run = planar_run(still_table(100.0, gravity=0.0), sphere, periods=1, gap=1.0)
     assert run.state.v[0] / along == pytest.approx(5 / 7, rel=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["block", "disc"])
+def test_gravity_that_lifts_a_body_lays_it_on_the_ceiling(shape):
+    """Upside down it falls through its play, bounces on the ceiling as on a floor, and rubs there."""
+    size = {"length": 0.02, "height": 0.01} if shape == "block" else {"radius": 0.005}
+    k, play, mu, speed = 0.6, 1e-3, 0.2, 1.0
+    body = {"shape": shape, "mass": 0.7, "friction": mu, "restitution": k, "velocity": speed} | size
+    table = still_table(1.0)
+    table["gravity"] |= {"orientation_deg": 180.0}
+    run = planar_run(table, body, periods=1, gap=10.0, play=play)
+    fall = math.sqrt(2 * play / G)
+    impacts = run.events(IMPACT)
+    assert set(run.system.surface[impacts[:, 2].astype(int)]) == {CEILING}
+    times = np.unique(impacts[:, 0])
+    np.testing.assert_allclose(times[:6], fall * (1 + 2 * np.r_[0, np.cumsum(k ** np.arange(1, 6))]), rtol=1e-9)
+    # friction ends the slip of a block, and lets a disc roll
+    assert run.state.v[0] == pytest.approx(0.0 if shape == "block" else 2 / 3 * speed, abs=1e-9)
+    assert run.state.q[1] == pytest.approx(play, abs=1e-12)
+    assert abs(ledger(run)) <= 1e-11
 
 
 def test_bounces_on_the_wall_and_on_the_floor_alike():

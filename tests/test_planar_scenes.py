@@ -145,7 +145,6 @@ def test_a_sweep_of_blocks():
         ({"solver.method": "penalty", "solver.scheme": "hht"}, 'solver.scheme: "hht" takes sliders only'),
         ({"solver.method": "penalty", "damper.0.restitution": 0.0}, "damper[0].restitution: a contact with a dashpot"),
         ({"contact": {"law": "compliant", "stiffness": 1e8}}, "contact.law"),
-        ({"continuation.direction": "up", "sweep": {"excitation.frequency": [1900.0, 1910.0]}}, "continuation"),
     ],
 )
 def test_wrong_input_is_answered_in_one_line(wrong, said):

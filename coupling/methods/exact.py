@@ -10,6 +10,7 @@ from vanedamp.coupling.scene.solver_options import PlanarOptions, SolverOptions
 if TYPE_CHECKING:  # a scene takes the options without the engine
     from vanedamp.coupling.response.evaluation import Run
     from vanedamp.coupling.response.records import Records
+    from vanedamp.coupling.response.restart_state import RestartState
     from vanedamp.coupling.scene.scene import Scene
     from vanedamp.coupling.system.assembly import InitialMotion
     from vanedamp.coupling.system.system import System
@@ -31,8 +32,11 @@ def begin(system: System, options: SolverOptions, initial: InitialMotion, record
     return EngineRun(system, initial, records, events, options.max_events)
 
 
-def begin_planar(scene: Scene, system: System, options: SolverOptions, records: Records, events: bool) -> Run:
+def begin_planar(
+    scene: Scene, system: System, options: SolverOptions, records: Records, events: bool,
+    start: RestartState | None = None,
+) -> Run:  # fmt: skip
     """Return a run by the engine for bodies in the plane."""
     from vanedamp.coupling.planar.planar_run import begin_run
 
-    return begin_run(scene, system, records, events, options.max_events, getattr(options, "linearisation", 0.01))
+    return begin_run(scene, system, records, events, options.max_events, getattr(options, "linearisation", 0.01), start)

@@ -16,7 +16,7 @@ from vanedamp.coupling.response.restart import restart_from, restart_state
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
-from vanedamp.coupling.system.assembly import assemble, initial_motion, loads_of, physical_scale
+from vanedamp.coupling.system.assembly import InitialMotion, assemble, initial_motion, loads_of, physical_scale
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
@@ -33,8 +33,9 @@ def respond(
     run = run_of(scene, events, samples_per_period, start)
     status, transient = run_scene(run, scene, progress)
     outcome, last = run.outcome(), run.final()
-    final = None if last is None else restart_state(outcome.system, physical_scale(scene, outcome.system), last)
-    return replace(evaluate(scene, outcome, status, transient, started), final=final)
+    if isinstance(last, InitialMotion):
+        last = restart_state(outcome.system, physical_scale(scene, outcome.system), last)
+    return replace(evaluate(scene, outcome, status, transient, started), final=last)
 
 
 def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:
@@ -69,14 +70,16 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     scale = physical_scale(scene, system)
     records = new_records(system, scene.time.simulated, samples_per_period)
     if scene.planar:
-        return _begin_planar(scene, system, method, records, events)
+        return _begin_planar(scene, system, method, records, events, start)
     initial = initial_motion(scene, system) if start is None else restart_from(system, scale, start)
     signal = scene.excitation.signal
     further = {} if signal is None else {"loads": loads_of(scene, signal)}
     return method.begin(system, scene.solver, initial, records, events, **further)
 
 
-def _begin_planar(scene: Scene, system: System, method: Method, records: Records, events: bool) -> Run:
+def _begin_planar(
+    scene: Scene, system: System, method: Method, records: Records, events: bool, start: RestartState | None
+) -> Run:
     begin = getattr(method, "begin_planar", None)
     if begin is None:
         able = [name for name, part in METHODS.all().items() if hasattr(part, "begin_planar")]
@@ -84,14 +87,13 @@ def _begin_planar(scene: Scene, system: System, method: Method, records: Records
             f"solver.method: {scene.solver.method} takes sliders only; bodies with extent, stiffness or dashpot are "
             f"for {' or '.join(able)}"
         )
-    run: Run = begin(scene, system, scene.solver, records, events)
+    further = {} if start is None else {"start": start}
+    run: Run = begin(scene, system, scene.solver, records, events, **further)
     return run
 
 
 def why_no_restart(scene: Scene) -> str | None:
     """Return why runs of the scene's method cannot begin with the state of another; None if they can."""
-    if scene.planar:
-        return "runs with bodies that have an extent, stiffness or dashpot leave no state for another"
     return _why_not(scene.solver.method, "RESTARTS")
 
 

@@ -57,6 +57,8 @@ class PlanarSystem(NamedTuple):
     tilt: np.ndarray  # (b,) coordinate theta, -1: none
     floor: np.ndarray  # (b, N) motion of the floor along the cavity
     turn: np.ndarray  # (b, N) rotation of the cavity
+    rise: np.ndarray  # (b, N) motion of the floor across the cavity, below the body's centre
+    cavity: np.ndarray  # (b,) number of the body's cavity
     neglected: (
         np.ndarray
     )  # (b,) shortening over the smallest play, per square of the tilt; nan for sliders, 0 for discs
@@ -137,11 +139,13 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     mass, weight = np.ones(size), np.zeros(size)
     load = np.zeros((len(flat.frequency), size), complex)
     load[:, :n] = flat.load[:, :n]
-    floor, turn = np.zeros((len(bodies), size)), np.zeros((len(bodies), size))
+    floor, turn, rise = np.zeros((3, len(bodies), size))
+    centre = _centres(bodies, owner)
     for body in bodies:
         k, x = body.number, body.x
         mass[x], weight[x], load[:, x] = body.damper.mass, flat.weight[n + k], flat.load[:, n + k]
-        floor[k, :n], turn[k, :n] = cavities[owner[k]][FLOOR].along, cavities[owner[k]][FLOOR].turn
+        below = cavities[owner[k]][FLOOR]
+        floor[k, :n], turn[k, :n], rise[k, :n] = below.along, below.turn, below.motion(float(centre[k]), 0.0)[1]
         if body.damper.shape != "slider":
             label = surface_labels(scene, owner[k])[2]
             normal = basis.across(label)
@@ -153,7 +157,7 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     units: list[_Unit] = []
     for index, cavity in enumerate(scene.cavity):
         inside = [body for body in bodies if owner[body.number] == index]
-        units += _contacts(scene, cavity, cavities[index], inside, size)
+        units += _contacts(scene, cavity, cavities[index], inside, centre, size)
     for row in range(flat.friction_rows, len(flat.J)):
         if not flat.J[row, n:].any():
             gap = np.zeros(size)
@@ -199,9 +203,21 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
         along=np.array([body.x for body in bodies], np.int64),
         tilt=np.array([-1 if body.damper.shape == "slider" else body.x + 2 for body in bodies], np.int64),
-        floor=floor, turn=turn,
+        floor=floor, turn=turn, rise=rise, cavity=np.array(owner, np.int64),
         neglected=np.array([_neglected(body, scene.cavity[owner[body.number]]) for body in bodies]),
     )  # fmt: skip
+
+
+def _centres(bodies: list[_Body], owner: list[int]) -> np.ndarray:
+    """Return where the centres of the bodies (b,) stand in their cavities, m from the middle, side by side."""
+    centre = np.zeros(len(bodies))
+    for index in set(owner):
+        row = [body for body in bodies if owner[body.number] == index]
+        end = -sum(body.a for body in row)
+        for body in row:
+            centre[body.number] = end + body.a
+            end = centre[body.number] + body.a
+    return centre
 
 
 def _neglected(body: _Body, cavity: Cavity) -> float:
@@ -264,24 +280,21 @@ def _places(basis: ModalBasis, labels: tuple[str, ...]) -> list[tuple[float, flo
 
 
 def _contacts(
-    scene: Scene, cavity: Cavity, surfaces: tuple[_Surface, ...], bodies: list[_Body], size: int
+    scene: Scene, cavity: Cavity, surfaces: tuple[_Surface, ...], bodies: list[_Body], centre: np.ndarray, size: int
 ) -> list[_Unit]:
     """Contacts in a cavity, from left to right, in each body's walls, floor and ceiling."""
     units: list[_Unit] = []
     length = 2 * sum(body.a for body in bodies)
-    centre = -length / 2
     for place, body in enumerate(bodies):
-        centre += body.a
         if place == 0:
             units += _at_walls(cavity, surfaces, body, LEFT, -cavity.gap / 2 - length / 2, size)
         if place == len(bodies) - 1:
             units += _at_walls(cavity, surfaces, body, RIGHT, cavity.gap / 2 + length / 2, size)
         if body.damper.shape != "slider":
             for surface in (FLOOR, CEILING):
-                units += _at_floor(cavity, surfaces, body, surface, centre, size)
+                units += _at_floor(cavity, surfaces, body, surface, float(centre[body.number]), size)
         if place + 1 < len(bodies):
             units += _between(scene, cavity, body, bodies[place + 1], size)
-        centre += body.a
     return units
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from vanedamp.coupling.exact.complex_modes import IllConditioned
 from vanedamp.coupling.numerics.codes import (
+    DONE,
     EVALUATIONS,
     EVENTS,
     IMPACTS,
@@ -19,11 +20,14 @@ from vanedamp.coupling.planar.automaton import advance, begin
 from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem, planar_motion, planar_system
 from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
 from vanedamp.coupling.planar.recorder import plane_of
+from vanedamp.coupling.planar.restart import planar_restart, planar_restart_state
 from vanedamp.coupling.planar.state import new_guards, new_scratch, new_state
 from vanedamp.coupling.response.evaluation import LOG_WIDTH, STATUS_OF, Outcome
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import physical_scale
 from vanedamp.coupling.system.system import System
 
 #: imbalance of the ledger above which a response is not to be used
@@ -31,12 +35,16 @@ _OPEN_LEDGER = 1e-6
 
 
 def begin_run(
-    scene: Scene, flat: System, records: Records, events: bool, max_events: int, linearisation: float
-) -> PlanarRun:
-    """Return a run of a scene at time zero. flat: its system with all bodies as sliders. Raises InputError."""
-    system = planar_system(scene, flat)
-    initial = planar_motion(scene, flat, system)
-    return PlanarRun(flat, system, initial, records, events, max_events, linearisation)
+    scene: Scene, flat: System, records: Records, events: bool, max_events: int, linearisation: float,
+    start: RestartState | None = None,
+) -> PlanarRun:  # fmt: skip
+    """Return a run of a scene at time zero, from its initial motion or the state of another run.
+
+    flat: its system with all bodies as sliders. Raises InputError.
+    """
+    system, scale = planar_system(scene, flat), physical_scale(scene, flat)
+    initial = planar_motion(scene, flat, system) if start is None else planar_restart(flat, system, scale, start)
+    return PlanarRun(flat, system, initial, records, events, max_events, linearisation, scale)
 
 
 class PlanarRun:
@@ -44,8 +52,9 @@ class PlanarRun:
 
     def __init__(
         self, flat: System, system: PlanarSystem, initial: PlanarMotion, records: Records, events: bool,
-        max_events: int, linearisation: float = 0.01,
+        max_events: int, linearisation: float = 0.01, scale: float = 1.0,
     ) -> None:  # fmt: skip
+        self.scale, self.ended = scale, False
         self.flat, self.system, self.records, self.max_events, self.keep = flat, system, records, max_events, events
         self.linearisation = linearisation
         self.flows = empty_flows(system)
@@ -62,6 +71,7 @@ class PlanarRun:
         if not self.begun:
             self.begun = True
             if not begin(self.system, self.state, self.records, self.log, self.scratch):
+                self.ended = True
                 return Status.UNDECIDED
         while True:
             code = advance(
@@ -75,8 +85,10 @@ class PlanarRun:
                 try:
                     self.flows = add_flow(self.flows, self.system, self.state.state)
                 except IllConditioned:
+                    self.ended = True
                     return Status.ILL_CONDITIONED
             elif code != LOG_FULL:
+                self.ended = code != DONE
                 return STATUS_OF[int(code)]
 
     def outcome(self) -> Outcome:
@@ -91,5 +103,8 @@ class PlanarRun:
             plane=plane_of(self.system, st.tilt, st.lifted, st.sampled, st.shut, self.linearisation),
         )  # fmt: skip
 
-    def final(self) -> None:
-        """Return None: runs of bodies with extent do not hand over their state yet."""
+    def final(self) -> RestartState | None:
+        """Return the state at the end of the periods done; None for a run that ended within one."""
+        if self.ended:
+            return None
+        return planar_restart_state(self.flat, self.system, self.scale, self.state.q, self.state.v)

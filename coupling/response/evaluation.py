@@ -16,6 +16,7 @@ import numpy as np
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.records import DETACHES, ENERGIES, EXCITATION, IMPACT, KINDS, STORED, VISCOUS, Records
 from vanedamp.coupling.response.response import Event, PlanarSamples, Response, Status, classify
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import InitialMotion
@@ -52,8 +53,11 @@ class Run(Protocol):
     def outcome(self) -> Outcome:
         """Return the records of the run so far, and its figures."""
 
-    def final(self) -> InitialMotion | None:
-        """Return the motion that another run can begin with; None if the run ended within a period, or keeps none."""
+    def final(self) -> InitialMotion | RestartState | None:
+        """Return the motion that another run can begin with; None if the run ended within a period, or keeps none.
+
+        Runs in the plane return the restart state itself.
+        """
 
 
 class Plane(NamedTuple):

@@ -33,22 +33,33 @@ def restart_from(system: System, scale: float, start: RestartState) -> InitialMo
     limits of their sliders. Raises InputError for a scene of another size.
     """
     b, friction = system.bodies, system.friction_rows
-    sizes = (system.modes, system.modes, b, b, friction - b, len(system.J) - friction)
-    found = tuple(len(array) for array in astuple(start))
-    if found != sizes:
-        raise InputError(
-            f"continuation: a state of {found[0]} modes, {found[2]} bodies and {found[4]} friction dampers does not "
-            f"fit a scene of {sizes[0]}, {sizes[2]} and {sizes[4]}"
-        )
+    check_size(system, start)
     p, rate = (array / scale for array in (start.displacement, start.velocity))
     limit, spring = system.limit[b:friction], system.spring[b:friction]
     elongation = np.where(np.isfinite(spring), np.clip(start.elongation, -limit / spring, limit / spring), 0.0)
-    p = _before_stops(system, p)
+    p = before_stops(system, p)
     slip = _inside(system, start, p)
     return InitialMotion(p, rate, *row_motion(system, slip, start.slip_velocity, p, rate, elongation))
 
 
-def _before_stops(system: System, p: np.ndarray) -> np.ndarray:
+def check_size(system: System, start: RestartState, planar: bool = False) -> None:
+    """Raise InputError for a state of a scene of another size; planar: whether its bodies move in the plane."""
+    b, friction = system.bodies, system.friction_rows
+    sizes = (system.modes, system.modes, b, b, friction - b, len(system.J) - friction, *4 * (b if planar else 0,))
+    found = tuple(len(array) for array in astuple(start))
+    if found[:6] != sizes[:6]:
+        raise InputError(
+            f"continuation: a state of {found[0]} modes, {found[2]} bodies and {found[4]} friction dampers does not "
+            f"fit a scene of {sizes[0]}, {sizes[2]} and {sizes[4]}"
+        )
+    if found != sizes:
+        raise InputError(
+            "continuation: a state of bodies that move in the plane, with extent, stiffness or dashpot, and one of "
+            "sliders do not fit each other's scenes"
+        )
+
+
+def before_stops(system: System, p: np.ndarray) -> np.ndarray:
     """Return modal coordinates (n,) outside of all rigid stops, moved out of each in turn, once for every stop."""
     stops = [
         r for r in range(system.friction_rows, len(system.J))

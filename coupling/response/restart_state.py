@@ -5,11 +5,15 @@ The phase of the excitation needs no entry: a run ends with a whole period and t
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 
 from vanedamp.files.store import frozen
+
+
+def _none() -> np.ndarray:
+    return frozen(())
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +24,9 @@ class RestartState:
     slip, slip_velocity: (b,) m and m/s of the bodies relative to their floors
     elongation: (d,) m of the friction dampers' springs; 0 for rigid ones
     gap: (c,) m, free travel of each gap's cavity, which the slips belong to
+    lift, lift_velocity: (b,) m and m/s across the cavity, of the bodies' centres above the floor, counted from where
+    they lie flat on it; tilt, tilt_rate: (b,) rad and rad/s relative to the cavity; 0 for sliders, and empty without
+    bodies that move in the plane
     """
 
     displacement: np.ndarray
@@ -28,6 +35,10 @@ class RestartState:
     slip_velocity: np.ndarray
     elongation: np.ndarray
     gap: np.ndarray
+    lift: np.ndarray = field(default_factory=_none)
+    lift_velocity: np.ndarray = field(default_factory=_none)
+    tilt: np.ndarray = field(default_factory=_none)
+    tilt_rate: np.ndarray = field(default_factory=_none)
 
     def to_list(self) -> list[list[float]]:
         """Return plain data, exact: Python writes the shortest text of a double that reads as the same."""

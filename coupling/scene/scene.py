@@ -166,7 +166,8 @@ class Scene:
             raise ValueError(f"{key}.{error}") from None
 
     def _check_load(self, index: int, damper: Damper) -> None:
-        if damper.normal_load is not None or damper.friction == 0 or self.gravity.direction is not None:
+        extended = damper.shape != "slider"  # has a ceiling to fall on
+        if extended or damper.normal_load is not None or damper.friction == 0 or self.gravity.direction is not None:
             return
         if math.cos(math.radians(self.gravity.orientation_deg)) < -1e-12 and self.gravity.acceleration > 0:
             raise ValueError(

@@ -1,0 +1,103 @@
+"""Runs of bodies in the plane that begin where another has ended."""
+
+import numpy as np
+import pytest
+
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.toml_input import InputError, validate
+
+#: a cavity that moves along, across and turns, with two blocks, and one with a slider on a spring
+DATA = {
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 400.0, "damping_ratio": 0.01},
+    "excitation": {"frequency": 3.1, "force": 2.0},
+    "initial": {"velocity": 0.1},
+    "gravity": {"acceleration": 0.05},
+    "cavity": [
+        {"name": "c1", "gap": 0.02, "play": 0.002, "normal_motion": 0.1, "rotation": 0.05}, {"name": "c2", "gap": 0.03},
+    ],
+    "damper": [
+        {
+            "cavity": "c1", "shape": "block", "length": 0.03, "height": 0.02, "mass": 0.05, "friction": 0.3,
+            "restitution": 0.8, "position": -0.006, "tilt": 0.01, "lift": 5e-4,
+        },
+        {
+            "cavity": "c1", "shape": "block", "length": 0.02, "height": 0.025, "mass": 0.04, "friction": 0.2,
+            "restitution": 0.8, "position": 0.004,
+        },
+        {"cavity": "c2", "mass": 0.03, "stiffness": 8.0, "restitution": 0.5, "friction": 0.1},
+    ],
+}  # fmt: skip
+
+
+def scene(periods, **changes):
+    return validate(Scene, DATA | {"time": {"periods": periods, "transient": 0}} | changes, "scene")
+
+
+@pytest.mark.parametrize("cut", [1, 3])
+def test_a_run_in_two_parts_is_the_run_in_one(cut):
+    """To what more than a hundred impacts make of the round-off of the state."""
+    whole = simulate(scene(4), events=True)
+    first = simulate(scene(cut))
+    second = simulate(scene(4 - cut), start=RestartState.from_list(first.final.to_list()))
+    assert len(whole.event_list) > 150
+    scale = np.abs(whole.section).max(axis=0)
+    np.testing.assert_allclose(second.section / scale, whole.section[cut:] / scale, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(second.peak, whole.peak[cut:], rtol=1e-8)
+    for name in ("displacement", "velocity", "slip", "slip_velocity", "lift", "tilt"):
+        one, other = getattr(whole.final, name), getattr(second.final, name)
+        np.testing.assert_allclose(other, one, atol=1e-8 * max(np.abs(one).max(), 1e-3))
+
+
+def test_the_state_is_relative_to_the_cavity():
+    final = simulate(scene(4)).final
+    assert final.lift.shape == final.tilt.shape == (3,)
+    assert final.lift[2] == final.tilt_rate[2] == 0.0
+    # inside its cavity, whatever the structure does
+    assert np.all(np.abs(final.tilt[:2]) <= 0.002 / np.array([0.03, 0.02]) * (1 + 1e-9))
+    assert np.all((final.lift >= -1e-12) & (final.lift <= 0.002))
+
+
+def test_a_smaller_cavity_takes_the_bodies_in():
+    final = simulate(scene(4)).final
+    cavity = [DATA["cavity"][0] | {"gap": 0.013, "play": 0.001}, DATA["cavity"][1] | {"gap": 0.02}]
+    begun = simulate(scene(2, cavity=cavity, solver={"linearisation": 0.1}), start=final)
+    assert begun.status == "ok"
+    assert np.abs(begun.slip[:, :2]).max() <= 0.0065 * (1 + 1e-9)
+    assert np.abs(begun.slip[:, 2]).max() <= 0.01 * (1 + 1e-9)
+
+
+def test_states_of_sliders_and_of_blocks_do_not_mix():
+    sliders = [{"cavity": "c1", "mass": 0.05}, {"cavity": "c1", "mass": 0.05}, {"cavity": "c2", "mass": 0.03}]
+    final = simulate(scene(1)).final
+    with pytest.raises(InputError, match="continuation: a state of bodies that move in the plane"):
+        simulate(scene(1, damper=sliders), start=final)
+    with pytest.raises(InputError, match="continuation: a state of bodies that move in the plane"):
+        simulate(scene(1), start=simulate(scene(1, damper=sliders)).final)
+
+
+def test_time_stepping_leaves_no_state():
+    with pytest.raises(InputError, match=r"continuation: is for solver\.method exact, not moreau"):
+        simulate(scene(1, solver={"method": "moreau"}), start=simulate(scene(1)).final)
+
+
+def test_continuation(tmp_path):
+    """Each point begins with the state of the one before; a sweep resumed from its checkpoint is the same."""
+    linked = {"sweep": {"excitation.frequency": [3.0, 3.1, 3.2]}, "continuation": {"direction": "up"}}
+    result = sweep(scene(5, **linked))
+    state = None
+    for k, frequency in enumerate(result.axes["excitation.frequency"]):
+        response = simulate(scene(5, excitation={"frequency": frequency, "force": 2.0}), start=state)
+        assert result.amplitude_mean[k] == response.amplitude_mean
+        state = response.final
+
+    def interrupt(done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sweep(scene(5, **linked), progress=interrupt, checkpoint=tmp_path / "sweep.partial")
+    resumed = sweep(scene(5, **linked), checkpoint=tmp_path / "sweep.partial")
+    np.testing.assert_array_equal(resumed.amplitude_mean, result.amplitude_mean)
