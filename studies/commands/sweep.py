@@ -53,7 +53,7 @@ def run(arguments: Namespace) -> None:
             if checkpoint is None
             else f"--resume: nothing to resume, there is no checkpoint {checkpoint}; leave --resume out to begin"
         )
-    from vanedamp.studies.commands.support.scenes import load_scene, print_model_order, print_resonance
+    from vanedamp.studies.commands.support.scenes import load_scene, print_choices, print_resonance
 
     scene = load_scene(arguments.input, outputs)
     from vanedamp.coupling.sweep.checkpoint import Checkpoint, clear
@@ -75,7 +75,7 @@ def run(arguments: Namespace) -> None:
             'run once more by itself; take "independent", or leave --peak out'
         )
     resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
-    print_model_order(arguments.input, points.estimate, points.warnings)
+    print_choices(arguments.input, points.estimate, points.advice, points.warnings)
     resonance = print_resonance(arguments.input, points.base)
     with workers(arguments.workers) as pool, progress("sweep") as report:
         started = time.perf_counter()
