@@ -15,7 +15,7 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.files.store import frozen
+from vanedamp.files.store import frozen, load
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.bench.bodies.measure import AMPLITUDE, MASS, NATURAL, STIFFNESS
@@ -240,6 +240,22 @@ def test_command_says_which_body(tmp_path, capsys):
     assert main(["run", str(tmp_path / "scene.toml"), "--json", str(tmp_path / "run.json")]) == 0
     assert "damper.shape: sliders: of 6 tilts" in capsys.readouterr().err
     assert json.loads((tmp_path / "run.json").read_text())["advice"]["shape"] == "slider"
+
+
+def test_the_peak_of_a_sweep_runs_as_in_the_sweep(tmp_path, capsys):
+    """Blocks begin in the sliders' motion there, too, and the report says which body ran."""
+    data = scene(1.0, periods=60, transient=20).to_dict()
+    lines = [f"[{name}]\n" + _table(data[name]) for name in ("structure", "excitation", "gravity", "time")]
+    lines += [f"[[{name}]]\n" + _table(data[name][0]) for name in ("cavity", "damper")]
+    lines += [f'[sweep]\n"excitation.frequency" = [{NATURAL}, {1.002 * NATURAL}]\n']
+    (tmp_path / "scene.toml").write_text("\n".join(lines))
+    files = [str(tmp_path / name) for name in ("scene.toml", "sweep.h5", "peak.h5", "report.html")]
+    assert main(["sweep", files[0], "-o", files[1], "--peak", files[2], "--json", "-", "--workers", "1"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    _, attributes = load(files[2], "response")
+    assert attributes["amplitude_mean"] == max(result["amplitude_mean"])
+    assert main(["report", *files[1:3], "-o", files[3]]) == 0
+    assert (tmp_path / "report.html").read_text().count("Bodies run as blocks: of 3 tilts") >= 2
 
 
 def _table(values):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, add_workers
@@ -115,10 +116,13 @@ def _run_peak(points: Grid, result: Sweep, path: str, source: str) -> None:
         print_note(source, f"--peak: no point is ok, {path} was not written")
         return
     values = points.values(index)
-    scene = Points(points.base, points.choices).scene(values)
+    chosen = Points(points.base, points.choices).chosen(values)
     with progress("peak") as report:
-        response = simulate(scene, events=True, samples_per_period=_SAMPLES, progress=report)
-    response.save(path, {"versions": result.provenance.get("versions", {}), "scene": scene.to_dict()})
+        response = simulate(
+            chosen.scene, events=True, samples_per_period=_SAMPLES, start=chosen.start, progress=report
+        )  # fmt: skip
+    response = replace(response, advice=chosen.advice)
+    response.save(path, {"versions": result.provenance.get("versions", {}), "scene": chosen.scene.to_dict()})
     at = ", ".join(f"{axis} = {format_value(value)}" for axis, value in values.items())
     print_note(source, f"--peak: {path} is the run at {at}")
 
