@@ -75,7 +75,7 @@ FULL = Effort(
     2, (1, 2, 3, 6, 12, 25, 60), 9, 1500, (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30),
     {"cluster": 4, "rod": 3, "beam": 3}, 2000, 40, 2000,
 )  # fmt: skip
-QUICK = Effort(1, (1, 2, 3, 6, 12), 3, 1200, (1, 2, 4, 8), {"cluster": 1, "beam": 1}, 200, 3, 300)
+QUICK = Effort(1, (1, 2, 3, 6, 12), 3, 1200, (1, 2, 4, 8), {"cluster": 1, "beam": 1}, 200, 3, 900)
 
 
 def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
