@@ -1,4 +1,4 @@
-"""A scene in, a response out: resolve `modes = "auto"`, then run the scene with its method (methods.registry)."""
+"""A scene in, a response out: resolve what is "auto", then run the scene with its method (methods.registry)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from vanedamp.coupling.methods.registry import respond
-from vanedamp.coupling.model_order.selection import select_model_order, warnings_of
+from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
@@ -28,7 +29,9 @@ def simulate(
     Raises InputError for a scene that the model does not allow; numerical trouble is a status of the response.
     """
     started = time.perf_counter()
-    selected = select_model_order(scene)
-    response = respond(selected.scene, events, samples_per_period, start, progress)
+    chosen = choose(scene)
+    response = respond(chosen.scene, events, samples_per_period, start or chosen.start, progress)
     took = time.perf_counter() - started
-    return replace(response, estimate=selected.estimate, warnings=warnings_of(selected.scene), wall_time_s=took)
+    return replace(
+        response, estimate=chosen.estimate, advice=chosen.advice, warnings=warnings_of(chosen.scene), wall_time_s=took
+    )  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from vanedamp.coupling.methods.registry import run_with_response
-from vanedamp.coupling.model_order.selection import select_model_order
+from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
@@ -37,7 +37,7 @@ def histories(scene: Scene, outputs: Sequence[str], samples_per_period: int = 10
     The contribution of a massless boundary's own yielding is left out. Raises InputError for a structure that is no
     reduced model, or an output that it does not have.
     """
-    scene = select_model_order(scene).scene
+    scene = choose(scene).scene
     structure = scene.structure
     if not isinstance(structure, Rom):
         raise InputError('structure.model: outputs are those of a reduced model; take model = "rom"')

@@ -53,5 +53,7 @@ def test_command(tmp_path, capsys):
     assert result["auto"]["kept"] >= 5
     assert all(row["cheapest_cost"] > 0.0 for row in result["auto"]["verdicts"])
     assert (tmp_path / "auto.csv").read_text().startswith("scene,tolerance,modes,estimate,error")
-    figures = {"ladder_bar.png", "ladder_cluster.png", "ladder_auto.png"}
+    assert [row["number"] for row in result["bodies"]["tolerances"]] == [3, 3]
+    assert (tmp_path / "bodies.csv").read_text().startswith("scene,tolerance,shape,tilts,persisting")
+    figures = {"ladder_bar.png", "ladder_cluster.png", "ladder_auto.png", "ladder_bodies.png"}
     assert {path.name for path in tmp_path.glob("*.png")} == figures

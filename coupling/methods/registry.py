@@ -32,10 +32,13 @@ def respond(
     started = time.perf_counter()
     run = run_of(scene, events, samples_per_period, start)
     status, transient = run_scene(run, scene, progress)
-    outcome, last = run.outcome(), run.final()
-    if isinstance(last, InitialMotion):
-        last = restart_state(outcome.system, physical_scale(scene, outcome.system), last)
-    return replace(evaluate(scene, outcome, status, transient, started), final=last)
+    return replace(evaluate(scene, run.outcome(), status, transient, started), final=final_state(scene, run))
+
+
+def final_state(scene: Scene, run: Run) -> RestartState | None:
+    """Return the state that a run of a scene has come to; None within a period, or if the method keeps none."""
+    last, system = run.final(), run.outcome().system
+    return restart_state(system, physical_scale(scene, system), last) if isinstance(last, InitialMotion) else last
 
 
 def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:

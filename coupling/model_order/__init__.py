@@ -1,1 +1,1 @@
-"""Choice of the number of modes, with an error estimate."""
+"""Choice of the number of modes and of the bodies, with error estimates."""

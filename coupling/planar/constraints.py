@@ -140,6 +140,8 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     basis, n = basis_of(scene), flat.modes
     bodies, size = [], n
     for number, damper in enumerate(scene.damper):
+        if damper.shape == "auto":
+            raise InputError(f'damper[{number}].shape: "auto" is still open; model_order.choices.choose settles it')
         a, b = damper.half_extent
         bodies.append(_Body(number, damper, size, a, b))
         size += 1 if damper.shape == "slider" else 3
@@ -505,8 +507,8 @@ def planar_motion(scene: Scene, flat: System, system: PlanarSystem) -> PlanarMot
         if damper.shape != "slider":
             lifted = damper.half_extent[0] * abs(damper.tilt) if damper.shape == "block" else 0.0
             # a tilted block stands on its corner unless it is lifted higher
-            q[x + 1 : x + 3] = damper.lift + lifted, damper.tilt
-            v[x + 1 : x + 3] = damper.lift_velocity, damper.tilt_rate
+            q[x + 1 : x + 3] = damper.lift + lifted + system.rise[k] @ q, damper.tilt + system.turn[k] @ q
+            v[x + 1 : x + 3] = damper.lift_velocity + system.rise[k] @ v, damper.tilt_rate + system.turn[k] @ v
     gaps = system.rest + system.J[: len(system.rest)] @ q
     for unit in range(system.contacts):
         if gaps[unit] < -1e-12 * system.play[unit]:

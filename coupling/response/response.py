@@ -119,7 +119,8 @@ class Response:
     period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
     time, displacement, body_displacement: samples, empty if none were asked for; penetration: deepest overlap of bodies
     and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model
-    whose number of modes was chosen automatically (model_order.selection), None otherwise; warnings: to be read
+    whose number of modes was chosen automatically (model_order.selection), advice: on the bodies whose shape was
+    (model_order.body_choice), None otherwise; warnings: to be read
     before its figures are used; final: the state at its end, with which another run can begin, None for one
     that ended within a period, or whose method leaves none; tilt_max (rad), lift_share (of the time), linearisation:
     largest tilt of each body in its cavity, its share of the time off the floor, and what small tilts neglect over the
@@ -160,6 +161,7 @@ class Response:
     lift_share: tuple[float | None, ...] | None = None
     linearisation: tuple[float | None, ...] | None = None
     in_plane: PlanarSamples | None = None
+    advice: dict[str, Any] | None = None
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
@@ -176,6 +178,8 @@ class Response:
                 data[name] = list(values)
         if self.estimate is not None:
             data["estimate"] = self.estimate
+        if self.advice is not None:
+            data["advice"] = self.advice
         if events:
             fields = self._event_fields()
             data["event_list"] = [{name: getattr(event, name) for name in fields} for event in self.event_list]

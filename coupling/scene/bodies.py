@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, Fraction, NonNegative, Positive, Real
@@ -46,8 +46,10 @@ class Damper:
     """A loose body: mass (kg), Coulomb friction and restitution coefficients, state relative to the cavity.
 
     shape: "slider", one coordinate along the cavity; "block" (length, height, m) and "disc" (radius, m) move in the
-    plane of the cavity. inertia: kg m^2 about the centre, that of the homogeneous body unless given. lift: height of
-    its lowest point above the floor, m; tilt: rad. stiffness, dashpot: of a spring between body and floor, along it.
+    plane of the cavity; "auto": a block, run as a slider where that changes the mean amplitude by at most `tolerance`
+    (relative, 0.05 unless given). inertia: kg m^2 about the centre, that of the homogeneous body unless given. lift:
+    height of its lowest point above the floor, m; tilt: rad. stiffness, dashpot: of a spring between body and floor,
+    along it.
     """
 
     cavity: str
@@ -57,7 +59,7 @@ class Damper:
     position: Real = 0.0
     velocity: Real = 0.0
     normal_load: NonNegative | None = None
-    shape: Literal["slider", "block", "disc"] = "slider"
+    shape: Literal["slider", "block", "disc", "auto"] = "slider"
     length: Positive | None = None
     height: Positive | None = None
     radius: Positive | None = None
@@ -68,9 +70,11 @@ class Damper:
     tilt_rate: Real = 0.0
     stiffness: Positive | None = None
     dashpot: NonNegative | None = None
+    tolerance: Annotated[Real, Field(gt=0, lt=1)] | None = None
 
     def __post_init__(self) -> None:
-        wanted = {"slider": (), "block": ("length", "height"), "disc": ("radius",)}[self.shape]
+        block = ("length", "height")
+        wanted = {"slider": (), "block": block, "disc": ("radius",), "auto": block}[self.shape]
         for key in ("length", "height", "radius"):
             if (getattr(self, key) is not None) != (key in wanted):
                 raise ValueError(f'{key}: {"missing" if key in wanted else "not a measure"} of shape = "{self.shape}"')
@@ -79,7 +83,9 @@ class Damper:
                 if getattr(self, key):
                     raise ValueError(f'{key}: a slider only moves along its cavity; take shape = "block" or "disc"')
         elif self.normal_load is not None:
-            raise ValueError(f"normal_load: a {self.shape} is pressed by its contacts; leave it out")
+            raise ValueError(f'normal_load: a body of shape = "{self.shape}" is pressed by its contacts; leave it out')
+        if self.tolerance is not None and self.shape != "auto":
+            raise ValueError(f'tolerance: of shape = "auto", which chooses; leave it out of shape = "{self.shape}"')
 
     @property
     def planar(self) -> bool:

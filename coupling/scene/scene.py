@@ -147,6 +147,23 @@ class Scene:
                     f'cavity[{number}].play: missing; damper[{index}] with shape = "{damper.shape}" needs the free '
                     "travel across the cavity"
                 )
+        shapes = [damper.shape for damper in self.damper]
+        if "auto" in shapes and not {"slider", "auto"}.issuperset(shapes):
+            raise ValueError(
+                f'damper[{shapes.index("auto")}].shape: "auto" compares blocks with sliders, and needs sliders or '
+                '"auto" beside it; say which body each is'
+            )
+        for index, damper in enumerate(self.damper):
+            if "auto" in shapes and (damper.stiffness is not None or damper.dashpot is not None):
+                raise ValueError(
+                    f'damper[{index}].stiffness, dashpot: beside shape = "auto" bodies have no springs; say which body '
+                    "each is"
+                )
+        if "auto" in shapes and not self.contact.rigid:
+            raise ValueError(
+                f'contact.law: "{self.contact.law}" beside shape = "auto", which is for rigid contacts; say which body '
+                "each is"
+            )
         for index, friction_damper in enumerate(self.friction_damper):
             if friction_damper.stiffness is not None:
                 raise ValueError(

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
-from vanedamp.coupling.model_order.selection import Choices, choices_of, needs_selection, warnings_of, with_choice
+from vanedamp.coupling.model_order.choices import NOTHING, Choices, Chosen, choices_of, leaves_open, with_choices
+from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.scene.paths import assign, axis_values
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
@@ -27,14 +28,18 @@ _FIXED = ("structure.model", "structure.file", "structure.modes", "structure.nat
 class Points:
     """Scenes of a grid from the values of their axes: little to send to a worker, however large the grid."""
 
-    def __init__(self, base: Scene, choices: Choices) -> None:
-        """Take a scene without sweep, and the choices of its numbers of modes."""
+    def __init__(self, base: Scene, choices: Choices = NOTHING) -> None:
+        """Take a scene without sweep, and the choices of what it leaves open."""
         self.base, self.choices = base, choices
         self._data = base.to_dict()
 
     def scene(self, values: Mapping[str, Any]) -> Scene:
         """Return the scene at a point, without open choices. Raises InputError for a point that is no scene."""
-        return with_choice(self.raw(values), self.choices).scene
+        return self.chosen(values).scene
+
+    def chosen(self, values: Mapping[str, Any]) -> Chosen:
+        """Return the scene at a point with what was chosen for it. Raises InputError for a point that is no scene."""
+        return with_choices(self.raw(values), self.choices)
 
     def raw(self, values: Mapping[str, Any]) -> Scene:
         """Return the scene at a point with its choices open. Raises InputError for a point that is no scene."""
@@ -61,8 +66,9 @@ class Grid:
     scene     the scene with its [sweep] table
     axes      dotted path -> the values as the scene has them
     base      the scene without its sweep
-    choices   numbers of modes that suit all points, where they were left open
+    choices   that suit all points, of what they leave open
     estimate  of the model chosen, None where there was no choice
+    advice    on the bodies, None where their shapes were given
     warnings  of the first point's scene, to be read before figures are used
     along     the axis along which runs are linked, None if they are not
     """
@@ -72,6 +78,7 @@ class Grid:
     base: Scene
     choices: Choices
     estimate: dict[str, Any] | None
+    advice: dict[str, Any] | None
     along: str | None
     warnings: tuple[str, ...] = ()
 
@@ -105,11 +112,11 @@ class Grid:
 
 
 class PointList:
-    """Points in any places, to be run like those of a grid; `base` leaves no number of modes open."""
+    """Points in any places, to be run like those of a grid; `base` leaves nothing open."""
 
     def __init__(self, base: Scene, points: Sequence[Mapping[str, Any]]) -> None:
         self.base, self.size, self._points = base, len(points), points
-        self.choices: Choices = {}
+        self.choices = NOTHING
 
     def values(self, index: int) -> Mapping[str, Any]:
         """Return the values that a point changes in the base."""
@@ -127,22 +134,23 @@ def grid(scene: Scene) -> Grid:
         raise InputError(
             'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
         )
-    points = Points(replace(scene, sweep={}), {})
-    first, linked, leaves_open = None, False, False
+    points = Points(replace(scene, sweep={}))
+    first, linked, undecided = None, False, False
     for values in _telling(axes):
         made = points.raw(values)
         first = first or made
         linked = linked or made.continuation.direction != "independent"
-        leaves_open = leaves_open or needs_selection(made)
+        undecided = undecided or leaves_open(made)
         _check_method(made)
     assert first is not None
     along = _along(scene, axes) if linked else None
     base = _with_range(points.base, axes)
-    points = Points(base, {})
-    choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if leaves_open else {}
-    start = with_choice(first, choices)
+    points = Points(base)
+    choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if undecided else NOTHING
+    start = with_choices(first, choices)
     assemble(start.scene)
-    return Grid(scene, axes, base, choices, start.estimate, along, warnings_of(start.scene))
+    advice = None if choices.body is None else choices.body.to_json()
+    return Grid(scene, axes, base, choices, start.estimate, advice, along, warnings_of(start.scene))
 
 
 def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:

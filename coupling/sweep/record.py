@@ -84,9 +84,8 @@ class Sweep:
     def to_json(self) -> dict[str, Any]:
         """Return plain data: axes and units by path, measures as nested lists (nan where there is none)."""
         names = (*MEASURES, "energy_share", "status", "classification")
-        estimate = self.provenance.get("estimate")
         notes = {"warnings": list(self.provenance.get("warnings", ()))}
-        notes |= {} if estimate is None else {"estimate": estimate}
+        notes |= {name: self.provenance[name] for name in ("estimate", "advice") if self.provenance.get(name)}
         axes = {path: values.tolist() for path, values in self.axes.items()}
         further = {**self.in_plane, **self.peaks}
         units = self.units() | MEASURES | {name: (IN_PLANE | PEAKS)[name] for name in further}

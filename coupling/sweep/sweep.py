@@ -84,7 +84,8 @@ def _result(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Swe
         peaks=_peaks(grid),
         provenance=provenance
         | ({"warnings": list(grid.warnings)} if grid.warnings else {})
-        | ({} if grid.estimate is None else {"estimate": grid.estimate}),
+        | ({} if grid.estimate is None else {"estimate": grid.estimate})
+        | ({} if grid.advice is None else {"advice": grid.advice}),
     )
 
 

@@ -123,9 +123,9 @@ def _run(
 ) -> RestartState | None:
     """Run one point into its row and its texts. Returns its last state."""
     try:
-        scene = maker.scene(point)
-        row[_LINEAR] = _linear(scene)
-        response = simulate(scene, start=start)
+        chosen = maker.chosen(point)
+        row[_LINEAR] = _linear(chosen.scene)
+        response = simulate(chosen.scene, start=start or chosen.start)
     except Exception as error:  # one broken point must not cost the others
         texts.extend(broken(error).texts)
         return None

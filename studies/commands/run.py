@@ -27,7 +27,7 @@ def run(arguments: Namespace) -> None:
     from vanedamp.studies.commands.support.outputs import check_outputs
 
     outputs = check_outputs(arguments)
-    from vanedamp.studies.commands.support.scenes import load_scene, print_model_order, print_resonance
+    from vanedamp.studies.commands.support.scenes import load_scene, print_choices, print_resonance
 
     scene = load_scene(arguments.input, outputs)
     from vanedamp.coupling.engine import simulate
@@ -41,7 +41,7 @@ def run(arguments: Namespace) -> None:
     if arguments.output:
         response.save(arguments.output, {"versions": versions(), "scene": scene.to_dict()})
     result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)
-    print_model_order(arguments.input, response.estimate, response.warnings)
+    print_choices(arguments.input, response.estimate, response.advice, response.warnings)
     write_result(arguments.json, result)
     if arguments.json != "-":
         for name, value in result.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, add_workers
@@ -53,7 +54,7 @@ def run(arguments: Namespace) -> None:
             if checkpoint is None
             else f"--resume: nothing to resume, there is no checkpoint {checkpoint}; leave --resume out to begin"
         )
-    from vanedamp.studies.commands.support.scenes import load_scene, print_model_order, print_resonance
+    from vanedamp.studies.commands.support.scenes import load_scene, print_choices, print_resonance
 
     scene = load_scene(arguments.input, outputs)
     from vanedamp.coupling.sweep.checkpoint import Checkpoint, clear
@@ -75,7 +76,7 @@ def run(arguments: Namespace) -> None:
             'run once more by itself; take "independent", or leave --peak out'
         )
     resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
-    print_model_order(arguments.input, points.estimate, points.warnings)
+    print_choices(arguments.input, points.estimate, points.advice, points.warnings)
     resonance = print_resonance(arguments.input, points.base)
     with workers(arguments.workers) as pool, progress("sweep") as report:
         started = time.perf_counter()
@@ -115,10 +116,13 @@ def _run_peak(points: Grid, result: Sweep, path: str, source: str) -> None:
         print_note(source, f"--peak: no point is ok, {path} was not written")
         return
     values = points.values(index)
-    scene = Points(points.base, points.choices).scene(values)
+    chosen = Points(points.base, points.choices).chosen(values)
     with progress("peak") as report:
-        response = simulate(scene, events=True, samples_per_period=_SAMPLES, progress=report)
-    response.save(path, {"versions": result.provenance.get("versions", {}), "scene": scene.to_dict()})
+        response = simulate(
+            chosen.scene, events=True, samples_per_period=_SAMPLES, start=chosen.start, progress=report
+        )  # fmt: skip
+    response = replace(response, advice=chosen.advice)
+    response.save(path, {"versions": result.provenance.get("versions", {}), "scene": chosen.scene.to_dict()})
     at = ", ".join(f"{axis} = {format_value(value)}" for axis, value in values.items())
     print_note(source, f"--peak: {path} is the run at {at}")
 

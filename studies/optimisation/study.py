@@ -179,7 +179,7 @@ class Study(NamedTuple):
         design = Design(variables.mass_ratio[1], variables.gap_ratio[0], variables.bodies[1])
         for side in (-1.0, 1.0):
             deviation = {name: side * width for name, width in widths.items()}
-            scene = Points(self.with_bodies(design.bodies), {}).scene(
+            scene = Points(self.with_bodies(design.bodies)).scene(
                 self.point(design, deviation, float(self.table.frequencies[0]))
             )
             assemble(scene)
@@ -197,7 +197,7 @@ class Study(NamedTuple):
     def linear(self, design: Design, deviation: Mapping[str, float]) -> tuple[LinearResponse, LinearResponse]:
         """Return the linear responses without bodies, and with those of a design glued to their floors."""
         point = self.point(design, deviation, float(self.table.frequencies[0]))
-        return linear_responses(Points(self.with_bodies(design.bodies), {}).scene(point))
+        return linear_responses(Points(self.with_bodies(design.bodies)).scene(point))
 
     def point(self, design: Design, deviation: Mapping[str, float], frequency: float) -> dict[str, Any]:
         """Return what a design, off by a deviation of the tolerances, changes in the scene with its bodies."""
@@ -229,6 +229,8 @@ def _check(scene: Scene) -> None:
         raise InputError("structure.modes: name a number, so that all designs are compared on one model")
     if not scene.damper:
         raise InputError("damper: missing; the first one says what the bodies are like")
+    if any(damper.planar for damper in scene.damper):
+        raise InputError("damper: the search is for sliders without springs; leave shape, stiffness and dashpot out")
     if scene.excitation.base_acceleration:
         raise InputError(
             "excitation.base_acceleration: name force or resonance_amplitude, the level that is to be damped"

@@ -16,6 +16,7 @@ import plotly.offline
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import csv_text, digest, replacing
 from vanedamp.studies.headline import format_value
+from vanedamp.studies.report.body_advice import body_note_of_run
 from vanedamp.studies.report.charts import Chart, chart
 from vanedamp.studies.report.motion import Motion
 from vanedamp.studies.report.results import Results, Section, sections
@@ -103,6 +104,7 @@ def _environment(names: Mapping[str, str]) -> jinja2.Environment:
         "name": names.__getitem__,
         "anchor": lambda file: _anchor(names[file]),
     }
+    environment.filters["body_note"] = body_note_of_run
     environment.globals["plot"] = environment.get_template("plot.html").make_module().plot  # type: ignore[attr-defined]
     return environment
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 NAME = "ladder"
 ORDER = 40
-SUMMARY = "contact laws and numbers of modes of reduced models, and their choice"
+SUMMARY = "contact laws and numbers of modes of reduced models, sliders and blocks, and their choice"
 
 
 def run(folder: Path, quick: bool) -> None:

@@ -95,3 +95,35 @@ def auto_figure(auto: Mapping[str, Any], path: Path) -> None:
         draw_grid(axis)
         axis.legend(fontsize=8)
     save(figure, path)
+
+
+def bodies_figure(bodies: Mapping[str, Any], path: Path) -> None:
+    """Draw error against cost of slider and block, and the slider's estimated error beside the true one."""
+    figure, (left, right) = subplots(1, 2, size=(11.5, 4.8))
+    smallest = min(row["tolerance"] for row in bodies["tolerances"])
+    rows = [row for row in bodies["verdicts"] if row["tolerance"] == smallest]
+    least = 1e-4  # where smaller errors are drawn
+    for shape, colour in (("slider", BLUE), ("block", RED)):
+        errors = [row["error" if shape == "slider" else "block_confidence"] for row in rows]
+        costs = [1e6 * row[f"{shape}_cost"] / bodies["periods"] for row in rows]
+        left.loglog(costs, np.maximum(np.abs(errors), least), "o", color=colour, label=shape, ms=5, alpha=0.7)
+        mine = [row for row in rows if row["shape"] == shape and row["estimate"] is not None]
+        places = [np.maximum(np.abs([row[name] for row in mine]), least) for name in ("estimate", "error")]
+        bars = [row["confidence"] for row in mine]
+        low = np.minimum(bars, places[1] - least / 2)
+        right.errorbar(
+            *places, yerr=np.array([low, bars]), fmt="o", color=colour, label=f"{shape} chosen", elinewidth=0.7, ms=5,
+            alpha=0.7,
+        )  # fmt: skip
+    right.loglog([least, 1.0], [least, 1.0], "-", color=GREY, lw=0.8)
+    for axis in (left, right):
+        axis.axhline(smallest, ls="--", color=GREY, label="tolerance")
+        draw_grid(axis)
+        axis.set_ylim(least / 2, 2.0)
+    left.set_xlabel("CPU time per excitation period, µs")
+    left.set_ylabel("relative error of the mean amplitude (block: 95 % of its mean)")
+    right.set_xlabel(f"estimated error of the slider (below {least:g}: drawn there)")
+    right.set_ylabel("true error of the slider (bars: 95 %)")
+    left.legend(fontsize=8)
+    right.legend(fontsize=8)
+    save(figure, path)

@@ -1,7 +1,7 @@
 """The ladder of models, charted: contact laws against the number of modes, error against cost.
 
 A bar on a wall, which has an exact solution; the shipped cluster with a loose body, all laws against one finest model;
-and the automatic choice of a model on trial.
+and the automatic choices, of a number of modes and of slider or block, on trial.
 
 The finest model of the cluster is the one with the most modes and a contact that yields by its own spring and by what
 these modes lack of the wall's flexibility. Its contact has a limit as modes are added, and a loss that is given;
@@ -28,6 +28,9 @@ from vanedamp.rom.truncation import massless
 from vanedamp.studies.bench.engine.inside import time_of_a_period
 from vanedamp.studies.bench.model_order.bar_on_wall import LAWS as BAR_LAWS
 from vanedamp.studies.bench.model_order.bar_on_wall import bounce
+from vanedamp.studies.bench.model_order.body_trial import SEED as BODY_SEED
+from vanedamp.studies.bench.model_order.body_trial import print_body_trial, run_body_trial
+from vanedamp.studies.bench.model_order.body_trial import summary as body_summary
 from vanedamp.studies.bench.model_order.scenes import SEED
 from vanedamp.studies.bench.model_order.structures import cluster_model
 from vanedamp.studies.bench.model_order.trial import print_trial, run_trial, summary
@@ -64,17 +67,19 @@ class Effort:
     bar_modes: tuple[int, ...]
     trials: dict[str, int]
     trial_periods: int
+    body_trials: int
+    body_periods: int
 
 
 FULL = Effort(
     2, (1, 2, 3, 6, 12, 25, 60), 9, 1500, (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30),
-    {"cluster": 4, "rod": 3, "beam": 3}, 2000,
+    {"cluster": 4, "rod": 3, "beam": 3}, 2000, 40, 2000,
 )  # fmt: skip
-QUICK = Effort(1, (1, 2, 3, 6, 12), 3, 1200, (1, 2, 4, 8), {"cluster": 1, "beam": 1}, 200)
+QUICK = Effort(1, (1, 2, 3, 6, 12), 3, 1200, (1, 2, 4, 8), {"cluster": 1, "beam": 1}, 200, 3, 900)
 
 
 def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
-    """Measure, and write ladder.json with its two figures to the folder, made if need be."""
+    """Measure, and write ladder.json with its figures to the folder, made if need be."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -86,12 +91,16 @@ def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
         result["cluster"] = cluster_curves(file, effort, report)
     with progress("automatic choice") as report:
         result["auto"] = summary(run_trial(folder, SEED, effort.trials, effort.trial_periods, report))
+    with progress("bodies") as report:
+        verdicts = run_body_trial(folder, BODY_SEED, effort.body_trials, effort.body_periods, report)
+        result["bodies"] = body_summary(verdicts) | {"periods": effort.body_periods}
     write_json(folder / "ladder.json", finite(result))
-    from vanedamp.studies.bench.model_order.figures import auto_figure, bar_figure, cluster_figure
+    from vanedamp.studies.bench.model_order.figures import auto_figure, bar_figure, bodies_figure, cluster_figure
 
     bar_figure(result["bar"], folder / "ladder_bar.png")
     cluster_figure(result["cluster"], folder / "ladder_cluster.png")
     auto_figure(result["auto"], folder / "ladder_auto.png")
+    bodies_figure(result["bodies"], folder / "ladder_bodies.png")
     return result
 
 
@@ -174,3 +183,4 @@ def print_summary(result: Mapping[str, Any]) -> None:
     for law, entry in cluster["laws"].items():
         print(f"  {law:22} " + "  ".join(f"{error:.1e}" for error in entry["error"]))
     print_trial(result["auto"])
+    print_body_trial(result["bodies"])

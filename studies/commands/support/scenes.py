@@ -29,10 +29,13 @@ def load_scene(path: str, outputs: Outputs) -> Scene:
     return scene
 
 
-def print_model_order(source: str, estimate: Mapping[str, Any] | None, warnings: Iterable[str]) -> None:
-    """Print which model `modes = "auto"` has chosen and why, and warnings."""
-    if estimate is not None:
-        print_note(source, f"structure.modes: {estimate['sentence']}")
+def print_choices(
+    source: str, estimate: Mapping[str, Any] | None, advice: Mapping[str, Any] | None, warnings: Iterable[str]
+) -> None:
+    """Print which model `modes = "auto"` and which bodies `shape = "auto"` have chosen and why, and warnings."""
+    for key, chosen in (("structure.modes", estimate), ("damper.shape", advice)):
+        if chosen is not None:
+            print_note(source, f"{key}: {chosen['sentence']}")
     print_warnings(source, warnings)
 
 

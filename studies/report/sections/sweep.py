@@ -11,6 +11,7 @@ import numpy as np
 
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import LOSSES
+from vanedamp.studies.report.body_advice import body_note
 from vanedamp.studies.report.charts import Chart
 from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, model_name
 from vanedamp.studies.report.forced_response_charts import (
@@ -44,12 +45,17 @@ def load(path: Path) -> Result:
 
 
 def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
-    """Return the groups of responses that share an axis, and the maps."""
+    """Return the groups of responses that share an axis, the maps, and what is to be said about the bodies."""
     sweeps = {file: result.record for file, result in results.items()}
     return {
         "groups": [_group(group, page) for group in _by_axis(_responses(sweeps, page))],
         "maps": [_map(file, sweep, page) for file, sweep in sweeps.items() if map_axes(sweep)],
+        "notes": list(dict.fromkeys(filter(None, map(_body_note, sweeps.values())))),
     }
+
+
+def _body_note(sweep: Sweep) -> str | None:
+    return body_note(sweep.provenance, any(damper.shape == "slider" for damper in sweep.scene.damper))
 
 
 def _scene(sweep: Sweep) -> dict[str, Any]:

@@ -1,0 +1,72 @@
+"""All that scenes leave open, chosen: the number of modes (selection), then the shape of the bodies (body_choice).
+
+The points of a sweep share their choices, so that a curve is one model's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.model_order import selection
+from vanedamp.coupling.model_order.body_choice import Advice, judge_all, needs_body, with_blocks, with_sliders
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.scene import Scene
+
+#: points of a sweep whose bodies are judged, evenly spread
+_POINTS = 5
+
+
+class Choices(NamedTuple):
+    """What was chosen: numbers of modes by model, and the advice on bodies, None where none was open."""
+
+    modes: selection.Choices
+    body: Advice | None = None
+
+
+#: nothing was open
+NOTHING = Choices({})
+
+
+class Chosen(NamedTuple):
+    """A scene without open choices, the estimate of its model and the advice on its bodies (None: were not open).
+
+    start: the state with which it begins, in place of its own initial one (None).
+    """
+
+    scene: Scene
+    estimate: dict[str, Any] | None
+    advice: dict[str, Any] | None = None
+    start: RestartState | None = None
+
+
+def leaves_open(scene: Scene) -> bool:
+    """Whether a scene leaves something open."""
+    return selection.needs_selection(scene) or needs_body(scene)
+
+
+def choose(scene: Scene) -> Chosen:
+    """Return a scene with what it leaves open. Raises InputError when there is no good choice."""
+    return with_choices(scene, choices_of([scene]))
+
+
+def choices_of(scenes: Iterable[Scene]) -> Choices:
+    """Return the choices that suit all of these scenes. Raises InputError when there is no good one."""
+    scenes = list(scenes)
+    modes = selection.choices_of(scenes)
+    undecided = [scene for scene in scenes if needs_body(scene)]
+    if not undecided:
+        return Choices(modes)
+    tried = np.unique(np.linspace(0, len(undecided) - 1, _POINTS).round().astype(int))
+    return Choices(modes, judge_all([selection.with_choice(undecided[place], modes).scene for place in tried]))
+
+
+def with_choices(scene: Scene, choices: Choices) -> Chosen:
+    """Return the scene with the choices that were made for it."""
+    selected, body = selection.with_choice(scene, choices.modes), choices.body
+    if body is None or not needs_body(scene):
+        return Chosen(*selected)
+    made = (with_sliders(selected.scene), None) if body.shape == "slider" else with_blocks(selected.scene)
+    return Chosen(made[0], selected.estimate, body.to_json(), made[1])
