@@ -16,11 +16,11 @@ from vanedamp.studies.paper.curve import Curve
 from vanedamp.studies.paper.figure_file import Bar
 from vanedamp.studies.report.claims import Claim
 
-#: figures and their curves that blocks stand beside
-SLIDERS = {
-    "fig9": ("",),
-    "fig14": ("single", "double", "quad", "double_aside", "quad_aside"),
-    "fig19": ("light", "nominal", "heavy", "light_same_gap", "nominal_same_gap", "heavy_same_gap"),
+_BARS = ("light", "nominal", "heavy", "light_same_gap", "nominal_same_gap", "heavy_same_gap")
+#: figures and their curves, of sliders, that the blocks of a study stand beside
+SLIDERS: dict[str, dict[str, tuple[str, ...]]] = {
+    "blocks": {"fig9": ("",), "fig14": ("single", "double", "quad", "double_aside", "quad_aside"), "fig19": _BARS},
+    "fit": {"fig9": ("",)},
 }
 ROWS = ("single", "double", "triple", "quad")
 #: by how much tops that are the same may differ
@@ -143,7 +143,7 @@ def _numbers(curves: Curves, sliders: Curves) -> list[Claim]:
 
 
 def _masses(curves: Curves, sliders: Curves, bar: Bar, mass: float) -> list[Claim]:
-    bars = {name: curves[name] for name in SLIDERS["fig19"]}
+    bars = {name: curves[name] for name in _BARS}
     why = (
         "Thrown up, the blocks meet both walls at once, whatever the gap; sliders in wide gaps are hit now and then.",
         "The mass by itself counts as much as for the slider, the gap less.",

@@ -110,7 +110,7 @@ def study(name: str, session: Session) -> Study:
     figure = PaperFigure.load(name, session.structure, session.effort)
     sweeps = {curve: _swept(figure, curve, session) for curve in figure.scenes}
     read = {curve: curves(sweep, curve.replace("_", " ") or name) for curve, sweep in sweeps.items()}
-    sliders = _sliders(session) if name in ("blocks", "fit") else {}
+    sliders = _sliders(name, session)
     claims = _claims(figure, read, sliders)
     _picture(figure, read, sliders, session.folder / f"{name}.png")
     trouble = [text for curve, sweep in sweeps.items() for text in _trouble(curve, sweep)]
@@ -129,13 +129,13 @@ def _trouble(curve: str, sweep: Sweep) -> list[str]:
     return [f"{name} {count} of {sweep.status.size} {status}".strip() for status, count in counts.items()]
 
 
-def _sliders(session: Session) -> dict[str, dict[str, list[Curve]]]:
-    """Return curves of sliders by their figures, which blocks stand beside."""
-    figures = {name: PaperFigure.load(name, session.structure, session.effort) for name in claims_blocks.SLIDERS}
-    return {
-        name: {curve: curves(_swept(figure, curve, session), curve) for curve in claims_blocks.SLIDERS[name]}
-        for name, figure in figures.items()
-    }
+def _sliders(name: str, session: Session) -> dict[str, dict[str, list[Curve]]]:
+    """Return the curves of other figures, by these, that a study's blocks stand beside."""
+    read = {}
+    for other, wanted in claims_blocks.SLIDERS.get(name, {}).items():
+        figure = PaperFigure.load(other, session.structure, session.effort)
+        read[other] = {curve: curves(_swept(figure, curve, session), curve or other) for curve in wanted}
+    return read
 
 
 def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
