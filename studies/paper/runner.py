@@ -187,9 +187,8 @@ def _claims(
         case "blocks":
             return claims_blocks.blocks(by_name, sliders, _bar(figure), figure.scenes["nominal"].damper[0].mass)
         case "fit":
-            _, play, friction, _ = first.sweep_points()[0].values()
-            tops = claims_blocks.highest_means(by_name[""], (2, len(play), len(friction)))
-            return claims_blocks.fit(tops, play, friction, sliders["fig9"][""][1])
+            _, play, friction, _ = figure.scenes["map"].sweep_points()[0].values()
+            return claims_blocks.fit(by_name, play, friction, sliders["fig9"][""][1])
     return claims_systems.claims(by_name)
 
 
@@ -226,8 +225,8 @@ def _picture(
         case "blocks":
             plots.blocks_picture(by_name, sliders, title, path)
         case "fit":
-            _, play, friction, _ = figure.scenes[""].sweep_points()[0].values()
-            tops = claims_blocks.highest_means(by_name[""], (2, len(play), len(friction)))
+            _, play, friction, _ = figure.scenes["map"].sweep_points()[0].values()
+            tops = claims_blocks.highest_means(by_name["map"], (2, len(play), len(friction)))
             plots.fit_picture(tops, play, friction, sliders["fig9"][""][1], title, path)
         case _:
             plots.responses_picture({name: of[0] for name, of in _named(by_name).items()}, title, path)
