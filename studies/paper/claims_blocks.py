@@ -63,8 +63,9 @@ def _drop(curves: Curves, slider: Curve) -> list[Claim]:
         _beside(
             claims_reduced.onset(curves["flat"][0]),
             claims_reduced.onset(slider),
-            "This block begins flat and at rest, in a cavity that turns by 1 rad/m of the structure's motion. One that "
-            "is thrown up as it begins goes on hitting the walls at all frequencies and has no onset.",
+            "This block begins flat and at rest, but its cavity turns with the structure, as the shipped cluster's does: "
+            "the floor throws it up, and it hits the walls at all frequencies. In a cavity that does not turn it lies "
+            "flat and has the slider's onset.",
         ),
         _beside(
             claims_reduced.drop(block),
@@ -184,8 +185,8 @@ def fit(curves: Curves, play: np.ndarray, friction: np.ndarray, slider: Curve) -
             f"vertically, from {len(level)} starts each; {settled.mean():.0%} of the horizontal runs leave more than "
             f"the vertical ones by a fifth. With {1e6 * play[-1]:.0f} µm tops differ by at most {apart:.3f}",
             verdict(worst - vertical > 0.1, worst - vertical > 0.05),
-            "Gravity decides whether a block in a tight cavity settles flat on the floor, where it is the slider, or "
-            "goes on tilting. Once it tilts, orientation does not matter.",
+            "In a tight cavity that does not turn, gravity decides whether a block settles flat on the floor, where it "
+            "is the slider, or goes on tilting. Once it tilts, orientation does not matter.",
             {"horizontal": worst, "vertical": vertical, "settled": settled.mean(), "differs_wide": apart},
         ),
     ]
