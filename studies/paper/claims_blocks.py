@@ -63,9 +63,9 @@ def _drop(curves: Curves, slider: Curve) -> list[Claim]:
         _beside(
             claims_reduced.onset(curves["flat"][0]),
             claims_reduced.onset(slider),
-            "This block begins flat and at rest, but its cavity turns with the structure, as the shipped cluster's does: "
-            "the floor throws it up, and it hits the walls at all frequencies. In a cavity that does not turn it lies "
-            "flat and has the slider's onset.",
+            "This block begins flat and at rest, but its cavity turns with the structure, as the shipped cluster's "
+            "does: the floor throws it up, and it hits the walls at all frequencies. In a cavity that does not turn it "
+            "lies flat and has the slider's onset.",
         ),
         _beside(
             claims_reduced.drop(block),
