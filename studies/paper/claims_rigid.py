@@ -102,7 +102,7 @@ def fig10(curves: Curves) -> list[Claim]:
 
 
 #: mean amplitude above which a row near its peak moves together like one body: between its two steady states
-_TOGETHER = 0.3
+TOGETHER = 0.3
 
 
 def fig14(curves: Curves) -> list[Claim]:
@@ -124,7 +124,7 @@ def fig14(curves: Curves) -> list[Claim]:
     light = "Gravity is a sixteen-hundredth of the walls' acceleration here, so that it matters only to a body at rest."
     best = min(level, key=lambda name: level[name])
     together = {name: np.array([curve.mean for curve in curves[f"{name}_starts"]]) for name in ("double", "quad")}
-    share = {name: float(np.mean(means > _TOGETHER)) for name, means in together.items()}
+    share = {name: float(np.mean(means > TOGETHER)) for name, means in together.items()}
     worst = {name: float(means.max()) for name, means in together.items()}
     figures |= {f"together_{name}": value for name, value in share.items()}
     figures |= {f"worst_{name}": value for name, value in worst.items()}

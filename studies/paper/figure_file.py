@@ -164,6 +164,8 @@ def with_length(scene: Scene, bar: Bar, longer: float) -> Scene:
         raise InputError(f"longer: by {change:g} m, which is more than the gap of {cavity.gap:g} m")
     # a body at a wall stays there
     values = {"cavity.0.gap": gap, "damper.0.mass": damper.mass * (1 + longer)}
+    if damper.length is not None:
+        values["damper.0.length"] = damper.length * (1 + longer)
     return scene.replace(values | {"damper.0.position": damper.position * gap / cavity.gap})
 
 

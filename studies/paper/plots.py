@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from vanedamp.coupling.response.response import Response
 from vanedamp.studies.figures import draw_grid, save, subplots
+from vanedamp.studies.paper.claims_blocks import ROWS
 from vanedamp.studies.paper.claims_rigid import MOST_THETA, attached_closed_form, regime
 from vanedamp.studies.paper.claims_systems import FORCES, LOADS, NAMES, top
 from vanedamp.studies.paper.curve import Curve
@@ -67,6 +68,62 @@ def orientations_picture(
     draw_grid(third)
     third.legend(fontsize=8)
     figure.suptitle(title)
+    save(figure, path, dpi=110)
+
+
+def blocks_picture(
+    blocks: Mapping[str, Sequence[Curve]], sliders: Mapping[str, Mapping[str, Sequence[Curve]]], title: str, path: Path
+) -> None:
+    """Draw blocks beside sliders (dashed): the drop to the fixed curve, gaps, rows, bars."""
+    figure, panels = subplots(2, 2, size=(14, 10.5))
+    drop, gaps, rows, bars = panels.ravel()
+    _linear(drop, blocks["gap"][1])
+    _damped(drop, blocks["gap"][1], "block", COLOURS[0])
+    flat = blocks["flat"][0]
+    drop.plot(
+        flat.frequency, 100 * flat.mean, "+", color=COLOURS[2], markersize=6, label="block, flat and at rest first"
+    )
+    slider = sliders["fig9"][""][1]
+    drop.plot(slider.frequency, 100 * slider.smooth, "--", color=COLOURS[1], label="slider")
+    widths = ("reference", "reference/2", "reference/10")
+    _besides(gaps, dict(zip(widths, blocks["gap"], strict=True)), dict(zip(widths, sliders["fig9"][""], strict=True)))
+    for axes, names, figure_name in ((rows, ROWS, "fig14"), (bars, ("light", "nominal", "heavy"), "fig19")):
+        others = {name: of[0] for name, of in sliders[figure_name].items()}
+        _besides(axes, {name: blocks[name][0] for name in names}, others)
+    texts = ("reference/2: drop to the fixed curve", "gaps", "bodies in a row", "mass and gap by the bar's length")
+    for axes, text in zip(panels.ravel(), texts, strict=True):
+        _finish(axes, text)
+    figure.suptitle(f"{title} (dashed)")
+    save(figure, path, dpi=110)
+
+
+def _besides(axes: Axes, blocks: Mapping[str, Curve], sliders: Mapping[str, Curve]) -> None:
+    """Draw means of blocks and, dashed, smoothed means of sliders, by their names."""
+    _linear(axes, next(iter(blocks.values())))
+    for (name, block), colour in zip(blocks.items(), COLOURS, strict=False):
+        axes.plot(block.frequency, 100 * block.mean, color=colour, linewidth=2, label=name)
+        if name in sliders:
+            axes.plot(sliders[name].frequency, 100 * sliders[name].smooth, "--", color=colour, linewidth=1.2)
+
+
+def fit_picture(
+    tops: np.ndarray, play: np.ndarray, friction: np.ndarray, slider: Curve, title: str, path: Path
+) -> None:
+    """Draw maps of highest means (2, plays, frictions), horizontally and vertically; play in m."""
+    figure, row = subplots(1, 2, size=(12, 4.8), sharey=True)
+    for axes, values, name in zip(row, 100 * tops, ("horizontal", "vertical"), strict=True):
+        mesh = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis_r", vmin=0, vmax=100 * tops.max())
+        for (i, j), value in np.ndenumerate(values):
+            dark = value > 50 * tops.max()
+            axes.text(j, i, f"{value:.0f}", ha="center", va="center", color="white" if dark else "black")
+        axes.set_xticks(range(len(friction)), [f"{value:g}" for value in friction])
+        axes.set_yticks(range(len(play)), [f"{1e6 * value:g}" for value in play])
+        axes.set_xlabel("coefficient of friction")
+        axes.set_title(name)
+    row[0].set_ylabel("play across the cavity, µm")
+    figure.colorbar(mesh, ax=row, label="highest mean / undamped maximum, %")
+    references = f"slider {100 * slider.peak().height:.0f} %, body fixed {100 * slider.fixed.max():.0f} %"
+    figure.suptitle(f"{title}: highest mean over the frequency ({references})")
     save(figure, path, dpi=110)
 
 

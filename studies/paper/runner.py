@@ -10,6 +10,7 @@ import json
 import shutil
 import textwrap
 import time
+from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field, replace
@@ -27,14 +28,14 @@ from vanedamp.files.store import StoreError, digest, finite, load, write_json
 from vanedamp.files.toml_input import InputError, nearest, read_toml, validate
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.paper import claims_reduced, claims_rigid, claims_systems, plots
+from vanedamp.studies.paper import claims_blocks, claims_reduced, claims_rigid, claims_systems, plots
 from vanedamp.studies.paper.curve import Curve, curves
 from vanedamp.studies.paper.figure_file import FOLDER, Bar, Effort, PaperFigure, Structure, write_scene
 from vanedamp.studies.report.claims import CLAIMS, Claim, Study
 from vanedamp.studies.terminal import progress
 from vanedamp.studies.workers import workers
 
-NAMES = ("fig9", "fig10", "fig12", "fig13", "fig14", "fig19", "mistuning", "systems")
+NAMES = ("fig9", "fig10", "fig12", "fig13", "fig14", "fig19", "mistuning", "systems", "blocks", "fit")
 #: modes of the reduced model's file: what `modes = "auto"` chooses from
 MODES = 12
 
@@ -109,13 +110,32 @@ def study(name: str, session: Session) -> Study:
     figure = PaperFigure.load(name, session.structure, session.effort)
     sweeps = {curve: _swept(figure, curve, session) for curve in figure.scenes}
     read = {curve: curves(sweep, curve.replace("_", " ") or name) for curve, sweep in sweeps.items()}
-    claims = _claims(figure, read)
-    _picture(figure, read, session.folder / f"{name}.png")
-    trouble = sum(int((sweep.status != "ok").sum()) for sweep in sweeps.values())
+    sliders = _sliders(name, session)
+    claims = _claims(figure, read, sliders)
+    _picture(figure, read, sliders, session.folder / f"{name}.png")
+    trouble = [text for curve, sweep in sweeps.items() for text in _trouble(curve, sweep)]
+    title = f"{figure.title} (not ok: {', '.join(trouble)})" if trouble else figure.title
     if trouble:
-        failed = f" ({trouble} of {sum(sweep.status.size for sweep in sweeps.values())} points are not ok.)"
+        count = sum(int((sweep.status != "ok").sum()) for sweep in sweeps.values())
+        failed = f" ({count} of {sum(sweep.status.size for sweep in sweeps.values())} points are not ok.)"
         claims = [replace(claim, why=(claim.why + failed).strip()) for claim in claims]
-    return _written(Study(name, figure.title, [f"{figure.stem(curve)}.h5" for curve in sweeps], claims), session.folder)
+    return _written(Study(name, title, [f"{figure.stem(curve)}.h5" for curve in sweeps], claims), session.folder)
+
+
+def _trouble(curve: str, sweep: Sweep) -> list[str]:
+    """Return how many points of a curve have which status other than ok, in words."""
+    counts = Counter(status for status in sweep.status.ravel().tolist() if status != "ok")
+    name = curve.replace("_", " ")
+    return [f"{name} {count} of {sweep.status.size} {status}".strip() for status, count in counts.items()]
+
+
+def _sliders(name: str, session: Session) -> dict[str, dict[str, list[Curve]]]:
+    """Return the curves of other figures, by these, that a study's blocks stand beside."""
+    read = {}
+    for other, wanted in claims_blocks.SLIDERS.get(name, {}).items():
+        figure = PaperFigure.load(other, session.structure, session.effort)
+        read[other] = {curve: curves(_swept(figure, curve, session), curve or other) for curve in wanted}
+    return read
 
 
 def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
@@ -146,7 +166,9 @@ def _kept(path: Path) -> Sweep | None:
         return None
 
 
-def _claims(figure: PaperFigure, by_name: dict[str, list[Curve]]) -> list[Claim]:
+def _claims(
+    figure: PaperFigure, by_name: dict[str, list[Curve]], sliders: dict[str, dict[str, list[Curve]]]
+) -> list[Claim]:
     first = next(iter(figure.scenes.values()))
     reference = next(iter(by_name.values()))[0].reference
     match figure.name:
@@ -159,14 +181,24 @@ def _claims(figure: PaperFigure, by_name: dict[str, list[Curve]]) -> list[Claim]
         case "fig14":
             return claims_rigid.fig14(by_name)
         case "fig19":
-            bar = validate(Bar, read_toml(FOLDER / "fig19.toml")["bar"], "bar")
-            return claims_rigid.fig19(by_name, bar, figure.scenes["nominal"].damper[0].mass)
+            return claims_rigid.fig19(by_name, _bar(figure), figure.scenes["nominal"].damper[0].mass)
         case "mistuning":
             return claims_rigid.mistuning(by_name, _half_gaps(first, reference), first.damper[0].restitution)
+        case "blocks":
+            return claims_blocks.blocks(by_name, sliders, _bar(figure), figure.scenes["nominal"].damper[0].mass)
+        case "fit":
+            _, play, friction, _ = figure.scenes["map"].sweep_points()[0].values()
+            return claims_blocks.fit(by_name, play, friction, sliders["fig9"][""][1])
     return claims_systems.claims(by_name)
 
 
-def _picture(figure: PaperFigure, by_name: dict[str, list[Curve]], path: Path) -> None:
+def _bar(figure: PaperFigure) -> Bar:
+    return validate(Bar, read_toml(FOLDER / f"{figure.name}.toml")["bar"], "bar")
+
+
+def _picture(
+    figure: PaperFigure, by_name: dict[str, list[Curve]], sliders: dict[str, dict[str, list[Curve]]], path: Path
+) -> None:
     title = figure.title
     match figure.name:
         case "fig9":
@@ -190,6 +222,12 @@ def _picture(figure: PaperFigure, by_name: dict[str, list[Curve]], path: Path) -
             plots.mistuning_picture(by_name[""], gaps, first.damper[0].restitution, title, path)
         case "systems":
             plots.systems_picture(by_name, title, path)
+        case "blocks":
+            plots.blocks_picture(by_name, sliders, title, path)
+        case "fit":
+            _, play, friction, _ = figure.scenes["map"].sweep_points()[0].values()
+            tops = claims_blocks.highest_means(by_name["map"], (2, len(play), len(friction)))
+            plots.fit_picture(tops, play, friction, sliders["fig9"][""][1], title, path)
         case _:
             plots.responses_picture({name: of[0] for name, of in _named(by_name).items()}, title, path)
 
