@@ -11,6 +11,7 @@ from pydantic.dataclasses import dataclass
 from tests.test_planar_surfaces import FOUR, HEIGHT, INCLINED, LENGTH, cavity_scene, rigid_cavity
 from tests.tools.planar import planar_scene, run_planar, still_table
 from tests.tools.planar_laws import scene_of, tables
+from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods import moreau, penalty, scipy_ivp
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.response.evaluation import residual
@@ -143,6 +144,13 @@ def test_penalty_converges_where_nothing_rubs():
     # eight impacts with 0.3 m/s and less, 172 steps each
     assert errors[2] <= 8 * 0.3 * 172 / 640_000 / 60 / 1e-3
     assert errors[2] <= 0.1 * errors[0]
+
+
+def test_penalty_with_friction_carries_a_warning():
+    rubbing, smooth = (in_flight(friction).replace({"time": {"periods": 1, "transient": 0}}) for friction in (0.3, 0.0))
+    for scene, method, said in ((rubbing, "penalty", 1), (smooth, "penalty", 0), (rubbing, "moreau", 0)):
+        response = simulate(scene.replace({"solver": {"method": method, "steps_per_period": 10_000}}))
+        assert len([warning for warning in response.warnings if "Newton's law" in warning]) == said
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

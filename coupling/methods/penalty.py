@@ -30,6 +30,10 @@ VARIANTS = (
     Variant("penalty, HHT", "#0e7490", "^", {"scheme": "hht"}),
 )
 WAVEFORMS = True
+RUBBING_WARNING = (
+    "impacts of bodies with extent on springs that rub leave other speeds than Newton's law, with any number of steps; "
+    'take "exact" or "moreau" for amplitudes'
+)
 
 
 class Options(PenaltyOptions, PlanarOptions):

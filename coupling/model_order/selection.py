@@ -23,6 +23,7 @@ import numpy as np
 
 from vanedamp.coupling.model_order.collision_sensitivity import sensitivity
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.reduced_model_file import reduced_model
 from vanedamp.coupling.system.resonance import excitation_force
@@ -116,13 +117,23 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
     stiffness = min((collision.stiffness for collision in contacts), default=None)
     estimate = choice.to_json() | {"stiffness": stiffness}
     warning = _warning(_shared(scene, structure))
+    sentences = [choice.sentence]
     if warning is not None:
-        estimate |= warning | {"sentence": f"{choice.sentence}; {warning['sentence']}"}
-    return Selected(timed(scene), estimate)
+        estimate |= warning
+        sentences.append(warning["sentence"])
+    if any(damper.shape != "slider" for damper in scene.damper):
+        sentences.append("bodies with extent count as sliders")
+    return Selected(timed(scene), estimate | {"sentence": "; ".join(sentences)})
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
-    """Return the warnings of a scene without open choices: that an impact law acts on several modes."""
+    """Return the warnings of a scene without open choices: of its method, and of impact laws on several modes."""
+    rubs = any(damper.shape != "slider" and damper.friction > 0.0 for damper in scene.damper)
+    warning = getattr(METHODS.part(scene.solver.method), "RUBBING_WARNING", None) if rubs else None
+    return (*([] if warning is None else [f"solver.method: {warning}"]), *_of_impact_laws(scene))
+
+
+def _of_impact_laws(scene: Scene) -> tuple[str, ...]:
     if not (isinstance(scene.structure, Rom) and scene.contact.rigid and (scene.damper or scene.stop)):
         return ()
     size = reduced_model(scene.structure).size
