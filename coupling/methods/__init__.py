@@ -55,6 +55,6 @@ class Method(Protocol):
         (response.recorder); events: whether to keep a log of them. Raises InputError for an impossible scene.
         A method that takes bodies in the plane (coupling.planar) also has begin_planar(scene, system, options, records,
         events), system with all of them as sliders; and PLANAR_LAWS, what it takes there beside rigid contacts of one
-        restitution: "yields", springs; "two_phases", Poisson's law; "depends_on_speed". And it may have RUBBING_WARNING, a
-        sentence that every run of such bodies with friction carries.
+        restitution: "yields", springs; "two_phases", Poisson's law; "depends_on_speed". It may have RUBBING_WARNING,
+        a sentence that every run of such bodies with friction carries.
         """
