@@ -141,6 +141,30 @@ def test_below_that_angle_the_sphere_rolls_off():
     assert run.state.v[0] / along == pytest.approx(5 / 7, rel=1e-12)
 
 
+@pytest.mark.parametrize(("angle", "left"), [(20.0, 0.599), (39.54, 0.774)])
+def test_a_tangential_spring_at_the_contact_gives_what_was_measured(angle, left):
+    """Mindlin (1949): tangential over normal stiffness 2 (1 - nu)/(2 - nu), here of a floor without mass to speak of.
+
+    The spring returns what it took while the sphere stuck, and slows the sphere below 5/7. Where the sphere slides all
+    the time it changes nothing.
+    """
+    k, mu, speed, radius, mass, stiffness, poisson = 0.98, 0.092, 3.9, 2.5e-3, 2.618e-4, 1e6, 0.22
+    normal, along = speed * math.cos(math.radians(angle)), speed * math.sin(math.radians(angle))
+    sphere = {
+        "shape": "disc", "radius": radius, "mass": mass, "inertia": 0.4 * mass * radius**2, "friction": mu,
+        "restitution": k, "lift": 1e-6, "lift_velocity": -normal, "velocity": along,
+    }  # fmt: skip
+    table = still_table(1 / (3 * math.pi * math.sqrt(mass / stiffness)), gravity=0.0) | {
+        "structure": {
+            "model": "rigid", "mass": 1e-3 * mass, "stiffness": 2 * (1 - poisson) / (2 - poisson) * stiffness,
+            "damping_ratio": 0.05,
+        },
+        "contact": {"law": "compliant", "stiffness": stiffness},
+    }  # fmt: skip
+    run = planar_run(table, sphere, periods=1, gap=1.0)
+    assert run.state.v[1] / along == pytest.approx(left, rel=0.02)
+
+
 @pytest.mark.parametrize("shape", ["block", "disc"])
 def test_gravity_that_lifts_a_body_lays_it_on_the_ceiling(shape):
     """Upside down it falls through its play, bounces on the ceiling as on a floor, and rubs there."""
