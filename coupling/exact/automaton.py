@@ -113,8 +113,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
             st.time[0] = 0.0
             for r in range(len(st.last_impact)):
                 st.last_impact[r] -= system.period
-            for h in range(len(system.frequency)):
-                st.amplitude[h] = 1.0
+            _set_phases(system, st)
             _select_awake_modes(flows, st)
             record_start(system, flows, st, rec, scratch)
             align_gaps(system, st, scratch.coordinates)

@@ -190,9 +190,8 @@ def _free_bodies(system, flows, st, rec, scratch, s, period, tau, waves):
         if flows.body_acceleration[s, b, b] != 0.0:
             speed += system.mass[n + b] * st.velocity[b]
     for h in range(len(system.frequency)):
-        rate, change = system.frequency[h], scratch.change[h]
-        share = 1.0 / rate
-        flat = complex(share * change.imag, share * change.real)
+        rate = system.frequency[h]
+        flat = complex(0.0, 1.0 / rate) * scratch.change[h].conjugate()
         momentum = speed * flat
         if drift != 0.0:
             # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
@@ -201,9 +200,8 @@ def _free_bodies(system, flows, st, rec, scratch, s, period, tau, waves):
         if h == 0:
             rec.momentum[period] += momentum
         if system.alike:
-            load = system.load[h, n]
-            work = load.real * momentum.real + load.imag * momentum.imag
-            st.ledger[EXCITATION] += work / system.mass[n]
+            load = system.load[h, n] / system.mass[n]
+            st.ledger[EXCITATION] += load.real * momentum.real + load.imag * momentum.imag
         else:
             st.ledger[EXCITATION] += _work_on_bodies(system, flows, st, scratch, s, h, tau, flat)
 

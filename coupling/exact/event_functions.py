@@ -132,7 +132,7 @@ def _list_functions(system, flows, st, watched, s):
     count = ZERO
     for r in range(system.friction_rows):
         state = st.state[r]
-        if (state == STICK or state == SPRUNG) and _may_reach_bound(system, flows, st, s, r):
+        if state == STICK or state == SPRUNG:
             for side in (AT_LOW, AT_HIGH):
                 count = _add_force_bound(system, flows, st, watched, s, r, side, system.limit[r], count)
         elif state == SLIP_LEFT or state == SLIP_RIGHT:
@@ -303,17 +303,6 @@ def _add_reclosing(system, flows, st, watched, s, r, k):
     # the contact ended at zero force
     watched.noise[k] = 1e-15 * (abs(spring * st.displacement[r]) + abs(dashpot * st.velocity[r]))
     return k + 1
-
-
-@inlined
-def _may_reach_bound(system, flows, st, s, r):
-    """Whether the force of a closed friction row may come to one of its bounds: most segments end before it can."""
-    swing = abs(st.constant_force[r])
-    for a in range(st.counters[AWAKE]):
-        j = st.awake[a]
-        share, c = flows.force[s, r, j], st.amplitude[j]
-        swing += (abs(share.real) + abs(share.imag)) * (abs(c.real) + abs(c.imag))
-    return swing >= system.limit[r] or _is_driven(flows, s)
 
 
 @inlined
