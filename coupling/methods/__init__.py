@@ -40,9 +40,9 @@ class Method(Protocol):
     """The contract of a method.
 
     It may also have RESTARTS = True: its runs leave a state, and begin with any (those in the plane by a further
-    argument, the RestartState or None). And WAVEFORMS = True: `begin` has one
-    more argument, `loads`, for an excitation that is no sum of the system's harmonics: its loads (k, N), N, at angles
-    omega t (k,) in [0, 2 pi), in place of those of the system. Other methods refuse such an excitation.
+    argument, the RestartState or None). And WAVEFORMS = True: `begin` has one more argument, `loads`, for an
+    excitation that is no sum of the system's harmonics: its loads (k, N), N, at angles omega t (k,) in [0, 2 pi), in
+    place of those of the system. Other methods refuse such an excitation.
     """
 
     Options: type[SolverOptions]

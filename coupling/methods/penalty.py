@@ -96,5 +96,5 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
         return planar.march(system, times, motion, records, log, forces, inverse, periods, budget, deepest)
 
     motion = start_steps(system, initial, records, forces.spring)
-    plane = plane_of(system, motion.tilt, motion.lifted, motion.sampled, motion.shut, options.linearisation)
+    plane = plane_of(system, motion, options.linearisation)
     return SteppedRun(flat, march, motion, records, events, plane)

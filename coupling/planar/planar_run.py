@@ -97,10 +97,9 @@ class PlanarRun:
         numbers = {"impacts": IMPACTS, "segments": SEGMENTS, "evaluations": EVALUATIONS}
         found = {name: int(counters[place]) for name, place in numbers.items()}
         found["subsystems"] = int(np.count_nonzero(self.flows.modes))
-        st = self.state
         return Outcome(
             self.flat, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER, found, self.chunks,
-            plane=plane_of(self.system, st.tilt, st.lifted, st.sampled, st.shut, self.linearisation),
+            plane=plane_of(self.system, self.state, self.linearisation),
         )  # fmt: skip
 
     def final(self) -> RestartState | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
@@ -14,24 +15,34 @@ from vanedamp.coupling.response.records import STORED
 from vanedamp.coupling.response.response import PlanarSamples
 
 
-def plane_of(
-    system: PlanarSystem,
-    tilt: np.ndarray,
-    lifted: np.ndarray,
-    sampled: np.ndarray,
-    shut: np.ndarray,
-    linearisation: float,
-) -> Plane:
-    """Return the results in the plane of a run.
+class Kept(Protocol):
+    """The results in the plane that a run has kept, of every method."""
 
-    tilt, lifted: (periods, b); sampled: (n, N) coordinates; shut: (n, u) whether contacts are closed.
-    """
+    @property
+    def tilt(self) -> np.ndarray:
+        """(periods, b) largest |tilt| in the cavity, rad."""
+
+    @property
+    def lifted(self) -> np.ndarray:
+        """(periods, b) time off the floor, s."""
+
+    @property
+    def sampled(self) -> np.ndarray:
+        """(n, N) coordinates."""
+
+    @property
+    def shut(self) -> np.ndarray:
+        """(n, u) whether contacts are closed."""
+
+
+def plane_of(system: PlanarSystem, kept: Kept, linearisation: float) -> Plane:
+    """Return the results in the plane of a run."""
     places = [
         (int(body), SURFACES[surface], int(corner))
         for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
     ]
-    samples = partial(_samples, system, sampled, shut, places)
-    return Plane(tilt, lifted, system.neglected, linearisation, places, samples, system.spring)
+    samples = partial(_samples, system, kept.sampled, kept.shut, places)
+    return Plane(kept.tilt, kept.lifted, system.neglected, linearisation, places, samples, system.spring)
 
 
 def _samples(

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp import Options
-from vanedamp.coupling.methods.scipy_ivp.arcs import first_step, integrate
+from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
+from vanedamp.coupling.methods.scipy_ivp.event_loop import STANDING, EventLoop
 from vanedamp.coupling.methods.scipy_ivp.planar_contacts import (
     NEVER,
     OPEN,
@@ -26,7 +27,7 @@ from vanedamp.coupling.methods.scipy_ivp.planar_contacts import (
 from vanedamp.coupling.methods.scipy_ivp.planar_records import PlanarRecorder
 from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
 from vanedamp.coupling.planar.recorder import plane_of
-from vanedamp.coupling.response.evaluation import Outcome
+from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.system import System
@@ -38,103 +39,61 @@ _SHORTEST = 1e-26
 _TOUCH, _NEAR, _STILL = 1e-11, 10 * ROUND_OFF, 1e-11
 #: flights shorter than this share of a period, and all that follow them, are the end of a chatter
 _CHATTER = 1e-6
-#: time without events, as a share of a period, in which events happen at once; how many may
-_AT_ONCE, _STANDING = 1e-13, 100
-#: imbalance of the ledger above which a response is not to be used, in units of rtol or of _LEAST
-_OPEN_LEDGER, _LEAST = 1e3, 1e-9
 
 
-class PlanarIvpRun:
+class PlanarIvpRun(EventLoop):
     """A run by solve_ivp: state y = (q, v, integrals) and the states of the units. Times count from the period's start.
 
     flat: the scene's system with every body as a slider.
     """
 
+    AT_ONCE = 1e-13
+
     def __init__(
         self, flat: System, system: PlanarSystem, options: Options, initial: PlanarMotion, records: Records,
         events: bool,
     ) -> None:  # fmt: skip
-        self.flat, self.system, self.options, self.steps = flat, system, options, options.steps_per_period
+        self.system = system
         self.free = free = Unforced(system)
-        self.record = PlanarRecorder(free, records, self.steps, events)
-        self.time, self.step = 0.0, system.period / self.steps
+        record = PlanarRecorder(free, records, options.steps_per_period, events)
+        super().__init__(flat, options, record, np.concatenate([initial.q, initial.v, np.zeros(record.count)]))
         self.sizes = self.record.sizes(float(flat.omega))
         self.absolute = options.rtol * self.sizes
-        self.y = np.concatenate([initial.q, initial.v, np.zeros(self.record.count)])
-        self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
         self.state, self.struck = np.full(free.u, OPEN), np.full(free.u, -np.inf)  # times of the last impacts
         self.motion: Motion
         self.guard, self.order = np.zeros((0, free.extent)), np.zeros(0, int)
-        self.begun = False
 
-    def advance_to(self, periods: int) -> Status:
-        """Continue to the end of `periods`, unless the run ends before."""
-        if not self.begun:
-            self.begun = True
-            self.record.section(self.y)
-            if not self._decide():
-                return Status.UNDECIDED
+    def _begin(self) -> bool:
+        self.record.section(self.y)
+        decided = self._decide()
+        if decided:
             self.record.start(self.y)
-        with np.errstate(all="ignore"):
-            while self.record.period < periods:
-                if self.events >= self.options.max_events:
-                    return Status.EVENT_BUDGET
-                status = self._segment()
-                if status is not Status.OK:
-                    return status
-        return Status.OK
+        return decided
 
-    def outcome(self) -> Outcome:
-        """Return the results of the run."""
-        record = self.record
-        numbers = {"impacts": record.impacts, "evaluations": self.evaluations}
-        log = [np.array(record.log)] if record.log else []
-        return Outcome(
-            self.flat, record.records, record.period, self.events,
-            _OPEN_LEDGER * max(self.options.rtol, _LEAST), numbers, log, max(record.deep, 0.0),
-            plane_of(
-                self.system, record.tilt, record.lifted, record.sampled, record.shut, self.options.linearisation
-            ),
-        )  # fmt: skip
-
-    def final(self) -> None:
-        """Return None: the states of contacts are no part of a motion that another run could begin with."""
+    def _plane(self) -> Plane:
+        return plane_of(self.system, self.record, self.options.linearisation)
 
     # -- motion between events
 
-    def _segment(self) -> Status:
-        """Integrate to the next event or to the end of the period."""
-        grid = np.arange(1, self.steps + 1) * self.step
-        grid = grid[grid > self.time]
-        if not len(grid):  # an event has fallen on the period's end
-            return self._end_period()
+    def _integrate(self, grid: np.ndarray) -> Arc:
         free, guard = self.free, self.guard
-        arc = integrate(
+        return integrate(
             self._rate, self.y, self.time, grid, lambda t, y: guard @ free.extended(t, y[: free.size]), self.order,
             self.options.rtol, self.absolute, self._first_step(), self.step,
         )  # fmt: skip
-        self.evaluations += arc.evaluations
-        if arc.failed or not np.isfinite(arc.last).all():
-            return Status.DIVERGED
-        self.record.points(arc.t, arc.y)
-        if self.record.deep > self.options.penetration:
-            return Status.PENETRATION
-        self.record.flight(arc.duration)
-        self.time, self.y = self.time + arc.duration, arc.last
-        if arc.event is None:
-            self.order = np.zeros_like(self.order)
-            return self._end_period()
-        self.events += 1
-        self.standing = self.standing + 1 if arc.duration < _AT_ONCE * self.system.period else 0
-        if self.standing > _STANDING:
-            return Status.UNDECIDED
-        return Status.OK if self._decide() else Status.UNDECIDED
+
+    def _pass(self, duration: float) -> None:
+        self.record.flight(duration)
+
+    def _go_on(self) -> None:
+        self.order = np.zeros_like(self.order)
+
+    def _happen(self, event: int) -> bool:
+        return self._decide()
 
     def _end_period(self) -> Status:
-        self.time = 0.0
         self.struck -= self.system.period
-        self.record.end_period(self.y)
-        return Status.OK
+        return super()._end_period()
 
     def _first_step(self) -> float:
         now = self.free.extended(self.time, self.y[: self.free.size])
@@ -165,7 +124,7 @@ class PlanarIvpRun:
         touch = np.maximum(_TOUCH * system.play[: system.contacts], _NEAR * terms)
         closed = (self.state[: system.contacts] != OPEN) | (free.gaps(q) <= touch)
         self._bring(q, normal[closed], free.gaps(q)[closed])
-        for _ in range(_STANDING):
+        for _ in range(STANDING):
             if not np.any(normal[closed] @ v < -slow):
                 break
             found = impact(free, v, np.flatnonzero(closed).tolist(), self._restitution())
@@ -204,7 +163,7 @@ class PlanarIvpRun:
 
     def _restitution(self) -> np.ndarray:
         """Return the coefficients (u,): impacts that follow each other at once end without rebound."""
-        collapses = self.time - self.struck < _AT_ONCE * self.system.period
+        collapses = self.time - self.struck < self.AT_ONCE * self.system.period
         return np.where(collapses, 0.0, self.system.restitution)
 
     def _jump(self, v: np.ndarray, found: Impact) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
+from vanedamp.coupling.methods.scipy_ivp.event_loop import STANDING, EventLoop
 from vanedamp.coupling.methods.scipy_ivp.impacts import COLLAPSE, FRESH, TOUCH, simultaneous_impacts, zero_round_off
 from vanedamp.coupling.methods.scipy_ivp.integrals import Recorder
 from vanedamp.coupling.methods.scipy_ivp.motion import (
@@ -29,9 +30,7 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
     Unforced,
 )
 from vanedamp.coupling.numerics.complementarity import new_problem
-from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
 
@@ -39,62 +38,30 @@ from vanedamp.coupling.system.system import System
 _SHORTEST = 1e-26
 #: gaps below this share of the free travel are closed at the start
 _TOUCHING = 1e-12
-#: imbalance of the ledger above which a response is not to be used, in units of rtol or of _LEAST
-_OPEN_LEDGER, _LEAST = 1e3, 1e-9
-#: events without time between them before the run is given up
-_STANDING = 100
 
 
-class IvpRun:
+class IvpRun(EventLoop):
     """A run by solve_ivp: state y = (z, integrals) and the states of the rows. Times count from the period's start."""
+
+    AT_ONCE = COLLAPSE
 
     def __init__(
         self, system: System, options: Options, initial: InitialMotion, records: Records, events: bool
     ) -> None:
-        self.system, self.options, self.steps = system, options, options.steps_per_period
+        self.system = system
         self.unforced = u = Unforced(system)
-        self.record = Recorder(u, records, self.steps, events)
-        self.y = np.zeros(u.size + self.record.count)
+        record = Recorder(u, records, options.steps_per_period, events)
+        super().__init__(system, options, record, np.zeros(u.size + record.count))
         self.y[u.p], self.y[u.d] = initial.p, initial.displacement
         self.y[u.p_rate], self.y[u.s] = initial.p_rate, initial.velocity
-        self.time, self.step = 0.0, system.period / self.steps
         self.problem = new_problem(u.r)
-        self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
         self.since = np.full(u.r, np.inf)  # s, since each contact's last impact
-        self.begun = False
         nothing = np.zeros(u.r, int)
         self._follow(Contacts(nothing + UNFORCED, nothing.astype(float), nothing, nothing))
-        self.tolerance = options.rtol
-        self.absolute = self.tolerance * self.record.sizes(_reach(u))
-
-    def advance_to(self, periods: int) -> Status:
-        """Continue to the end of `periods`, unless the run ends before."""
-        if not self.begun and not self._begin():
-            return Status.UNDECIDED
-        with np.errstate(all="ignore"):
-            while self.record.period < periods:
-                if self.events >= self.options.max_events:
-                    return Status.EVENT_BUDGET
-                status = self._segment()
-                if status is not Status.OK:
-                    return status
-        return Status.OK
-
-    def outcome(self) -> Outcome:
-        """Return the results of the run."""
-        record = self.record
-        numbers = {"impacts": record.impacts, "evaluations": self.evaluations}
-        log = [np.array(record.log)] if record.log else []
-        open_ledger = _OPEN_LEDGER * max(self.tolerance, _LEAST)
-        return Outcome(
-            self.system, record.records, record.period, self.events, open_ledger, numbers, log, max(record.deep, 0.0)
-        )
-
-    def final(self) -> None:
-        """Return None: the states of contacts are no part of a motion that another run could begin with."""
+        self.absolute = options.rtol * self.record.sizes(_reach(u))
 
     def _begin(self) -> bool:
-        self.begun, place = True, self.y[self.unforced.d]
+        place = self.y[self.unforced.d]
         contacts = slice(self.system.friction_rows, None)
         gap = place[contacts]
         gap[np.abs(gap) <= _TOUCHING * self.system.free_travel[contacts]] = 0.0
@@ -104,42 +71,21 @@ class IvpRun:
 
     # -- motion between events
 
-    def _segment(self) -> Status:
-        """Integrate to the next event or to the end of the period."""
-        grid = np.arange(1, self.steps + 1) * self.step
-        grid = grid[grid > self.time]
-        if not len(grid):  # an event has fallen on the period's end
-            return self._end_period()
-        arc = self._integrate(grid)
-        self.evaluations += arc.evaluations
-        if arc.failed or not np.isfinite(arc.last).all():
-            return Status.DIVERGED
-        self.record.points(arc.t, arc.y)
-        if self.record.deep > self.options.penetration:
-            return Status.PENETRATION
-        self.time, self.y = self.time + arc.duration, arc.last
-        self.since += arc.duration
-        if arc.event is None:
-            self.guards.order[:] = 0
-            return self._end_period()
-        self.events += 1
-        self.standing = self.standing + 1 if arc.duration < COLLAPSE * self.system.period else 0
-        if self.standing > _STANDING:
-            return Status.UNDECIDED
-        decided = self._decide(int(self.guards.row[arc.event]), int(self.guards.kind[arc.event]))
-        return Status.OK if decided else Status.UNDECIDED
+    def _pass(self, duration: float) -> None:
+        self.since += duration
 
-    def _end_period(self) -> Status:
-        self.time = 0.0
-        self.record.end_period(self.y)
-        return Status.OK
+    def _go_on(self) -> None:
+        self.guards.order[:] = 0
+
+    def _happen(self, event: int) -> bool:
+        return self._decide(int(self.guards.row[event]), int(self.guards.kind[event]))
 
     def _integrate(self, grid: np.ndarray) -> Arc:
         """Return the motion from now to the first event, or to the end of the grid."""
         u, guards = self.unforced, self.guards
         return integrate(
             self.rate, self.y, self.time, grid, lambda t, y: guards.functional @ u.extended(t, y[: u.size]),
-            guards.order, self.tolerance, self.absolute, self._first_step(), self.step,
+            guards.order, self.options.rtol, self.absolute, self._first_step(), self.step,
         )  # fmt: skip
 
     def _first_step(self) -> float:
@@ -166,7 +112,7 @@ class IvpRun:
         self._arrive(row, kind, z)
         self.record.turning(self.time, self.y)
         self._zero_round_off(z)
-        for _ in range(_STANDING):
+        for _ in range(STANDING):
             # an impact may close gaps that are about to
             if not np.any(u.rigid_contact & (z[u.d] == 0) & (z[u.s] < 0)):
                 break

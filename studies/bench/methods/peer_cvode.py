@@ -77,7 +77,7 @@ class CvodeRun(IvpRun):
         roots.direction = [-1] * len(leaves)  # type: ignore[attr-defined]
         events = {"eventsfn": roots, "num_events": len(leaves)} if len(leaves) else {}
         solver = CVODE(
-            rate, method="Adams", rtol=self.tolerance, atol=self.absolute, max_step=self.step,
+            rate, method="Adams", rtol=self.options.rtol, atol=self.absolute, max_step=self.step,
             max_num_steps=100_000, **events,
         )  # fmt: skip
         return solver.solve(np.concatenate([[self.time], grid]), self.y)
