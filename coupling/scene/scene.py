@@ -18,6 +18,7 @@ from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper, Stop
 from vanedamp.coupling.scene.contact_laws.newton import Newton
 from vanedamp.coupling.scene.contact_laws.registry import Contact
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
+from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
@@ -111,6 +112,7 @@ class Scene:
     solver: Solver = field(default_factory=partial(options_of, {}))
     continuation: Continuation = field(default_factory=Continuation)
     sweep: dict[str, Axis] = field(default_factory=dict)
+    orbit: Orbit | None = None
 
     def __post_init__(self) -> None:
         names = [cavity.name for cavity in self.cavity]
@@ -290,7 +292,7 @@ class Scene:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain nested data as in the file, without values that are None."""
-        data: dict[str, Any] = TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True)
+        data: dict[str, Any] = TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True, by_alias=True)
         return data
 
     def replace(self, values: Mapping[str, Any]) -> Scene:
