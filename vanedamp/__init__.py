@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from vanedamp.coupling.response.response import Response, Status
     from vanedamp.coupling.scene.scene import Scene
     from vanedamp.coupling.sweep.record import Sweep
+    from vanedamp.coupling.sweep.steady_states import steady_states
     from vanedamp.coupling.sweep.sweep import sweep
     from vanedamp.files.errors import VanedampError
     from vanedamp.files.toml_input import InputError
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "Scene", "Status", "Sweep",
-    "SystemMatrices", "VanedampError", "reduce", "rigid_model", "simulate", "solve_modes", "sweep",
+    "SystemMatrices", "VanedampError", "reduce", "rigid_model", "simulate", "solve_modes", "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -51,6 +52,7 @@ _HOMES = {
     "rigid_model": "modal.rigid_model",
     "simulate": "coupling.engine",
     "solve_modes": "modal.eigen",
+    "steady_states": "coupling.sweep.steady_states",
     "sweep": "coupling.sweep.sweep",
 }
 
