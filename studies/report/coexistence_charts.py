@@ -81,11 +81,12 @@ def _numbers(names: np.ndarray, motions: Sequence[str]) -> np.ndarray:
 
 def count_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
     """Draw how many steady states were found; a panel a combination of other axes."""
-    most = max(int(states.count.max()), 1)
-    shades = [_NOT_OK, *sample_colorscale("Viridis", np.linspace(0.0, 1.0, max(most, 2))[:most].tolist())]
+    least, most = min(int(states.count.min()), 1), max(int(states.count.max()), 1)
+    shades = [_NOT_OK, *sample_colorscale("Viridis", np.linspace(0.0, 1.0, max(most, 2))[:most].tolist())][least:]
     return panels_figure(
-        sweep, count_panels(sweep, states), count_axes(sweep), zmin=-0.5, zmax=most + 0.5, colorscale=_steps(shades),
-        colorbar={"title": {"text": "steady<br>states"}, "tickvals": list(range(1, most + 1))},
+        sweep, count_panels(sweep, states), count_axes(sweep), zmin=least - 0.5, zmax=most + 0.5,
+        colorscale=_steps(shades),
+        colorbar={"title": {"text": "steady<br>states"}, "tickvals": list(range(least, most + 1))},
         hovertemplate="%{x:.6g}, %{y:.4g}: %{z} steady states<extra></extra>",
     )  # fmt: skip
 
