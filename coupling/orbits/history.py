@@ -59,6 +59,5 @@ def _rate(time: np.ndarray, values: np.ndarray, jumps: np.ndarray) -> np.ndarray
     rate = np.full(values.shape, np.nan)
     for piece in np.split(np.arange(len(time)), np.searchsorted(time, jumps)):
         if len(piece) > 1:
-            order = min(len(piece) - 1, 2)
-            rate[piece] = np.gradient(values[piece], time[piece], axis=0, edge_order=order)
+            rate[piece] = np.gradient(values[piece], time[piece], axis=0, edge_order=2 if len(piece) > 2 else 1)
     return rate
