@@ -11,6 +11,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from vanedamp.coupling.response.restart_state import RestartState
+
 
 class PassageStatus(StrEnum):
     """How a passage ended."""
@@ -42,7 +44,8 @@ class Passage(NamedTuple):
     state: (k,) after the periods; derivative: (k, k) of it with respect to the state before, one-sided where the map
     has kinks; crossings: the events in order, of which the names are the sequence that tells branches apart;
     clearance: the smallest distance to an event that did not happen (a gap that nearly closed, a force near its bound),
-    as a share of its scale (free travel, bound), and which: (share, name); inf where nothing came near.
+    as a share of its scale (free travel, bound), and which: (share, name); inf where nothing came near;
+    peaks: (periods,) m, largest magnitude of the response's displacement in each period, as in a Response.
     """
 
     state: np.ndarray
@@ -50,6 +53,7 @@ class Passage(NamedTuple):
     crossings: tuple[Crossing, ...]
     clearance: tuple[float, str]
     status: PassageStatus
+    peaks: np.ndarray
 
     @property
     def sequence(self) -> tuple[str, ...]:
@@ -72,7 +76,19 @@ class PeriodMap(Protocol):
         """Return the passage that begins with a state (k,)."""
 
     def at(self, value: float) -> PeriodMap:
-        """Return the map of the same scene with its parameter (any dotted key of it) set to a value."""
+        """Return the map of the same scene with its parameter (any dotted key of it) set to a value.
+
+        Raises InputError for a value that makes it no scene.
+        """
+
+    def over(self, periods: int) -> PeriodMap:
+        """Return the map of the same scene over another number of periods."""
+
+    def state_of(self, restart: RestartState) -> np.ndarray:
+        """Return the state (k,) that a run has left."""
+
+    def restart_of(self, state: np.ndarray) -> RestartState:
+        """Return the state with which a run of the scene begins as the passage does."""
 
     def linear_orbit(self) -> np.ndarray:
         """Return the state (k,) of the motion without contact, where all bodies are at rest on their floors."""
