@@ -110,7 +110,7 @@ class SliderDynamics:
         return share
 
     def impulse(self, rows: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Return the derivative (k, k) of an impact at rows (m,): speeds after it are -slope (m,) times those before."""
+        """Return the derivative (k, k) of an impact at rows (m,), whose speeds after it are -slope (m,) times before."""
         on_rates, jump = self._on_rates[rows], np.eye(self.k)
         inverse = np.linalg.pinv(on_rates @ on_rates.T, rcond=1e-12, hermitian=True)
         jump[self.rates, self.rates] -= on_rates.T @ inverse @ ((1.0 + slope)[:, None] * on_rates)
