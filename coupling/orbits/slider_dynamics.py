@@ -128,12 +128,15 @@ class SliderDynamics:
         Slips that stick and gaps that are closed come to rest by forces between the two sides only, which keep their
         momentum and, of closed gaps, their centre of mass: a projection in the metric of mass.
         """
-        rows, jump = self.constraints(state), np.eye(self.k)
+        rows = self.constraints(state)
+        jump = self.closed(rows[rows >= self.system.friction_rows])
         jump[self.rates, self.rates] = held(self._on_rates[rows])
-        closed = rows[rows >= self.system.friction_rows]
-        size = len(self.root)
-        project = held(self._on_rates[closed])
-        jump[:size, :size] = self.rate[:, None] * project / self.rate
+        return jump
+
+    def closed(self, rows: np.ndarray) -> np.ndarray:
+        """Return the derivative (k, k) of gaps (m,) that close without time: they keep their centre of mass."""
+        size, jump = len(self.root), np.eye(self.k)
+        jump[:size, :size] = self.rate[:, None] * held(self._on_rates[rows]) / self.rate
         return jump
 
     @cached_property

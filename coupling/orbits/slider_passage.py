@@ -225,6 +225,8 @@ class _Walk:
         self.clearance = (np.inf, "")
         self.status = PassageStatus.OK
         self.size = np.zeros(dynamics.k)
+        #: largest derivative so far of each coordinate
+        self.reach = np.zeros(dynamics.k)
         #: flow, state and time at the start of the segment that holds the middle of the first period
         self.middle: tuple[LinearFlow, np.ndarray, float] | None = None
         #: saltation matrix of the last event, and when it was
@@ -397,10 +399,12 @@ class _Walk:
         """Return the saltation matrix of gaps that close together.
 
         On a prescribed motion cavities do not feel each other: each has its own time of impact. Where they do, the map
-        has another derivative for each order of the impacts: COINCIDENT, with that of the first.
+        has another derivative for each order of the impacts: COINCIDENT, with that of the first. A chatter that ends
+        leaves nothing of gaps and speeds, in any order.
         """
-        dynamics, system = self.dynamics, self.dynamics.system
-        cavity = dynamics.cavity
+        dynamics, system, cavity = self.dynamics, self.dynamics.system, self.dynamics.cavity
+        if not self.run.state.velocity[arrivals].any():
+            return dynamics.closed(np.array(arrivals)) @ jump
         owner = [int(cavity[max(system.left_body[r], system.right_body[r])]) for r in arrivals]
         if system.modes or len(set(owner)) < len(owner):
             self.status = PassageStatus.COINCIDENT
@@ -471,5 +475,6 @@ class _Walk:
         rows = dynamics.constraints(self.run.state.state)
         closed = rows[rows >= dynamics.system.friction_rows]
         still = np.vstack([dynamics.speed[rows], dynamics.place[closed]])
-        if np.any(np.abs(still @ M) > 1e-6 * np.abs(still) @ np.abs(M).max(axis=1, keepdims=True)):
+        self.reach = np.maximum(self.reach, np.abs(M).max(axis=1))
+        if np.any(np.abs(still @ M).max(axis=1, initial=0.0) > 1e-7 * np.abs(still) @ self.reach):
             raise Untrusted
