@@ -103,7 +103,7 @@ class Orbit:
     @property
     def impacts_per_period(self) -> float:
         """Impacts in one period of the excitation."""
-        return sum(name.startswith("impact") for name in self.passage.sequence) / self.periods
+        return sum(name.count("impact ") for name in self.passage.sequence) / self.periods
 
 
 class Point(NamedTuple):
@@ -153,7 +153,7 @@ class Problem:
         return np.append(state / self.weight, share)
 
     def passage(self, y: np.ndarray) -> Passage | None:
-        """Return the passage of y; None if the parameter's value is none of a scene or the engine stops."""
+        """Return the passage of y; None if its parameter makes no scene, or the passage has no end or no derivative."""
         return self._passage(y[:-1] * self.weight, self.parameter(y))
 
     def _passage(self, state: np.ndarray, parameter: float) -> Passage | None:
@@ -162,8 +162,8 @@ class Problem:
             passage = self.at(parameter)(state)
         except InputError:
             return None
-        whole = passage.status is not PassageStatus.STOPPED
-        return passage if whole and np.isfinite(passage.state).all() and np.isfinite(passage.derivative).all() else None
+        known = passage.status not in (PassageStatus.STOPPED, PassageStatus.UNDETERMINED)
+        return passage if known and np.isfinite(passage.state).all() and np.isfinite(passage.derivative).all() else None
 
     def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
         """Return by how much an orbit misses itself, scaled (k,)."""
@@ -175,7 +175,7 @@ class Problem:
         Central differences of the passage; where one side has another sequence of events, those of the other side.
         """
         parameter = self.parameter(y)
-        h = _DIFFERENCE * max(abs(parameter), _FLOOR * self.span)
+        h = _DIFFERENCE * max(abs(parameter), _FLOOR * abs(self.span))
         state, known = y[:-1] * self.weight, {0: passage.state}
 
         def side(steps: int) -> np.ndarray | None:

@@ -57,9 +57,10 @@ def run(arguments: Namespace) -> None:
     from vanedamp.studies.commands.support.scenes import load_scene, print_choices, print_resonance
 
     scene = load_scene(arguments.input, outputs)
-    from vanedamp.coupling.sweep.checkpoint import Checkpoint, clear
+    from vanedamp.coupling.sweep.checkpoint import Checkpoint
     from vanedamp.coupling.sweep.grid import grid
     from vanedamp.coupling.sweep.sweep import sweep
+    from vanedamp.files.checkpoint_file import clear
     from vanedamp.files.provenance import versions
     from vanedamp.studies.commands.support.budget import check_run, check_sweep
     from vanedamp.studies.report.forced_response import forced_responses
