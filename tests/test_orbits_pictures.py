@@ -8,6 +8,7 @@ import pytest
 from tests.test_coupling_continuation import BISTABLE, HALF_GAP
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.history import SAMPLES, orbit_history
+from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import validate
@@ -33,7 +34,8 @@ def hitting():
 def test_history_is_the_motion_along_the_orbit(hitting):
     """It closes, has the structure's peak, is its own mirror image, and impacts reverse the body's speed."""
     scene, settled = hitting
-    history = orbit_history(scene, settled.final, 1)
+    along = period_map(scene)
+    history = orbit_history(along, along.state_of(settled.final))
     assert history.time[[0, -1]] == pytest.approx([0.0, 1 / FREQUENCY])
     half = SAMPLES // 2
     for name in ("displacement", "velocity", "slip", "slip_velocity"):

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.scene.scene import Scene, Time
+from vanedamp.coupling.orbits.passage import PeriodMap
+from vanedamp.coupling.scene.scene import Time
 from vanedamp.files.store import frozen
 
 #: samples of an excitation period
@@ -36,10 +36,11 @@ class OrbitHistory:
     impact_body: np.ndarray
 
 
-def orbit_history(scene: Scene, start: RestartState, periods: int) -> OrbitHistory:
-    """Return the motion of a scene over some excitation periods from the state at the start of an orbit."""
+def orbit_history(period_map: PeriodMap, state: np.ndarray) -> OrbitHistory:
+    """Return the motion that a period map passes from a state (k,), that of an orbit at the start of its period."""
+    scene, periods = period_map.scene, period_map.periods
     whole = replace(scene, time=Time(periods=periods, transient=0), sweep={}, orbit=None)
-    response = simulate(whole, events=True, samples_per_period=SAMPLES, start=start)
+    response = simulate(whole, events=True, samples_per_period=SAMPLES, start=period_map.restart_of(state))
     impacts = [event for event in response.event_list if event.kind == "impact"]
     moments = np.array([event.time for event in impacts])
     # the orbit ends where it began

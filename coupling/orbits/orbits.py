@@ -287,3 +287,8 @@ class _Diagram:
 
 def _along_parameter(problem: Problem) -> np.ndarray:
     return np.append(np.zeros(problem.size), 1.0)
+
+
+def map_along(scene: Scene) -> PeriodMap:
+    """Return the period map at the `from` of a scene's [orbit] table: orbits of its branches are fixed points of it."""
+    return _Search(scene).map
