@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,21 +21,23 @@ class Checkpoint:
     returns all three as they are now.
     """
 
-    def __init__(self, path: str | Path | None, scene: Scene, provenance: Mapping[str, Any]) -> None:
+    def __init__(
+        self, path: str | Path | None, scene: Scene, provenance: Mapping[str, Any],
+        current: Callable[[], tuple[Branches, np.ndarray, float]],
+    ) -> None:  # fmt: skip
         """Take up what the file holds. Raises InputError for the file of other branches, or one that cannot be read."""
         belongs = {
             "scene": ("scene", scene.to_dict()),
             "model": ("reduced model", digests(scene.files)),
             "provenance": ("version of the software", provenance),
         }
+        self._current = current
         self._file = CheckpointFile(path, "orbits-checkpoint", belongs, self._content)
         self.found: Branches | None = None
         self.tangent, self.step = np.zeros(0), 0.0
-        self.current: Callable[[], tuple[Branches, np.ndarray, float]]
         if (read := self._file.read()) is not None:
             variables, attributes = read
-            found = Branches.of(variables, attributes, str(path))
-            self.found = replace(found, scene=scene, provenance=dict(provenance))
+            self.found = Branches.of(variables, attributes, str(path))
             self.tangent, self.step = variables["tangent"], float(attributes["step"])
 
     def __enter__(self) -> Checkpoint:
@@ -52,7 +53,7 @@ class Checkpoint:
         self._file.changed()
 
     def _content(self) -> tuple[Mapping[str, Variable], dict[str, Any], str]:
-        found, tangent, step = self.current()
+        found, tangent, step = self._current()
         points = sum(len(branch.parameter) for branch in found.branches)
         variables = found.variables() | {"tangent": Variable(tangent, ("tangent_entry",))}
         attributes = found.attributes() | {"step": step}

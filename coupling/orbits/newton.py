@@ -121,13 +121,14 @@ class Problem:
     """Orbits of a period map over a range of its parameter, scaled.
 
     origin: parameter at which the scaled one is 0, nan for a map without; span: range of the parameter; count: of
-    passages so far, the only part that changes.
+    passages so far.
     """
 
     map: PeriodMap
     origin: float = math.nan
     span: float = 1.0
     count: Counter[str] = field(default_factory=Counter)
+    _maps: dict[float, PeriodMap] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -141,7 +142,13 @@ class Problem:
 
     def at(self, parameter: float) -> PeriodMap:
         """Return the map at a value of the parameter. Raises InputError for one that is no scene."""
-        return self.map if math.isnan(parameter) else self.map.at(parameter)
+        if math.isnan(parameter):
+            return self.map
+        if parameter not in self._maps:
+            made = self.map.at(parameter)
+            self._maps.clear()  # the next passage is often one of the same scene; more would fill the memory
+            self._maps[parameter] = made
+        return self._maps[parameter]
 
     def parameter(self, y: np.ndarray) -> float:
         """Return the parameter, nan for a map without."""
