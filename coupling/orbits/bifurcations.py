@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -74,7 +75,10 @@ def _root(
     problem: Problem, before: Point, length: float, function: Callable[[Point], float],
     corrected: Callable[[Point, float], Orbit | None], size: float,
 ) -> tuple[float, Point] | None:  # fmt: skip
-    """Return arclength and point of a test function's zero; None if it jumps."""
+    """Return arclength and point of a test function's zero; None if it jumps.
+
+    Beside a pitchfork the orbit is determined too badly to be corrected: there the zero is that of the chord.
+    """
     points: dict[float, Point] = {0.0: before}
 
     def value(at: float) -> float:
@@ -89,9 +93,22 @@ def _root(
     try:
         root = brentq(value, 0.0, length, xtol=_CLOSE * min(1.0, share or 1.0), maxiter=100)
         value(root)
-    except (_Lost, ValueError, RuntimeError):
+    except _Lost:
+        root = _on_chord(problem, points, function)
+    except (ValueError, RuntimeError):
         return None
     return (root, points[root]) if abs(function(points[root])) <= _ZERO * size else None
+
+
+def _on_chord(problem: Problem, points: dict[float, Point], function: Callable[[Point], float]) -> float:
+    """Add the zero of a test function on the chord of the two points next to it. Returns its arclength."""
+    one, other = sorted(points, key=lambda at: abs(function(points[at])))[:2]
+    near, far = points[one], points[other]
+    share = function(near) / (function(near) - function(far))
+    root, y = one + share * (other - one), near.y + share * (far.y - near.y)
+    orbit = replace(near.orbit, state=y[:-1] * problem.weight, parameter=problem.parameter(y))
+    points[root] = near._replace(y=y, orbit=orbit)
+    return root
 
 
 def _fold(point: Point, neutral: int) -> float:

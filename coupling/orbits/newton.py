@@ -25,6 +25,8 @@ from vanedamp.files.toml_input import InputError
 _SMALL = 1e-8
 #: scaled residual of an orbit, over the size of its map's derivative, which is what round-off of the state grows by
 _RESIDUAL = 1e-13
+#: that of an orbit whose map's derivative is nearly singular, so that steps do not become small
+_ROUND_OFF = 1e-13
 #: relative step of differences in the parameter: a map known to some 1e-14, over which its third derivative is of
 #: order one, has the smallest error (some 1e-9) at the cube root
 _DIFFERENCE = 3e-5
@@ -239,20 +241,29 @@ def solve(
             problem, y, step, passage, math.inf if last else float(np.linalg.norm(residual)), halvings
         )
         if taken is None:
-            status = OrbitStatus.FORBIDDEN if changed else status
+            # beside a bifurcation a residual at round-off is an orbit, and the next step is noise
+            if float(np.abs(residual).max(initial=0.0)) <= _ROUND_OFF * _reach(passage, relative, size):
+                status = OrbitStatus.OK
+            else:
+                status = OrbitStatus.FORBIDDEN if changed else status
             break
         moved = taken[0] - y
         y, passage, residual = taken
         # what an exact slope would have left is of second order (Broyden's update, of this column only)
         slope = slope + residual * (moved[-1] / max(float(moved @ moved), np.finfo(float).tiny))
         missed = float(np.abs(residual).max(initial=0.0))
-        if last and missed <= _RESIDUAL * size * (1.0 + float(np.abs(passage.derivative * relative).max(initial=0.0))):
+        if last and missed <= _RESIDUAL * _reach(passage, relative, size):
             status = OrbitStatus.OK
             break
     missed, scale = float(np.abs(residual).max(initial=0.0)) * math.sqrt(problem.size), problem.map.scale
     return Orbit(
         status, problem.parameter(y), y[:-1] * problem.weight, problem.map.periods, scale, passage, missed, count
     )
+
+
+def _reach(passage: Passage, relative: np.ndarray, size: float) -> float:
+    """Return the size of what a passage adds up: scaled states times its derivative."""
+    return size * (1.0 + float(np.abs(passage.derivative * relative).max(initial=0.0)))
 
 
 def _taken(
