@@ -152,6 +152,11 @@ class SliderDynamics:
                 first[right] = first[left]
         return first
 
+    def owner(self, r: int) -> int:
+        """Return the cavity of a row, by the number of its first body; -1: none."""
+        bodies = np.flatnonzero(self.system.of_bodies.J[r])
+        return int(self.cavity[bodies[0]]) if len(bodies) else -1
+
     @cached_property
     def free_travel(self) -> np.ndarray:
         """(b,) free travel of each body's cavity, m."""

@@ -32,6 +32,8 @@ from vanedamp.coupling.numerics.codes import (
     PERIOD,
     POSITION,
     ROOT,
+    SLIP_LEFT,
+    SLIP_RIGHT,
     SPRUNG,
     STICK,
     TOUCHING,
@@ -72,8 +74,9 @@ _LEAST = 1e-6
 
 
 class _Guard(NamedTuple):
-    """An event function before its event: gradient (k,), rate and second derivative in time, scale."""
+    """An event function before its event: row, gradient (k,), rate and second derivative in time, scale."""
 
+    row: int
     gradient: np.ndarray
     speed: float
     bend: float
@@ -426,21 +429,46 @@ class _Walk:
         size = len(dynamics.root)
         if collides:
             kick[:size] = dynamics.rate * kicked[dynamics.rates]
-        guard = self._guard(row, order, old, flow, rate, time)
-        speed = met.get(row, guard.speed) if order == POSITION else guard.speed
-        arrivals = [int(r) for r in hit if old[r] == OPEN and met.get(int(r), 0.0) < 0.0]
-        S = jump
-        if len(arrivals) > 1:
-            S = self._at_once(jump, kick, arrivals, met)
+        guards = self._guards(row, order, old, hit, met, flow, rate, time)
+        moment = int(st.counters[PERIOD]) * dynamics.system.period + time
+        if order == VELOCITY and moment <= SIMULTANEOUS * dynamics.system.period:
+            S = dynamics.settled(st.state)  # a row at rest to round-off: the passage begins with it at rest
+        elif len(guards) > 1:
+            S = self._at_once(jump, kick, guards)
         elif np.any(kick):
-            turns_back = speed * guard.bend < 0.0
-            if turns_back and speed * speed <= 2.0 * TANGENTIAL * guard.scale * abs(guard.bend):
-                self.status = PassageStatus.GRAZING
-            if speed == 0.0:
-                raise Untrusted
-            S = jump + np.multiply.outer(kick / speed, guard.gradient)
-        self._check_order(S, int(st.counters[PERIOD]) * dynamics.system.period + time)
-        return after, S, self.names.event(old, st.state, hit), speed
+            S = self._at_one(jump, kick, guards[0])
+        else:
+            S = jump
+        self._check_order(S, moment)
+        return after, S, self.names.event(old, st.state, hit), guards[0].speed
+
+    def _guards(
+        self, row: int, order: int, old: np.ndarray, hit: np.ndarray, met: dict[int, float], flow: LinearFlow,
+        rate: np.ndarray, time: float,
+    ) -> list[_Guard]:  # fmt: skip
+        """Return the event functions that vanish in an event: of its row first, then of others at the same time."""
+        guards = [self._guard(row, order, old, flow, rate, time)]
+        if order == POSITION:
+            others = [int(r) for r in hit if r != row and old[r] == OPEN and met.get(int(r), 0.0) < 0.0]
+            guards += [self._guard(r, order, old, flow, rate, time) for r in others]
+            # speeds as the engine has them, not as small differences
+            rows = [row, *others]
+            return [guard._replace(speed=met.get(r, guard.speed)) for r, guard in zip(rows, guards, strict=True)]
+        if order == VELOCITY:
+            friction = np.arange(self.dynamics.system.friction_rows)
+            slid = (old[friction] == SLIP_LEFT) | (old[friction] == SLIP_RIGHT)
+            turned = friction[slid & (old[friction] != self.run.state.state[friction]) & (friction != row)]
+            guards += [self._guard(int(r), order, old, flow, rate, time) for r in turned]
+        return guards
+
+    def _at_one(self, jump: np.ndarray, kick: np.ndarray, guard: _Guard) -> np.ndarray:
+        """Return the saltation matrix of an event with one event function."""
+        turns_back = guard.speed * guard.bend < 0.0
+        if turns_back and guard.speed**2 <= 2.0 * TANGENTIAL * guard.scale * abs(guard.bend):
+            self.status = PassageStatus.GRAZING
+        if guard.speed == 0.0:
+            raise Untrusted
+        return jump + np.multiply.outer(kick / guard.speed, guard.gradient)
 
     def _met(self) -> dict[int, float]:
         """Return the relative speed of approach, below zero, of each contact that the last event's log has hit."""
@@ -448,24 +476,25 @@ class _Walk:
             int(entry[2]): float(entry[3]) for chunk in self.run.log.chunks for entry in chunk if entry[1] == IMPACT
         }
 
-    def _at_once(self, jump: np.ndarray, kick: np.ndarray, arrivals: list[int], met: dict[int, float]) -> np.ndarray:
-        """Return the saltation matrix of gaps that close together.
+    def _at_once(self, jump: np.ndarray, kick: np.ndarray, guards: list[_Guard]) -> np.ndarray:
+        """Return the saltation matrix of events that coincide: gaps that close, slips that end together.
 
-        On a prescribed motion cavities do not feel each other: each has its own time of impact. Where they do, the map
-        has another derivative for each order of the impacts: COINCIDENT, with that of the first. A chatter that ends
-        leaves nothing of gaps and speeds, in any order.
+        On a prescribed motion cavities do not feel each other: each has its own time. Where they do, the map has
+        another derivative for each order of the events: COINCIDENT, with that of the first. A chatter that ends leaves
+        nothing of gaps and speeds, in any order.
         """
-        dynamics, system, cavity = self.dynamics, self.dynamics.system, self.dynamics.cavity
-        if not self.run.state.velocity[arrivals].any():
+        dynamics, cavity = self.dynamics, self.dynamics.cavity
+        contacts = [guard.row for guard in guards if guard.row >= dynamics.system.friction_rows]
+        if len(contacts) == len(guards) and not self.run.state.velocity[contacts].any():
             return dynamics.closed(self.run.state.state) @ jump
-        owner = [int(cavity[max(system.left_body[r], system.right_body[r])]) for r in arrivals]
-        if system.modes or len(set(owner)) < len(owner):
+        owners = [dynamics.owner(guard.row) for guard in guards]
+        if dynamics.system.modes or len(set(owners)) < len(owners):
             self.status = PassageStatus.COINCIDENT
-            return jump + np.multiply.outer(kick / met[arrivals[0]], dynamics.place[arrivals[0]])
-        S = jump.copy()
-        for r, c in zip(arrivals, owner, strict=True):
-            own = np.r_[cavity == c, cavity == c]
-            S += np.multiply.outer(np.where(own, kick, 0.0) / met[r], dynamics.place[r])
+            return self._at_one(jump, kick, guards[0])
+        S = jump
+        for guard, owner in zip(guards, owners, strict=True):
+            own = np.r_[cavity == owner, cavity == owner]
+            S = S + self._at_one(np.zeros_like(jump), np.where(own, kick, 0.0), guard)
         return S
 
     def _check_order(self, S: np.ndarray, time: float) -> None:
@@ -518,9 +547,9 @@ class _Walk:
             share, free = dynamics.force(old, row), dynamics.free_flow(old, self.run.state.applied_force)
             on_rates = share @ free.A[dynamics.rates]
             speed = on_rates @ rate + share @ free.drift(time)[dynamics.rates]
-            return _Guard(on_rates, float(speed), 0.0, 1.0)
+            return _Guard(row, on_rates, float(speed), 0.0, 1.0)
         second = flow.A @ rate + flow.drift(time)
-        return _Guard(gradient, float(gradient @ rate), float(gradient @ second), scale)
+        return _Guard(row, gradient, float(gradient @ rate), float(gradient @ second), scale)
 
     def _check_rank(self, M: np.ndarray) -> None:
         """Raise Untrusted if the derivative moves rows that are at rest now."""
