@@ -40,7 +40,7 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.orbits.passage import Crossing, Passage, PassageStatus
-from vanedamp.coupling.orbits.saltation import LinearFlow
+from vanedamp.coupling.orbits.saltation import LinearFlow, kicked
 from vanedamp.coupling.orbits.slider_dynamics import SliderDynamics
 from vanedamp.coupling.orbits.slider_names import RowNames
 from vanedamp.coupling.orbits.slider_symmetry import mirror_of
@@ -49,7 +49,6 @@ from vanedamp.coupling.response.restart import restart_from
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble, physical_scale
-from vanedamp.coupling.system.linear_response import glued_mass
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.files.store import frozen
 
@@ -61,6 +60,8 @@ AGREEMENT = 1e-8
 TANGENTIAL = 1e-12
 
 
+#: points a period between which minima of event functions that do not vanish are sought
+LOOKS = 32
 #: step of the differences that find the slope of a restitution, as a share of the speed
 _STEP = 1e-2
 
@@ -116,7 +117,7 @@ class SliderMap:
     @cached_property
     def _dynamics(self) -> SliderDynamics:
         system = assemble(self.scene)
-        return SliderDynamics(system, physical_scale(self.scene, system))
+        return SliderDynamics(system, physical_scale(self.scene, system), self.scale)
 
     @cached_property
     def _names_of_rows(self) -> RowNames:
@@ -135,7 +136,7 @@ class SliderMap:
         return passage
 
     def _walk(self, state: np.ndarray) -> _Walk:
-        walk = _Walk(self._dynamics, self._names_of_rows, self.restart_of(state), self.periods, self.scale)
+        walk = _Walk(self._dynamics, self._names_of_rows, self.restart_of(state), self.periods)
         if self._flows:
             walk.run.flows = self._flows[0]
         return walk
@@ -166,7 +167,7 @@ class SliderMap:
         """Return the state (k,) of the motion without contact, where all bodies are at rest on their floors."""
         dynamics, system = self._dynamics, self._dynamics.system
         n, b = system.modes, system.bodies
-        amplitude = _glued_amplitude(dynamics)
+        amplitude = dynamics.glued_amplitude()
         weight = system.of_bodies.weight @ system.floor
         p = amplitude.sum(axis=0).real + weight / system.of_structure.stiffness
         rate = ((1j * system.frequency) @ amplitude).real
@@ -199,39 +200,13 @@ def slider_map(scene: Scene, parameter: str, periods: int) -> SliderMap:
     """Return the period map of a scene of sliders. Raises InputError for one that the exact engine cannot run."""
     check_waveform(scene, "exact")
     system = assemble(scene)
-    return SliderMap(scene, parameter, periods, _sizes(SliderDynamics(system, physical_scale(scene, system))))
-
-
-def _glued_amplitude(dynamics: SliderDynamics) -> np.ndarray:
-    """Return the complex amplitudes (e, n) of p with all bodies at rest on their floors."""
-    system = dynamics.system
-    modes, bodies = system.of_structure, system.of_bodies
-    load = modes.load + bodies.load @ system.floor
-    omega = system.frequency[:, None, None]
-    dynamic = np.diag(modes.stiffness) + 1j * omega * modes.damping - omega**2 * glued_mass(system)
-    amplitude: np.ndarray = np.linalg.solve(dynamic, load[:, :, None])[:, :, 0]
-    return amplitude
-
-
-def _sizes(dynamics: SliderDynamics) -> np.ndarray:
-    """Return sizes (k,) of the coordinates: linear response, free travel, and these times omega."""
-    system, omega = dynamics.system, dynamics.system.omega
-    reach = dynamics.scale * np.abs(_glued_amplitude(dynamics)).sum(axis=0)
-    travel = np.r_[dynamics.free_travel, system.free_travel[system.friction_rows :]]
-    travel = travel[np.isfinite(travel) & (travel > 0)]
-    # a structure that nothing excites moves by its start and the bodies
-    largest = reach.max(initial=0.0) or float(travel.max(initial=0.0)) or 1.0
-    reach = np.maximum(reach, 1e-6 * largest)
-    springs = system.limit[dynamics.springs] / system.spring[dynamics.springs]
-    return frozen(np.r_[reach, omega * reach, dynamics.free_travel, omega * dynamics.free_travel, springs])
+    return SliderMap(scene, parameter, periods, SliderDynamics(system, physical_scale(scene, system)).sizes)
 
 
 class _Walk:
     """One passage on its way: the engine's run, and the derivative of its state so far."""
 
-    def __init__(
-        self, dynamics: SliderDynamics, names: RowNames, start: RestartState, periods: int, scale: np.ndarray
-    ) -> None:
+    def __init__(self, dynamics: SliderDynamics, names: RowNames, start: RestartState, periods: int) -> None:
         self.dynamics, self.names, self.periods = dynamics, names, periods
         system = dynamics.system
         self.start = start
@@ -242,7 +217,7 @@ class _Walk:
         self.clearance = (np.inf, "")
         self.status = PassageStatus.OK
         #: size of each coordinate so far, and least one that it is compared by
-        self.size = _LEAST * np.abs(dynamics.from_state) @ scale
+        self.size = _LEAST * np.abs(dynamics.from_state) @ dynamics.sizes
         #: largest derivative so far of each coordinate
         self.reach = np.abs(dynamics.from_state).max(axis=1)
         #: flow, state and time at the start of the segment that holds the middle of the first period
@@ -271,8 +246,8 @@ class _Walk:
             raise Stopped
         u, M = self._begin()
         while st.counters[PERIOD] < self.periods:
-            state, time = st.state.copy(), float(st.time[0])
-            flow = dynamics.flow(state, st.applied_force)
+            state, applied, time = st.state.copy(), st.applied_force.copy(), float(st.time[0])
+            flow = dynamics.flow(state, applied)
             if st.counters[PERIOD] == 0 and time <= 0.5 * period:
                 self.middle = flow, u, time
             # what is left there of other segments is no root of this one
@@ -281,12 +256,14 @@ class _Walk:
             loss = float(st.ledger[IMPACT_LOSS])
             code = run.advance(int(st.counters[PERIOD]) + 1, int(st.counters[EVENTS]) + 1)
             if code == DONE:
+                self._look_around(flow, state, applied, u, time, period - time)
                 u, power = flow.propagate(u, time, period - time)
                 u, M = self._agreed(u), power @ M
                 continue
             if code != EVENT_BUDGET or st.counters[EVENTS] > self.budget:
                 raise Stopped
             event, tau = self._event(float(st.time[0]) - time)
+            self._look_around(flow, state, applied, u, time, tau)
             u, power = flow.propagate(u, time, tau)
             u, S, name, speed = self._across(event, flow, state, u)
             M = S @ power @ M
@@ -296,6 +273,15 @@ class _Walk:
                 self.crossings.append(Crossing(moment, name, speed, float(st.ledger[IMPACT_LOSS]) - loss))
         derivative: np.ndarray = dynamics.to_state @ M
         return derivative
+
+    def _look_around(
+        self, flow: LinearFlow, state: np.ndarray, applied: np.ndarray, u: np.ndarray, time: float, duration: float
+    ) -> None:
+        """Keep the smallest distance to an event that does not happen in a segment."""
+        functionals, rows, orders = self.dynamics.distances(state, applied)
+        share, which = flow.least(functionals, u, time, duration, self.dynamics.system.period / LOOKS)
+        if share < self.clearance[0]:
+            self.clearance = max(share, 0.0), self.names.missed(rows[which], orders[which])
 
     def _begin(self) -> tuple[np.ndarray, np.ndarray]:
         """Return state and derivative after the decision of the initial state."""
@@ -468,7 +454,7 @@ class _Walk:
             self.status = PassageStatus.GRAZING
         if guard.speed == 0.0:
             raise Untrusted
-        return jump + np.multiply.outer(kick / guard.speed, guard.gradient)
+        return kicked(jump, kick, guard.gradient, guard.speed)
 
     def _met(self) -> dict[int, float]:
         """Return the relative speed of approach, below zero, of each contact that the last event's log has hit."""
