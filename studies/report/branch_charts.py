@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -57,9 +58,21 @@ def branches_figure(branches: Branches, sweeps: Mapping[str, tuple[np.ndarray, n
     return dressed(figure, height=720)
 
 
+def joined(records: Sequence[Branches]) -> Branches:
+    """Return the branches of several files of one scene and parameter as one record, numbered through."""
+    branches: list[Branch] = []
+    for record in records:
+        first = len(branches)
+        for branch in record.branches:
+            source = None if branch.source is None else (branch.source[0] + first, branch.source[1])
+            branches.append(replace(branch, source=source))
+    warnings = dict.fromkeys(warning for record in records for warning in record.warnings)
+    return replace(records[0], branches=tuple(branches), warnings=tuple(warnings))
+
+
 def branch_name(number: int, branch: Branch) -> str:
-    """Return the name of a branch, counted from 1, with its period."""
-    return f"branch {number + 1}" if branch.periods == 1 else f"branch {number + 1}, period {branch.periods}"
+    """Return the name of a branch, counted from 0, with the periods that its orbits take."""
+    return f"branch {number}" if branch.periods == 1 else f"branch {number}, {branch.periods} periods"
 
 
 def _drawn(own: np.ndarray) -> np.ndarray:
@@ -86,7 +99,7 @@ def _add_special_points(figure: go.Figure, branches: Branches, wide: float) -> N
         if found:
             figure.add_scatter(
                 x=[wide * point.parameter for point, _, _ in found], y=[1e6 * amplitude for _, amplitude, _ in found],
-                name=kind, mode="markers", row=1, col=1, legendgroup="special points",
+                name=kind, mode="markers", row=1, col=1, visible=True if kind != "sequence" else "legendonly",
                 customdata=[f"{name}: {point.note}".removesuffix(": ") for point, _, name in found],
                 marker={"symbol": symbol, "size": 11, "color": "#ffffff", "line": {"color": "#000000", "width": 2}},
                 hovertemplate="%{customdata}<br>%{x:.12g}: %{y:.6g} µm<extra></extra>",
@@ -100,8 +113,8 @@ def branches_header(branches: Branches) -> list[str]:
 
 
 def branches_rows(branches: Branches) -> Iterator[list[object]]:
-    """Yield a line a point, branches counted from 1, in SI units."""
-    for number, branch in enumerate(branches.branches, start=1):
+    """Yield a line a point, branches counted from 0, in SI units."""
+    for number, branch in enumerate(branches.branches):
         columns = (branch.parameter, branch.amplitude_mean, branch.amplitude_max, branch.impacts_per_period)
         largest = np.abs(branch.multipliers).max(axis=1, initial=0.0)
         for index, values in enumerate(np.column_stack([*columns, largest]).tolist()):
@@ -151,6 +164,6 @@ def multipliers_header(branches: Branches) -> list[str]:
 
 def multipliers_rows(branches: Branches) -> Iterator[list[object]]:
     """Yield a line a multiplier."""
-    for number, branch in enumerate(branches.branches, start=1):
+    for number, branch in enumerate(branches.branches):
         for parameter, values in zip(branch.parameter.tolist(), branch.multipliers, strict=True):
             yield from ([number, parameter, value.real, value.imag] for value in values.tolist())

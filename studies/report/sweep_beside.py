@@ -27,20 +27,20 @@ def points_beside(scene: Scene, parameter: str, sweep: Sweep) -> tuple[np.ndarra
     paths = list(sweep.axes)
     if parameter not in paths:
         return np.zeros(0), np.zeros(0)
-    mine, shown = _system(scene, {}, parameter), np.zeros(sweep.shape, bool)
+    mine, shown = system_of(scene, {}, parameter), np.zeros(sweep.shape, bool)
     others = [index for index, path in enumerate(paths) if path != parameter and not is_start(path)]
     for combination in itertools.product(*(range(sweep.shape[index]) for index in others)):
         place: list[int | slice] = [slice(None)] * len(paths)
         for index, value in zip(others, combination, strict=True):
             place[index] = value
         values = {paths[i]: sweep.axes[paths[i]].tolist()[j] for i, j in zip(others, combination, strict=True)}
-        shown[tuple(place)] = _system(sweep.scene, values, parameter) == mine
+        shown[tuple(place)] = system_of(sweep.scene, values, parameter) == mine
     shown &= sweep.status == "ok"
     along = np.meshgrid(*sweep.axes.values(), indexing="ij")[paths.index(parameter)]
     return along[shown], sweep.amplitude_mean[shown]
 
 
-def _system(scene: Scene, values: Mapping[str, Any], parameter: str) -> dict[str, Any] | None:
+def system_of(scene: Scene, values: Mapping[str, Any], parameter: str) -> dict[str, Any] | None:
     """Return a scene at some values as data, without its parameter and how it is run; None if it has no such keys."""
     data = {name: table for name, table in scene.to_dict().items() if name not in _ABOUT_RUNS}
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from vanedamp.studies.report.branch_charts import (
     branches_figure,
     branches_header,
     branches_rows,
+    joined,
     multipliers_figure,
     multipliers_header,
     multipliers_rows,
@@ -28,13 +30,15 @@ from vanedamp.studies.report.forced_response import quantity
 from vanedamp.studies.report.orbit_charts import orbits_figure, orbits_header, orbits_rows
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.results import Result
-from vanedamp.studies.report.sweep_beside import points_beside
+from vanedamp.studies.report.sweep_beside import points_beside, system_of
 
 ORDER = 15
 KIND = "orbits"
 #: orbits of a file that are drawn
 _MOST_ORBITS = 6
 _BIFURCATIONS = ("fold", "pitchfork", "period doubling", "neimark-sacker")
+#: kinds of special points in the table; branches of bodies that stick have many changes of the sequence
+_LISTED = (*_BIFURCATIONS, "grazing")
 
 
 def load(path: Path) -> Result:
@@ -45,37 +49,45 @@ def load(path: Path) -> Result:
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return the charts of every file, its special points, and the ends of its branches."""
-    return [_branches(file, result.record, page) for file, result in results.items()]
+    """Return charts, branches and special points of every scene and parameter, which may have several files."""
+    groups: dict[str, dict[str, Branches]] = {}
+    for file, result in results.items():
+        record = result.record
+        system = system_of(record.scene, {}, record.parameter)
+        groups.setdefault(json.dumps([record.parameter, system]), {})[file] = record
+    return [_group(records, page) for records in groups.values()]
 
 
-def _branches(file: str, branches: Branches, page: Page) -> dict[str, Any]:
+def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
+    branches, files = joined(list(records.values())), list(records)
     beside = {
         other: points_beside(branches.scene, branches.parameter, result.record)
         for other, result in page.results.kinds["sweep"].items()
     }
     beside = {other: points for other, points in beside.items() if len(points[0])}
     figure = branches_figure(branches, {page.names[other]: points for other, points in beside.items()})
-    shown: dict[str, Any] = {"file": file, "record": branches, "units": unit_of(branches.parameter), "orbits": None}
+    shown: dict[str, Any] = {"record": branches, "units": unit_of(branches.parameter), "orbits": None}
     shown["rows"] = [_row(branches, number) for number in range(len(branches.branches))]
-    shown["chart"] = page.chart("branches", figure, branches_header(branches), branches_rows(branches), [file, *beside])
+    shown["chart"] = page.chart(
+        "branches", figure, branches_header(branches), branches_rows(branches), [*files, *beside]
+    )
     shown["multipliers"] = page.chart(
-        "multipliers", multipliers_figure(branches), multipliers_header(branches), multipliers_rows(branches), [file]
+        "multipliers", multipliers_figure(branches), multipliers_header(branches), multipliers_rows(branches), files
     )
     named, shown["missing"] = _histories(branches)
     if named:
-        shown["orbits"] = page.chart("orbits", orbits_figure(named), orbits_header(named), orbits_rows(named), [file])
+        shown["orbits"] = page.chart("orbits", orbits_figure(named), orbits_header(named), orbits_rows(named), files)
     return shown
 
 
 def _row(branches: Branches, number: int) -> dict[str, Any]:
     """Return a branch with its name, where it comes from, and its special points with their amplitudes."""
     branch = branches.branches[number]
-    special = [(point, amplitude_at(branches, branch, point)) for point in branch.special if point.kind != "end"]
+    special = [(point, amplitude_at(branches, branch, point)) for point in branch.special if point.kind in _LISTED]
     source = ""
     if branch.source is not None:
         parent, place = branch.source
-        source = f"{branches.branches[parent].special[place].kind} on branch {parent + 1}"
+        source = f"{branches.branches[parent].special[place].kind} on branch {parent}"
     return {"name": branch_name(number, branch), "branch": branch, "special": special, "source": source}
 
 
