@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 
 from tests.test_coupling_continuation import BISTABLE, HALF_GAP
+from tests.test_studies_report import charts
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.history import SAMPLES, orbit_history
+from vanedamp.coupling.orbits.orbits import find_orbit, orbits
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import validate
+from vanedamp.studies.report.branch_charts import joined
+from vanedamp.studies.report.page import write_report
+from vanedamp.studies.report.results import collect
 from vanedamp.studies.report.sweep_beside import points_beside
 
 #: beside the resonance, where the motion with two impacts a period is symmetric
@@ -75,3 +81,76 @@ def test_runs_beside_branches_are_those_of_the_same_scene(hitting):
     status[1, 0, 1] = "undecided_contact"
     x, _ = points_beside(scene, "excitation.frequency", replace(found, status=status))
     np.testing.assert_array_equal(x, np.repeat(frequencies, 2)[1:])
+
+
+@pytest.fixture(scope="module")
+def followed(hitting):
+    """The branch of two impacts a period from beside the resonance towards it, beyond its loss of symmetry."""
+    scene, _ = hitting
+    table = {"from": FREQUENCY, "to": 1.004 / (2 * np.pi), "step": 0.02, "max_step": 0.05}
+    return orbits(scene.replace({"orbit": table}))
+
+
+def test_branch_of_a_scene_loses_its_symmetry_in_a_pitchfork(hitting, followed):
+    """A multiplier passes 1 there, on an orbit that is its own mirror image; the orbits beyond are unstable."""
+    scene, _ = hitting
+    (branch,) = followed.branches
+    (pitchfork,) = (point for point in branch.special if point.kind == "pitchfork")
+    assert pitchfork.note == "symmetry breaks"
+    assert branch.symmetric.all()
+    np.testing.assert_array_equal(branch.stable, branch.parameter > pitchfork.parameter)
+    along = period_map(scene)
+    for side, inside in ((1, True), (-1, False)):
+        here = scene.replace({"excitation.frequency": pitchfork.parameter * (1 + side * 1e-6)})
+        orbit = find_orbit(here, along.restart_of(pitchfork.state))
+        distance = np.abs(orbit.multipliers - 1.0).min()
+        nearest = orbit.multipliers[np.abs(orbit.multipliers - 1.0).argmin()]
+        # 0.4 of the multiplier goes over a thousandth of the frequency
+        assert 1e-5 < distance < 1e-2
+        assert (nearest.real < 1.0) == inside
+
+
+def test_report_shows_branches_over_the_points_of_sweeps(hitting, followed, tmp_path):
+    scene, _ = hitting
+    frequencies = np.linspace(1.0065, 1.01, 4) / (2 * np.pi)
+    sweep(scene.replace({"sweep": {"excitation.frequency": frequencies.tolist()}})).save(tmp_path / "runs.h5")
+    followed.save(tmp_path / "branch.h5")
+    replace(followed, branches=followed.branches[:1]).save(tmp_path / "same.h5")
+    write_report(collect([tmp_path]), tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    found = charts(page)
+    assert {"branches-0", "multipliers-0", "orbits-0"} <= set(found)
+    assert "branches-1" not in found  # files of one scene share their charts
+    (branch,) = followed.branches
+    by_name = {trace["name"]: trace for trace in reversed(found["branches-0"])}  # the upper panel's come first
+    runs = by_name["runs of runs.h5"]
+    np.testing.assert_allclose(runs["x"], frequencies)
+    order = np.argsort(branch.parameter)
+    along = 1e6 * np.interp(runs["x"], branch.parameter[order], branch.amplitude_mean[order])
+    # stable orbits are where runs end; between its points the branch is drawn as straight lines
+    np.testing.assert_allclose(runs["y"], along, rtol=2e-2)
+    stable, unstable = (by_name[f"branch 1, {kind}"] for kind in ("stable", "unstable"))
+    assert (stable["line"]["dash"], unstable["line"]["dash"]) == ("solid", "dash")
+    last = np.flatnonzero(branch.stable)[-1]
+    np.testing.assert_allclose(np.asarray(stable["y"], float)[: last + 1], 1e6 * branch.amplitude_mean[: last + 1])
+    np.testing.assert_allclose(np.asarray(unstable["x"], float)[last + 1 :], branch.parameter[last + 1 :])
+    (special,) = (point for point in branch.special if point.kind == "pitchfork")
+    mark = by_name["pitchfork"]
+    assert mark["x"][0] == special.parameter
+    low, high = sorted(1e6 * branch.amplitude_mean[[special.index, special.index + 1]])
+    assert low < mark["y"][0] < high
+    plane = next(trace for trace in found["multipliers-0"] if trace.get("legendgroup") == "branch 0")
+    np.testing.assert_allclose(plane["x"] + 1j * np.asarray(plane["y"]), branch.multipliers.ravel())
+    orbit = found["orbits-0"][0]
+    assert max(orbit["y"]) == pytest.approx(1e6 * branch.amplitude_mean[branch.stable].max(), rel=1e-3)
+    assert "pitchfork" in page
+    assert "symmetry breaks" in page
+
+
+def test_branches_of_several_files_are_numbered_through(followed):
+    (branch,) = followed.branches
+    second = replace(followed, branches=(branch, replace(branch, source=(0, 0))), warnings=("w",))
+    whole = joined([second, second, followed])
+    assert isinstance(whole, Branches)
+    assert [each.source for each in whole.branches] == [None, (0, 0), None, (2, 0), None]
+    assert whole.warnings == ("w",)

@@ -94,20 +94,24 @@ def _root(
         root = brentq(value, 0.0, length, xtol=_CLOSE * min(1.0, share or 1.0), maxiter=100)
         value(root)
     except _Lost:
-        root = _on_chord(problem, points, function)
+        if (found := _on_chord(problem, points, function)) is None:
+            return None
+        root = found
     except (ValueError, RuntimeError):
         return None
     return (root, points[root]) if abs(function(points[root])) <= _ZERO * size else None
 
 
-def _on_chord(problem: Problem, points: dict[float, Point], function: Callable[[Point], float]) -> float:
-    """Add the zero of a test function on the chord of the two points next to it. Returns its arclength."""
+def _on_chord(problem: Problem, points: dict[float, Point], function: Callable[[Point], float]) -> float | None:
+    """Add a test function's zero on the chord of the two points next to it. Returns its arclength, None without one."""
     one, other = sorted(points, key=lambda at: abs(function(points[at])))[:2]
     near, far = points[one], points[other]
     share = function(near) / (function(near) - function(far))
     root, y = one + share * (other - one), near.y + share * (far.y - near.y)
-    orbit = replace(near.orbit, state=y[:-1] * problem.weight, parameter=problem.parameter(y))
-    points[root] = near._replace(y=y, orbit=orbit)
+    if (passage := problem.passage(y)) is None:
+        return None
+    state, parameter = y[:-1] * problem.weight, problem.parameter(y)
+    points[root] = near._replace(y=y, orbit=replace(near.orbit, state=state, parameter=parameter, passage=passage))
     return root
 
 
