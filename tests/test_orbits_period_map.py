@@ -98,11 +98,12 @@ def begun(mapped, state):
             speed = state[2 * n + b + i]
             states[str(i)] = "rest" if speed == 0.0 else "right" if speed > 0.0 else "left"
     for i, damper in enumerate(mapped.scene.friction_damper):
-        states[f"casing.{i}"] = "spring" if damper.stiffness else "right" if state[1] > 0.0 else "left"
-        if damper.stiffness and abs(state[-1]) * damper.stiffness >= damper.friction * damper.normal_force * (
-            1 - 1e-12
-        ):
-            states[f"casing.{i}"] = "right" if state[-1] > 0.0 else "left"
+        way, bound = "right" if state[1] > 0.0 else "left", (1 - 1e-12) * damper.friction * damper.normal_force
+        if damper.stiffness:
+            slides = abs(state[-1]) * damper.stiffness >= bound
+            states[f"casing.{i}"] = ("right" if state[-1] > 0.0 else "left") if slides else "spring"
+        else:
+            states[f"casing.{i}"] = "rest" if abs(state[1]) <= 1e-12 * mapped.scale[1] else way
     return states
 
 
