@@ -20,6 +20,11 @@ class PassageStatus(StrEnum):
     OK = "ok"
     #: an event is tangential within round-off: the map has a kink there, and the derivative is that of one side
     GRAZING = "grazing"
+    #: events that do not follow from each other meet at one instant, and their order matters: the derivative is that
+    #: of motions in which they still meet, and others part from it by a kink or a jump
+    COINCIDENT = "coincident"
+    #: no exact derivative, and the matrix is not to be used: contact forces that the laws leave open, a wedged block
+    UNDETERMINED = "undetermined"
     #: the engine did not reach the end: event budget, undecided, accuracy lost, diverged, ill-conditioned
     STOPPED = "stopped"
 
