@@ -67,15 +67,19 @@ class Passage(NamedTuple):
 
 
 class PeriodMap(Protocol):
-    """A period map of a scene.
+    """A period map of a scene."""
 
-    names: (k,) of the coordinates, such as "mode 0", "mode 0 rate", "body 0 slip"; scale: (k,) typical sizes, by which
-    coordinates are divided before they are compared; periods: of the excitation that it passes.
-    """
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names (k,) of the coordinates, such as "mode 0", "mode 0 rate", "body 0 slip"."""
 
-    names: tuple[str, ...]
-    scale: np.ndarray
-    periods: int
+    @property
+    def scale(self) -> np.ndarray:
+        """Typical sizes (k,), by which coordinates are divided before they are compared."""
+
+    @property
+    def periods(self) -> int:
+        """Excitation periods that the map passes."""
 
     def __call__(self, state: np.ndarray) -> Passage:
         """Return the passage that begins with a state (k,)."""
