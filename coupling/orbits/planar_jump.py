@@ -63,9 +63,7 @@ def impact(
     return _expand(system, pressed.jump, impulse - compression, given, steep)
 
 
-def _expand(
-    system: PlanarSystem, pressed: Jump, impulse: np.ndarray, given: np.ndarray, steep: np.ndarray
-) -> Jump:
+def _expand(system: PlanarSystem, pressed: Jump, impulse: np.ndarray, given: np.ndarray, steep: np.ndarray) -> Jump:
     """Return the jump of an expansion with given normal impulses (u,), their derivatives (u, N), and what is more."""
     u = len(system.rest)
     hit, sticks, drag = _taking_part(system, impulse)
@@ -118,8 +116,8 @@ def _restitution(system: PlanarSystem, approach: np.ndarray) -> tuple[np.ndarray
     return now, (ends[0] - ends[3] + 8.0 * (ends[2] - ends[1])) / (12.0 * step)
 
 
-def stopped(system: PlanarSystem, v: np.ndarray, after: np.ndarray, shut: np.ndarray, speed: float) -> np.ndarray:
-    """Return the projector (N, N) that has stopped speeds v (N,), where a chatter ended, to `after` in the mass metric.
+def stopped(system: PlanarSystem, after: np.ndarray, shut: np.ndarray, speed: float) -> np.ndarray:
+    """Return the projector (N, N), in the mass metric, of speeds onto those that a completed chatter has left (N,).
 
     shut: (u,) the closed contacts, whose rows at rest count; speed: the fastest, m/s.
     """
@@ -127,4 +125,4 @@ def stopped(system: PlanarSystem, v: np.ndarray, after: np.ndarray, shut: np.nda
     rests = np.abs(system.J @ after) <= _NOTHING * speed
     rows = system.J[np.r_[shut & rests[:u], shut & rests[u:] & (system.friction > 0.0)]] / root
     held = np.linalg.pinv(rows, rcond=_DEPENDENT) @ rows
-    return np.eye(len(v)) - held * root / root[:, None]
+    return np.eye(len(after)) - held * root / root[:, None]

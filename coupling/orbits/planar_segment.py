@@ -26,10 +26,13 @@ from vanedamp.coupling.numerics.codes import (
     STOPS,
     TOUCHING,
 )
+from vanedamp.coupling.planar.contact_flow import ContactFlows
 from vanedamp.coupling.planar.planar_run import PlanarRun
 
 #: points in which the fastest mode turns once, and the most that a segment has, where the least margins are sought
 _TURN, _POINTS = 12, 240
+#: singular values that count as none
+_DEPENDENT = 1e-9
 #: steps of Newton's method to a least margin
 _STEPS = 6
 
@@ -103,6 +106,13 @@ class Segment:
         still[n:, n:] = np.eye(n) - self._snap_rate @ system.J
         return still
 
+    def pressed(self) -> np.ndarray:
+        """Return the projector (2N, 2N) of states onto those that the contacts with a force hold."""
+        system, root, n = self.system, np.sqrt(self.system.mass), len(self.q)
+        rows = system.J[: len(self.state)][(self.state < OPEN) & np.isinf(system.spring)] / root
+        held = np.eye(n) - np.linalg.pinv(rows, rcond=_DEPENDENT) @ rows * root / root[:, None]
+        return np.kron(np.eye(2), held)
+
     def guard(self, r: int, what: int, t: float) -> Guard:
         """Return the event function `what` (numerics.codes) of unit r at a time t."""
         system, n, u = self.system, len(self.q), len(self.system.rest)
@@ -150,13 +160,14 @@ class Segment:
                 yield from self._least(self._gap(r), times, system.play[r], r, CLOSES)
             if r < system.contacts and state not in (OPEN, TOUCHING, LEAVING) and (r, PARTS) != event:
                 yield from self._least(self._room(r, PARTS), times, None, r, PARTS)
-            if state == STICK and (system.friction[r] > 0.0 or r >= system.contacts):
+            rubs = system.friction[r] > 0.0 or r >= system.contacts
+            if state == STICK and rubs:
                 for what in (AT_LOW, AT_HIGH):
                     if (r, what) != event:
                         yield from self._least(self._room(r, what), times, None, r, what)
-            elif state in (SLIP_LEFT, SLIP_RIGHT) and not self.held[r] and (r, STOPS) != event:
-                if system.friction[r] > 0.0 or r >= system.contacts:
-                    yield from self._least(self._slip(r), times, None, r, STOPS)
+            slides = state in (SLIP_LEFT, SLIP_RIGHT) and not self.held[r] and rubs
+            if slides and (r, STOPS) != event:
+                yield from self._least(self._slip(r), times, None, r, STOPS)
 
     def _gap(self, r: int) -> Margin:
         J = self.system.J[r]
@@ -189,7 +200,7 @@ class Segment:
     def _least(
         self, margin: Margin, times: np.ndarray, scale: float | None, r: int, what: int
     ) -> Iterator[tuple[float, int, int]]:
-        """Yield the lowest of the minima of a margin between some times; its scale is its largest value unless given."""
+        """Yield the lowest minimum of a margin between some times; its scale is its largest value unless given."""
         value, rate, _ = margin(times)
         low = np.flatnonzero((rate[:-1] < 0.0) & (rate[1:] > 0.0))
         if not len(low):
@@ -204,3 +215,14 @@ class Segment:
             t = step if start < step < end else 0.5 * (start + end)
         size = scale or float(np.abs(value).max())
         yield float(margin(np.array([t]))[0, 0]) / size, r, what
+
+
+def acceleration_of(flows: ContactFlows, s: int, z: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """Return the accelerations (N,) of flow s in a state (2N,) at phases (e,) of the harmonics."""
+    modes, n = flows.modes[s], len(z) // 2
+    turned = flows.in_phase[s, :modes] @ phase.real + flows.in_quadrature[s, :modes] @ phase.imag
+    amplitude = flows.project[s, :modes] @ z - flows.offset[s, :modes] - turned
+    amplitude[: len(phase)] = phase
+    shape = flows.motion[s, :, :modes] * flows.eigenvalue[s, :modes] ** 2
+    acceleration: np.ndarray = flows.bend[s] + flows.bend_held[s] @ z[:n] + (shape @ amplitude).real
+    return acceleration
