@@ -55,8 +55,8 @@ _EVENTS_A_PERIOD = 2000
 _AGREEMENT = 1e-8
 #: an event is tangential if its function would come back from beyond zero within this share of its scale
 _TANGENTIAL = 1e-12
-#: share of the terms of a sum that is round-off, and of a derivative that does not matter; by which the shifts of events
-#: may differ that are one
+#: share of the terms of a sum that is round-off, and of a derivative that does not matter; by which the shifts of
+#: events may differ that are one
 _ROUND_OFF, _NOTHING, _ONE_INSTANT = 1e-12, 1e-9, 1e-6
 
 
@@ -363,15 +363,17 @@ class _Walk:
     def _look_at_idle_contacts(self, segment: Segment, M: np.ndarray) -> None:
         """Note contacts that touch without force and that motions beside this one open or hit: they have a kink."""
         idle = self.system.J[: len(segment.state)][segment.state == TOUCHING]
+        if not len(idle):
+            return
         for part in np.split(segment.pressed() @ M, 2):
             if np.any(np.abs(idle @ part) > _ONE_INSTANT * (np.abs(idle) @ np.abs(part))):
                 self._worsen(PassageStatus.GRAZING)
 
     def _watch(self, segment: Segment, duration: float, event: tuple[int, int] | None) -> None:
         """Note the event of a segment that was nearest and did not happen."""
-        for share, r, what in segment.margins(duration, event):
-            if share < self.clearance[0]:
-                self.clearance = share, self.frame.names.possible(r, what)
+        nearest = segment.nearest(duration, event)
+        if nearest is not None and nearest[0] < self.clearance[0]:
+            self.clearance = nearest[0], self.frame.names.possible(*nearest[1:])
 
     def _across(
         self, segment: Segment, duration: float, z: np.ndarray, M: np.ndarray, before: _Before
@@ -435,7 +437,7 @@ class _Walk:
         impulse = np.zeros(2 * u)
         impulse[units], impulse[u + units] = struck[:, 5], struck[:, 6]
         if len(units):
-            jump = impact(system, v, impulse, run.scratch.compression, plastic)
+            jump = impact(system, v, impulse, run.scratch.compression, plastic, speed)
         left = v + system.J.T @ impulse / system.mass
         unique = len(np.unique(units)) == len(units)
         known = unique and self._agrees(np.r_[z[:n], jump.v], np.r_[z[:n], left], speed)

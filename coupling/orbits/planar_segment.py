@@ -5,7 +5,7 @@ States z = (q, q') (2N,): coordinates of planar.constraints and their rates.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -35,9 +35,6 @@ _TURN, _POINTS = 12, 240
 _DEPENDENT = 1e-9
 #: steps of Newton's method to a least margin
 _STEPS = 6
-
-#: value of a function of time, its rate and its curvature at times (n,): (3, n)
-Margin = Callable[[np.ndarray], np.ndarray]
 
 
 class Guard(NamedTuple):
@@ -145,76 +142,74 @@ class Segment:
             on[u + r] = -1.0 if what == AT_HIGH else 1.0
         return on
 
-    def margins(self, duration: float, event: tuple[int, int] | None) -> Iterator[tuple[float, int, int]]:
-        """Yield least margins of the events that are possible, as shares of their scales, each with its unit and code.
+    def nearest(self, duration: float, event: tuple[int, int] | None) -> tuple[float, int, int] | None:
+        """Return the least margin of the events that were possible but one, as a share of its scale, its unit and code.
 
-        Those inside the segment only. event: unit and code of the one that ends it.
+        The least inside the segment, where a margin turns; None if none does.
+        event: unit and code of the one that ends the segment.
         """
-        system, u = self.system, len(self.system.rest)
+        watched = [each for each in self._possible() if each != event]
+        if not watched:
+            return None
+        powers, waves = (np.array(part) for part in zip(*(self._signal(*each) for each in watched), strict=True))
         fastest = np.abs(self._rate).max(initial=0.0)
         count = int(min(max(8, fastest * duration * _TURN / (2 * np.pi)), _POINTS))
-        times = duration * np.arange(count + 1) / count
-        for r in range(u):
-            state = self.state[r]
-            if r < system.contacts and state == OPEN and (r, CLOSES) != event:
-                yield from self._least(self._gap(r), times, system.play[r], r, CLOSES)
-            if r < system.contacts and state not in (OPEN, TOUCHING, LEAVING) and (r, PARTS) != event:
-                yield from self._least(self._room(r, PARTS), times, None, r, PARTS)
-            rubs = system.friction[r] > 0.0 or r >= system.contacts
-            if state == STICK and rubs:
-                for what in (AT_LOW, AT_HIGH):
-                    if (r, what) != event:
-                        yield from self._least(self._room(r, what), times, None, r, what)
-            slides = state in (SLIP_LEFT, SLIP_RIGHT) and not self.held[r] and rubs
-            if slides and (r, STOPS) != event:
-                yield from self._least(self._slip(r), times, None, r, STOPS)
-
-    def _gap(self, r: int) -> Margin:
-        J = self.system.J[r]
-        constant = self.system.rest[r] + J @ self.q - (J @ self._shape @ self._amplitude).real
-        linear = J @ self.v - (J @ self._shape @ self._derivative(1, 0.0)).real
-        powers = np.array([constant, linear, J @ self._bend])
-        return self._signal(powers, J @ self._shape * self._amplitude)
-
-    def _slip(self, r: int) -> Margin:
-        J = self.system.J[len(self.system.rest) + r] * (1.0 if self.state[r] == SLIP_RIGHT else -1.0)
-        wave = J @ self._shape * self._derivative(1, 0.0)
-        return self._signal(np.array([J @ self.v - wave.sum().real, J @ self._bend, 0.0]), wave)
-
-    def _room(self, r: int, what: int) -> Margin:
-        on = self._on_forces(r, what)
-        constant = on @ self._force + (0.0 if what == PARTS else self.system.limit[r])
-        return self._signal(np.array([constant, 0.0, 0.0]), on @ self._forces * self._amplitude)
-
-    def _signal(self, powers: np.ndarray, wave: np.ndarray) -> Margin:
-        """Return  powers_0 + powers_1 t + powers_2 t^2/2 + Re sum_j wave_j exp(rate_j t)  as a function."""
-
-        def values(t: np.ndarray) -> np.ndarray:
-            turned = np.exp(np.multiply.outer(t, self._rate))
-            parts = [(turned @ (wave * self._rate**order)).real for order in range(3)]
-            polynomial = (powers[0] + t * (powers[1] + 0.5 * t * powers[2]), powers[1] + t * powers[2], powers[2])
-            return np.array([part + more for part, more in zip(parts, polynomial, strict=True)])
-
-        return values
-
-    def _least(
-        self, margin: Margin, times: np.ndarray, scale: float | None, r: int, what: int
-    ) -> Iterator[tuple[float, int, int]]:
-        """Yield the lowest minimum of a margin between some times; its scale is its largest value unless given."""
-        value, rate, _ = margin(times)
-        low = np.flatnonzero((rate[:-1] < 0.0) & (rate[1:] > 0.0))
-        if not len(low):
-            return
-        at = low[np.argmin(np.minimum(value[low], value[low + 1]))]
+        times = duration / count * np.arange(count + 1)
+        value, rate, _ = self._values(powers, waves, times)
+        turns = (rate[:, :-1] < 0.0) & (rate[:, 1:] > 0.0)
+        if not turns.any():
+            return None
+        gaps = np.array([self.system.play[r] if what == CLOSES else np.inf for r, what in watched])
+        scale = np.where(np.isfinite(gaps), gaps, np.abs(value).max(axis=1))
+        low = np.where(turns, np.minimum(value[:, :-1], value[:, 1:]) / scale[:, None], np.inf)
+        k, at = np.unravel_index(np.argmin(low), low.shape)
         start, end = times[at], times[at + 1]
         t = 0.5 * (start + end)
         for _ in range(_STEPS):  # Newton's method, held between the bounds
-            _, slope, curvature = margin(np.array([t]))[:, 0]
+            slope, curvature = self._values(powers[k : k + 1], waves[k : k + 1], np.array([t]))[1:, 0, 0]
             start, end = (t, end) if slope < 0.0 else (start, t)
             step = t - slope / curvature if curvature > 0.0 else start
             t = step if start < step < end else 0.5 * (start + end)
-        size = scale or float(np.abs(value).max())
-        yield float(margin(np.array([t]))[0, 0]) / size, r, what
+        least = self._values(powers[k : k + 1], waves[k : k + 1], np.array([t]))[0, 0, 0]
+        return float(least / scale[k]), *watched[k]
+
+    def _possible(self) -> Iterator[tuple[int, int]]:
+        """Yield the events that the engine watches, each by its unit and its code."""
+        system = self.system
+        for r, state in enumerate(self.state.tolist()):
+            contact, rubs = r < system.contacts, system.friction[r] > 0.0 or r >= system.contacts
+            if contact and state == OPEN:
+                yield r, int(CLOSES)
+            elif contact and state not in (TOUCHING, LEAVING):
+                yield r, int(PARTS)
+            if state == STICK and rubs:
+                yield r, int(AT_LOW)
+                yield r, int(AT_HIGH)
+            elif state in (SLIP_LEFT, SLIP_RIGHT) and rubs and not self.held[r]:
+                yield r, int(STOPS)
+
+    def _signal(self, r: int, what: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return an event function by its powers (3,) and waves (m,): those of 1, t, t^2/2 and exp(rate t)."""
+        system, u = self.system, len(self.system.rest)
+        if what == CLOSES:
+            wave = system.J[r] @ self._shape * self._amplitude
+            constant = system.rest[r] + system.J[r] @ self.q - wave.sum().real
+            linear = system.J[r] @ self.v - (wave @ self._rate).real
+            return np.array([constant, linear, system.J[r] @ self._bend]), wave
+        if what == STOPS:
+            row = system.J[u + r] * (1.0 if self.state[r] == SLIP_RIGHT else -1.0)
+            wave = row @ self._shape * self._derivative(1, 0.0)
+            return np.array([row @ self.v - wave.sum().real, row @ self._bend, 0.0]), wave
+        on = self._on_forces(r, what)
+        return np.array([on @ self._force + system.limit[r], 0.0, 0.0]), on @ self._forces * self._amplitude
+
+    def _values(self, powers: np.ndarray, waves: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Return such functions (f,), their rates and curvatures at times (n,): (3, f, n)."""
+        turned = np.exp(np.multiply.outer(self._rate, t))
+        constant, linear, bend = powers.T[:, :, None]
+        polynomial = constant + t * (linear + 0.5 * t * bend), linear + t * bend, bend
+        parts = [(waves * self._rate**order @ turned).real for order in range(3)]
+        return np.array([part + more for part, more in zip(parts, polynomial, strict=True)])
 
 
 def acceleration_of(flows: ContactFlows, s: int, z: np.ndarray, phase: np.ndarray) -> np.ndarray:
