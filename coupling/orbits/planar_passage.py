@@ -23,6 +23,7 @@ from vanedamp.coupling.numerics.codes import (
     BOUNDED,
     CLOSES,
     EVENTS,
+    LEAVING,
     OPEN,
     PARTS,
     PERIOD,
@@ -37,7 +38,7 @@ from vanedamp.coupling.orbits.planar_jump import Jump, impact, stopped
 from vanedamp.coupling.orbits.planar_names import UnitNames
 from vanedamp.coupling.orbits.planar_segment import Guard, Segment, acceleration_of
 from vanedamp.coupling.orbits.saltation import saltation
-from vanedamp.coupling.planar.constraints import PlanarSystem, planar_system
+from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem, planar_system
 from vanedamp.coupling.planar.contact_flow import ContactFlows, add_flow
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.planar.restart import planar_restart, planar_restart_state
@@ -141,6 +142,11 @@ class _Frame:
         units = np.eye(2 * size)
         self.to_state = np.column_stack([self.state_of(self.restart_at(z[:size], z[size:])) for z in units])
         self.from_state = np.linalg.inv(self.to_state)
+
+    def gaps(self, q: np.ndarray) -> np.ndarray:
+        """Return the gaps (u,) at coordinates (N,), m."""
+        gaps: np.ndarray = self.system.rest + self.system.J[: len(self.system.rest)] @ q
+        return gaps
 
     def restart_at(self, q: np.ndarray, v: np.ndarray) -> RestartState:
         """Return the restart state of coordinates (N,) and their rates."""
@@ -274,12 +280,18 @@ class _Walk:
         self.frame, self.system, self.scale, self.periods = frame, frame.system, scale, periods
         self.status, self.clearance = PassageStatus.OK, (np.inf, "")
         self.crossings: list[Crossing] = []
-        motion = planar_restart(frame.flat, frame.system, frame.scale, start)
-        given = (frame.from_state @ frame.state_of(start))[: len(motion.q)]
-        contacts = slice(0, self.system.contacts)
-        if np.any(np.abs(self.system.J[contacts] @ (motion.q - given)) > _NOTHING * self.system.play[contacts]):
+        motion = PlanarMotion(*np.split(frame.from_state @ frame.state_of(start), 2))
+        gap, speed = frame.gaps(motion.q), frame.system.J[: len(frame.system.rest)] @ motion.v
+        yields = np.isfinite(self.system.spring)
+        if np.any((gap < -_NOTHING * self.system.play)[~yields & (np.arange(len(gap)) < self.system.contacts)]):
             self._worsen(PassageStatus.GRAZING)  # a body that would begin in a wall is put beside it
+            motion = planar_restart(frame.flat, frame.system, frame.scale, start)
         self.run = PlanarRun(frame.flat, frame.system, motion, new_records(frame.flat, periods, 0), True, 0)
+        # a spring that is compressed pushes, or lags behind the body that leaves it
+        inside = yields & (gap < -SIMULTANEOUS * self.system.play)
+        stiffness = np.where(yields, self.system.spring, 0.0)
+        pushes = stiffness * gap + self.system.dashpot * speed < 0.0
+        self.run.state.state[inside] = np.where(pushes, SLIP_RIGHT, LEAVING)[inside]
         if frame.flows:
             self.run.flows = frame.flows[0]
         self.last: tuple[float, np.ndarray] | None = None  # time of the last event with a kick, and its shifts
@@ -362,11 +374,13 @@ class _Walk:
 
     def _look_at_idle_contacts(self, segment: Segment, M: np.ndarray) -> None:
         """Note contacts that touch without force and that motions beside this one open or hit: they have a kink."""
-        idle = self.system.J[: len(segment.state)][segment.state == TOUCHING]
+        idle = np.flatnonzero(segment.state == TOUCHING)
         if not len(idle):
             return
-        for part in np.split(segment.pressed() @ M, 2):
-            if np.any(np.abs(idle @ part) > _ONE_INSTANT * (np.abs(idle) @ np.abs(part))):
+        # gaps and their rates, of which a contact with a force holds some
+        for part, size in zip(np.split(segment.carried() @ M, 2), (1.0, self.system.frequency[0]), strict=True):
+            opened = np.abs(self.system.J[idle] @ part).max(axis=1)
+            if np.any(opened > _NOTHING * size * self.system.play[idle]):
                 self._worsen(PassageStatus.GRAZING)
 
     def _watch(self, segment: Segment, duration: float, event: tuple[int, int] | None) -> None:
@@ -444,8 +458,7 @@ class _Walk:
         derivative = jump.derivative
         if not self._agrees(np.r_[z[:n], left], np.r_[z[:n], new.v], speed):  # a chatter has been completed
             shut = np.zeros(u, bool)
-            gaps = system.rest + system.J[:u] @ new.q
-            shut[: system.contacts] = (gaps <= SIMULTANEOUS * system.play)[: system.contacts]
+            shut[: system.contacts] = (self.frame.gaps(new.q) <= SIMULTANEOUS * system.play)[: system.contacts]
             held = stopped(system, new.v, shut, speed)
             derivative = held @ derivative
             known = known and self._agrees(np.r_[z[:n], held @ left], np.r_[z[:n], new.v], speed)
@@ -464,22 +477,19 @@ class _Walk:
         shifts: (k,) of the time of the event.
         """
         system, n, u = self.system, len(z) // 2, len(self.system.rest)
-        rows = [
-            np.r_[system.J[c], np.zeros(n)]
-            for c in struck[:, 2].astype(int)
-            if segment.state[c] == OPEN and (c, CLOSES) != (r, what)
-        ]
+        struck = [c for c in struck[:, 2].astype(int) if segment.state[c] == OPEN and (c, CLOSES) != (r, what)]
+        apart = [(np.r_[system.J[c], np.zeros(n)], system.play[c]) for c in struck]
         slides = np.isin(segment.state, (SLIP_LEFT, SLIP_RIGHT)) & ~segment.held & (new.state != segment.state)
         slides &= (system.friction > 0.0) | (np.arange(u) >= system.contacts)
         stops = slides & (np.abs(system.J[u:] @ z[n:]) <= _ROUND_OFF * segment.speed)
         if what == STOPS:
-            rows += [np.r_[np.zeros(n), system.J[u + c]] for c in np.flatnonzero(stops) if c != r]
-        apart = [(row, row @ f, shifts) for row in rows]
+            apart += [(np.r_[np.zeros(n), system.J[u + c]], segment.speed) for c in np.flatnonzero(stops) if c != r]
+        events = [(gradient, gradient @ f, shifts, scale) for gradient, scale in apart]
         if self.last is not None and time - self.last[0] <= RESOLUTION * system.period:
-            apart.append((guard.gradient, guard.rate, self.last[1]))
-        for gradient, rate, shift in apart:
+            events.append((guard.gradient, guard.rate, self.last[1], guard.scale))
+        for gradient, rate, shift, scale in events:
             terms = np.abs(gradient @ M) + np.abs(rate * shift)
-            if np.any(np.abs(gradient @ M + rate * shift) > _ONE_INSTANT * terms.max(initial=0.0)):
+            if np.any(np.abs(gradient @ M + rate * shift) > np.maximum(_ONE_INSTANT * terms, _NOTHING * scale)):
                 return True
         return False
 

@@ -103,12 +103,15 @@ class Segment:
         still[n:, n:] = np.eye(n) - self._snap_rate @ system.J
         return still
 
-    def pressed(self) -> np.ndarray:
-        """Return the projector (2N, 2N) of states onto those that the contacts with a force hold."""
-        system, root, n = self.system, np.sqrt(self.system.mass), len(self.q)
-        rows = system.J[: len(self.state)][(self.state < OPEN) & np.isinf(system.spring)] / root
-        held = np.eye(n) - np.linalg.pinv(rows, rcond=_DEPENDENT) @ rows * root / root[:, None]
-        return np.kron(np.eye(2), held)
+    def carried(self) -> np.ndarray:
+        """Return the projector (2N, 2N), in the mass metric, of states onto those that contacts with a force hold."""
+        system, root, n, u = self.system, np.sqrt(self.system.mass), len(self.q), len(self.state)
+        closed = system.J[:u][(self.state < OPEN) & np.isinf(system.spring)] / root
+        held = np.eye(2 * n)
+        for part, rows in enumerate((closed, np.vstack([closed, system.J[u:][self.state == STICK] / root]))):
+            own = slice(part * n, (part + 1) * n)
+            held[own, own] -= np.linalg.pinv(rows, rcond=_DEPENDENT) @ rows * root / root[:, None]
+        return held
 
     def guard(self, r: int, what: int, t: float) -> Guard:
         """Return the event function `what` (numerics.codes) of unit r at a time t."""
