@@ -60,7 +60,7 @@ SCENES = {
     "jenkins": (
         BASE | {"friction_damper": [{"normal_force": 0.1, "friction": 0.5, "stiffness": 0.7}], "damper": RUBBING}, 8,
     ),
-    "friction damper": (BASE | {"friction_damper": [{"normal_force": 0.1, "friction": 0.5}]}, 8),
+    "friction damper": (BASE | {"friction_damper": [{"normal_force": 0.1, "friction": 0.4}]}, 8),
     "stops": (
         BASE | {"stop": [{"side": "right", "gap": 0.5, "restitution": 0.8}, {"side": "left", "gap": 0.6}],
                 "initial": {"displacement": 0.3}}, 8,
