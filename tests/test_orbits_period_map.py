@@ -243,7 +243,7 @@ def test_grazing_is_called_by_its_name(excess):
     if passage.status is PassageStatus.GRAZING:
         assert abs(excess) <= 1e-12
         return
-    assert passage.status is PassageStatus.OK and abs(excess) != 1e-14
+    assert passage.status is PassageStatus.OK
     if passage.crossings:
         assert excess > 0.0
         assert passage.crossings[0].speed == pytest.approx(-math.sqrt(2 * excess), rel=1e-2)
@@ -309,7 +309,7 @@ def test_impacts_at_once_on_a_structure_are_called_by_their_name():
     assert mapped(np.array([0.5, 0.1, 0.01, 0.01, 0.3, 0.3])).status is PassageStatus.COINCIDENT
 
 
-@pytest.mark.parametrize("name", ["newton, friction", "two bodies in a cavity", "jenkins", "two cavities"])
+@pytest.mark.parametrize("name", ["newton, friction", "two bodies in a cavity", "jenkins", "two cavities", "prescribed"])
 def test_the_mirror_image_of_the_mirror_image_is_a_period_later(name):
     tables, periods = SCENES[name]
     if name == "two bodies in a cavity":
