@@ -9,7 +9,7 @@ import numpy as np
 
 from vanedamp.coupling.exact.subsystem_assembly import Flows
 from vanedamp.coupling.methods.registry import check_waveform
-from vanedamp.coupling.orbits.passage import Passage
+from vanedamp.coupling.orbits.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.slider_dynamics import SliderDynamics
 from vanedamp.coupling.orbits.slider_names import RowNames
 from vanedamp.coupling.orbits.slider_symmetry import mirror_of
@@ -18,6 +18,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble, physical_scale
 from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,9 @@ class SliderMap:
 
     def __call__(self, state: np.ndarray) -> Passage:
         """Return the passage that begins with a state (k,)."""
+        if not np.all(np.isfinite(state)):
+            nothing = np.full((len(state), len(state)), np.nan)
+            return Passage(state, nothing, (), (np.inf, ""), PassageStatus.STOPPED, np.full(self.periods, np.nan))
         return self._walk(state).passage
 
     def _walk(self, state: np.ndarray) -> Walk:
@@ -88,17 +92,19 @@ class SliderMap:
         return RestartState(*map(frozen, (*parts[:4], elongation, system.free_travel[friction:])))
 
     def linear_orbit(self) -> np.ndarray:
-        """Return the state (k,) of the motion without contact, where all bodies are at rest on their floors."""
+        """Return the state (k,) of the motion without contact, where all bodies are at rest on their floors.
+
+        Raises InputError at a resonance without damping.
+        """
         dynamics, system = self._dynamics, self._dynamics.system
-        n, b = system.modes, system.bodies
-        amplitude = dynamics.glued_amplitude()
+        b, amplitude = system.bodies, dynamics.glued_amplitude()
+        if not np.all(np.isfinite(amplitude)):
+            raise InputError("excitation.frequency: at a resonance without damping no motion repeats; change it")
         weight = system.of_bodies.weight @ system.floor
         p = amplitude.sum(axis=0).real + weight / system.of_structure.stiffness
         rate = ((1j * system.frequency) @ amplitude).real
-        place = np.array([damper.position for damper in self.scene.damper])
-        return np.r_[dynamics.scale * p, dynamics.scale * rate, place, np.zeros(b + len(dynamics.springs))].reshape(
-            2 * n + 2 * b + len(dynamics.springs)
-        )
+        place = [damper.position for damper in self.scene.damper]
+        return np.concatenate([dynamics.scale * p, dynamics.scale * rate, place, np.zeros(b + len(dynamics.springs))])
 
     def mirrored(self, state: np.ndarray) -> np.ndarray | None:
         """Return the mirror image of a state half a period later, (k,); None for a scene without that symmetry.

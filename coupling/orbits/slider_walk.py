@@ -24,7 +24,6 @@ from vanedamp.coupling.numerics.codes import (
     PERIOD,
     POSITION,
     ROOT,
-    VELOCITY,
 )
 from vanedamp.coupling.orbits.passage import Crossing, Passage, PassageStatus
 from vanedamp.coupling.orbits.saltation import LinearFlow
@@ -107,8 +106,7 @@ class Walk:
     def _walk(self) -> np.ndarray:
         """Walk to the end of the periods. Return the derivative (k, k) of states."""
         dynamics, run, st, period = self._dynamics, self.run, self.run.state, self._dynamics.system.period
-        start = np.concatenate([self._initial.p, self._initial.p_rate, self._initial.displacement])
-        if not np.all(np.isfinite(start)) or run.begin(self._budget) != DONE:
+        if run.begin(self._budget) != DONE:
             raise Stopped
         u, M = self._begin()
         while st.counters[PERIOD] < self._periods:
@@ -170,8 +168,8 @@ class Walk:
         met = {int(e[2]): float(e[3]) for chunk in self.run.log.chunks for e in chunk if e[1] == IMPACT}
         S, speed, status = across(dynamics, before, st, after, impulse, met)
         moment = int(st.counters[PERIOD]) * period + before.time
-        if before.order == VELOCITY and moment <= SIMULTANEOUS * period:
-            S = dynamics.settled(st.state)  # a row at rest to round-off: the passage begins with it at rest
+        if not collides and moment <= SIMULTANEOUS * period:
+            S = dynamics.settled(st.state)  # rows at rest to round-off: the passage begins with them at rest
         elif status is not PassageStatus.OK:
             self._status = status
         self._check_order(S, moment)
