@@ -230,6 +230,16 @@ def test_sticking_leaves_a_multiplier_of_zero():
     assert multipliers[0] < 1e-13 < multipliers[1]
 
 
+@pytest.mark.parametrize("speed", [0.0, 1e-17, -1e-17])
+def test_what_rests_at_the_start_to_round_off_rests(speed):
+    mapped = period_map(rubbing(20.0, force=5.0, friction=1.0), FREQUENCY)
+    passage = mapped(np.array([1e-4, speed]))
+    assert passage.status is PassageStatus.OK and not passage.crossings
+    assert passage.derivative == pytest.approx(np.diag([1.0, 0.0]), abs=1e-14)
+    # the spring and the force leave friction 10 N - 1 N - 5 N
+    assert passage.clearance == (pytest.approx(0.4, rel=1e-9), "slips casing.0")
+
+
 @pytest.mark.parametrize("excess", [-1e-4, -1e-13, 0.0, 1e-14, 1e-13, 1e-12, 1e-4])
 def test_grazing_is_called_by_its_name(excess):
     # x'' + 0.1 x' + x = A sin t reaches the stop at 1 for A = 0.1
