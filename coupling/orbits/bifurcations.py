@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import svd
 from scipy.optimize import brentq
 
+from vanedamp.coupling.orbits.corrector import corrected
 from vanedamp.coupling.orbits.multipliers import decided, indicators
 from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, point_of, with_symmetry
 
@@ -38,13 +39,8 @@ class _Lost(Exception):
     """No orbit was found where one was looked for."""
 
 
-def bifurcations(
-    problem: Problem, before: Point, after: Point, corrected: Callable[[Point, float], Orbit | None]
-) -> Iterator[Located]:
-    """Yield the bifurcations between two points whose orbits have one sequence of events, in order of arclength.
-
-    corrected: returns the orbit at an arclength from a point, None if there is none.
-    """
+def bifurcations(problem: Problem, before: Point, after: Point) -> Iterator[Located]:
+    """Yield the bifurcations between two points whose orbits have one sequence of events, in order of arclength."""
     if before.orbit.neutral != after.orbit.neutral:
         return
     length = float((after.y - before.y) @ before.tangent)
@@ -54,7 +50,7 @@ def bifurcations(
         low, high = function(before), function(after)
         if low * high >= 0.0:
             continue
-        located = _root(problem, before, length, function, corrected, max(abs(low), abs(high)))
+        located = _root(problem, before, length, function, max(abs(low), abs(high)))
         if located is not None and (kind != "neimark-sacker" or _on_circle(located[1].orbit, neutral)):
             found.append((located[0], kind, located[1]))
     meeting = [at for at, kind, _ in found if kind == "pitchfork"]
@@ -71,15 +67,14 @@ def _note(problem: Problem, kind: str, point: Point) -> str:
 
 
 def _root(
-    problem: Problem, before: Point, length: float, function: Callable[[Point], float],
-    corrected: Callable[[Point, float], Orbit | None], size: float,
-) -> tuple[float, Point] | None:  # fmt: skip
+    problem: Problem, before: Point, length: float, function: Callable[[Point], float], size: float
+) -> tuple[float, Point] | None:
     """Return arclength and point of a test function's zero; None if it jumps."""
     points: dict[float, Point] = {0.0: before}
 
     def value(at: float) -> float:
         if at not in points:
-            orbit = corrected(before, at)
+            orbit = corrected(problem, before, at)
             if orbit is None or orbit.passage.sequence != before.orbit.passage.sequence:
                 raise _Lost
             points[at] = point_of(problem, orbit, before.tangent)
