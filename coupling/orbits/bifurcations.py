@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import svd
 from scipy.optimize import brentq
 
+from vanedamp.coupling.orbits.corrector import corrected
 from vanedamp.coupling.orbits.multipliers import decided, indicators
 from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, point_of, with_symmetry
 
@@ -39,13 +40,8 @@ class _Lost(Exception):
     """No orbit was found where one was looked for."""
 
 
-def bifurcations(
-    problem: Problem, before: Point, after: Point, corrected: Callable[[Point, float], Orbit | None]
-) -> Iterator[Located]:
-    """Yield the bifurcations between two points whose orbits have one sequence of events, in order of arclength.
-
-    corrected: returns the orbit at an arclength from a point, None if there is none.
-    """
+def bifurcations(problem: Problem, before: Point, after: Point) -> Iterator[Located]:
+    """Yield the bifurcations between two points whose orbits have one sequence of events, in order of arclength."""
     if before.orbit.neutral != after.orbit.neutral:
         return
     length = float((after.y - before.y) @ before.tangent)
@@ -55,7 +51,7 @@ def bifurcations(
         low, high = function(before), function(after)
         if low * high >= 0.0:
             continue
-        located = _root(problem, before, length, function, corrected, max(abs(low), abs(high)))
+        located = _root(problem, before, after, function, max(abs(low), abs(high)))
         if located is not None and (kind != "neimark-sacker" or _on_circle(located[1].orbit, neutral)):
             found.append((located[0], kind, located[1]))
     meeting = [at for at, kind, _ in found if kind == "pitchfork"]
@@ -72,18 +68,18 @@ def _note(problem: Problem, kind: str, point: Point) -> str:
 
 
 def _root(
-    problem: Problem, before: Point, length: float, function: Callable[[Point], float],
-    corrected: Callable[[Point, float], Orbit | None], size: float,
-) -> tuple[float, Point] | None:  # fmt: skip
-    """Return arclength and point of a test function's zero; None if it jumps.
+    problem: Problem, before: Point, after: Point, function: Callable[[Point], float], size: float
+) -> tuple[float, Point] | None:
+    """Return arclength and point of a test function's zero between two points; None if it jumps.
 
     Beside a pitchfork the orbit is determined too badly to be corrected: there the zero is that of the chord.
     """
-    points: dict[float, Point] = {0.0: before}
+    length = float((after.y - before.y) @ before.tangent)
+    points: dict[float, Point] = {0.0: before, length: after}
 
     def value(at: float) -> float:
         if at not in points:
-            orbit = corrected(before, at)
+            orbit = corrected(problem, before, at)
             if orbit is None or orbit.passage.sequence != before.orbit.passage.sequence:
                 raise _Lost
             points[at] = point_of(problem, orbit, before.tangent)

@@ -2,52 +2,30 @@
 
 Between events the period map is smooth, and so is a branch as long as the sequence of events along the orbit stays.
 Where the sequence changes a branch may have a kink, turn back or end. That point is located from the side where the
-branch comes from; then an orbit of the other sequence is looked for: along the branch, in the direction in which the
-event grows, and in the image of both (an event that passes the start of the period).
+branch comes from; then an orbit of the other sequence is looked for (orbits.other_side).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
 from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
-from vanedamp.coupling.orbits.multipliers import null_space
-from vanedamp.coupling.orbits.newton import (
-    Orbit,
-    OrbitStatus,
-    Point,
-    Problem,
-    bordered,
-    least_squares,
-    point_of,
-    solve,
-    tangent_of,
-    with_symmetry,
-)
-from vanedamp.coupling.orbits.passage import Passage
+from vanedamp.coupling.orbits.corrector import HALVINGS, ITERATIONS, corrected
+from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Point, Problem, point_of, solve, with_symmetry
+from vanedamp.coupling.orbits.other_side import CENTRED, OtherSide
 from vanedamp.coupling.orbits.sequence_changes import change, forecast
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
-#: corrections of a point before its step is shortened
-_ITERATIONS, _HALVINGS = 8, 3
 #: iterations up to which, and cosines of the angle between tangents from which, steps grow; and are good enough
 _QUICK, _STRAIGHT, _BENT = 3, 0.985, 0.9
 #: scaled distance of an orbit from itself half of its periods later, where it is known by its root
 _SAME = 1e-4
 #: relative error of the parameter where the sequence changes
 _CLOSE = 1e-10
-#: what happens to a body that comes to a wall and has room on the other side
-_CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"
-#: scaled distance within which a neutral coordinate is looked for an end
-_FARTHEST = 10.0
-#: how often the search for the place of a new event is widened
-_WIDENINGS = 6
 #: attempts at the place of a change of sequence, at least every third one a bisection
 _ATTEMPTS = 120
 
@@ -73,6 +51,7 @@ class Follower:
 
     def __init__(self, problem: Problem, table: Table) -> None:
         self.problem, self.table = problem, table
+        self.other_side = OtherSide(problem, table.step, table.min_step)
 
     def begin(self, orbit: Orbit, row: np.ndarray, source: tuple[int, int] | None = None) -> Trace:
         """Return a branch of one orbit that goes on in the direction of `row` (k + 1,)."""
@@ -124,7 +103,7 @@ class Follower:
 
     def _reach(self, head: Point, step: float) -> Point | None:
         """Return the point at an arclength from another, at most the end of the range; None if there is none."""
-        orbit = self._corrected(head, step)
+        orbit = corrected(self.problem, head, step)
         if orbit is None:
             return None
         y = self.problem.pack(orbit.state, orbit.parameter)
@@ -134,28 +113,10 @@ class Follower:
             start = head.y + share * (y - head.y)
             start[-1] = edge
             row = np.append(np.zeros(self.problem.size), 1.0)
-            at_edge = solve(self.problem, start, row, head.slope, _ITERATIONS, _HALVINGS)
+            at_edge = solve(self.problem, start, row, head.slope, ITERATIONS, HALVINGS)
             if at_edge.status is OrbitStatus.OK:
                 orbit = at_edge
         return point_of(self.problem, orbit, head.tangent)
-
-    def _corrected(self, head: Point, step: float) -> Orbit | None:
-        """Return the orbit in the plane normal to the tangent, at a distance along it; None if there is none near."""
-        return self._near(head.y + step * head.tangent, head.tangent, head.slope, abs(step))
-
-    def _near(self, predicted: np.ndarray, row: np.ndarray, slope: np.ndarray, distance: float) -> Orbit | None:
-        """Return the orbit in the plane through a point; with the slope there, if the one given does not serve."""
-        for renewed in (False, True):
-            if renewed:
-                if (passage := self.problem.passage(predicted)) is None:
-                    return None
-                slope = self.problem.slope(predicted, passage)
-            orbit = solve(self.problem, predicted, row, slope, _ITERATIONS, _HALVINGS)
-            self.problem.count["iterations"] += orbit.iterations
-            if orbit.status is OrbitStatus.OK:
-                off = np.linalg.norm(self.problem.pack(orbit.state, orbit.parameter) - predicted)
-                return orbit if off <= distance else None
-        return None
 
     def _accept(self, trace: Trace, before: Point, point: Point) -> None:
         """Add a point, and the end if it is one."""
@@ -169,7 +130,7 @@ class Follower:
 
     def _search(self, trace: Trace, before: Point, point: Point) -> bool:
         """Note the bifurcations between two points. Returns whether the branch has ended on one: joined another."""
-        for found in bifurcations(self.problem, before, point, self._corrected):
+        for found in bifurcations(self.problem, before, point):
             # where a branch meets its own mirror image it turns, so that it looks like a fold, too
             turns = found.kind in ("fold", "pitchfork")
             if turns and (why := self._joined(trace, found.orbit)):
@@ -221,10 +182,10 @@ class Follower:
             return
         how = ""
         if point is None:
-            point, how = self._other_side(last, step)
+            point, how = self.other_side.find(last, step)
         if point is not None and point.tangent[-1] * last.tangent[-1] < 0:
             how += ": the branch turns"
-        after = self._passage_beyond(last) if point is None or how == _CENTRED else point.orbit.passage
+        after = self.other_side.passage(last) if point is None or how == CENTRED else point.orbit.passage
         kind, what = change(last.orbit.passage, after)
         self._note(trace, Located(last.orbit, kind, f"{what}{how}"))
         if point is None:
@@ -262,7 +223,7 @@ class Follower:
                 at = middle
             else:
                 at = float(np.clip(at + (margin if attempt % 3 else -margin), low + margin / 2, high - margin / 2))
-            orbit = self._corrected(head, at)
+            orbit = corrected(self.problem, head, at)
             if orbit is not None and orbit.passage.sequence == head.orbit.passage.sequence:
                 low = at
                 seen.append((at, orbit))
@@ -270,145 +231,3 @@ class Follower:
                 high, beyond = at, orbit
         last = head if len(seen) == 1 else point_of(self.problem, seen[-1][1], head.tangent)
         return last, None if beyond is None else point_of(self.problem, beyond, head.tangent)
-
-    def _other_side(self, last: Point, step: float) -> tuple[Point | None, str]:
-        """Return an orbit beyond a change of sequence and how it was found."""
-        sequence = last.orbit.passage.sequence
-        if (centred := self._centred(last)) is not None:
-            return centred, _CENTRED
-        for size in self.table.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
-            y = last.y + size * last.tangent
-            passage = self.problem.passage(y)
-            if passage is None:
-                continue
-            if passage.sequence != sequence:
-                orbit = self._beside(last, y, passage)
-                if orbit is not None:
-                    away = self.problem.pack(orbit.state, orbit.parameter) - last.y
-                    return point_of(self.problem, orbit, away / np.linalg.norm(away)), ""
-            # an event that passes the start of the period changes the state there, as the passage's end shows
-            image = self.problem.pack(passage.state, self.problem.parameter(y))
-            if np.linalg.norm(image - y) > 100 * size and (found := self.problem.passage(image)) is not None:
-                row = tangent_of(self.problem, found, self.problem.slope(image, found), last.tangent)
-                orbit = self._near(image, last.tangent, last.slope, size)
-                if orbit is not None:
-                    return point_of(self.problem, orbit, row), " at the start of the period"
-        for factor in (1.0, 2.0, 4.0):
-            orbit = self._corrected(last, factor * step)
-            if orbit is not None:
-                return point_of(self.problem, orbit, last.tangent), f", stepped over by {factor * step:.2g}"
-        return None, ""
-
-    def _passage_beyond(self, last: Point) -> Passage | None:
-        """Return a passage of the next sequence of events, of a state close to the last orbit; None if none is near."""
-        for size in self.table.step * 10.0 ** np.arange(-6.0, 0.0):
-            passage = self.problem.passage(last.y + size * last.tangent)
-            if passage is not None and passage.sequence != last.orbit.passage.sequence:
-                return passage
-        return None
-
-    def _centred(self, last: Point) -> Point | None:
-        """Return the orbit with its neutral coordinates amid those of its sequence; None if they are there already.
-
-        A body that may rest anywhere has come to a wall, though its motion has room on the other side. The tangent
-        takes it on along the middle.
-        """
-        y = self._amid(last.y, last)
-        if y is None or np.linalg.norm(y - last.y) < self.table.min_step:
-            return None
-        orbit = self._at_parameter(y, last)
-        if orbit is None:
-            return None
-        tangent = last.tangent
-        for ahead in (0.1 * self.table.step, 1e-3 * self.table.step):
-            other = self._at_parameter(y + ahead * last.tangent, last)
-            moved = None if other is None else self._amid(self.problem.pack(other.state, other.parameter), last)
-            if moved is not None:
-                tangent = (moved - y) / np.linalg.norm(moved - y)
-                break
-        return point_of(self.problem, orbit, tangent)
-
-    def _at_parameter(self, y: np.ndarray, last: Point) -> Orbit | None:
-        """Return the orbit of the same sequence at the parameter of y; None if there is none."""
-        row = np.append(np.zeros(self.problem.size), 1.0)
-        orbit = solve(self.problem, y, row, last.slope, _ITERATIONS, _HALVINGS)
-        same = orbit.passage.sequence == last.orbit.passage.sequence
-        return orbit if orbit.status is OrbitStatus.OK and same else None
-
-    def _amid(self, y: np.ndarray, last: Point) -> np.ndarray | None:
-        """Return y with its neutral coordinates amid those of its sequence; None for an orbit without any."""
-        neutral = null_space(last.orbit.derivative)
-        for free in neutral:
-            direction, base = np.append(free, 0.0), y
-
-            def stays(at: float, base: np.ndarray = base, direction: np.ndarray = direction) -> bool:
-                passage = self.problem.passage(base + at * direction)
-                return passage is not None and passage.sequence == last.orbit.passage.sequence
-
-            reaches = [_reach(stays, sign) for sign in (-1.0, 1.0)]
-            if max(map(abs, reaches)) < _FARTHEST:
-                y = y + sum(reaches) / 2 * direction
-        return y if len(neutral) else None
-
-    def _beside(self, last: Point, y: np.ndarray, passage: Passage) -> Orbit | None:
-        """Return an orbit of another sequence that begins where the present one ends; None if none is found.
-
-        y, passage: beyond the end, along the tangent. The new event adds v k to the residual, k a direction and v a
-        measure of the event, such as the speed of a grazing impact: a root of the distance along the tangent, so that
-        orbits lie at last.y + v alpha to first order, (D - 1) alpha = -k (Nordmark 1991). What is of second order, as
-        that distance is, is a root along the tangent.
-        """
-        problem, sequence = self.problem, last.orbit.passage.sequence
-        residual = problem.residual(y, passage)
-        kick = float(np.linalg.norm(residual))
-        if kick == 0.0:
-            return None
-        here = bordered(problem, last.orbit.passage, last.slope, last.tangent)
-        alpha = least_squares(here, np.append(-residual / kick, 0.0))
-        length, away = float(np.linalg.norm(alpha)), float(np.linalg.norm(y - last.y))
-        for share in (1e-3, 1e-2, 1e-1, 1.0):
-            measure = share * self.table.step / length
-            distance = self._root(
-                last, last.y + measure * alpha, away * min(measure / kick, (measure / kick) ** 2), residual
-            )
-            if distance is None:
-                continue
-            start = last.y + measure * alpha + distance * last.tangent
-            found = problem.passage(start)
-            if found is None:
-                continue
-            orbit = self._near(start, alpha / length, problem.slope(start, found), 2 * length * measure)
-            if orbit is not None and orbit.passage.sequence != sequence:
-                return orbit
-        return None
-
-    def _root(self, last: Point, base: np.ndarray, distance: float, residual: np.ndarray) -> float | None:
-        """Return how far along the tangent from `base` the residual has no part in another; None if nowhere near."""
-
-        def part(at: float) -> float:
-            passage = self.problem.passage(base + at * last.tangent)
-            return (
-                np.nan
-                if passage is None
-                else float(residual @ self.problem.residual(base + at * last.tangent, passage))
-            )
-
-        for _ in range(_WIDENINGS):
-            if part(-distance) * part(distance) < 0.0:
-                try:
-                    return float(brentq(part, -distance, distance, xtol=1e-3 * distance, maxiter=60))
-                except ValueError:
-                    return None
-            distance *= 10
-        return None
-
-
-def _reach(stays: Callable[[float], bool], sign: float) -> float:
-    """Return how far a condition holds from 0 in a direction, at most some _FARTHEST."""
-    low, high = 0.0, 1e-9
-    while stays(sign * high) and high < _FARTHEST:
-        low, high = high, 2 * high
-    for _ in range(20):
-        middle = (low + high) / 2
-        low, high = (middle, high) if stays(sign * middle) else (low, middle)
-    return sign * low
