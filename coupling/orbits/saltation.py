@@ -52,18 +52,6 @@ class LinearFlow:
         return power[:k] @ np.r_[state, size, size * turn.real, size * turn.imag], power[:k, :k]
 
 
-def saltation(
-    jump: np.ndarray, before: np.ndarray, after: np.ndarray, gradient: np.ndarray, speed: float
-) -> np.ndarray:
-    """Return the derivative (k, k) across an event: jump + (after - jump before) gradient^T / speed.
-
-    jump: (k, k), derivative of the state after the event with respect to that before, at a fixed time; before, after:
-    (k,) rates of the state on both sides; gradient: (k,) of the event function; speed: its whole rate before the event.
-    """
-    kick = after - jump @ before
-    return jump + np.multiply.outer(kick, gradient / speed) if np.any(kick) else jump
-
-
 def held(rows: np.ndarray) -> np.ndarray:
     """Return the orthogonal projector (k, k) onto the states (k,) where functionals (m, k) vanish, dependent or not."""
     if not len(rows):

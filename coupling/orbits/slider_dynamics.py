@@ -110,7 +110,7 @@ class SliderDynamics:
         return share
 
     def impulse(self, rows: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Return the derivative (k, k) of an impact at rows (m,), whose speeds after it are -slope (m,) times before."""
+        """Return the derivative (k, k) of an impact at rows (m,), which change their speeds by -slope (m,) times."""
         on_rates, jump = self._on_rates[rows], np.eye(self.k)
         inverse = np.linalg.pinv(on_rates @ on_rates.T, rcond=1e-12, hermitian=True)
         jump[self.rates, self.rates] -= on_rates.T @ inverse @ ((1.0 + slope)[:, None] * on_rates)
@@ -128,13 +128,25 @@ class SliderDynamics:
         Slips that stick and gaps that are closed come to rest by forces between the two sides only, which keep their
         momentum and, of closed gaps, their centre of mass: a projection in the metric of mass.
         """
-        rows, jump = self.constraints(state), np.eye(self.k)
+        rows = self.constraints(state)
+        jump = self.closed(rows[rows >= self.system.friction_rows])
         jump[self.rates, self.rates] = held(self._on_rates[rows])
-        closed = rows[rows >= self.system.friction_rows]
-        size = len(self.root)
-        project = held(self._on_rates[closed])
-        jump[:size, :size] = self.rate[:, None] * project / self.rate
         return jump
+
+    def closed(self, rows: np.ndarray) -> np.ndarray:
+        """Return the derivative (k, k) of gaps (m,) that close without time: they keep their centre of mass."""
+        size, jump = len(self.root), np.eye(self.k)
+        jump[:size, :size] = self.rate[:, None] * held(self._on_rates[rows]) / self.rate
+        return jump
+
+    @cached_property
+    def cavity(self) -> np.ndarray:
+        """(b,) number of the first body in each body's cavity."""
+        system, first = self.system, np.arange(self.system.bodies)
+        for left, right in zip(system.left_body, system.right_body, strict=True):
+            if left >= 0 and right >= 0:
+                first[right] = first[left]
+        return first
 
     @cached_property
     def free_travel(self) -> np.ndarray:

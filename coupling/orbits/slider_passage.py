@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.exact.event_driven import EngineRun
 from vanedamp.coupling.exact.event_functions import RESOLUTION
+from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
+from vanedamp.coupling.exact.subsystem_assembly import Flows
 from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.numerics.codes import (
     BOUNDED,
@@ -23,6 +26,7 @@ from vanedamp.coupling.numerics.codes import (
     EVENT_BUDGET,
     EVENTS,
     FLOW,
+    OPEN,
     PERIOD,
     POSITION,
     ROOT,
@@ -33,7 +37,8 @@ from vanedamp.coupling.orbits.passage import Crossing, Passage, PassageStatus
 from vanedamp.coupling.orbits.saltation import LinearFlow
 from vanedamp.coupling.orbits.slider_dynamics import SliderDynamics
 from vanedamp.coupling.orbits.slider_names import RowNames
-from vanedamp.coupling.response.records import IMPACT_LOSS, new_records
+from vanedamp.coupling.orbits.slider_symmetry import mirror_of
+from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, new_records
 from vanedamp.coupling.response.restart import restart_from
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
@@ -48,6 +53,23 @@ EVENTS_A_PERIOD = 2000
 AGREEMENT = 1e-8
 #: an event is tangential if its function would come back from beyond zero within this share of its scale
 TANGENTIAL = 1e-12
+
+
+#: step of the differences that find the slope of a restitution, as a share of the speed
+_STEP = 1e-2
+
+
+class _Guard(NamedTuple):
+    """An event function before its event: gradient (k,), rate and second derivative in time, scale."""
+
+    gradient: np.ndarray
+    speed: float
+    bend: float
+    scale: float
+
+
+class Stopped(ArithmeticError):
+    """The engine has not come to the end."""
 
 
 class Untrusted(ArithmeticError):
@@ -86,18 +108,22 @@ class SliderMap:
         return RowNames(self.scene, self._dynamics.system)
 
     @cached_property
-    def _flows(self) -> list[object]:
+    def _flows(self) -> list[Flows]:
         """The engine's subsystems, which all passages of a map share."""
         return []
 
     def __call__(self, state: np.ndarray) -> Passage:
         """Return the passage that begins with a state (k,)."""
-        walk = _Walk(self._dynamics, self._names_of_rows, self.restart_of(state), self.periods)
-        if self._flows:
-            walk.run.flows = self._flows[0]  # type: ignore[assignment]
+        walk = self._walk(state)
         passage = walk.passage()
         self._flows[:] = [walk.run.flows]
         return passage
+
+    def _walk(self, state: np.ndarray) -> _Walk:
+        walk = _Walk(self._dynamics, self._names_of_rows, self.restart_of(state), self.periods)
+        if self._flows:
+            walk.run.flows = self._flows[0]
+        return walk
 
     def at(self, value: float) -> SliderMap:
         """Return the map with the parameter at a value. Raises InputError for a value that makes it no scene."""
@@ -135,8 +161,23 @@ class SliderMap:
         )
 
     def mirrored(self, state: np.ndarray) -> np.ndarray | None:
-        """Return the mirror image of a state half a period later, (k,); None for a scene without that symmetry."""
-        raise NotImplementedError
+        """Return the mirror image of a state half a period later, (k,); None for a scene without that symmetry.
+
+        None, too, where the engine does not come so far.
+        """
+        mirror = self._mirror
+        if mirror is None:
+            return None
+        walk = self._walk(state)
+        if walk.passage().status is PassageStatus.STOPPED or walk.middle is None:
+            return None
+        flow, u, time = walk.middle
+        half, _ = flow.propagate(u, time, 0.5 * self._dynamics.system.period - time)
+        return mirror @ self._dynamics.to_state @ half
+
+    @cached_property
+    def _mirror(self) -> np.ndarray | None:
+        return mirror_of(self._dynamics)
 
 
 def slider_map(scene: Scene, parameter: str, periods: int) -> SliderMap:
@@ -176,66 +217,116 @@ class _Walk:
     def __init__(self, dynamics: SliderDynamics, names: RowNames, start: RestartState, periods: int) -> None:
         self.dynamics, self.names, self.periods = dynamics, names, periods
         system = dynamics.system
+        self.start = start
         self.initial = restart_from(system, dynamics.scale, start)
-        budget = EVENTS_A_PERIOD * periods
-        self.run = EngineRun(system, self.initial, new_records(system, periods, 0), False, budget)
-        self.budget = budget
+        self.budget = EVENTS_A_PERIOD * periods
+        self.run = EngineRun(system, self.initial, new_records(system, periods, 0), True, self.budget)
         self.crossings: list[Crossing] = []
         self.clearance = (np.inf, "")
         self.status = PassageStatus.OK
         self.size = np.zeros(dynamics.k)
+        #: largest derivative so far of each coordinate
+        self.reach = np.zeros(dynamics.k)
+        #: flow, state and time at the start of the segment that holds the middle of the first period
+        self.middle: tuple[LinearFlow, np.ndarray, float] | None = None
+        #: saltation matrix of the last event, and when it was
+        self.last: tuple[np.ndarray, float] = np.eye(dynamics.k), -np.inf
 
     def passage(self) -> Passage:
         """Walk to the end of the periods."""
         derivative = np.full((self.dynamics.k, self.dynamics.k), np.nan)
         try:
             derivative = self._walk()
-        except Untrusted:
+        except Stopped:
             self.status = PassageStatus.STOPPED
+        except Untrusted:
+            arrived = self.run.advance(self.periods, self.budget) == DONE
+            self.status = PassageStatus.UNDETERMINED if arrived else PassageStatus.STOPPED
         return Passage(
             self.dynamics.to_state @ self._state(), derivative, tuple(self.crossings), self.clearance, self.status,
             self.run.records.peak[: self.periods].copy(),
         )  # fmt: skip
 
     def _walk(self) -> np.ndarray:
-        dynamics, run, st = self.dynamics, self.run, self.run.state
-        nothing = np.full((dynamics.k, dynamics.k), np.nan)
+        dynamics, run, st, period = self.dynamics, self.run, self.run.state, self.dynamics.system.period
         if run.begin(self.budget) != DONE:
-            self.status = PassageStatus.STOPPED
-            return nothing
-        if run.scratch.impulse.any():
-            self.status = PassageStatus.GRAZING  # the period begins with an impact
-        u = self._state()
-        M = dynamics.settled(st.state) @ dynamics.from_state
+            raise Stopped
+        u, M = self._begin()
         while st.counters[PERIOD] < self.periods:
             state, time = st.state.copy(), float(st.time[0])
-            loss = float(st.ledger[IMPACT_LOSS])
             flow = dynamics.flow(state, st.applied_force)
-            self.run.event_functions.status[int(st.counters[CARRIED]) :] = BOUNDED
-            code = run.advance(int(st.counters[PERIOD]) + 1, min(int(st.counters[EVENTS]) + 1, self.budget + 1))
+            if st.counters[PERIOD] == 0 and time <= 0.5 * period:
+                self.middle = flow, u, time
+            # what is left there of other segments is no root of this one
+            run.event_functions.status[int(st.counters[CARRIED]) :] = BOUNDED
+            run.log.chunks.clear()
+            loss = float(st.ledger[IMPACT_LOSS])
+            code = run.advance(int(st.counters[PERIOD]) + 1, int(st.counters[EVENTS]) + 1)
             if code == DONE:
-                u, power = flow.propagate(u, time, dynamics.system.period - time)
+                u, power = flow.propagate(u, time, period - time)
                 u, M = self._agreed(u), power @ M
                 continue
             if code != EVENT_BUDGET or st.counters[EVENTS] > self.budget:
-                self.status = PassageStatus.STOPPED
-                return nothing
+                raise Stopped
             event, tau = self._event(float(st.time[0]) - time)
             u, power = flow.propagate(u, time, tau)
-            u, M = self._across(event, flow, state, u, power @ M, loss)
+            u, S, name, speed = self._across(event, flow, state, u)
+            M = S @ power @ M
+            self._check_rank(M)
+            if name:
+                moment = int(st.counters[PERIOD]) * period + float(st.time[0])
+                self.crossings.append(Crossing(moment, name, speed, float(st.ledger[IMPACT_LOSS]) - loss))
         derivative: np.ndarray = dynamics.to_state @ M
         return derivative
+
+    def _begin(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return state and derivative after the decision of the initial state."""
+        dynamics, initial, b = self.dynamics, self.initial, self.dynamics.system.bodies
+        given = dynamics.from_state @ np.r_[
+            dynamics.scale * initial.p, dynamics.scale * initial.p_rate, initial.displacement[:b],
+            initial.velocity[:b], initial.displacement[dynamics.springs],
+        ]  # fmt: skip
+        u, hit = self._state(), np.flatnonzero(self.run.scratch.impulse)
+        M = dynamics.from_state @ self._clipped()
+        if len(hit):
+            self.status = PassageStatus.GRAZING  # an impact at the very start, which another state has a period before
+            M = self._jump(hit, dynamics.speed[hit] @ given, dynamics.speed[hit] @ u) @ M
+        return u, dynamics.settled(self.run.state.state) @ M
+
+    def _clipped(self) -> np.ndarray:
+        """Return the derivative (k, k) of the state that the run begins with: outside of walls and of bounds."""
+        dynamics, system, initial, start = self.dynamics, self.dynamics.system, self.initial, self.start
+        n, b = system.modes, system.bodies
+        kept = np.eye(dynamics.k)
+        if np.any(initial.p * dynamics.scale != start.displacement):
+            self.status = PassageStatus.GRAZING  # the structure would begin beyond a stop
+        elongation = initial.displacement[dynamics.springs]
+        moved = np.flatnonzero(elongation != start.elongation[dynamics.springs - b])
+        kept[2 * (n + b) + moved, 2 * (n + b) + moved] = 0.0
+        pushed = np.flatnonzero(np.abs(initial.displacement[:b] - start.slip) > 0.0)
+        if len(pushed):
+            # gaps of bodies that were pushed and are closed now stay closed
+            gap = dynamics.place @ dynamics.from_state
+            rows = np.arange(system.friction_rows, len(system.J))
+            slips = 2 * n + np.arange(b)
+            shut = np.abs(initial.displacement[rows]) <= SIMULTANEOUS * system.free_travel[rows]
+            rows = rows[shut & np.any(gap[np.ix_(rows, slips[pushed])] != 0.0, axis=1)]
+            follow = -np.linalg.pinv(gap[np.ix_(rows, slips[pushed])]) @ gap[rows]
+            follow[:, slips[pushed]] = 0.0
+            kept[slips[pushed]] = follow
+        return kept
 
     def _state(self) -> np.ndarray:
         """Return u (k,) as the engine has it now."""
         run, st, dynamics, system = self.run, self.run.state, self.dynamics, self.dynamics.system
         n, b, s = system.modes, system.bodies, int(st.counters[FLOW])
         m = int(run.flows.modes[s])
-        y = (run.flows.shape[s][:, :m] @ st.amplitude[:m]).real
+        y = (run.flows.shape[s, :, :m] @ st.amplitude[:m]).real
         y[:n] += st.constant
-        p, rate = dynamics.scale * y[:n], dynamics.scale * y[n:]
         slip = st.displacement[:b] + st.low_word[:b]
-        u: np.ndarray = dynamics.from_state @ np.r_[p, rate, slip, st.velocity[:b], st.displacement[dynamics.springs]]
+        u: np.ndarray = (
+            dynamics.from_state @ np.r_[dynamics.scale * y, slip, st.velocity[:b], st.displacement[dynamics.springs]]
+        )
         return u
 
     def _agreed(self, predicted: np.ndarray) -> np.ndarray:
@@ -259,46 +350,85 @@ class _Walk:
         return k, tau if tau > RESOLUTION * period else 0.0
 
     def _across(
-        self, event: int, flow: LinearFlow, old: np.ndarray, u: np.ndarray, M: np.ndarray, loss: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return state and derivative after an event; u, M before it."""
-        dynamics, st, run = self.dynamics, self.run.state, self.run
-        row, order, meaning = (
-            int(part[event])
-            for part in (run.event_functions.row, run.event_functions.order, run.event_functions.meaning)
-        )
-        time, new = float(st.time[0]), st.state
+        self, event: int, flow: LinearFlow, old: np.ndarray, u: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, str, float]:
+        """Return the state after an event, its saltation matrix (k, k), its name and the rate of its function.
+
+        u: (k,) state before it; old: (r,) states of the rows then.
+        """
+        dynamics, run, st = self.dynamics, self.run, self.run.state
+        watched, time = run.event_functions, float(st.time[0])
+        row, order, meaning = (int(part[event]) for part in (watched.row, watched.order, watched.meaning))
         collides = order == POSITION and meaning == CLOSES and bool(np.isinf(dynamics.system.spring[row]))
-        impulse = run.scratch.impulse if collides else np.zeros(len(new))
-        after = self._agreed(u + dynamics.kick(impulse))
-        rate = flow.rate(u, time)
-        jump = self._jump(np.flatnonzero(impulse), old, u, after)
-        gradient, speed, bend, scale = self._guard(row, order, meaning, old, flow, rate, time)
-        rate_after = dynamics.flow(new, st.applied_force).rate(after, time)
+        impulse = run.scratch.impulse if collides else np.zeros(len(old))
+        hit, kicked = np.flatnonzero(impulse), dynamics.kick(impulse)
+        after = self._agreed(u + kicked)
+        # speeds of rows as the engine has them, not as small differences
+        met = self._met()
+        before = np.array([met.get(int(r), 0.0) for r in hit])
+        jump = self._jump(hit, before, st.velocity[hit])
+        rate, rate_after = flow.rate(u, time), dynamics.flow(st.state, st.applied_force).rate(after, time)
         kick = rate_after - jump @ rate
-        kick[np.abs(kick) <= 1e-12 * (np.abs(rate_after) + np.abs(rate))] = 0.0
-        if np.any(kick):
-            if speed * speed <= 2.0 * TANGENTIAL * scale * abs(bend) and speed * bend < 0.0:
+        kick[np.abs(kick) <= 1e-13 * (np.abs(rate_after) + np.abs(rate))] = 0.0
+        size = len(dynamics.root)
+        if collides:
+            kick[:size] = dynamics.rate * kicked[dynamics.rates]
+        guard = self._guard(row, order, old, flow, rate, time)
+        speed = met.get(row, guard.speed) if order == POSITION else guard.speed
+        arrivals = [int(r) for r in hit if old[r] == OPEN and met.get(int(r), 0.0) < 0.0]
+        S = jump
+        if len(arrivals) > 1:
+            S = self._at_once(jump, kick, arrivals, met)
+        elif np.any(kick):
+            turns_back = speed * guard.bend < 0.0
+            if turns_back and speed * speed <= 2.0 * TANGENTIAL * guard.scale * abs(guard.bend):
                 self.status = PassageStatus.GRAZING
             if speed == 0.0:
                 raise Untrusted
-            M = jump @ M + np.multiply.outer(kick / speed, gradient @ M)
-        else:
-            M = jump @ M
-        self._check_rank(new, M)
-        name = self.names.event(old, new, np.flatnonzero(impulse))
-        if name:
-            taken = float(st.ledger[IMPACT_LOSS]) - loss
-            period = int(st.counters[PERIOD])
-            self.crossings.append(Crossing(period * dynamics.system.period + time, name, speed, taken))
-        return after, M
+            S = jump + np.multiply.outer(kick / speed, guard.gradient)
+        self._check_order(S, int(st.counters[PERIOD]) * dynamics.system.period + time)
+        return after, S, self.names.event(old, st.state, hit), speed
 
-    def _jump(self, rows: np.ndarray, old: np.ndarray, u: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Return the derivative (k, k) of the impact at the rows (m,) that got an impulse, at a fixed time."""
+    def _met(self) -> dict[int, float]:
+        """Return the relative speed of approach, below zero, of each contact that the last event's log has hit."""
+        return {
+            int(entry[2]): float(entry[3]) for chunk in self.run.log.chunks for entry in chunk if entry[1] == IMPACT
+        }
+
+    def _at_once(self, jump: np.ndarray, kick: np.ndarray, arrivals: list[int], met: dict[int, float]) -> np.ndarray:
+        """Return the saltation matrix of gaps that close together.
+
+        On a prescribed motion cavities do not feel each other: each has its own time of impact. Where they do, the map
+        has another derivative for each order of the impacts: COINCIDENT, with that of the first. A chatter that ends
+        leaves nothing of gaps and speeds, in any order.
+        """
+        dynamics, system, cavity = self.dynamics, self.dynamics.system, self.dynamics.cavity
+        if not self.run.state.velocity[arrivals].any():
+            return dynamics.closed(np.array(arrivals)) @ jump
+        owner = [int(cavity[max(system.left_body[r], system.right_body[r])]) for r in arrivals]
+        if system.modes or len(set(owner)) < len(owner):
+            self.status = PassageStatus.COINCIDENT
+            return jump + np.multiply.outer(kick / met[arrivals[0]], dynamics.place[arrivals[0]])
+        S = jump.copy()
+        for r, c in zip(arrivals, owner, strict=True):
+            own = np.r_[cavity == c, cavity == c]
+            S += np.multiply.outer(np.where(own, kick, 0.0) / met[r], dynamics.place[r])
+        return S
+
+    def _check_order(self, S: np.ndarray, time: float) -> None:
+        """Find a kink: two events at one time whose order matters."""
+        before, then = self.last
+        if time - then <= SIMULTANEOUS * self.dynamics.system.period:
+            one, other = S @ before, before @ S
+            if np.abs(one - other).max() > 1e-9 * np.abs(one).max():
+                self.status = PassageStatus.COINCIDENT
+        self.last = S, time
+
+    def _jump(self, rows: np.ndarray, before: np.ndarray, left: np.ndarray) -> np.ndarray:
+        """Return the derivative (k, k), at a fixed time, of the impact at rows (m,) with their speeds on both sides."""
         dynamics = self.dynamics
         if not len(rows):
             return np.eye(dynamics.k)
-        before, left = dynamics.speed[rows] @ u, dynamics.speed[rows] @ after
         restitution = restitutions_at(dynamics.system, rows, -before)
         fastest = np.abs(np.r_[before, left]).max()
         newton = np.abs(left + restitution * before) <= 1e-9 * fastest
@@ -309,49 +439,42 @@ class _Walk:
         return dynamics.impulse(rows, slope)
 
     def _steepness(self, rows: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Return speed times the derivative of the restitution by the speed, (m,): by differences of high order."""
+        """Return speed times the derivative of the restitution by the speed, (m,): by differences of sixth order."""
         system = self.dynamics.system
-        if system.restitution_at == 0:
-            return np.zeros(len(rows))
-        step = 1e-2
-        weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
         total = np.zeros(len(rows))
-        for j, weight in weights.items():
-            ahead, back = (restitutions_at(system, rows, -before * (1 + sign * j * step)) for sign in (1, -1))
-            total += weight * (ahead - back) / step
+        if system.restitution_at == 0:
+            return total
+        for j, weight in enumerate((3 / 4, -3 / 20, 1 / 60), start=1):
+            ahead, back = (restitutions_at(system, rows, -before * (1 + way * j * _STEP)) for way in (1, -1))
+            total += weight * (ahead - back) / _STEP
         return total
 
-    def _guard(
-        self, row: int, order: int, meaning: int, old: np.ndarray, flow: LinearFlow, rate: np.ndarray, time: float
-    ) -> tuple[np.ndarray, float, float, float]:
-        """Return gradient (k,), rate, second derivative and scale of an event function before the event."""
+    def _guard(self, row: int, order: int, old: np.ndarray, flow: LinearFlow, rate: np.ndarray, time: float) -> _Guard:
+        """Return the event function of a row before the event."""
         dynamics, system = self.dynamics, self.dynamics.system
-        second = flow.A @ rate + flow.drift(time)
+        scale: float
         if order == POSITION:
             gradient, scale = dynamics.place[row], system.free_travel[row]
-            return gradient, float(gradient @ rate), float(gradient @ second), float(scale)
-        if order == VELOCITY:
+        elif order == VELOCITY:
             gradient = dynamics.speed[row]
-            return gradient, float(gradient @ rate), float(gradient @ second), float(self.fastest(row))
-        if old[row] == SPRUNG:
+            scale = float(np.abs(gradient) @ self.size)
+        elif old[row] == SPRUNG:
             gradient = dynamics.push(row)
             scale = system.limit[row] if row < system.friction_rows else system.spring[row] * system.free_travel[row]
-            return gradient, float(gradient @ rate), float(gradient @ second), float(scale)
-        share, free = dynamics.force(old, row), dynamics.free_flow(old, self.run.state.applied_force)
-        on_rates = share @ free.A[dynamics.rates]
-        speed = on_rates @ rate + share @ free.drift(time)[dynamics.rates]
-        return on_rates, float(speed), 0.0, 1.0
+        else:
+            share, free = dynamics.force(old, row), dynamics.free_flow(old, self.run.state.applied_force)
+            on_rates = share @ free.A[dynamics.rates]
+            speed = on_rates @ rate + share @ free.drift(time)[dynamics.rates]
+            return _Guard(on_rates, float(speed), 0.0, 1.0)
+        second = flow.A @ rate + flow.drift(time)
+        return _Guard(gradient, float(gradient @ rate), float(gradient @ second), scale)
 
-    def fastest(self, row: int) -> float:
-        """Return a speed that a slip has at its fastest, as far as is known, m/s."""
-        return float(np.abs(self.dynamics.speed[row]) @ self.size)
-
-    def _check_rank(self, state: np.ndarray, M: np.ndarray) -> None:
+    def _check_rank(self, M: np.ndarray) -> None:
         """Raise Untrusted if the derivative moves rows that are at rest now."""
-        rows = self.dynamics.constraints(state)
-        moved = np.abs(self.dynamics.speed[rows] @ M)
-        size = np.abs(self.dynamics.speed[rows]) @ np.abs(M)
-        closed = rows[rows >= self.dynamics.system.friction_rows]
-        opened, room = np.abs(self.dynamics.place[closed] @ M), np.abs(self.dynamics.place[closed]) @ np.abs(M)
-        if np.any(moved > 1e-6 * size) or np.any(opened > 1e-6 * room):
+        dynamics = self.dynamics
+        rows = dynamics.constraints(self.run.state.state)
+        closed = rows[rows >= dynamics.system.friction_rows]
+        still = np.vstack([dynamics.speed[rows], dynamics.place[closed]])
+        self.reach = np.maximum(self.reach, np.abs(M).max(axis=1))
+        if np.any(np.abs(still @ M).max(axis=1, initial=0.0) > 1e-7 * np.abs(still) @ self.reach):
             raise Untrusted
