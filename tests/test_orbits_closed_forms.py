@@ -232,7 +232,8 @@ def test_the_period_of_an_upright_body_doubles_at_a_frequency_of_forty_digits():
     """A body of 2 % on a wall of the rigid cluster: the orbit, its derivative, and where a multiplier is -1."""
     gap, rest = 1e-4, np.array([0.0, 0.0, 5e-5, 0.0])
     data = scene(
-        structure=CLUSTER | {"model": "rigid", "damping": UPRIGHT.damping}, excitation={"frequency": UPRIGHT.frequency, "force": UPRIGHT.force},
+        structure=CLUSTER | {"model": "rigid", "damping": UPRIGHT.damping},
+        excitation={"frequency": UPRIGHT.frequency, "force": UPRIGHT.force},
         gravity={"acceleration": UPRIGHT.gravity, "orientation_deg": 90.0}, cavity=[{"name": "c", "gap": gap}],
         damper=[{"cavity": "c", "mass": UPRIGHT.body, "restitution": UPRIGHT.restitution, "position": -gap / 2}],
     )  # fmt: skip
@@ -250,8 +251,4 @@ def test_the_period_of_an_upright_body_doubles_at_a_frequency_of_forty_digits():
         return np.linalg.det(found + np.eye(4))
 
     reference = UPRIGHT.doubling(2338.0, 2345.0)
-    assert (
-        abs(np.linalg.det(np.array(replace(UPRIGHT, frequency=reference).orbit()[1].tolist(), float) + np.eye(4)))
-        < 1e-9
-    )
     assert brentq(turned, 2338.0, 2345.0, xtol=1e-11) == pytest.approx(float(reference), rel=1e-8)

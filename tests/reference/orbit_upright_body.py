@@ -39,7 +39,7 @@ class UprightBody:
     frequency: mp.mpf | float
 
     def orbit(self) -> tuple[mp.matrix, mp.matrix]:
-        """Return the state (x, x', y, y') at phase 0 of the force, and the derivative (4, 4) of the period map there."""
+        """Return the state (x, x', y, y') at phase 0 of the force, and the derivative (4, 4) of the map there."""
         with mp.workdps(_DIGITS):
             m, c, k, b, e, g, force, f = (mp.mpf(getattr(self, name)) for name in self.__dataclass_fields__)
             period, omega, j = 1 / f, 2 * mp.pi * f, (1 + e) * b / (m + b)
