@@ -1,0 +1,129 @@
+"""Bifurcations on a smooth piece of a branch: seen by the signs of test functions, located by their roots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import svd
+from scipy.optimize import brentq
+
+from vanedamp.coupling.orbits.multipliers import decided, tests
+from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, point_of, with_symmetry
+
+#: share of the parameter to which bifurcations are located
+_CLOSE = 1e-10
+#: a test function that is larger than this share of its ends' at its root has jumped there, and has no zero
+_ZERO = 1e-3
+#: distance of a pair's imaginary part from zero, of its modulus from 1
+_PAIR = 1e-4
+
+#: kinds of points from which branches of other orbits go out
+SWITCHES = ("period doubling", "pitchfork")
+
+
+class Located(NamedTuple):
+    """A special point of a branch: the orbit there, its kind, and what happens."""
+
+    orbit: Orbit
+    kind: str
+    note: str
+
+
+class _Lost(Exception):
+    """No orbit was found where one was looked for."""
+
+
+def bifurcations(
+    problem: Problem, before: Point, after: Point, corrected: Callable[[Point, float], Orbit | None]
+) -> Iterator[Located]:
+    """Yield the bifurcations between two points whose orbits have one sequence of events, in order of arclength.
+
+    corrected: returns the orbit at an arclength from a point, None if there is none.
+    """
+    if before.orbit.neutral != after.orbit.neutral:
+        return
+    length = float((after.y - before.y) @ before.tangent)
+    neutral, found = before.orbit.neutral, []
+    for kind, test in _TESTS.items():
+        function = partial(test, neutral=neutral)
+        low, high = function(before), function(after)
+        if low * high >= 0.0:
+            continue
+        located = _root(problem, before, length, function, corrected, max(abs(low), abs(high)))
+        if located is not None and (kind != "neimark-sacker" or _on_circle(located[1].orbit, neutral)):
+            found.append((located[0], kind, located[1]))
+    for _, kind, point in sorted(found, key=lambda entry: entry[0]):
+        yield Located(point.orbit, kind, _note(problem, kind, point))
+
+
+def _note(problem: Problem, kind: str, point: Point) -> str:
+    if kind != "pitchfork":
+        return ""
+    return "symmetry breaks" if with_symmetry(problem, point.orbit).symmetric else "branches meet"
+
+
+def _root(
+    problem: Problem, before: Point, length: float, function: Callable[[Point], float],
+    corrected: Callable[[Point, float], Orbit | None], size: float,
+) -> tuple[float, Point] | None:  # fmt: skip
+    """Return arclength and point of a test function's zero; None if it jumps."""
+    points: dict[float, Point] = {0.0: before}
+
+    def value(at: float) -> float:
+        if at not in points:
+            orbit = corrected(before, at)
+            if orbit is None or orbit.passage.sequence != before.orbit.passage.sequence:
+                raise _Lost
+            points[at] = point_of(problem, orbit, before.tangent)
+        return function(points[at])
+
+    share = abs(before.orbit.parameter) / problem.span
+    try:
+        root = brentq(value, 0.0, length, xtol=_CLOSE * min(1.0, share or 1.0), maxiter=100)
+        value(root)
+    except (_Lost, ValueError, RuntimeError):
+        return None
+    return (root, points[root]) if abs(function(points[root])) <= _ZERO * size else None
+
+
+def _fold(point: Point, neutral: int) -> float:
+    return float(point.tangent[-1])
+
+
+def _pitchfork(point: Point, neutral: int) -> float:
+    """A multiplier passes 1 while the parameter does not turn: the bordered derivative is singular (Keller 1977)."""
+    return tests(point.orbit.multipliers, neutral).unity * float(np.sign(point.tangent[-1]))
+
+
+def _doubling(point: Point, neutral: int) -> float:
+    return tests(point.orbit.multipliers, neutral).doubling
+
+
+def _torus(point: Point, neutral: int) -> float:
+    return tests(point.orbit.multipliers, neutral).torus
+
+
+#: by kind; the number of neutral multipliers is that of the piece, since at its end one more may be 1
+_TESTS: dict[str, Callable[..., float]] = {
+    "fold": _fold, "period doubling": _doubling, "neimark-sacker": _torus, "pitchfork": _pitchfork
+}  # fmt: skip
+
+
+def _on_circle(orbit: Orbit, neutral: int) -> bool:
+    """Say whether a complex pair lies on the unit circle, rather than two real multipliers with the product 1."""
+    values = decided(orbit.multipliers, neutral)
+    return bool(np.any((np.abs(values.imag) > _PAIR) & (np.abs(np.abs(values) - 1.0) < _PAIR)))
+
+
+def direction(derivative: np.ndarray, kind: str, neutral: np.ndarray) -> np.ndarray:
+    """Return the unit direction (k,) in which another branch leaves a point of one of the kinds of SWITCHES.
+
+    derivative: (k, k) of the map there, scaled; neutral: (n, k) orthonormal directions in which any orbit may be moved.
+    """
+    unit = -1.0 if kind == "period doubling" else 1.0
+    rows = svd(derivative - unit * np.eye(len(derivative)))[2]
+    null = rows[-1:] if kind == "period doubling" else rows[-1 - len(neutral) :]
+    return np.asarray(svd(null - null @ neutral.T @ neutral)[2][0])

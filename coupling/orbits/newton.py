@@ -1,0 +1,316 @@
+"""Newton's method for periodic orbits: a state that the period map takes to itself.
+
+Orbits and their parameter are zeros of one function of y = (state, parameter), both scaled: the state by the map's
+scale and the square root of its size, the parameter by the range of the branch. A last row says which zero is meant:
+the one of a given parameter, or the one at a given arclength (Keller 1977).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import lstsq
+
+from vanedamp.coupling.orbits.multipliers import NULL, decided, multipliers, null_space
+from vanedamp.coupling.orbits.passage import Passage, PassageStatus, PeriodMap
+from vanedamp.files.toml_input import InputError
+
+#: scaled length of a Newton step after which the orbit is known to round-off, because its square is
+_SMALL = 1e-8
+#: scaled residual of an orbit whose map is known to round-off only: chaotic ones lose that many digits
+_RESIDUAL = 1e-9
+#: relative step of differences in the parameter: a map known to some 1e-14, over which its third derivative is of
+#: order one, has the smallest error (some 1e-9) at the cube root
+_DIFFERENCE = 3e-5
+#: smallest size of a parameter, as a share of the branch's range, that its differences are relative to
+_FLOOR = 1e-3
+#: scaled distance of an orbit from its mirror image
+_SYMMETRIC = 1e-6
+
+
+class OrbitStatus(StrEnum):
+    """How the search for an orbit ended.
+
+    FORBIDDEN: the orbits that Newton's method heads for have another sequence of events than it assumes.
+    """
+
+    OK = "ok"
+    NOT_CONVERGED = "not_converged"
+    FORBIDDEN = "sequence_forbidden"
+    STOPPED = "engine_stopped"
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic orbit, or the last state of a search for one.
+
+    parameter: of the branch, nan without one; state: (k,) at the start of the excitation's period; periods: of the
+    excitation; scale: (k,) by which coordinates are compared; passage: its own; residual: largest share of the scale by
+    which it misses itself; iterations: of Newton's method; symmetric: whether it is its own mirror image half a period
+    later.
+    """
+
+    status: OrbitStatus
+    parameter: float
+    state: np.ndarray
+    periods: int
+    scale: np.ndarray
+    passage: Passage
+    residual: float
+    iterations: int
+    symmetric: bool = False
+
+    @cached_property
+    def derivative(self) -> np.ndarray:
+        """The derivative (k, k) of the period map in scaled coordinates."""
+        return np.asarray(self.passage.derivative * (self.scale / self.scale[:, None]))
+
+    @cached_property
+    def _multipliers(self) -> tuple[np.ndarray, int]:
+        return multipliers(self.derivative)
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Multipliers (k,) complex, the largest first."""
+        return self._multipliers[0]
+
+    @property
+    def neutral(self) -> int:
+        """How many multipliers are 1 because the orbit may be moved: of bodies at rest or in free flight."""
+        return self._multipliers[1]
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers but the neutral ones lie inside the unit circle."""
+        return bool(np.all(np.abs(decided(*self._multipliers)) < 1.0))
+
+    @property
+    def amplitude_mean(self) -> float:
+        """Mean of the periods' largest displacements of the response, m."""
+        return float(self.passage.peaks.mean())
+
+    @property
+    def amplitude_max(self) -> float:
+        """Largest displacement of the response, m."""
+        return float(self.passage.peaks.max())
+
+    @property
+    def impacts_per_period(self) -> float:
+        """Impacts in one period of the excitation."""
+        return sum(name.startswith("impact") for name in self.passage.sequence) / self.periods
+
+
+class Point(NamedTuple):
+    """An orbit on a branch: y = (state, parameter) scaled (k + 1,), slope of the residual by the parameter (k,),
+    unit tangent of the branch (k + 1,)."""
+
+    y: np.ndarray
+    orbit: Orbit
+    slope: np.ndarray
+    tangent: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Orbits of a period map over a range of its parameter, scaled.
+
+    origin: parameter at which the scaled one is 0, nan for a map without; span: range of the parameter; count: of
+    passages so far, the only part that changes.
+    """
+
+    map: PeriodMap
+    origin: float = math.nan
+    span: float = 1.0
+    count: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates of a state."""
+        return len(self.map.scale)
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """Sizes (k,) by which states are divided: the mean square of a scaled state counts."""
+        return np.asarray(self.map.scale * math.sqrt(self.size))
+
+    def at(self, parameter: float) -> PeriodMap:
+        """Return the map at a value of the parameter. Raises InputError for one that is no scene."""
+        return self.map if math.isnan(parameter) else self.map.at(parameter)
+
+    def parameter(self, y: np.ndarray) -> float:
+        """Return the parameter, nan for a map without."""
+        return self.origin + self.span * float(y[-1])
+
+    def pack(self, state: np.ndarray, parameter: float) -> np.ndarray:
+        """Return y (k + 1,)."""
+        share = 0.0 if math.isnan(self.origin) else (parameter - self.origin) / self.span
+        return np.append(state / self.weight, share)
+
+    def passage(self, y: np.ndarray) -> Passage | None:
+        """Return the passage of y; None if the parameter's value is none of a scene or the engine stops."""
+        return self._passage(y[:-1] * self.weight, self.parameter(y))
+
+    def _passage(self, state: np.ndarray, parameter: float) -> Passage | None:
+        self.count["passages"] += 1
+        try:
+            passage = self.at(parameter)(state)
+        except InputError:
+            return None
+        whole = passage.status is not PassageStatus.STOPPED
+        return passage if whole and np.isfinite(passage.state).all() and np.isfinite(passage.derivative).all() else None
+
+    def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
+        """Return by how much an orbit misses itself, scaled (k,)."""
+        return np.asarray(passage.state / self.weight - y[:-1])
+
+    def slope(self, y: np.ndarray, passage: Passage) -> np.ndarray:
+        """Return the derivative of the residual by the scaled parameter (k,).
+
+        Central differences of the passage; where one side has another sequence of events, those of the other side.
+        """
+        parameter = self.parameter(y)
+        h = _DIFFERENCE * max(abs(parameter), _FLOOR * self.span)
+        state, known = y[:-1] * self.weight, {0: passage.state}
+
+        def side(steps: int) -> np.ndarray | None:
+            found = self._passage(state, parameter + steps * h)
+            if found is None or found.sequence != passage.sequence:
+                return None
+            known[steps] = found.state
+            return found.state
+
+        above, below = side(1), side(-1)
+        if above is not None and below is not None:
+            difference = (above - below) / (2 * h)
+        else:
+            sign = 1 if above is not None else -1
+            near = known.get(sign)
+            far = None if near is None else side(2 * sign)
+            if near is None:
+                return np.zeros(self.size)
+            step = sign * h
+            difference = (near - passage.state) / step
+            if far is not None:
+                difference = (4 * near - 3 * passage.state - far) / (2 * step)
+        return np.asarray(difference / self.weight * self.span)
+
+
+def find_orbit(period_map: PeriodMap, start: np.ndarray) -> Orbit:
+    """Return the periodic orbit that Newton's method finds from a state (k,), or its last state and why it is none."""
+    problem = Problem(period_map)
+    fixed = np.append(np.zeros(problem.size), 1.0)
+    orbit = solve(problem, problem.pack(np.asarray(start, float), math.nan), fixed, np.zeros(problem.size))
+    return with_symmetry(problem, orbit) if orbit.status is OrbitStatus.OK else orbit
+
+
+def solve(
+    problem: Problem, start: np.ndarray, row: np.ndarray, slope: np.ndarray, iterations: int = 20, halvings: int = 10
+) -> Orbit:
+    """Return the orbit in the plane through `start` (k + 1,) normal to `row` (k + 1,).
+
+    slope: derivative of the residual by the parameter (k,), near the orbit: it is not renewed on the way.
+    Steps are least squares of least norm, so that neutral coordinates stay where they are; a step that does not lessen
+    the residual, such as one into another sequence of events, is halved.
+    """
+    y, passage = start, problem.passage(start)
+    if passage is None:
+        return _stopped(problem, start)
+    residual, status, count = problem.residual(y, passage), OrbitStatus.NOT_CONVERGED, 0
+    for count in range(1, iterations + 1):  # noqa: B007
+        right = np.append(-residual, -row @ (y - start))
+        step = _solved(bordered(problem, passage, slope, row), right)
+        size = 1.0 + float(np.linalg.norm(y))
+        last = float(np.linalg.norm(step)) <= _SMALL * size
+        taken, changed = _taken(
+            problem, y, step, passage, math.inf if last else float(np.linalg.norm(residual)), halvings
+        )
+        if taken is None:
+            status = OrbitStatus.FORBIDDEN if changed else status
+            break
+        y, passage, residual = taken
+        if last:
+            status = OrbitStatus.OK if np.abs(residual).max(initial=0.0) <= _RESIDUAL * size else status
+            break
+    missed, scale = float(np.abs(residual).max(initial=0.0)) * math.sqrt(problem.size), problem.map.scale
+    return Orbit(
+        status, problem.parameter(y), y[:-1] * problem.weight, problem.map.periods, scale, passage, missed, count
+    )
+
+
+def _taken(
+    problem: Problem,
+    y: np.ndarray,
+    step: np.ndarray,
+    passage: Passage,
+    bound: float,
+    halvings: int,
+) -> tuple[tuple[np.ndarray, Passage, np.ndarray] | None, bool]:
+    """Take a step, or the largest part of it that brings the residual below a bound.
+
+    Returns y, its passage and its residual, or None, and whether the sequence of events changes on the way.
+    """
+    changed, share = False, 1.0
+    for _ in range(halvings):
+        trial = y + share * step
+        found = problem.passage(trial) if np.isfinite(trial).all() else None
+        if found is not None:
+            residual = problem.residual(trial, found)
+            if np.linalg.norm(residual) < (1.0 - 1e-3 * share) * bound:
+                return (trial, found, residual), changed
+            changed = changed or found.sequence != passage.sequence
+        share /= 2
+    return None, changed
+
+
+def bordered(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """Return the derivative of the residual by y, and a row below it (k + 1, k + 1)."""
+    scale = problem.map.scale
+    matrix = np.empty((problem.size + 1, problem.size + 1))
+    matrix[:-1, :-1] = passage.derivative * (scale / scale[:, None]) - np.eye(problem.size)
+    matrix[:-1, -1], matrix[-1] = slope, row
+    return matrix
+
+
+def tangent_of(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """Return the unit tangent of the branch (k + 1,), on the side of `row`, without a share of neutral coordinates."""
+    tangent = _solved(bordered(problem, passage, slope, row), np.append(np.zeros(problem.size), 1.0))
+    length = float(np.linalg.norm(tangent))
+    return tangent / length if length > 0.0 else row
+
+
+def point_of(problem: Problem, orbit: Orbit, row: np.ndarray) -> Point:
+    """Return an orbit as a point of a branch that goes on in the direction of `row` (k + 1,)."""
+    y = problem.pack(orbit.state, orbit.parameter)
+    slope = problem.slope(y, orbit.passage)
+    return Point(y, orbit, slope, tangent_of(problem, orbit.passage, slope, row))
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    solution = lstsq(matrix, right, cond=NULL, check_finite=False)[0]
+    return np.asarray(solution)
+
+
+def with_symmetry(problem: Problem, orbit: Orbit) -> Orbit:
+    """Return the orbit with whether it is symmetric, which takes another half of a period."""
+    found = problem.at(orbit.parameter).mirrored(orbit.state)
+    if found is None:
+        return orbit
+    difference, size = (found - orbit.state) / orbit.scale, 1.0 + float(np.abs(orbit.state / orbit.scale).max())
+    for free in null_space(orbit.derivative):  # where a body rests is nothing that a mirror could change
+        difference = difference - free * (free @ difference)
+    return replace(orbit, symmetric=bool(np.abs(difference).max() < _SYMMETRIC * size))
+
+
+def _stopped(problem: Problem, y: np.ndarray) -> Orbit:
+    """Return a search that could not begin."""
+    k, periods = problem.size, problem.map.periods
+    unknown, matrix = np.full(k, np.nan), np.full((k, k), np.nan)
+    passage = Passage(unknown, matrix, (), (math.inf, ""), PassageStatus.STOPPED, np.full(periods, np.nan))
+    state = y[:-1] * problem.weight
+    return Orbit(OrbitStatus.STOPPED, problem.parameter(y), state, periods, problem.map.scale, passage, math.nan, 0)
