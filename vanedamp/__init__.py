@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vanedamp.coupling.engine import simulate
+    from vanedamp.coupling.orbits.branch import Branches
+    from vanedamp.coupling.orbits.orbits import find_orbit, orbits
     from vanedamp.coupling.response.response import Response, Status
     from vanedamp.coupling.scene.scene import Scene
     from vanedamp.coupling.sweep.record import Sweep
@@ -29,12 +31,14 @@ if TYPE_CHECKING:
     from vanedamp.studies.case.tables import Case
 
 __all__ = [
-    "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "Scene", "Status", "Sweep",
-    "SystemMatrices", "VanedampError", "reduce", "rigid_model", "simulate", "solve_modes", "sweep",
+    "Branches", "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "Scene", "Status",
+    "Sweep", "SystemMatrices", "VanedampError", "find_orbit", "orbits", "reduce", "rigid_model", "simulate",
+    "solve_modes", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
 _HOMES = {
+    "Branches": "coupling.orbits.branch",
     "Case": "studies.case.tables",
     "InputError": "files.toml_input",
     "Interface": "rom.interface",
@@ -47,6 +51,8 @@ _HOMES = {
     "Sweep": "coupling.sweep.sweep",
     "SystemMatrices": "modal.matrices",
     "VanedampError": "files.errors",
+    "find_orbit": "coupling.orbits.orbits",
+    "orbits": "coupling.orbits.orbits",
     "reduce": "rom.reduction",
     "rigid_model": "modal.rigid_model",
     "simulate": "coupling.engine",

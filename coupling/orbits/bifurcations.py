@@ -19,6 +19,8 @@ _CLOSE = 1e-10
 _ZERO = 1e-3
 #: distance of a pair's imaginary part from zero, of its modulus from 1
 _PAIR = 1e-4
+#: distance of two bifurcations that are one, as a share of the step
+_SAME = 1e-3
 
 #: kinds of points from which branches of other orbits go out
 SWITCHES = ("period doubling", "pitchfork")
@@ -55,7 +57,10 @@ def bifurcations(
         located = _root(problem, before, length, function, corrected, max(abs(low), abs(high)))
         if located is not None and (kind != "neimark-sacker" or _on_circle(located[1].orbit, neutral)):
             found.append((located[0], kind, located[1]))
-    for _, kind, point in sorted(found, key=lambda entry: entry[0]):
+    meeting = [at for at, kind, _ in found if kind == "pitchfork"]
+    for at, kind, point in sorted(found, key=lambda entry: entry[0]):
+        if kind == "fold" and any(abs(at - other) < _SAME * abs(length) for other in meeting):
+            continue  # a branch that goes back on its mirror image
         yield Located(point.orbit, kind, _note(problem, kind, point))
 
 
@@ -80,7 +85,7 @@ def _root(
             points[at] = point_of(problem, orbit, before.tangent)
         return function(points[at])
 
-    share = abs(before.orbit.parameter) / problem.span
+    share = abs(before.orbit.parameter / problem.span)
     try:
         root = brentq(value, 0.0, length, xtol=_CLOSE * min(1.0, share or 1.0), maxiter=100)
         value(root)

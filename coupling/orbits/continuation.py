@@ -8,13 +8,12 @@ has on the other side, in both directions, and in the images of both (an event t
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
-from vanedamp.coupling.orbits.branch import SpecialPoint
+from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
 from vanedamp.coupling.orbits.newton import (
     Orbit,
     OrbitStatus,
@@ -32,6 +31,8 @@ from vanedamp.coupling.scene.orbit import Orbit as Table
 _ITERATIONS, _HALVINGS = 8, 3
 #: iterations up to which, and cosines of the angle between tangents from which, steps grow; and are good enough
 _QUICK, _STRAIGHT, _BENT = 3, 0.985, 0.9
+#: scaled distance of an orbit from itself half of its periods later, where it is known by its root
+_SAME = 1e-4
 #: relative error of the parameter where the sequence changes
 _CLOSE = 1e-10
 #: attempts at the place of a change of sequence, at least every third one a bisection
@@ -40,16 +41,15 @@ _ATTEMPTS = 120
 
 @dataclass(eq=False)
 class Trace:
-    """A branch while it is followed: its orbits, where it is, and its next step.
+    """A branch while it is followed: its orbits, the last of them with its tangent, and the next step.
 
-    source: the branch and the special point that it was switched from; first: y of its first point; end: why it is not
-    followed further, "" while it is.
+    source: the branch and the special point that it was switched from; end: why it is not followed further, "" while
+    it is.
     """
 
-    orbits: list[Orbit]
+    points: list[BranchPoint]
     special: list[SpecialPoint]
     head: Point
-    first: np.ndarray
     step: float
     source: tuple[int, int] | None = None
     end: str = ""
@@ -63,14 +63,31 @@ class Follower:
 
     def begin(self, orbit: Orbit, row: np.ndarray, source: tuple[int, int] | None = None) -> Trace:
         """Return a branch of one orbit that goes on in the direction of `row` (k + 1,)."""
-        orbit = with_symmetry(self.problem, orbit)
         head = point_of(self.problem, orbit, row)
-        return Trace([orbit], [], head, head.y, self.table.step, source)
+        return Trace([BranchPoint.of(with_symmetry(self.problem, orbit))], [], head, self.table.step, source)
+
+    def resume(self, branch: Branch, tangent: np.ndarray, step: float) -> Trace | None:
+        """Return a branch that was interrupted, from its last point and the tangent there; None if that is no orbit."""
+        last = branch.points[-1]
+        y = self.problem.pack(last.state, last.parameter)
+        passage = self.problem.passage(y)
+        if passage is None:
+            return None
+        missed = float(np.abs(self.problem.residual(y, passage)).max(initial=0.0))
+        orbit = Orbit(
+            OrbitStatus.OK, last.parameter, last.state, branch.periods, self.problem.map.scale, passage, missed, 0
+        )
+        head = Point(y, orbit, self.problem.slope(y, passage), tangent)
+        return Trace(branch.points, list(branch.special), head, step, branch.source, branch.end)
+
+    def branch(self, trace: Trace) -> Branch:
+        """Return the record of a branch, whole or not."""
+        return Branch.of(trace.points, self.problem.map.periods, trace.special, trace.end, trace.source)
 
     def advance(self, trace: Trace) -> None:
         """Add the next point to a branch, with the special points before it, or end it."""
-        if len(trace.orbits) >= self.table.max_points:
-            self._end(trace, f"max_points ({self.table.max_points}) reached")
+        if len(trace.points) >= self.table.max_points:
+            self._end(trace, f"max_points ({self.table.max_points}) reached", trace.head.orbit)
             return
         head, step = trace.head, trace.step
         while step >= self.table.min_step:
@@ -81,8 +98,8 @@ class Follower:
             if point.orbit.passage.sequence != head.orbit.passage.sequence:
                 break
             if point.tangent @ head.tangent > _BENT or step <= 2 * self.table.min_step:
-                self._search(trace, head, point)
-                self._accept(trace, head, point)
+                if not self._search(trace, head, point):
+                    self._accept(trace, head, point)
                 quick = point.orbit.iterations <= _QUICK and point.tangent @ head.tangent > _STRAIGHT
                 trace.step = min(1.5 * step, self.table.max_step) if quick else max(step, self.table.min_step)
                 return
@@ -122,34 +139,53 @@ class Follower:
 
     def _accept(self, trace: Trace, before: Point, point: Point) -> None:
         """Add a point, and the end if it is one."""
-        trace.orbits.append(with_symmetry(self.problem, point.orbit))
+        trace.points.append(BranchPoint.of(with_symmetry(self.problem, point.orbit)))
         trace.head = point
         share = point.y[-1]
         if share >= 1.0 or share <= 0.0:
-            self._end(trace, "the end of the parameter's range")
-        elif len(trace.orbits) > 3 and self._returned(trace, before, point):
-            self._end(trace, "closed: back at its first orbit")
+            self._end(trace, "the end of the parameter's range", point.orbit)
+        elif len(trace.points) > 3 and self._returned(trace, before, point):
+            self._end(trace, "closed: back at its first orbit", point.orbit)
 
-    def _search(self, trace: Trace, before: Point, point: Point) -> None:
+    def _search(self, trace: Trace, before: Point, point: Point) -> bool:
+        """Note the bifurcations between two points. Returns whether the branch has ended on one: joined another."""
         for found in bifurcations(self.problem, before, point, self._corrected):
             self._note(trace, found)
+            if found.kind == "pitchfork" and (why := self._joined(trace, found.orbit)):
+                self._end(trace, why, found.orbit)
+                return True
+        return False
+
+    def _joined(self, trace: Trace, orbit: Orbit) -> str:
+        """Say on which branch of more symmetric orbits this one ends; "" if it does not."""
+        if not trace.points[-1].symmetric and with_symmetry(self.problem, orbit).symmetric:
+            return "joins a branch of symmetric orbits"
+        periods = self.problem.map.periods
+        if periods % 2 == 0 and not self._repeats(trace.head.orbit) and self._repeats(orbit):
+            return f"joins a branch of orbits of {periods // 2} period{'s' if periods > 2 else ''}"
+        return ""
+
+    def _repeats(self, orbit: Orbit) -> bool:
+        """Say whether an orbit repeats after half of its periods."""
+        passage = self.problem.at(orbit.parameter).over(orbit.periods // 2)(orbit.state)
+        return bool(np.abs((passage.state - orbit.state) / orbit.scale).max() < _SAME)
 
     def _note(self, trace: Trace, found: Located) -> None:
         orbit = found.orbit
         trace.special.append(
-            SpecialPoint(len(trace.orbits) - 1, orbit.parameter, found.kind, found.note, orbit.state)
+            SpecialPoint(len(trace.points) - 1, orbit.parameter, found.kind, found.note, orbit.state)
         )  # fmt: skip
 
     def _returned(self, trace: Trace, before: Point, point: Point) -> bool:
         """Say whether the branch passes its first orbit between two points."""
         piece = point.y - before.y
-        share = (trace.first - before.y) @ piece / max(float(piece @ piece), np.finfo(float).tiny)
-        away = np.linalg.norm(trace.first - before.y - share * piece)
+        first = self.problem.pack(trace.points[0].state, trace.points[0].parameter)
+        share = (first - before.y) @ piece / max(float(piece @ piece), np.finfo(float).tiny)
+        away = np.linalg.norm(first - before.y - share * piece)
         return bool(0.0 <= share < 1.0 and away < 0.05 * np.linalg.norm(piece))
 
-    def _end(self, trace: Trace, why: str) -> None:
-        last = trace.orbits[-1]
-        trace.special.append(SpecialPoint(len(trace.orbits) - 1, last.parameter, "end", why, last.state))
+    def _end(self, trace: Trace, why: str, orbit: Orbit) -> None:
+        self._note(trace, Located(orbit, "end", why))
         trace.end = why
 
     # -- changes of the event sequence
@@ -158,15 +194,15 @@ class Follower:
         """Go on with the next sequence of events from where the present one ends, within a step; or end the branch."""
         head = trace.head
         last, point = self._last(head, step)
-        if last is not head:
-            self._search(trace, head, last)
+        if last is not head and self._search(trace, head, last):
+            return
         how = ""
         if point is None:
             point, how = self._other_side(last, step)
         kind, what = change(last.orbit.passage, None if point is None else point.orbit.passage)
         self._note(trace, Located(last.orbit, kind, f"{what}{how}"))
         if point is None:
-            self._end(trace, f"{what}; no orbit found beyond")
+            self._end(trace, f"{what}; no orbit found beyond", last.orbit)
             return
         self._accept(trace, last, point)
         trace.step = max(min(step, self.table.step) / 4, self.table.min_step)
@@ -179,7 +215,7 @@ class Follower:
         """
         low, high, seen = 0.0, step, [(0.0, head.orbit)]
         beyond: Orbit | None = None
-        close = _CLOSE * min(1.0, abs(head.orbit.parameter) / self.problem.span or 1.0)
+        close = _CLOSE * min(1.0, abs(head.orbit.parameter / self.problem.span) or 1.0)
         for attempt in range(_ATTEMPTS):
             if high - low <= close:
                 break
@@ -203,31 +239,28 @@ class Follower:
 
     def _other_side(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
-        sequence, sizes = last.orbit.passage.sequence, step * 10.0 ** np.arange(-4.0, 1.0)
-        for size in sizes:
-            # the map's derivative on the other side, where the branch's continuation is no orbit
+        sequence = last.orbit.passage.sequence
+        for size in step * 10.0 ** np.arange(-4.0, 1.0):
             y = last.y + size * last.tangent
             passage = self.problem.passage(y)
             if passage is None:
                 continue
-            starts = [(y, passage)]
+            if passage.sequence != sequence:
+                # the map's derivative on the other side, where the branch's continuation is no orbit
+                slope = self.problem.slope(y, passage)
+                row = tangent_of(self.problem, passage, slope, last.tangent)
+                for sign in (1.0, -1.0):
+                    orbit = self._near(last.y + sign * size * row, sign * row, slope, size)
+                    if orbit is not None and orbit.passage.sequence != sequence:
+                        turned = sign * row[-1] * last.tangent[-1] < 0
+                        return point_of(self.problem, orbit, sign * row), ": the branch turns" if turned else ""
+            # an event that passes the start of the period changes the state there, as the passage's end shows
             image = self.problem.pack(passage.state, self.problem.parameter(y))
-            if (again := self.problem.passage(image)) is not None:
-                starts.append((image, again))
-            for (start, found), sign in itertools.product(starts, (1.0, -1.0)):
-                if start is y and found.sequence == sequence:
-                    continue
-                jump = start is not y
-                slope = self.problem.slope(start, found)
-                row = sign * tangent_of(self.problem, found, slope, last.tangent)
-                predicted = start if jump else last.y + size * row
-                if jump and sign < 0:
-                    continue
-                orbit = self._near(predicted, row, slope, size)
-                if orbit is not None and (jump or orbit.passage.sequence != sequence):
-                    turned = " the branch turns" if row[-1] * last.tangent[-1] < 0 else ""
-                    how = ", at the start of the period" if jump else turned and f":{turned}"
-                    return point_of(self.problem, orbit, row), how
+            if np.linalg.norm(image - y) > 100 * size and (found := self.problem.passage(image)) is not None:
+                row = tangent_of(self.problem, found, self.problem.slope(image, found), last.tangent)
+                orbit = self._near(image, last.tangent, last.slope, size)
+                if orbit is not None:
+                    return point_of(self.problem, orbit, row), " at the start of the period"
         for factor in (1.0, 2.0, 4.0):
             orbit = self._corrected(last, factor * step)
             if orbit is not None:

@@ -103,7 +103,7 @@ class Orbit:
     @property
     def impacts_per_period(self) -> float:
         """Impacts in one period of the excitation."""
-        return sum(name.startswith("impact") for name in self.passage.sequence) / self.periods
+        return sum(name.count("impact ") for name in self.passage.sequence) / self.periods
 
 
 class Point(NamedTuple):
@@ -121,13 +121,14 @@ class Problem:
     """Orbits of a period map over a range of its parameter, scaled.
 
     origin: parameter at which the scaled one is 0, nan for a map without; span: range of the parameter; count: of
-    passages so far, the only part that changes.
+    passages so far.
     """
 
     map: PeriodMap
     origin: float = math.nan
     span: float = 1.0
     count: Counter[str] = field(default_factory=Counter)
+    _maps: dict[float, PeriodMap] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -141,7 +142,13 @@ class Problem:
 
     def at(self, parameter: float) -> PeriodMap:
         """Return the map at a value of the parameter. Raises InputError for one that is no scene."""
-        return self.map if math.isnan(parameter) else self.map.at(parameter)
+        if math.isnan(parameter):
+            return self.map
+        if parameter not in self._maps:
+            made = self.map.at(parameter)
+            self._maps.clear()  # the next passage is often one of the same scene; more would fill the memory
+            self._maps[parameter] = made
+        return self._maps[parameter]
 
     def parameter(self, y: np.ndarray) -> float:
         """Return the parameter, nan for a map without."""
@@ -153,7 +160,7 @@ class Problem:
         return np.append(state / self.weight, share)
 
     def passage(self, y: np.ndarray) -> Passage | None:
-        """Return the passage of y; None if the parameter's value is none of a scene or the engine stops."""
+        """Return the passage of y; None if its parameter makes no scene, or the passage has no end or no derivative."""
         return self._passage(y[:-1] * self.weight, self.parameter(y))
 
     def _passage(self, state: np.ndarray, parameter: float) -> Passage | None:
@@ -162,8 +169,8 @@ class Problem:
             passage = self.at(parameter)(state)
         except InputError:
             return None
-        whole = passage.status is not PassageStatus.STOPPED
-        return passage if whole and np.isfinite(passage.state).all() and np.isfinite(passage.derivative).all() else None
+        known = passage.status not in (PassageStatus.STOPPED, PassageStatus.UNDETERMINED)
+        return passage if known and np.isfinite(passage.state).all() and np.isfinite(passage.derivative).all() else None
 
     def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
         """Return by how much an orbit misses itself, scaled (k,)."""
@@ -175,7 +182,7 @@ class Problem:
         Central differences of the passage; where one side has another sequence of events, those of the other side.
         """
         parameter = self.parameter(y)
-        h = _DIFFERENCE * max(abs(parameter), _FLOOR * self.span)
+        h = _DIFFERENCE * max(abs(parameter), _FLOOR * abs(self.span))
         state, known = y[:-1] * self.weight, {0: passage.state}
 
         def side(steps: int) -> np.ndarray | None:

@@ -49,10 +49,10 @@ def change(before: Passage, after: Passage | None) -> tuple[str, str]:
     if after is None:
         near = before.clearance[1]
         slow = min(before.crossings, key=lambda crossing: abs(crossing.speed), default=None)
-        grazing = before.status is PassageStatus.GRAZING or near.startswith("impact")
+        grazing = before.status is PassageStatus.GRAZING or "impact" in near
         name = near or ("" if slow is None else slow.name)
         return ("grazing" if grazing else "sequence"), f"the sequence of events ends, at {name or 'an unknown event'}"
     lost, new = Counter(before.sequence) - Counter(after.sequence), Counter(after.sequence) - Counter(before.sequence)
     words = [f"{name} begins" for name in new] + [f"{name} ceases" for name in lost]
-    kind = "grazing" if any(name.startswith("impact") for name in (*lost, *new)) else "sequence"
+    kind = "grazing" if any("impact" in name for name in (*lost, *new)) else "sequence"
     return kind, ", ".join(words) or "events change their order"

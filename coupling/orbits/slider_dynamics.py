@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag
 
-from vanedamp.coupling.numerics.codes import CLOSED, SLIP_LEFT, SLIP_RIGHT, SPRUNG, STICK
+from vanedamp.coupling.numerics.codes import CLOSED, SPRUNG, STICK, TOUCHING
 from vanedamp.coupling.orbits.saltation import LinearFlow, held
 from vanedamp.coupling.system.system import System
 
@@ -126,15 +126,19 @@ class SliderDynamics:
         """Return the derivative (k, k) of a state that begins with rows at rest: what disturbs them dies out at once.
 
         Slips that stick and gaps that are closed come to rest by forces between the two sides only, which keep their
-        momentum and, of closed gaps, their centre of mass: a projection in the metric of mass.
+        momentum and, of closed gaps, their centre of mass: a projection in the metric of mass. A Jenkins element that
+        slides has its elongation from its bound.
         """
         rows = self.constraints(state)
-        jump = self.closed(rows[rows >= self.system.friction_rows])
+        jump = self.closed(state)
         jump[self.rates, self.rates] = held(self._on_rates[rows])
+        sliding = 2 * len(self.root) + np.flatnonzero(state[self.springs] != SPRUNG)
+        jump[sliding, sliding] = 0.0
         return jump
 
-    def closed(self, rows: np.ndarray) -> np.ndarray:
-        """Return the derivative (k, k) of gaps (m,) that close without time: they keep their centre of mass."""
+    def closed(self, state: np.ndarray) -> np.ndarray:
+        """Return the derivative (k, k) of places whose closed gaps close without time: they keep their centre."""
+        rows = np.flatnonzero((state == CLOSED) | (state == TOUCHING))
         size, jump = len(self.root), np.eye(self.k)
         jump[:size, :size] = self.rate[:, None] * held(self._on_rates[rows]) / self.rate
         return jump
@@ -157,8 +161,3 @@ class SliderDynamics:
                 if body >= 0:
                     travel[body] = system.free_travel[r]
         return travel
-
-
-def slides(state: int) -> bool:
-    """Whether the state of a friction row is a slip with friction."""
-    return state in (SLIP_LEFT, SLIP_RIGHT)

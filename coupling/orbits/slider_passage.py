@@ -21,16 +21,20 @@ from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.numerics.codes import (
     BOUNDED,
     CARRIED,
+    CLOSED,
     CLOSES,
     DONE,
     EVENT_BUDGET,
     EVENTS,
     FLOW,
+    FORCE,
     OPEN,
     PERIOD,
     POSITION,
     ROOT,
     SPRUNG,
+    STICK,
+    TOUCHING,
     VELOCITY,
 )
 from vanedamp.coupling.orbits.passage import Crossing, Passage, PassageStatus
@@ -57,6 +61,10 @@ TANGENTIAL = 1e-12
 
 #: step of the differences that find the slope of a restitution, as a share of the speed
 _STEP = 1e-2
+
+
+#: a force this close to its bound, as a share of its terms, is at it
+_NEAR = 1e-9
 
 
 class _Guard(NamedTuple):
@@ -226,7 +234,7 @@ class _Walk:
         self.status = PassageStatus.OK
         self.size = np.zeros(dynamics.k)
         #: largest derivative so far of each coordinate
-        self.reach = np.zeros(dynamics.k)
+        self.reach = np.abs(dynamics.from_state).max(axis=1)
         #: flow, state and time at the start of the segment that holds the middle of the first period
         self.middle: tuple[LinearFlow, np.ndarray, float] | None = None
         #: saltation matrix of the last event, and when it was
@@ -291,7 +299,41 @@ class _Walk:
         if len(hit):
             self.status = PassageStatus.GRAZING  # an impact at the very start, which another state has a period before
             M = self._jump(hit, dynamics.speed[hit] @ given, dynamics.speed[hit] @ u) @ M
+        if self._loose(u):
+            self.status = PassageStatus.GRAZING
         return u, dynamics.settled(self.run.state.state) @ M
+
+    def _loose(self, u: np.ndarray) -> bool:
+        """Whether a row begins at rest that nothing keeps there: a gap closed without force, a stick at its bound.
+
+        A body that friction and a wall hold at once is kept at the wall by what friction could not hold.
+        """
+        dynamics, system, st = self.dynamics, self.dynamics.system, self.run.state
+        rows = dynamics.constraints(st.state)
+        if not len(rows):
+            return False
+        free = dynamics.free_flow(st.state, st.applied_force).rate(u, 0.0)[dynamics.rates]
+        share = np.array([dynamics.force(st.state, r) for r in rows])
+        force, size = np.array(st.applied_force), np.zeros(len(system.J))
+        force[rows], size[rows] = share @ free, np.abs(share) @ np.abs(free)
+        for r in rows[rows < system.friction_rows]:
+            if abs(force[r]) >= (1.0 - _NEAR) * system.limit[r] and not self._at_wall(r):
+                return True
+        for r in np.flatnonzero((st.state == CLOSED) | (st.state == TOUCHING)):
+            press, held = force[r], 0.0
+            for body in (int(system.left_body[r]), int(system.right_body[r])):
+                if body >= 0 and st.state[body] >= STICK:
+                    press += force[body] * system.J[r, system.modes + body]
+                    held += system.limit[body]
+            if press <= held + _NEAR * max(held, size[rows].max(initial=0.0)):
+                return True
+        return False
+
+    def _at_wall(self, body: int) -> bool:
+        """Whether a gap of a body is closed."""
+        system, state = self.dynamics.system, self.run.state.state
+        beside = (system.left_body == body) | (system.right_body == body)
+        return bool(np.any(beside & ((state == CLOSED) | (state == TOUCHING))))
 
     def _clipped(self) -> np.ndarray:
         """Return the derivative (k, k) of the state that the run begins with: outside of walls and of bounds."""
@@ -369,7 +411,9 @@ class _Walk:
         jump = self._jump(hit, before, st.velocity[hit])
         rate, rate_after = flow.rate(u, time), dynamics.flow(st.state, st.applied_force).rate(after, time)
         kick = rate_after - jump @ rate
-        kick[np.abs(kick) <= 1e-13 * (np.abs(rate_after) + np.abs(rate))] = 0.0
+        # what only reaches its bound is the same on both sides of it, but for the round-off of large terms
+        same = 1e-9 if order == FORCE else 1e-13
+        kick[np.abs(kick) <= same * (np.abs(rate_after) + np.abs(rate))] = 0.0
         size = len(dynamics.root)
         if collides:
             kick[:size] = dynamics.rate * kicked[dynamics.rates]
@@ -404,7 +448,7 @@ class _Walk:
         """
         dynamics, system, cavity = self.dynamics, self.dynamics.system, self.dynamics.cavity
         if not self.run.state.velocity[arrivals].any():
-            return dynamics.closed(np.array(arrivals)) @ jump
+            return dynamics.closed(self.run.state.state) @ jump
         owner = [int(cavity[max(system.left_body[r], system.right_body[r])]) for r in arrivals]
         if system.modes or len(set(owner)) < len(owner):
             self.status = PassageStatus.COINCIDENT

@@ -1,4 +1,4 @@
-"""Period maps with closed forms: normal forms of bifurcations, the Henon map, maps with a kink, an impact oscillator."""
+"""Period maps with closed forms: normal forms of bifurcations, the Henon map, a kink, an impact oscillator."""
 
 from __future__ import annotations
 
