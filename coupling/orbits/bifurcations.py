@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import svd
 from scipy.optimize import brentq
 
-from vanedamp.coupling.orbits.multipliers import decided, tests
+from vanedamp.coupling.orbits.multipliers import decided, indicators
 from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, point_of, with_symmetry
 
 #: share of the parameter to which bifurcations are located
@@ -100,15 +100,15 @@ def _fold(point: Point, neutral: int) -> float:
 
 def _pitchfork(point: Point, neutral: int) -> float:
     """A multiplier passes 1 while the parameter does not turn: the bordered derivative is singular (Keller 1977)."""
-    return tests(point.orbit.multipliers, neutral).unity * float(np.sign(point.tangent[-1]))
+    return indicators(point.orbit.multipliers, neutral).unity * float(np.sign(point.tangent[-1]))
 
 
 def _doubling(point: Point, neutral: int) -> float:
-    return tests(point.orbit.multipliers, neutral).doubling
+    return indicators(point.orbit.multipliers, neutral).doubling
 
 
 def _torus(point: Point, neutral: int) -> float:
-    return tests(point.orbit.multipliers, neutral).torus
+    return indicators(point.orbit.multipliers, neutral).torus
 
 
 #: by kind; the number of neutral multipliers is that of the piece, since at its end one more may be 1

@@ -26,6 +26,7 @@ from vanedamp.coupling.orbits.newton import (
 )
 from vanedamp.coupling.orbits.sequence_changes import change, forecast
 from vanedamp.coupling.scene.orbit import Orbit as Table
+from vanedamp.files.toml_input import InputError
 
 #: corrections of a point before its step is shortened
 _ITERATIONS, _HALVINGS = 8, 3
@@ -130,12 +131,18 @@ class Follower:
         return self._near(head.y + step * head.tangent, head.tangent, head.slope, abs(step))
 
     def _near(self, predicted: np.ndarray, row: np.ndarray, slope: np.ndarray, distance: float) -> Orbit | None:
-        orbit = solve(self.problem, predicted, row, slope, _ITERATIONS, _HALVINGS)
-        self.problem.count["iterations"] += orbit.iterations
-        if orbit.status is not OrbitStatus.OK:
-            return None
-        off = np.linalg.norm(self.problem.pack(orbit.state, orbit.parameter) - predicted)
-        return orbit if off <= distance else None
+        """Return the orbit in the plane through a point; with the slope there, if the one given does not serve."""
+        for renewed in (False, True):
+            if renewed:
+                if (passage := self.problem.passage(predicted)) is None:
+                    return None
+                slope = self.problem.slope(predicted, passage)
+            orbit = solve(self.problem, predicted, row, slope, _ITERATIONS, _HALVINGS)
+            self.problem.count["iterations"] += orbit.iterations
+            if orbit.status is OrbitStatus.OK:
+                off = np.linalg.norm(self.problem.pack(orbit.state, orbit.parameter) - predicted)
+                return orbit if off <= distance else None
+        return None
 
     def _accept(self, trace: Trace, before: Point, point: Point) -> None:
         """Add a point, and the end if it is one."""
@@ -150,10 +157,13 @@ class Follower:
     def _search(self, trace: Trace, before: Point, point: Point) -> bool:
         """Note the bifurcations between two points. Returns whether the branch has ended on one: joined another."""
         for found in bifurcations(self.problem, before, point, self._corrected):
-            self._note(trace, found)
-            if found.kind == "pitchfork" and (why := self._joined(trace, found.orbit)):
+            # where a branch meets its own mirror image it turns, so that it looks like a fold, too
+            turns = found.kind in ("fold", "pitchfork")
+            if turns and (why := self._joined(trace, found.orbit)):
+                self._note(trace, Located(found.orbit, "pitchfork", "branches meet"))
                 self._end(trace, why, found.orbit)
                 return True
+            self._note(trace, found)
         return False
 
     def _joined(self, trace: Trace, orbit: Orbit) -> str:
@@ -199,13 +209,23 @@ class Follower:
         how = ""
         if point is None:
             point, how = self._other_side(last, step)
+        elif point.tangent[-1] * last.tangent[-1] < 0:
+            how = ": the branch turns"
         kind, what = change(last.orbit.passage, None if point is None else point.orbit.passage)
         self._note(trace, Located(last.orbit, kind, f"{what}{how}"))
         if point is None:
-            self._end(trace, f"{what}; no orbit found beyond", last.orbit)
+            self._end(trace, self._refusal(last, step) or f"{what}; no orbit found beyond", last.orbit)
             return
         self._accept(trace, last, point)
         trace.step = max(min(step, self.table.step) / 4, self.table.min_step)
+
+    def _refusal(self, last: Point, step: float) -> str:
+        """Say why values of the parameter beyond a point make no scene; "" if they do."""
+        try:
+            self.problem.at(self.problem.parameter(last.y + step * last.tangent))
+        except InputError as error:
+            return str(error)
+        return ""
 
     def _last(self, head: Point, step: float) -> tuple[Point, Point | None]:
         """Return the last point of the present sequence within a step, and the first beyond it, None if none is near.

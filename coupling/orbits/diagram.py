@@ -157,17 +157,20 @@ class Diagram:
             return None
         parent, follower = self._follower(branch.periods).problem, self._follower(periods)
         problem, y = follower.problem, follower.problem.pack(point.state, point.parameter)
-        here, passage = parent.passage(y), problem.passage(y)
+        here = parent.passage(y)
         regular = parent.passage(parent.pack(branch.state[point.index], float(branch.parameter[point.index])))
-        if here is None or passage is None or regular is None:
+        if here is None or regular is None:
             return None
         scaled = problem.map.scale / problem.map.scale[:, None]
         neutral = null_space(regular.derivative * scaled)
         row = np.append(direction(here.derivative * scaled, point.kind, neutral), 0.0)
-        slope = problem.slope(y, passage)
         for quarters in range(_QUARTERS):
             step = self.table.step / 4.0**quarters
-            orbit = solve(problem, y + step * row, row, slope)
+            start = y + step * row
+            if (passage := problem.passage(start)) is None:
+                continue
+            # the slope at the bifurcation itself says nothing of the other branch
+            orbit = solve(problem, start, row, problem.slope(start, passage))
             problem.count["iterations"] += orbit.iterations
             if orbit.status is OrbitStatus.OK:
                 onward = problem.pack(orbit.state, orbit.parameter) - y

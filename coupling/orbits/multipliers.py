@@ -14,7 +14,7 @@ NULL = 1e-10
 _UNITY = 1e-6
 
 
-class Tests(NamedTuple):
+class Indicators(NamedTuple):
     """Test functions of an orbit: each changes its sign at a bifurcation, and is linear in the parameter there.
 
     unity: of real multipliers that pass 1 (folds and pitchforks); doubling: that pass -1; torus: of pairs that pass the
@@ -48,11 +48,11 @@ def decided(values: np.ndarray, neutral: int) -> np.ndarray:
     return values[np.argsort(np.abs(values - 1.0), kind="stable")[neutral:]]
 
 
-def tests(values: np.ndarray, neutral: int) -> Tests:
+def indicators(values: np.ndarray, neutral: int) -> Indicators:
     """Return the test functions of an orbit by its multipliers."""
     rest = decided(values, neutral)
     pairs = [one * other - 1.0 for one, other in itertools.combinations(rest, 2)]
-    return Tests(_signed(rest - 1.0), _signed(rest + 1.0), _signed(np.array(pairs)))
+    return Indicators(_signed(rest - 1.0), _signed(rest + 1.0), _signed(np.array(pairs)))
 
 
 def _signed(factors: np.ndarray) -> float:

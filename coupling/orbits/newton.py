@@ -23,8 +23,8 @@ from vanedamp.files.toml_input import InputError
 
 #: scaled length of a Newton step after which the orbit is known to round-off, because its square is
 _SMALL = 1e-8
-#: scaled residual of an orbit whose map is known to round-off only: chaotic ones lose that many digits
-_RESIDUAL = 1e-9
+#: scaled residual of an orbit, over the size of its map's derivative, which is what round-off of the state grows by
+_RESIDUAL = 1e-13
 #: relative step of differences in the parameter: a map known to some 1e-14, over which its third derivative is of
 #: order one, has the smallest error (some 1e-9) at the cube root
 _DIFFERENCE = 3e-5
@@ -221,7 +221,7 @@ def solve(
 ) -> Orbit:
     """Return the orbit in the plane through `start` (k + 1,) normal to `row` (k + 1,).
 
-    slope: derivative of the residual by the parameter (k,), near the orbit: it is not renewed on the way.
+    slope: derivative of the residual by the parameter (k,), near the orbit: the steps mend it on the way.
     Steps are least squares of least norm, so that neutral coordinates stay where they are; a step that does not lessen
     the residual, such as one into another sequence of events, is halved.
     """
@@ -229,6 +229,7 @@ def solve(
     if passage is None:
         return _stopped(problem, start)
     residual, status, count = problem.residual(y, passage), OrbitStatus.NOT_CONVERGED, 0
+    relative = problem.map.scale / problem.map.scale[:, None]
     for count in range(1, iterations + 1):  # noqa: B007
         right = np.append(-residual, -row @ (y - start))
         step = _solved(bordered(problem, passage, slope, row), right)
@@ -240,9 +241,13 @@ def solve(
         if taken is None:
             status = OrbitStatus.FORBIDDEN if changed else status
             break
+        moved = taken[0] - y
         y, passage, residual = taken
-        if last:
-            status = OrbitStatus.OK if np.abs(residual).max(initial=0.0) <= _RESIDUAL * size else status
+        # what an exact slope would have left is of second order (Broyden's update, of this column only)
+        slope = slope + residual * (moved[-1] / max(float(moved @ moved), np.finfo(float).tiny))
+        missed = float(np.abs(residual).max(initial=0.0))
+        if last and missed <= _RESIDUAL * size * (1.0 + float(np.abs(passage.derivative * relative).max(initial=0.0))):
+            status = OrbitStatus.OK
             break
     missed, scale = float(np.abs(residual).max(initial=0.0)) * math.sqrt(problem.size), problem.map.scale
     return Orbit(

@@ -67,6 +67,10 @@ _STEP = 1e-2
 _NEAR = 1e-9
 
 
+#: share of a coordinate's typical size that counts as its size where it hardly moves
+_LEAST = 1e-6
+
+
 class _Guard(NamedTuple):
     """An event function before its event: gradient (k,), rate and second derivative in time, scale."""
 
@@ -128,7 +132,7 @@ class SliderMap:
         return passage
 
     def _walk(self, state: np.ndarray) -> _Walk:
-        walk = _Walk(self._dynamics, self._names_of_rows, self.restart_of(state), self.periods)
+        walk = _Walk(self._dynamics, self._names_of_rows, self.restart_of(state), self.periods, self.scale)
         if self._flows:
             walk.run.flows = self._flows[0]
         return walk
@@ -222,7 +226,9 @@ def _sizes(dynamics: SliderDynamics) -> np.ndarray:
 class _Walk:
     """One passage on its way: the engine's run, and the derivative of its state so far."""
 
-    def __init__(self, dynamics: SliderDynamics, names: RowNames, start: RestartState, periods: int) -> None:
+    def __init__(
+        self, dynamics: SliderDynamics, names: RowNames, start: RestartState, periods: int, scale: np.ndarray
+    ) -> None:
         self.dynamics, self.names, self.periods = dynamics, names, periods
         system = dynamics.system
         self.start = start
@@ -232,7 +238,8 @@ class _Walk:
         self.crossings: list[Crossing] = []
         self.clearance = (np.inf, "")
         self.status = PassageStatus.OK
-        self.size = np.zeros(dynamics.k)
+        #: size of each coordinate so far, and least one that it is compared by
+        self.size = _LEAST * np.abs(dynamics.from_state) @ scale
         #: largest derivative so far of each coordinate
         self.reach = np.abs(dynamics.from_state).max(axis=1)
         #: flow, state and time at the start of the segment that holds the middle of the first period
@@ -296,9 +303,10 @@ class _Walk:
         ]  # fmt: skip
         u, hit = self._state(), np.flatnonzero(self.run.scratch.impulse)
         M = dynamics.from_state @ self._clipped()
-        if len(hit):
+        before, left = dynamics.speed[hit] @ given, dynamics.speed[hit] @ u
+        if np.any(np.abs(before) > 1e-12 * np.abs(dynamics.speed[hit]) @ np.abs(given)):
             self.status = PassageStatus.GRAZING  # an impact at the very start, which another state has a period before
-            M = self._jump(hit, dynamics.speed[hit] @ given, dynamics.speed[hit] @ u) @ M
+            M = self._jump(hit, before, left) @ M
         if self._loose(u):
             self.status = PassageStatus.GRAZING
         return u, dynamics.settled(self.run.state.state) @ M
@@ -373,9 +381,10 @@ class _Walk:
 
     def _agreed(self, predicted: np.ndarray) -> np.ndarray:
         """Return the engine's state. Raises Untrusted if the prediction is another."""
-        u = self._state()
-        size = np.maximum(np.abs(u), np.abs(predicted))
-        half = len(self.dynamics.root)
+        u, dynamics = self._state(), self.dynamics
+        # a body's place is slip plus structure, which may cancel
+        size = np.abs(dynamics.from_state) @ np.abs(dynamics.to_state @ u)
+        half = len(dynamics.root)
         # a coordinate and its rate have one size, since either may pass through zero
         size[:half] = size[half : 2 * half] = np.maximum(size[:half], size[half : 2 * half])
         self.size = np.maximum(self.size, size)

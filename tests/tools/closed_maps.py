@@ -44,7 +44,7 @@ class ClosedMap:
 
     def at(self, value: float) -> ClosedMap:
         if value < self.lowest:
-            raise InputError(f"scene: value: {value:g} is too small")
+            raise InputError(f"scene: value: {self.lowest:g} is the least")
         return replace(self, value=value)
 
     def over(self, periods: int) -> ClosedMap:
@@ -79,6 +79,27 @@ def resting(x: np.ndarray, a: float) -> tuple:
     derivative = np.eye(4)
     derivative[0, 0], derivative[2, 3] = 1 - 2 * x[0], 3.0
     return [x[0] + a - x[0] ** 2, *flight], derivative
+
+
+def drifting(x: np.ndarray, a: float) -> tuple:
+    """Return a body that moves on by 0.1 in every period, wherever it is."""
+    return [x[0] + 0.1, 0.5 * x[1]], [[1.0, 0.0], [0.0, 0.5]]
+
+
+def isola(x: np.ndarray, a: float) -> tuple:
+    """Return a map whose orbits lie on the unit circle of state and parameter."""
+    return [x[0] + 0.5 * (1 - a * a - x[0] ** 2)], [[1 - x[0]]]
+
+
+def cliff() -> ClosedMap:
+    """Return the map whose orbit x = a runs into an event at x = 0.3, after which all is thrown far away."""
+
+    def step(x: np.ndarray, a: float) -> tuple:
+        if x[0] > 0.3:
+            return 0.5 * x + 0.5 * a - 40.0, np.array([[0.5]]), (Crossing(0.5, "sticks 0", 1.0, 0.0),), (math.inf, "")
+        return 0.5 * x + 0.5 * a, np.array([[0.5]]), (), (float(0.3 - x[0]), "sticks 0")
+
+    return ClosedMap(step, np.ones(1))
 
 
 def kinked(left: float, right: float) -> ClosedMap:
