@@ -7,6 +7,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import barycentric_interpolate
 from scipy.linalg import svd
 from scipy.optimize import brentq
 
@@ -39,11 +40,11 @@ class _Lost(Exception):
 
 
 def bifurcations(
-    problem: Problem, before: Point, after: Point, corrected: Callable[[Point, float], Orbit | None]
+    problem: Problem, before: Point, after: Point, near: Callable[[np.ndarray], Orbit | None]
 ) -> Iterator[Located]:
     """Yield the bifurcations between two points whose orbits have one sequence of events, in order of arclength.
 
-    corrected: returns the orbit at an arclength from a point, None if there is none.
+    near: returns the orbit in the plane through a y (k + 1,), normal to the first tangent; None if there is none.
     """
     if before.orbit.neutral != after.orbit.neutral:
         return
@@ -54,7 +55,7 @@ def bifurcations(
         low, high = function(before), function(after)
         if low * high >= 0.0:
             continue
-        located = _root(problem, before, length, function, corrected, max(abs(low), abs(high)))
+        located = _root(problem, before, after, function, near, max(abs(low), abs(high)))
         if located is not None and (kind != "neimark-sacker" or _on_circle(located[1].orbit, neutral)):
             found.append((located[0], kind, located[1]))
     meeting = [at for at, kind, _ in found if kind == "pitchfork"]
@@ -71,15 +72,21 @@ def _note(problem: Problem, kind: str, point: Point) -> str:
 
 
 def _root(
-    problem: Problem, before: Point, length: float, function: Callable[[Point], float],
-    corrected: Callable[[Point, float], Orbit | None], size: float,
+    problem: Problem, before: Point, after: Point, function: Callable[[Point], float],
+    near: Callable[[np.ndarray], Orbit | None], size: float,
 ) -> tuple[float, Point] | None:  # fmt: skip
-    """Return arclength and point of a test function's zero; None if it jumps."""
-    points: dict[float, Point] = {0.0: before}
+    """Return arclength and point of a test function's zero; None if it jumps.
+
+    Orbits are looked for on the parabola through the three nearest that are known: close to a branch point Newton's
+    method, whose derivative is singular there, has only a small part of its way left for it.
+    """
+    length = float((after.y - before.y) @ before.tangent)
+    points: dict[float, Point] = {0.0: before, length: after}
 
     def value(at: float) -> float:
         if at not in points:
-            orbit = corrected(before, at)
+            known = sorted(points, key=lambda other: abs(other - at))[:3]
+            orbit = near(barycentric_interpolate(known, [points[other].y for other in known], at))
             if orbit is None or orbit.passage.sequence != before.orbit.passage.sequence:
                 raise _Lost
             points[at] = point_of(problem, orbit, before.tangent)

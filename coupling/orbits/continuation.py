@@ -156,7 +156,12 @@ class Follower:
 
     def _search(self, trace: Trace, before: Point, point: Point) -> bool:
         """Note the bifurcations between two points. Returns whether the branch has ended on one: joined another."""
-        for found in bifurcations(self.problem, before, point, self._corrected):
+        length = float(np.linalg.norm(point.y - before.y))
+
+        def near(predicted: np.ndarray) -> Orbit | None:
+            return self._near(predicted, before.tangent, before.slope, length)
+
+        for found in bifurcations(self.problem, before, point, near):
             # where a branch meets its own mirror image it turns, so that it looks like a fold, too
             turns = found.kind in ("fold", "pitchfork")
             if turns and (why := self._joined(trace, found.orbit)):
