@@ -24,6 +24,7 @@ from vanedamp.coupling.orbits.newton import (
     tangent_of,
     with_symmetry,
 )
+from vanedamp.coupling.orbits.period_start import past_the_start
 from vanedamp.coupling.orbits.sequence_changes import change, forecast
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
@@ -212,6 +213,8 @@ class Follower:
         if last is not head and self._search(trace, head, last):
             return
         how = ""
+        if point is None:
+            point, how = past_the_start(self.problem, last, self._near), " at the start of the period"
         if point is None:
             point, how = self._other_side(last, step)
         elif point.tangent[-1] * last.tangent[-1] < 0:

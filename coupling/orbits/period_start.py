@@ -1,0 +1,42 @@
+"""Branches on which an event passes the start of the period.
+
+There the state at the start jumps, by what the event does, while the orbit goes on as if nothing had happened. The state
+on the other side is how a passage ends that begins a little beside the last orbit: the event, which comes at either end
+of that, is then inside of the period at one end, and outside at the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, point_of
+
+#: scaled distances from the last orbit, and how much farther a state is that has jumped
+_BESIDE, _FARTHER = (1e-8, 1e-7, 1e-6, 1e-5), 1e3
+
+
+def past_the_start(
+    problem: Problem, last: Point, near: Callable[[np.ndarray, np.ndarray, np.ndarray, float], Orbit | None]
+) -> Point | None:
+    """Return an orbit of the branch beyond its last one, before which an event is at the start; None if none is found.
+
+    near: returns the orbit in the plane through y (k + 1,) normal to a row (k + 1,), by the slope there (k,), within a
+    distance; None if there is none.
+    """
+    ahead = np.append(np.zeros(problem.size), np.sign(last.tangent[-1]))
+    for size in _BESIDE:
+        for direction in (*np.eye(problem.size), *-np.eye(problem.size)):
+            y = last.y + size * (np.append(direction, 0.0) + ahead)
+            passage = problem.passage(y)
+            if passage is None:
+                continue
+            image = problem.pack(passage.state, problem.parameter(y))
+            beyond = problem.passage(image) if np.linalg.norm(image - y) > _FARTHER * size else None
+            if beyond is None:
+                continue
+            orbit = near(image, ahead, problem.slope(image, beyond), _FARTHER * size)
+            if orbit is not None:
+                return point_of(problem, orbit, ahead)
+    return None
