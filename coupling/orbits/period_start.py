@@ -1,8 +1,8 @@
 """Branches on which an event passes the start of the period.
 
-There the state at the start jumps, by what the event does, while the orbit goes on as if nothing had happened. The state
-on the other side is how a passage ends that begins a little beside the last orbit: the event, which comes at either end
-of that, is then inside of the period at one end, and outside at the other.
+There the state at the start jumps, by what the event does, while the orbit goes on as if nothing had happened. The
+state on the other side is how a passage ends that begins a little beside the last orbit: the event, which comes at both
+of its ends, is then inside of the period at one end and outside at the other.
 """
 
 from __future__ import annotations
