@@ -2,8 +2,8 @@
 
 Between events the period map is smooth, and so is a branch as long as the sequence of events along the orbit stays.
 Where the sequence changes a branch may have a kink, turn back or end. That point is located from the side where the
-branch comes from; then an orbit of the other sequence is looked for: along the branch, along the tangent that the map
-has on the other side, in both directions, and in the images of both (an event that passes the start of the period).
+branch comes from; then an orbit of the other sequence is looked for: along the branch, in the direction in which the
+event grows, and in the image of both (an event that passes the start of the period).
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import svd
+from scipy.optimize import brentq
 
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
 from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
@@ -19,11 +21,14 @@ from vanedamp.coupling.orbits.newton import (
     OrbitStatus,
     Point,
     Problem,
+    bordered,
+    least_squares,
     point_of,
     solve,
     tangent_of,
     with_symmetry,
 )
+from vanedamp.coupling.orbits.passage import Passage
 from vanedamp.coupling.orbits.period_start import past_the_start
 from vanedamp.coupling.orbits.sequence_changes import change, forecast
 from vanedamp.coupling.scene.orbit import Orbit as Table
@@ -37,6 +42,8 @@ _QUICK, _STRAIGHT, _BENT = 3, 0.985, 0.9
 _SAME = 1e-4
 #: relative error of the parameter where the sequence changes
 _CLOSE = 1e-10
+#: how often the search for the place of a new event is widened
+_WIDENINGS = 6
 #: attempts at the place of a change of sequence, at least every third one a bisection
 _ATTEMPTS = 120
 
@@ -217,8 +224,8 @@ class Follower:
             point, how = past_the_start(self.problem, last, self._near), " at the start of the period"
         if point is None:
             point, how = self._other_side(last, step)
-        elif point.tangent[-1] * last.tangent[-1] < 0:
-            how = ": the branch turns"
+        if point is not None and point.tangent[-1] * last.tangent[-1] < 0:
+            how += ": the branch turns"
         kind, what = change(last.orbit.passage, None if point is None else point.orbit.passage)
         self._note(trace, Located(last.orbit, kind, f"{what}{how}"))
         if point is None:
@@ -268,20 +275,16 @@ class Follower:
     def _other_side(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
         sequence = last.orbit.passage.sequence
-        for size in step * 10.0 ** np.arange(-4.0, 1.0):
+        for size in self.table.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
             y = last.y + size * last.tangent
             passage = self.problem.passage(y)
             if passage is None:
                 continue
             if passage.sequence != sequence:
-                # the map's derivative on the other side, where the branch's continuation is no orbit
-                slope = self.problem.slope(y, passage)
-                row = tangent_of(self.problem, passage, slope, last.tangent)
-                for sign in (1.0, -1.0):
-                    orbit = self._near(last.y + sign * size * row, sign * row, slope, size)
-                    if orbit is not None and orbit.passage.sequence != sequence:
-                        turned = sign * row[-1] * last.tangent[-1] < 0
-                        return point_of(self.problem, orbit, sign * row), ": the branch turns" if turned else ""
+                orbit = self._beside(last, y, passage)
+                if orbit is not None:
+                    away = self.problem.pack(orbit.state, orbit.parameter) - last.y
+                    return point_of(self.problem, orbit, away / np.linalg.norm(away)), ""
             # an event that passes the start of the period changes the state there, as the passage's end shows
             image = self.problem.pack(passage.state, self.problem.parameter(y))
             if np.linalg.norm(image - y) > 100 * size and (found := self.problem.passage(image)) is not None:
@@ -294,3 +297,57 @@ class Follower:
             if orbit is not None:
                 return point_of(self.problem, orbit, last.tangent), f", stepped over by {factor * step:.2g}"
         return None, ""
+
+    def _beside(self, last: Point, y: np.ndarray, passage: Passage) -> Orbit | None:
+        """Return an orbit of another sequence that begins where the present one ends; None if none is found.
+
+        y, passage: beyond the end, along the tangent. The new event adds v k to the residual, k a direction and v a
+        measure of the event, such as the speed of a grazing impact: a root of the distance along the tangent, so that
+        orbits lie at last.y + v alpha to first order, (D - 1) alpha = k, where alpha does not change that distance
+        (Nordmark 1991). What is of second order, as that distance is, is a root along the tangent.
+        """
+        problem, sequence = self.problem, last.orbit.passage.sequence
+        residual = problem.residual(y, passage)
+        kick = float(np.linalg.norm(residual))
+        there = bordered(problem, passage, problem.slope(y, passage), last.tangent)
+        here = bordered(problem, last.orbit.passage, last.slope, last.tangent)
+        here[-1] = svd(there - here)[2][0]
+        if kick == 0.0:
+            return None
+        alpha = least_squares(here, np.append(-residual / kick, 0.0))
+        length, away = float(np.linalg.norm(alpha)), float(np.linalg.norm(y - last.y))
+        for share in (1e-3, 1e-2, 1e-1, 1.0):
+            measure = share * self.table.step / length
+            distance = self._root(
+                last, last.y + measure * alpha, away * min(measure / kick, (measure / kick) ** 2), residual
+            )
+            if distance is None:
+                continue
+            start = last.y + measure * alpha + distance * last.tangent
+            found = problem.passage(start)
+            if found is None:
+                continue
+            orbit = self._near(start, alpha / length, problem.slope(start, found), 2 * length * measure)
+            if orbit is not None and orbit.passage.sequence != sequence:
+                return orbit
+        return None
+
+    def _root(self, last: Point, base: np.ndarray, distance: float, residual: np.ndarray) -> float | None:
+        """Return how far along the tangent from `base` the residual has no part in another; None if nowhere near."""
+
+        def part(at: float) -> float:
+            passage = self.problem.passage(base + at * last.tangent)
+            return (
+                np.nan
+                if passage is None
+                else float(residual @ self.problem.residual(base + at * last.tangent, passage))
+            )
+
+        for _ in range(_WIDENINGS):
+            if part(-distance) * part(distance) < 0.0:
+                try:
+                    return float(brentq(part, -distance, distance, xtol=1e-3 * distance, maxiter=60))
+                except ValueError:
+                    return None
+            distance *= 10
+        return None

@@ -28,6 +28,8 @@ _RESIDUAL = 1e-13
 #: relative step of differences in the parameter: a map known to some 1e-14, over which its third derivative is of
 #: order one, has the smallest error (some 1e-9) at the cube root
 _DIFFERENCE = 3e-5
+#: by which steps are shortened where the passage is not smooth over them, and how far from straight it may be
+_SHRINKS, _BEND = (1.0, 1e-2, 1e-4, 1e-6), 1e-2
 #: smallest size of a parameter, as a share of the branch's range, that its differences are relative to
 _FLOOR = 1e-3
 #: scaled distance of an orbit from its mirror image
@@ -179,33 +181,24 @@ class Problem:
     def slope(self, y: np.ndarray, passage: Passage) -> np.ndarray:
         """Return the derivative of the residual by the scaled parameter (k,).
 
-        Central differences of the passage; where one side has another sequence of events, those of the other side.
+        Central differences of the passage, over steps that shrink as long as the sequence of events changes within
+        them, or the passage bends as it does near a grazing impact; where one side stays another motion, one-sided.
         """
         parameter = self.parameter(y)
-        h = _DIFFERENCE * max(abs(parameter), _FLOOR * abs(self.span))
-        state, known = y[:-1] * self.weight, {0: passage.state}
-
-        def side(steps: int) -> np.ndarray | None:
-            found = self._passage(state, parameter + steps * h)
-            if found is None or found.sequence != passage.sequence:
-                return None
-            known[steps] = found.state
-            return found.state
-
-        above, below = side(1), side(-1)
-        if above is not None and below is not None:
-            difference = (above - below) / (2 * h)
-        else:
-            sign = 1 if above is not None else -1
-            near = known.get(sign)
-            far = None if near is None else side(2 * sign)
-            if near is None:
-                return np.zeros(self.size)
-            step = sign * h
-            difference = (near - passage.state) / step
-            if far is not None:
-                difference = (4 * near - 3 * passage.state - far) / (2 * step)
-        return np.asarray(difference / self.weight * self.span)
+        state, here = y[:-1] * self.weight, passage.state
+        known = 1e3 * np.finfo(float).eps * np.abs(here)
+        found = None
+        for shrink in _SHRINKS:
+            h = shrink * _DIFFERENCE * max(abs(parameter), _FLOOR * abs(self.span))
+            sides = [self._passage(state, parameter + way * h) for way in (1, -1)]
+            above, below = (side.state if side and side.sequence == passage.sequence else None for side in sides)
+            if above is not None and below is not None:
+                found = (above - below) / (2 * h)
+                if np.all(np.abs(above - 2 * here + below) <= _BEND * np.abs(above - below).max() + known):
+                    break
+            elif found is None and (above is not None or below is not None):
+                found = (above - here) / h if above is not None else (here - below) / h
+        return np.zeros(self.size) if found is None else np.asarray(found / self.weight * self.span)
 
 
 def find_orbit(period_map: PeriodMap, start: np.ndarray) -> Orbit:
@@ -232,7 +225,7 @@ def solve(
     relative = problem.map.scale / problem.map.scale[:, None]
     for count in range(1, iterations + 1):  # noqa: B007
         right = np.append(-residual, -row @ (y - start))
-        step = _solved(bordered(problem, passage, slope, row), right)
+        step = least_squares(bordered(problem, passage, slope, row), right)
         size = 1.0 + float(np.linalg.norm(y))
         last = float(np.linalg.norm(step)) <= _SMALL * size
         taken, changed = _taken(
@@ -291,7 +284,7 @@ def bordered(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndar
 
 def tangent_of(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndarray) -> np.ndarray:
     """Return the unit tangent of the branch (k + 1,), on the side of `row`, without a share of neutral coordinates."""
-    tangent = _solved(bordered(problem, passage, slope, row), np.append(np.zeros(problem.size), 1.0))
+    tangent = least_squares(bordered(problem, passage, slope, row), np.append(np.zeros(problem.size), 1.0))
     length = float(np.linalg.norm(tangent))
     return tangent / length if length > 0.0 else row
 
@@ -303,7 +296,8 @@ def point_of(problem: Problem, orbit: Orbit, row: np.ndarray) -> Point:
     return Point(y, orbit, slope, tangent_of(problem, orbit.passage, slope, row))
 
 
-def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def least_squares(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the solution (k + 1,) of least norm, in which neutral coordinates do not move."""
     solution = lstsq(matrix, right, cond=NULL, check_finite=False)[0]
     return np.asarray(solution)
 

@@ -8,6 +8,7 @@ Mechanical Systems, 2004, chapter 7).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import expm
@@ -36,20 +37,83 @@ class LinearFlow:
         drift: np.ndarray = ((1j * self.frequency * np.exp(1j * self.frequency * time)) @ self.wave).real
         return drift
 
+    @cached_property
+    def size(self) -> float:
+        """The constant 1 as a state, so large that its column in `generator` is no larger than A."""
+        load = max(np.abs(self.constant).max(initial=0.0), np.abs(self.wave).max(initial=0.0))
+        return float(load / np.abs(self.A).max(initial=0.0)) or 1.0
+
+    @cached_property
+    def generator(self) -> np.ndarray:
+        """A (K, K) of the states (u, 1, cosines, sines), the latter times `size`: the flow without its loads."""
+        k, e = len(self.constant), len(self.frequency)
+        whole = np.zeros((k + 1 + 2 * e, k + 1 + 2 * e))
+        loads = np.hstack([self.constant[:, None], self.wave.real.T, -self.wave.imag.T])
+        whole[:k, :k], whole[:k, k:] = self.A, loads / self.size
+        turning, cosine, sine = np.diag(self.frequency), slice(k + 1, k + 1 + e), slice(k + 1 + e, None)
+        whole[cosine, sine], whole[sine, cosine] = -turning, turning
+        return whole
+
+    def extended(self, state: np.ndarray, time: float) -> np.ndarray:
+        """Return the state (K,) of `generator`."""
+        turn = np.exp(1j * self.frequency * time)
+        return np.concatenate([state, [self.size], self.size * turn.real, self.size * turn.imag])
+
     def propagate(self, state: np.ndarray, time: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the state (k,) after a duration and its derivative (k, k) with respect to the state before."""
-        k, turn = len(state), np.exp(1j * self.frequency * time)
-        # constant and harmonics are states as well, so large that their columns are no larger than A
-        size = max(np.abs(self.constant).max(initial=0.0), np.abs(self.wave).max(initial=0.0))
-        size = size / max(np.abs(self.A).max(initial=0.0), 1.0 / max(duration, 1e-300)) or 1.0
-        e = len(self.frequency)
-        whole = np.zeros((k + 1 + 2 * e, k + 1 + 2 * e))
-        whole[:k, :k], whole[:k, k] = self.A, self.constant / size
-        whole[:k, k + 1 : k + 1 + e], whole[:k, k + 1 + e :] = self.wave.real.T / size, -self.wave.imag.T / size
-        turning = np.diag(self.frequency)
-        whole[k + 1 : k + 1 + e, k + 1 + e :], whole[k + 1 + e :, k + 1 : k + 1 + e] = -turning, turning
-        power = expm(whole * duration)
-        return power[:k] @ np.r_[state, size, size * turn.real, size * turn.imag], power[:k, :k]
+        k, power = len(state), expm(self.generator * duration)
+        return power[:k] @ self.extended(state, time), power[:k, :k]
+
+    def least(
+        self, functionals: np.ndarray, state: np.ndarray, time: float, duration: float, step: float
+    ) -> tuple[float, int]:
+        """Return the smallest minimum within a duration of functionals (m, K) of the extended state, and which it is.
+
+        Minima between points a step apart, at most, are found by their slopes, where these pass through zero more
+        than round-off; (inf, -1) without any.
+        """
+        steps = max(int(np.ceil(duration / step)), 2)
+        step = duration / steps
+        power, motion = expm(self.generator * step), np.empty((steps + 1, len(self.generator)))
+        motion[0] = self.extended(state, time)
+        for i in range(steps):
+            motion[i + 1] = power @ motion[i]
+        slopes = functionals @ self.generator
+        value, slope = functionals @ motion.T, slopes @ motion.T
+        noise = 1e-9 * np.abs(slopes) @ np.abs(motion).max(axis=0)
+        which, cell = np.nonzero((slope[:, :-1] < -noise[:, None]) & (slope[:, 1:] > noise[:, None]))
+        if not len(which):
+            return np.inf, -1
+        # where the slope's chord vanishes, for a choice; then Newton's method on the motion itself
+        one, other = slope[which, cell], slope[which, cell + 1]
+        share = one / (one - other)
+        best = int(np.argmin(value[which, cell] + 0.5 * one * share * step))
+        row, at, low, high = int(which[best]), float(share[best] * step), 0.0, step
+        for _ in range(8):
+            now = expm(self.generator * at) @ motion[cell[best]]
+            tilt, bend = float(slopes[row] @ now), float(slopes[row] @ self.generator @ now)
+            low, high = (at, high) if tilt < 0.0 else (low, at)
+            move = at - tilt / bend if bend > 0.0 else low
+            if abs(move - at) <= 1e-12 * step:
+                break
+            at = move if low < move < high else 0.5 * (low + high)
+        return float(functionals[row] @ now), row
+
+
+def saltation(
+    jump: np.ndarray, before: np.ndarray, after: np.ndarray, gradient: np.ndarray, speed: float
+) -> np.ndarray:
+    """Return the derivative (k, k) across an event: jump + (after - jump before) gradient^T / speed.
+
+    jump: (k, k), derivative of the state after the event with respect to that before, at a fixed time; before, after:
+    (k,) rates of the state on both sides; gradient: (k,) of the event function; speed: its whole rate before the event.
+    """
+    return kicked(jump, after - jump @ before, gradient, speed)
+
+
+def kicked(jump: np.ndarray, kick: np.ndarray, gradient: np.ndarray, speed: float) -> np.ndarray:
+    """Return the same from the kick (k,) after - jump before, where it is known better than as a difference."""
+    return jump + np.multiply.outer(kick / speed, gradient)
 
 
 def held(rows: np.ndarray) -> np.ndarray:

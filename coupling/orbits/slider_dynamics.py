@@ -12,9 +12,22 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag
 
-from vanedamp.coupling.numerics.codes import CLOSED, SPRUNG, STICK, TOUCHING
+from vanedamp.coupling.numerics.codes import (
+    CLOSED,
+    FORCE,
+    OPEN,
+    POSITION,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    SPRUNG,
+    STICK,
+    TOUCHING,
+    VELOCITY,
+)
 from vanedamp.coupling.orbits.saltation import LinearFlow, held
+from vanedamp.coupling.system.linear_response import glued_mass
 from vanedamp.coupling.system.system import System
+from vanedamp.files.store import frozen
 
 
 class SliderDynamics:
@@ -22,10 +35,10 @@ class SliderDynamics:
 
     scale: displacement per modal coordinate (system.assembly.physical_scale). place, speed: (r, k) functionals of u,
     displacement less rest and velocity of each row; springs: rows of Jenkins elements; to_state, from_state: (k, k)
-    between u and the state of the contract (orbits.passage).
+    between u and the state of the contract (orbits.passage); sizes: (k,) of that state in a typical motion.
     """
 
-    def __init__(self, system: System, scale: float) -> None:
+    def __init__(self, system: System, scale: float, sizes: np.ndarray | None = None) -> None:
         self.system, self.scale = system, scale
         n, b, size = system.modes, system.bodies, system.modes + system.bodies
         friction = np.arange(len(system.J)) < system.friction_rows
@@ -40,6 +53,7 @@ class SliderDynamics:
         self.place = np.hstack([self._on_rates / self.rate, 0 * self._on_rates, none])
         self.speed = np.hstack([0 * self._on_rates, self._on_rates, none])
         self._flows: dict[bytes, LinearFlow] = {}
+        self._distances: dict[bytes, tuple[np.ndarray, list[int], list[int]]] = {}
         # (displacement, velocity, slip, slip velocity, elongation) from (p, x, p', x', elongation)
         relative = np.block([[np.eye(n) * scale, np.zeros((n, b))], [-system.floor, np.eye(b)]])
         absolute = np.block([[np.eye(n) / scale, np.zeros((n, b))], [system.floor / scale, np.eye(b)]])
@@ -47,7 +61,30 @@ class SliderDynamics:
         order = np.r_[0:n, size : size + n, n:size, size + n : 2 * size, 2 * size : self.k]
         springs = np.eye(len(self.springs))
         self.to_state = (block_diag(relative, relative, springs) * units)[order]
+        self.sizes = self._typical_sizes() if sizes is None else sizes
         self.from_state = (block_diag(absolute, absolute, springs) / units[:, None])[:, order]
+
+    def glued_amplitude(self) -> np.ndarray:
+        """Return the complex amplitudes (e, n) of p with all bodies at rest on their floors."""
+        system = self.system
+        modes, bodies = system.of_structure, system.of_bodies
+        load = modes.load + bodies.load @ system.floor
+        omega = system.frequency[:, None, None]
+        dynamic = np.diag(modes.stiffness) + 1j * omega * modes.damping - omega**2 * glued_mass(system)
+        amplitude: np.ndarray = np.linalg.solve(dynamic, load[:, :, None])[:, :, 0]
+        return amplitude
+
+    def _typical_sizes(self) -> np.ndarray:
+        """Return sizes (k,) of the coordinates: linear response, free travel, and these times omega."""
+        system, omega = self.system, self.system.omega
+        reach = self.scale * np.abs(self.glued_amplitude()).sum(axis=0)
+        travel = np.r_[self.free_travel, system.free_travel[system.friction_rows :]]
+        travel = travel[np.isfinite(travel) & (travel > 0)]
+        # a structure that nothing excites moves by its start and the bodies
+        largest = reach.max(initial=0.0) or float(travel.max(initial=0.0)) or 1.0
+        reach = np.maximum(reach, 1e-6 * largest)
+        springs = system.limit[self.springs] / system.spring[self.springs]
+        return frozen(np.r_[reach, omega * reach, self.free_travel, omega * self.free_travel, springs])
 
     @property
     def rates(self) -> slice:
@@ -91,6 +128,55 @@ class SliderDynamics:
         wave = np.zeros((len(system.frequency), self.k), complex)
         wave[:, rates] = system.load / self.root
         return LinearFlow(A, constant, wave, system.frequency)
+
+    def distances(self, state: np.ndarray, applied: np.ndarray) -> tuple[np.ndarray, list[int], list[int]]:
+        """Return functionals (m, K) of the extended state that do not vanish before an event, their rows and orders.
+
+        Each as a share of its scale: gaps of the free travel, speeds of a typical one, forces of their bound, or of the
+        terms that they are sums of.
+        """
+        key = state.tobytes() + applied.tobytes()
+        if key not in self._distances:
+            self._distances[key] = self._list_distances(state, applied)
+        return self._distances[key]
+
+    def _list_distances(self, state: np.ndarray, applied: np.ndarray) -> tuple[np.ndarray, list[int], list[int]]:
+        system, flow, found = self.system, self.flow(state, applied), []
+        width = len(flow.generator)
+        free = self.free_flow(state, applied)
+        free_rates = free.generator[self.rates] * np.r_[np.ones(self.k), np.full(width - self.k, free.size / flow.size)]
+        one = np.eye(width)[self.k] / flow.size
+        wide = np.zeros((len(state), width - self.k))
+        place, speed = np.hstack([self.place, wide]), np.hstack([self.speed, wide])
+        for r, kind in enumerate(state):
+            friction = r < system.friction_rows
+            if kind in (SLIP_LEFT, SLIP_RIGHT):
+                found.append((kind * speed[r] / self.typical_speed[r], r, VELOCITY))
+            elif kind == OPEN:
+                found.append(((place[r] + system.rest[r] * one) / system.free_travel[r], r, POSITION))
+            elif kind == SPRUNG and friction:
+                force = np.r_[self.push(r), wide[r]]
+                found += [(one + sign * force / system.limit[r], r, FORCE) for sign in (1, -1)]
+            elif kind in (STICK, CLOSED) and friction == (kind == STICK):
+                share = self.force(state, r)
+                force = share @ free_rates
+                if friction:
+                    found += [(one + sign * force / system.limit[r], r, FORCE) for sign in (1, -1)]
+                else:
+                    found.append((force / self.typical_force(share), r, FORCE))
+        functionals = np.array([entry[0] for entry in found]).reshape(len(found), width)
+        return functionals, [entry[1] for entry in found], [int(entry[2]) for entry in found]
+
+    def typical_force(self, share: np.ndarray) -> float:
+        """Return the size of a force by its shares (N,) of the rates of a typical motion, N."""
+        typical = self.rate * (np.abs(self.from_state) @ self.sizes)[self.rates]
+        return float(np.abs(share) @ (typical + np.abs(self.system.load).sum(axis=0) / self.root))
+
+    @cached_property
+    def typical_speed(self) -> np.ndarray:
+        """(r,) speed of each row in a typical motion, m/s."""
+        speed: np.ndarray = np.abs(self.speed) @ (np.abs(self.from_state) @ self.sizes)
+        return speed
 
     def push(self, r: int) -> np.ndarray:
         """Return the force of the closed spring of row r as a functional (k,) of u, without its constant part."""
@@ -151,6 +237,11 @@ class SliderDynamics:
             if left >= 0 and right >= 0:
                 first[right] = first[left]
         return first
+
+    def owner(self, r: int) -> int:
+        """Return the cavity of a row, by the number of its first body; -1: none."""
+        bodies = np.flatnonzero(self.system.of_bodies.J[r])
+        return int(self.cavity[bodies[0]]) if len(bodies) else -1
 
     @cached_property
     def free_travel(self) -> np.ndarray:

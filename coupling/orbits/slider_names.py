@@ -9,11 +9,13 @@ from vanedamp.coupling.numerics.codes import (
     HELD,
     LEAVING,
     OPEN,
+    POSITION,
     SLIP_LEFT,
     SLIP_RIGHT,
     SPRUNG,
     STICK,
     TOUCHING,
+    VELOCITY,
 )
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
@@ -56,6 +58,11 @@ class RowNames:
             if change[0] != change[1]:
                 parts.append(self._change(int(r), *change))
         return ", ".join(parts)
+
+    def missed(self, r: int, order: int) -> str:
+        """Return the name of an event that nearly happened, by the order of its event function (numerics.codes)."""
+        verb = {int(POSITION): "impact", int(VELOCITY): "turns"}.get(order)
+        return f"{verb or ('slips' if r < self.friction_rows else 'leaves')} {self.names[r]}"
 
     def _change(self, r: int, old: int, new: int) -> str:
         if r >= self.friction_rows:

@@ -32,13 +32,15 @@ from vanedamp.coupling.numerics.codes import (
     PERIOD,
     POSITION,
     ROOT,
+    SLIP_LEFT,
+    SLIP_RIGHT,
     SPRUNG,
     STICK,
     TOUCHING,
     VELOCITY,
 )
 from vanedamp.coupling.orbits.passage import Crossing, Passage, PassageStatus
-from vanedamp.coupling.orbits.saltation import LinearFlow
+from vanedamp.coupling.orbits.saltation import LinearFlow, kicked
 from vanedamp.coupling.orbits.slider_dynamics import SliderDynamics
 from vanedamp.coupling.orbits.slider_names import RowNames
 from vanedamp.coupling.orbits.slider_symmetry import mirror_of
@@ -47,7 +49,6 @@ from vanedamp.coupling.response.restart import restart_from
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble, physical_scale
-from vanedamp.coupling.system.linear_response import glued_mass
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.files.store import frozen
 
@@ -59,6 +60,8 @@ AGREEMENT = 1e-8
 TANGENTIAL = 1e-12
 
 
+#: points a period between which minima of event functions that do not vanish are sought
+LOOKS = 32
 #: step of the differences that find the slope of a restitution, as a share of the speed
 _STEP = 1e-2
 
@@ -72,8 +75,9 @@ _LEAST = 1e-6
 
 
 class _Guard(NamedTuple):
-    """An event function before its event: gradient (k,), rate and second derivative in time, scale."""
+    """An event function before its event: row, gradient (k,), rate and second derivative in time, scale."""
 
+    row: int
     gradient: np.ndarray
     speed: float
     bend: float
@@ -113,7 +117,7 @@ class SliderMap:
     @cached_property
     def _dynamics(self) -> SliderDynamics:
         system = assemble(self.scene)
-        return SliderDynamics(system, physical_scale(self.scene, system))
+        return SliderDynamics(system, physical_scale(self.scene, system), self.scale)
 
     @cached_property
     def _names_of_rows(self) -> RowNames:
@@ -132,7 +136,7 @@ class SliderMap:
         return passage
 
     def _walk(self, state: np.ndarray) -> _Walk:
-        walk = _Walk(self._dynamics, self._names_of_rows, self.restart_of(state), self.periods, self.scale)
+        walk = _Walk(self._dynamics, self._names_of_rows, self.restart_of(state), self.periods)
         if self._flows:
             walk.run.flows = self._flows[0]
         return walk
@@ -163,7 +167,7 @@ class SliderMap:
         """Return the state (k,) of the motion without contact, where all bodies are at rest on their floors."""
         dynamics, system = self._dynamics, self._dynamics.system
         n, b = system.modes, system.bodies
-        amplitude = _glued_amplitude(dynamics)
+        amplitude = dynamics.glued_amplitude()
         weight = system.of_bodies.weight @ system.floor
         p = amplitude.sum(axis=0).real + weight / system.of_structure.stiffness
         rate = ((1j * system.frequency) @ amplitude).real
@@ -196,39 +200,13 @@ def slider_map(scene: Scene, parameter: str, periods: int) -> SliderMap:
     """Return the period map of a scene of sliders. Raises InputError for one that the exact engine cannot run."""
     check_waveform(scene, "exact")
     system = assemble(scene)
-    return SliderMap(scene, parameter, periods, _sizes(SliderDynamics(system, physical_scale(scene, system))))
-
-
-def _glued_amplitude(dynamics: SliderDynamics) -> np.ndarray:
-    """Return the complex amplitudes (e, n) of p with all bodies at rest on their floors."""
-    system = dynamics.system
-    modes, bodies = system.of_structure, system.of_bodies
-    load = modes.load + bodies.load @ system.floor
-    omega = system.frequency[:, None, None]
-    dynamic = np.diag(modes.stiffness) + 1j * omega * modes.damping - omega**2 * glued_mass(system)
-    amplitude: np.ndarray = np.linalg.solve(dynamic, load[:, :, None])[:, :, 0]
-    return amplitude
-
-
-def _sizes(dynamics: SliderDynamics) -> np.ndarray:
-    """Return sizes (k,) of the coordinates: linear response, free travel, and these times omega."""
-    system, omega = dynamics.system, dynamics.system.omega
-    reach = dynamics.scale * np.abs(_glued_amplitude(dynamics)).sum(axis=0)
-    travel = np.r_[dynamics.free_travel, system.free_travel[system.friction_rows :]]
-    travel = travel[np.isfinite(travel) & (travel > 0)]
-    # a structure that nothing excites moves by its start and the bodies
-    largest = reach.max(initial=0.0) or float(travel.max(initial=0.0)) or 1.0
-    reach = np.maximum(reach, 1e-6 * largest)
-    springs = system.limit[dynamics.springs] / system.spring[dynamics.springs]
-    return frozen(np.r_[reach, omega * reach, dynamics.free_travel, omega * dynamics.free_travel, springs])
+    return SliderMap(scene, parameter, periods, SliderDynamics(system, physical_scale(scene, system)).sizes)
 
 
 class _Walk:
     """One passage on its way: the engine's run, and the derivative of its state so far."""
 
-    def __init__(
-        self, dynamics: SliderDynamics, names: RowNames, start: RestartState, periods: int, scale: np.ndarray
-    ) -> None:
+    def __init__(self, dynamics: SliderDynamics, names: RowNames, start: RestartState, periods: int) -> None:
         self.dynamics, self.names, self.periods = dynamics, names, periods
         system = dynamics.system
         self.start = start
@@ -239,7 +217,7 @@ class _Walk:
         self.clearance = (np.inf, "")
         self.status = PassageStatus.OK
         #: size of each coordinate so far, and least one that it is compared by
-        self.size = _LEAST * np.abs(dynamics.from_state) @ scale
+        self.size = _LEAST * np.abs(dynamics.from_state) @ dynamics.sizes
         #: largest derivative so far of each coordinate
         self.reach = np.abs(dynamics.from_state).max(axis=1)
         #: flow, state and time at the start of the segment that holds the middle of the first period
@@ -268,8 +246,8 @@ class _Walk:
             raise Stopped
         u, M = self._begin()
         while st.counters[PERIOD] < self.periods:
-            state, time = st.state.copy(), float(st.time[0])
-            flow = dynamics.flow(state, st.applied_force)
+            state, applied, time = st.state.copy(), st.applied_force.copy(), float(st.time[0])
+            flow = dynamics.flow(state, applied)
             if st.counters[PERIOD] == 0 and time <= 0.5 * period:
                 self.middle = flow, u, time
             # what is left there of other segments is no root of this one
@@ -278,12 +256,14 @@ class _Walk:
             loss = float(st.ledger[IMPACT_LOSS])
             code = run.advance(int(st.counters[PERIOD]) + 1, int(st.counters[EVENTS]) + 1)
             if code == DONE:
+                self._look_around(flow, state, applied, u, time, period - time)
                 u, power = flow.propagate(u, time, period - time)
                 u, M = self._agreed(u), power @ M
                 continue
             if code != EVENT_BUDGET or st.counters[EVENTS] > self.budget:
                 raise Stopped
             event, tau = self._event(float(st.time[0]) - time)
+            self._look_around(flow, state, applied, u, time, tau)
             u, power = flow.propagate(u, time, tau)
             u, S, name, speed = self._across(event, flow, state, u)
             M = S @ power @ M
@@ -293,6 +273,15 @@ class _Walk:
                 self.crossings.append(Crossing(moment, name, speed, float(st.ledger[IMPACT_LOSS]) - loss))
         derivative: np.ndarray = dynamics.to_state @ M
         return derivative
+
+    def _look_around(
+        self, flow: LinearFlow, state: np.ndarray, applied: np.ndarray, u: np.ndarray, time: float, duration: float
+    ) -> None:
+        """Keep the smallest distance to an event that does not happen in a segment."""
+        functionals, rows, orders = self.dynamics.distances(state, applied)
+        share, which = flow.least(functionals, u, time, duration, self.dynamics.system.period / LOOKS)
+        if share < self.clearance[0]:
+            self.clearance = max(share, 0.0), self.names.missed(rows[which], orders[which])
 
     def _begin(self) -> tuple[np.ndarray, np.ndarray]:
         """Return state and derivative after the decision of the initial state."""
@@ -426,21 +415,46 @@ class _Walk:
         size = len(dynamics.root)
         if collides:
             kick[:size] = dynamics.rate * kicked[dynamics.rates]
-        guard = self._guard(row, order, old, flow, rate, time)
-        speed = met.get(row, guard.speed) if order == POSITION else guard.speed
-        arrivals = [int(r) for r in hit if old[r] == OPEN and met.get(int(r), 0.0) < 0.0]
-        S = jump
-        if len(arrivals) > 1:
-            S = self._at_once(jump, kick, arrivals, met)
+        guards = self._guards(row, order, old, hit, met, flow, rate, time)
+        moment = int(st.counters[PERIOD]) * dynamics.system.period + time
+        if order == VELOCITY and moment <= SIMULTANEOUS * dynamics.system.period:
+            S = dynamics.settled(st.state)  # a row at rest to round-off: the passage begins with it at rest
+        elif len(guards) > 1:
+            S = self._at_once(jump, kick, guards)
         elif np.any(kick):
-            turns_back = speed * guard.bend < 0.0
-            if turns_back and speed * speed <= 2.0 * TANGENTIAL * guard.scale * abs(guard.bend):
-                self.status = PassageStatus.GRAZING
-            if speed == 0.0:
-                raise Untrusted
-            S = jump + np.multiply.outer(kick / speed, guard.gradient)
-        self._check_order(S, int(st.counters[PERIOD]) * dynamics.system.period + time)
-        return after, S, self.names.event(old, st.state, hit), speed
+            S = self._at_one(jump, kick, guards[0])
+        else:
+            S = jump
+        self._check_order(S, moment)
+        return after, S, self.names.event(old, st.state, hit), guards[0].speed
+
+    def _guards(
+        self, row: int, order: int, old: np.ndarray, hit: np.ndarray, met: dict[int, float], flow: LinearFlow,
+        rate: np.ndarray, time: float,
+    ) -> list[_Guard]:  # fmt: skip
+        """Return the event functions that vanish in an event: of its row first, then of others at the same time."""
+        guards = [self._guard(row, order, old, flow, rate, time)]
+        if order == POSITION:
+            others = [int(r) for r in hit if r != row and old[r] == OPEN and met.get(int(r), 0.0) < 0.0]
+            guards += [self._guard(r, order, old, flow, rate, time) for r in others]
+            # speeds as the engine has them, not as small differences
+            rows = [row, *others]
+            return [guard._replace(speed=met.get(r, guard.speed)) for r, guard in zip(rows, guards, strict=True)]
+        if order == VELOCITY:
+            friction = np.arange(self.dynamics.system.friction_rows)
+            slid = (old[friction] == SLIP_LEFT) | (old[friction] == SLIP_RIGHT)
+            turned = friction[slid & (old[friction] != self.run.state.state[friction]) & (friction != row)]
+            guards += [self._guard(int(r), order, old, flow, rate, time) for r in turned]
+        return guards
+
+    def _at_one(self, jump: np.ndarray, kick: np.ndarray, guard: _Guard) -> np.ndarray:
+        """Return the saltation matrix of an event with one event function."""
+        turns_back = guard.speed * guard.bend < 0.0
+        if turns_back and guard.speed**2 <= 2.0 * TANGENTIAL * guard.scale * abs(guard.bend):
+            self.status = PassageStatus.GRAZING
+        if guard.speed == 0.0:
+            raise Untrusted
+        return kicked(jump, kick, guard.gradient, guard.speed)
 
     def _met(self) -> dict[int, float]:
         """Return the relative speed of approach, below zero, of each contact that the last event's log has hit."""
@@ -448,24 +462,25 @@ class _Walk:
             int(entry[2]): float(entry[3]) for chunk in self.run.log.chunks for entry in chunk if entry[1] == IMPACT
         }
 
-    def _at_once(self, jump: np.ndarray, kick: np.ndarray, arrivals: list[int], met: dict[int, float]) -> np.ndarray:
-        """Return the saltation matrix of gaps that close together.
+    def _at_once(self, jump: np.ndarray, kick: np.ndarray, guards: list[_Guard]) -> np.ndarray:
+        """Return the saltation matrix of events that coincide: gaps that close, slips that end together.
 
-        On a prescribed motion cavities do not feel each other: each has its own time of impact. Where they do, the map
-        has another derivative for each order of the impacts: COINCIDENT, with that of the first. A chatter that ends
-        leaves nothing of gaps and speeds, in any order.
+        On a prescribed motion cavities do not feel each other: each has its own time. Where they do, the map has
+        another derivative for each order of the events: COINCIDENT, with that of the first. A chatter that ends leaves
+        nothing of gaps and speeds, in any order.
         """
-        dynamics, system, cavity = self.dynamics, self.dynamics.system, self.dynamics.cavity
-        if not self.run.state.velocity[arrivals].any():
+        dynamics, cavity = self.dynamics, self.dynamics.cavity
+        contacts = [guard.row for guard in guards if guard.row >= dynamics.system.friction_rows]
+        if len(contacts) == len(guards) and not self.run.state.velocity[contacts].any():
             return dynamics.closed(self.run.state.state) @ jump
-        owner = [int(cavity[max(system.left_body[r], system.right_body[r])]) for r in arrivals]
-        if system.modes or len(set(owner)) < len(owner):
+        owners = [dynamics.owner(guard.row) for guard in guards]
+        if dynamics.system.modes or len(set(owners)) < len(owners):
             self.status = PassageStatus.COINCIDENT
-            return jump + np.multiply.outer(kick / met[arrivals[0]], dynamics.place[arrivals[0]])
-        S = jump.copy()
-        for r, c in zip(arrivals, owner, strict=True):
-            own = np.r_[cavity == c, cavity == c]
-            S += np.multiply.outer(np.where(own, kick, 0.0) / met[r], dynamics.place[r])
+            return self._at_one(jump, kick, guards[0])
+        S = jump
+        for guard, owner in zip(guards, owners, strict=True):
+            own = np.r_[cavity == owner, cavity == owner]
+            S = S + self._at_one(np.zeros_like(jump), np.where(own, kick, 0.0), guard)
         return S
 
     def _check_order(self, S: np.ndarray, time: float) -> None:
@@ -518,9 +533,9 @@ class _Walk:
             share, free = dynamics.force(old, row), dynamics.free_flow(old, self.run.state.applied_force)
             on_rates = share @ free.A[dynamics.rates]
             speed = on_rates @ rate + share @ free.drift(time)[dynamics.rates]
-            return _Guard(on_rates, float(speed), 0.0, 1.0)
+            return _Guard(row, on_rates, float(speed), 0.0, 1.0)
         second = flow.A @ rate + flow.drift(time)
-        return _Guard(gradient, float(gradient @ rate), float(gradient @ second), scale)
+        return _Guard(row, gradient, float(gradient @ rate), float(gradient @ second), scale)
 
     def _check_rank(self, M: np.ndarray) -> None:
         """Raise Untrusted if the derivative moves rows that are at rest now."""
