@@ -17,6 +17,8 @@ from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.reference.orbit_upright_body import UprightBody
 from tests.tools.closed_form_scenes import ball, scene
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.orbits.newton import OrbitStatus
+from vanedamp.coupling.orbits.orbits import find_orbit, orbits
 from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.response import Status
@@ -252,3 +254,95 @@ def test_the_period_of_an_upright_body_doubles_at_a_frequency_of_forty_digits():
 
     reference = UPRIGHT.doubling(2338.0, 2345.0)
     assert brentq(turned, 2338.0, 2345.0, xtol=1e-11) == pytest.approx(float(reference), rel=1e-8)
+
+
+def branch_of(data, state, **table):
+    """The branch over a number of a scene through the orbit of a state, with its one structure and one body."""
+    place, rate, slip, slip_rate = state
+    begun = {
+        "initial": {"displacement": place, "velocity": rate}, "damper.0.position": slip, "damper.0.velocity": slip_rate,
+        "time": {"periods": 1, "transient": 0}, "orbit": table,
+    }  # fmt: skip
+    (branch,) = orbits(data.replace(begun)).branches
+    return branch
+
+
+def places(branch, kind):
+    return [2 * math.pi * point.parameter for point in branch.special if point.kind == kind]
+
+
+def frequencies(low, high):
+    return {"from": low / (2 * math.pi), "to": high / (2 * math.pi)}
+
+
+def lie_on(branch, both=False):
+    """Every point of a branch over the frequency is a closed form's; both: of either speed of approach."""
+    for frequency, state, values, stable in zip(
+        branch.parameter, branch.state, branch.multipliers, branch.stable, strict=True
+    ):
+        known = [replace(GAP, omega=2 * math.pi * frequency, larger=larger) for larger in (True, *[False] * both)]
+        orbit = min(known, key=lambda orbit: float(np.abs(orbit.state - state).max()))
+        # at a fold frequency and state are a double root of each other
+        assert state == pytest.approx(orbit.state, abs=1e-9 if orbit is known[0] and not both else 1e-6)
+        if not both:
+            assert np.sort_complex(np.round(values, 9)) == pytest.approx(multipliers(orbit.half @ orbit.half), abs=1e-8)
+            assert stable == (np.abs(orbit.multipliers).max() < 1)
+
+
+def test_a_branch_loses_its_symmetry_and_wins_it_back_where_the_closed_form_does():
+    """On the way an impact passes the start of the period, where the state jumps and the branch goes on."""
+    begin = replace(GAP, omega=0.98)
+    branch = branch_of(gapped(begin), begin.state, **frequencies(0.98, 0.82))
+    assert branch.end == "the end of the parameter's range"
+    limits = [GAP.pitchfork(0.92, 1.0), GAP.pitchfork(0.8, 0.9)]
+    assert places(branch, "pitchfork") == pytest.approx(limits, rel=1e-8)
+    assert len(places(branch, "sequence")) == 1
+    assert branch.symmetric.all()
+    lie_on(branch)
+
+
+def test_a_branch_turns_where_two_symmetric_motions_meet():
+    begin = replace(GAP, omega=1.13)
+    branch = branch_of(gapped(begin), begin.state, **frequencies(1.13, 1.4))
+    assert branch.end == "the end of the parameter's range"
+    assert places(branch, "fold") == pytest.approx([GAP.fold(1.25, 1.4)], rel=1e-8)
+    assert places(branch, "neimark-sacker")[0] == pytest.approx(GAP.neimark_sacker(1.13, 1.2), rel=1e-8)
+    lie_on(branch, both=True)
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.5, 0.8])
+def test_a_branch_of_a_ball_doubles_and_begins_where_holmes_has_it(restitution):
+    """Where the orbit begins two of them meet with the impact at phase 0, the start of the period."""
+    unit = 10.0 / (2 * math.pi) ** 2
+    orbit = BouncingBall(restitution, 0.5 * (beginning(restitution) + doubling(restitution)))
+    data, (position, velocity) = bouncing(orbit)
+    data = data.replace({
+        "damper.0.position": position, "damper.0.velocity": velocity, "time": {"periods": 1, "transient": 0},
+    })  # fmt: skip
+    for to in (0.9 * beginning(restitution), 1.1 * doubling(restitution)):
+        table = {"parameter": "structure.displacement_amplitude", "from": unit * orbit.acceleration, "to": unit * to}
+        (branch,) = orbits(data.replace({"orbit": table})).branches
+        if to < orbit.acceleration:
+            assert branch.special[-1].parameter == pytest.approx(unit * beginning(restitution), rel=1e-8)
+        else:
+            (found,) = [point.parameter for point in branch.special if point.kind == "period doubling"]
+            assert found == pytest.approx(unit * doubling(restitution), rel=1e-8)
+
+
+def test_the_branch_without_contact_grazes_where_its_amplitude_is_the_gap():
+    table = {"parameter": "excitation.force", "from": 0.05, "to": 0.2, "start": "linear"}
+    (branch,) = orbits(stopped(0.05).replace({"orbit": table})).branches
+    (place, *_) = [point.parameter for point in branch.special if point.kind == "grazing"]
+    assert place == pytest.approx(0.1, rel=1e-8)
+
+
+@pytest.mark.parametrize(("ratio", "friction", "stops"), [(0.6, 0.2, False), (0.6, 0.7, True), (0.4, 0.6, True)])
+def test_newtons_method_finds_den_hartogs_orbit_from_the_end_of_a_run(ratio, friction, stops):
+    """A run of five periods from rest; the map of sliding motion is smooth, that of sticking has lost a dimension."""
+    orbit = DryFriction(ratio, friction, stops)
+    data = rubbing(orbit).replace({"time": {"periods": 5, "transient": 0}})
+    found = find_orbit(data)
+    assert found.status is OrbitStatus.OK
+    assert found.iterations < 6
+    assert found.state == pytest.approx(orbit.at(0.0), abs=1e-11)
+    assert np.sort_complex(found.multipliers) == pytest.approx(np.sort_complex(orbit.multipliers), abs=1e-9)
