@@ -330,7 +330,7 @@ def test_a_branch_of_a_ball_doubles_and_begins_where_holmes_has_it(restitution):
 
 
 def test_the_branch_without_contact_grazes_where_its_amplitude_is_the_gap():
-    table = {"parameter": "excitation.force", "from": 0.05, "to": 0.2, "start": "linear"}
+    table = {"parameter": "excitation.force", "from": 0.05, "to": 0.2, "start": "linear", "max_points": 40}
     (branch,) = orbits(stopped(0.05).replace({"orbit": table})).branches
     (place, *_) = [point.parameter for point in branch.special if point.kind == "grazing"]
     assert place == pytest.approx(0.1, rel=1e-8)

@@ -98,9 +98,9 @@ class Follower:
         if len(trace.points) >= self.table.max_points:
             self._end(trace, f"max_points ({self.table.max_points}) reached", trace.head.orbit)
             return
-        head, step = trace.head, trace.step
+        head, step, tried = trace.head, trace.step, trace.step
         while step >= self.table.min_step:
-            point = self._reach(head, step)
+            point, tried = self._reach(head, step), step
             if point is None:
                 step /= 2
                 continue
@@ -113,7 +113,7 @@ class Follower:
                 trace.step = min(1.5 * step, self.table.max_step) if quick else max(step, self.table.min_step)
                 return
             step /= 2
-        self._cross(trace, max(step, self.table.min_step))
+        self._cross(trace, tried)
 
     # -- smooth pieces
 
