@@ -8,14 +8,15 @@ event grows, and in the image of both (an event that passes the start of the per
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import svd
 from scipy.optimize import brentq
 
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
 from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
+from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import (
     Orbit,
     OrbitStatus,
@@ -42,6 +43,10 @@ _QUICK, _STRAIGHT, _BENT = 3, 0.985, 0.9
 _SAME = 1e-4
 #: relative error of the parameter where the sequence changes
 _CLOSE = 1e-10
+#: what happens to a body that comes to a wall and has room on the other side
+_CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"
+#: scaled distance within which a neutral coordinate is looked for an end
+_FARTHEST = 10.0
 #: how often the search for the place of a new event is widened
 _WIDENINGS = 6
 #: attempts at the place of a change of sequence, at least every third one a bisection
@@ -226,7 +231,8 @@ class Follower:
             point, how = self._other_side(last, step)
         if point is not None and point.tangent[-1] * last.tangent[-1] < 0:
             how += ": the branch turns"
-        kind, what = change(last.orbit.passage, None if point is None else point.orbit.passage)
+        after = self._passage_beyond(last) if point is None or how == _CENTRED else point.orbit.passage
+        kind, what = change(last.orbit.passage, after)
         self._note(trace, Located(last.orbit, kind, f"{what}{how}"))
         if point is None:
             self._end(trace, self._refusal(last, step) or f"{what}; no orbit found beyond", last.orbit)
@@ -275,6 +281,8 @@ class Follower:
     def _other_side(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
         sequence = last.orbit.passage.sequence
+        if (centred := self._centred(last)) is not None:
+            return centred, _CENTRED
         for size in self.table.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
             y = last.y + size * last.tangent
             passage = self.problem.passage(y)
@@ -298,22 +306,71 @@ class Follower:
                 return point_of(self.problem, orbit, last.tangent), f", stepped over by {factor * step:.2g}"
         return None, ""
 
+    def _passage_beyond(self, last: Point) -> Passage | None:
+        """Return a passage of the next sequence of events, of a state close to the last orbit; None if none is near."""
+        for size in self.table.step * 10.0 ** np.arange(-6.0, 0.0):
+            passage = self.problem.passage(last.y + size * last.tangent)
+            if passage is not None and passage.sequence != last.orbit.passage.sequence:
+                return passage
+        return None
+
+    def _centred(self, last: Point) -> Point | None:
+        """Return the orbit with its neutral coordinates amid those of its sequence; None if they are there already.
+
+        A body that may rest anywhere has come to a wall, though its motion has room on the other side. The tangent
+        takes it on along the middle.
+        """
+        y = self._amid(last.y, last)
+        if y is None or np.linalg.norm(y - last.y) < self.table.min_step:
+            return None
+        orbit = self._at_parameter(y, last)
+        if orbit is None:
+            return None
+        tangent = last.tangent
+        for ahead in (0.1 * self.table.step, 1e-3 * self.table.step):
+            other = self._at_parameter(y + ahead * last.tangent, last)
+            moved = None if other is None else self._amid(self.problem.pack(other.state, other.parameter), last)
+            if moved is not None:
+                tangent = (moved - y) / np.linalg.norm(moved - y)
+                break
+        return point_of(self.problem, orbit, tangent)
+
+    def _at_parameter(self, y: np.ndarray, last: Point) -> Orbit | None:
+        """Return the orbit of the same sequence at the parameter of y; None if there is none."""
+        row = np.append(np.zeros(self.problem.size), 1.0)
+        orbit = solve(self.problem, y, row, last.slope, _ITERATIONS, _HALVINGS)
+        same = orbit.passage.sequence == last.orbit.passage.sequence
+        return orbit if orbit.status is OrbitStatus.OK and same else None
+
+    def _amid(self, y: np.ndarray, last: Point) -> np.ndarray | None:
+        """Return y with its neutral coordinates amid those of its sequence; None for an orbit without any."""
+        neutral = null_space(last.orbit.derivative)
+        for free in neutral:
+            direction, base = np.append(free, 0.0), y
+
+            def stays(at: float, base: np.ndarray = base, direction: np.ndarray = direction) -> bool:
+                passage = self.problem.passage(base + at * direction)
+                return passage is not None and passage.sequence == last.orbit.passage.sequence
+
+            reaches = [_reach(stays, sign) for sign in (-1.0, 1.0)]
+            if max(map(abs, reaches)) < _FARTHEST:
+                y = y + sum(reaches) / 2 * direction
+        return y if len(neutral) else None
+
     def _beside(self, last: Point, y: np.ndarray, passage: Passage) -> Orbit | None:
         """Return an orbit of another sequence that begins where the present one ends; None if none is found.
 
         y, passage: beyond the end, along the tangent. The new event adds v k to the residual, k a direction and v a
         measure of the event, such as the speed of a grazing impact: a root of the distance along the tangent, so that
-        orbits lie at last.y + v alpha to first order, (D - 1) alpha = k, where alpha does not change that distance
-        (Nordmark 1991). What is of second order, as that distance is, is a root along the tangent.
+        orbits lie at last.y + v alpha to first order, (D - 1) alpha = -k (Nordmark 1991). What is of second order, as
+        that distance is, is a root along the tangent.
         """
         problem, sequence = self.problem, last.orbit.passage.sequence
         residual = problem.residual(y, passage)
         kick = float(np.linalg.norm(residual))
-        there = bordered(problem, passage, problem.slope(y, passage), last.tangent)
-        here = bordered(problem, last.orbit.passage, last.slope, last.tangent)
-        here[-1] = svd(there - here)[2][0]
         if kick == 0.0:
             return None
+        here = bordered(problem, last.orbit.passage, last.slope, last.tangent)
         alpha = least_squares(here, np.append(-residual / kick, 0.0))
         length, away = float(np.linalg.norm(alpha)), float(np.linalg.norm(y - last.y))
         for share in (1e-3, 1e-2, 1e-1, 1.0):
@@ -351,3 +408,14 @@ class Follower:
                     return None
             distance *= 10
         return None
+
+
+def _reach(stays: Callable[[float], bool], sign: float) -> float:
+    """Return how far a condition holds from 0 in a direction, at most some _FARTHEST."""
+    low, high = 0.0, 1e-9
+    while stays(sign * high) and high < _FARTHEST:
+        low, high = high, 2 * high
+    for _ in range(20):
+        middle = (low + high) / 2
+        low, high = (middle, high) if stays(sign * middle) else (low, middle)
+    return sign * low

@@ -44,7 +44,7 @@ def _vanishing(passage: Passage) -> dict[str, float]:
 def change(before: Passage, after: Passage | None) -> tuple[str, str]:
     """Return the kind of a special point where the sequence changes, and what happens there.
 
-    "grazing" where an impact begins or ceases, "sequence" for any other change; after: None if the branch ends.
+    "grazing" where an impact begins or ceases, "sequence" for any other change; after: None if that is not known.
     """
     if after is None:
         near = before.clearance[1]

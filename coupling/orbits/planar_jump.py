@@ -1,0 +1,188 @@
+"""Jumps of the speeds in impacts of bodies in the plane, and their derivatives.
+
+Which contacts push, stick and slip is known from the engine's impulses; for these the complementarity problem of an
+impact is a set of linear equations (planar.impacts): the jump is a linear map as long as they stay the same.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.planar.constraints import PlanarSystem
+from vanedamp.coupling.system.restitution import restitutions_at
+
+#: singular values that count as none
+_DEPENDENT = 1e-9
+#: share of a speed after an impact within which a law has been found to hold
+_ALIKE = 1e-8
+#: energy that an impact may bring, as a share of what is there; of the restitutions, below which a wedged block has
+#: none, both as in planar.impacts
+_GAIN, _WEDGED = 1e-12, 1e-6
+#: share of its bound by which friction is short of it where a contact sticks, as in planar.impacts; of a slip that is
+#: round-off
+_EDGE, _ROUND_OFF = 1e-9, 1e-13
+#: share of the largest impulse, and of the fastest speed, that is round-off; slips that count as none
+_NOTHING, _SLOW = 1e-12, 1e-11
+#: step of differences of a restitution by the speed, as a share of it
+_STEP = 1e-3
+
+
+class Jump(NamedTuple):
+    """Speeds (N,) after a jump, and their derivative (N, N) with respect to those before."""
+
+    v: np.ndarray
+    derivative: np.ndarray
+
+
+class _Roles(NamedTuple):
+    """Contacts in a blow: those that push (a,), those that stick (s,), and friction (u,) that goes with each push."""
+
+    hit: np.ndarray
+    sticks: np.ndarray
+    drag: np.ndarray
+
+
+class _Blow(NamedTuple):
+    """A jump with the normal impulses (a,) that made it, and their derivatives (a, N)."""
+
+    jump: Jump
+    normal: np.ndarray
+    slope: np.ndarray
+
+
+def impact(
+    system: PlanarSystem, v: np.ndarray, impulse: np.ndarray, compression: np.ndarray, plastic: np.ndarray, speed: float
+) -> Jump:
+    """Return the jump of speeds v (N,) by an impact in which contacts take part as impulses (2u,) of the engine say.
+
+    compression: (2u,) impulses of the first phase, of laws that have two; plastic: (u,) contacts without restitution;
+    speed: the fastest of the scene, m/s.
+    """
+    begun = Jump(v, np.eye(len(v)))
+    approach, slope = -system.J[: len(system.rest)] @ v, -system.J[: len(system.rest)]
+    restitution, change = _restitution(system, approach)
+    restitution, change = np.where(plastic, 0.0, restitution), np.where(plastic, 0.0, change)
+    if not system.two_phases:
+        return _newton(system, begun, impulse, restitution, change, speed)
+    roles = _roles(system, v, compression, speed)
+    pressed = _blow(system, begun, roles, np.zeros(len(roles.hit)), np.zeros((len(roles.hit), len(v))))
+    given, steep = np.zeros(len(slope)), np.zeros(slope.shape)
+    given[roles.hit] = restitution[roles.hit] * pressed.normal
+    steep[roles.hit] = restitution[roles.hit, None] * pressed.slope
+    steep[roles.hit] += (change[roles.hit] * pressed.normal)[:, None] * slope[roles.hit]
+    left = impulse - compression
+    return _expand(system, pressed.jump, _roles(system, pressed.jump.v, left, speed), given, steep, left, speed)
+
+
+def _expand(
+    system: PlanarSystem,
+    pressed: Jump,
+    roles: _Roles,
+    given: np.ndarray,
+    steep: np.ndarray,
+    impulse: np.ndarray,
+    speed: float,
+) -> Jump:
+    """Return the jump of an expansion with given normal impulses (u,), their derivatives (u, N), and what is more.
+
+    impulse: (2u,) of the expansion, as the engine has it; speed: the fastest of the scene, m/s.
+    """
+    u = len(system.rest)
+    slides = np.where(np.isin(np.arange(u), roles.sticks), 0.0, roles.drag)
+    lever = (system.J[:u] - slides[:, None] * system.J[u:]).T / system.mass[:, None]
+    begun = Jump(pressed.v + lever @ given, pressed.derivative + lever @ steep)
+    mobility = np.diag(system.delassus)[roles.hit]
+    found, asked = impulse[roles.hit] * mobility, given[roles.hit] * mobility
+    more = roles.hit[found - asked > _EDGE * found + _ROUND_OFF * speed]
+    return _blow(
+        system, begun, roles._replace(hit=more), np.zeros(len(more)), np.zeros((len(more), len(pressed.v)))
+    ).jump
+
+
+def _newton(
+    system: PlanarSystem, begun: Jump, impulse: np.ndarray, restitution: np.ndarray, change: np.ndarray, speed: float
+) -> Jump:
+    """Return the jump by Newton's law with restitutions (u,), and their derivatives by the speeds of approach.
+
+    Where they would bring energy, with the share of all of them that brings none: it depends on the speeds.
+    """
+    roles = _roles(system, begun.v, impulse, speed)
+    hit, rows = roles.hit, system.J[roles.hit]
+    approach = -rows @ begun.v
+    kept = np.where(approach > _ROUND_OFF * speed, restitution[hit], 0.0)
+    steep = kept + np.where(kept > 0.0, change[hit] * approach, 0.0)
+    whole = _blow(system, begun, roles, kept * approach, -steep[:, None] * rows).jump
+    left = begun.v + system.J.T @ impulse / system.mass
+    asked = float(np.abs(kept * approach).max(initial=0.0))
+    if asked == 0.0 or np.abs(system.J @ (whole.v - left)).max() <= _ALIKE * max(asked, _ALIKE * speed):
+        return whole
+    first = int(np.argmax(kept * approach))
+    share = float(rows[first] @ left) / (kept[first] * approach[first])
+    part = _blow(system, begun, roles, share * kept * approach, -share * steep[:, None] * rows)
+    none = _blow(system, begun, roles, np.zeros(len(hit)), np.zeros(rows.shape)).jump
+    by_share = (whole.v - none.v) if share != 1.0 else np.zeros(len(left))
+    # the impulses bring what is allowed, m (v+^2 - v^2) = GAIN m v^2:  m v+ dv+ = (1 + GAIN) m v dv
+    mass, after = system.mass, part.jump.v
+    per_share = float(mass * after @ by_share)
+    along = (
+        ((1.0 + _GAIN) * mass * begun.v - mass * after @ part.jump.derivative) / per_share
+        if share > _WEDGED
+        else 0.0 * begun.v
+    )
+    return Jump(after, part.jump.derivative + np.multiply.outer(by_share, along))
+
+
+def _roles(system: PlanarSystem, v: np.ndarray, impulse: np.ndarray, speed: float) -> _Roles:
+    """Return who takes part in a blow of impulses (2u,) on speeds v (N,)."""
+    u = len(system.rest)
+    normal, tangential = impulse[:u], impulse[u:]
+    hit = np.flatnonzero(normal > 0.0)
+    slip, after = system.J[u:] @ v, system.J[u:] @ (v + system.J.T @ impulse / system.mass)
+    # where contacts depend on each other, friction may be at its bound without slip; its round-off is that of the slip
+    room = system.friction * normal - np.abs(tangential)
+    noise = _EDGE * system.friction * normal * np.diag(system.delassus)[u:] + _ROUND_OFF * np.abs(slip)
+    slides = (np.abs(after) > _SLOW * speed) | (room * np.diag(system.delassus)[u:] <= noise)
+    sticks = hit[(system.friction[hit] > 0.0) & ~slides[hit]]
+    return _Roles(hit, sticks, np.where(slides, -np.sign(tangential) * system.friction, 0.0))
+
+
+def _blow(system: PlanarSystem, begun: Jump, roles: _Roles, target: np.ndarray, steep: np.ndarray) -> _Blow:
+    """Return the blow that gives contacts that push normal speeds `target` (a,), with derivatives (a, N).
+
+    Those that stick lose their slips. begun: the speeds so far.
+    """
+    u, hit, sticks = len(system.rest), roles.hit, roles.sticks
+    rows = np.vstack([system.J[hit], system.J[u + sticks]])
+    lever = np.vstack([system.J[hit] - roles.drag[hit, None] * system.J[u + hit], system.J[u + sticks]]).T
+    lever = lever / system.mass[:, None]
+    size = 1.0 / np.sqrt((rows**2 / system.mass).sum(axis=1))
+    solve = np.linalg.pinv(rows @ lever * size * size[:, None], rcond=_DEPENDENT) * size * size[:, None]
+    wanted = np.r_[target, np.zeros(len(sticks))] - rows @ begun.v
+    slope = np.vstack([steep, np.zeros((len(sticks), len(begun.v)))]) - rows @ begun.derivative
+    jump = Jump(begun.v + lever @ solve @ wanted, begun.derivative + lever @ solve @ slope)
+    return _Blow(jump, (solve @ wanted)[: len(hit)], (solve @ slope)[: len(hit)])
+
+
+def _restitution(system: PlanarSystem, approach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the restitutions (u,) at speeds of approach (u,), and their derivatives by these."""
+    units = np.arange(len(approach))
+    now = restitutions_at(system, units, approach)
+    if system.restitution_at == 0:
+        return now, np.zeros(len(now))
+    step = _STEP * np.maximum(approach, 1e-300)
+    ends = [restitutions_at(system, units, approach + share * step) for share in (-2, -1, 1, 2)]
+    return now, (ends[0] - ends[3] + 8.0 * (ends[2] - ends[1])) / (12.0 * step)
+
+
+def stopped(system: PlanarSystem, after: np.ndarray, shut: np.ndarray, speed: float) -> np.ndarray:
+    """Return the projector (N, N), in the mass metric, of speeds onto those that a completed chatter has left (N,).
+
+    shut: (u,) the closed contacts, whose rows at rest count; speed: the fastest, m/s.
+    """
+    u, root = len(system.rest), np.sqrt(system.mass)
+    rests = np.abs(system.J @ after) <= _NOTHING * speed
+    rows = system.J[np.r_[shut & rests[:u], shut & rests[u:] & (system.friction > 0.0)]] / root
+    held = np.linalg.pinv(rows, rcond=_DEPENDENT) @ rows
+    return np.eye(len(after)) - held * root / root[:, None]
