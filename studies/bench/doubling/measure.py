@@ -10,7 +10,7 @@ exact engine's runs, judged by the same rule, are what they are compared with.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -49,6 +49,8 @@ CLOSE = 1e-10
 DRAWN = 2336.0, 2344.0
 #: frequency at which the exact motion repeats itself each period, Hz
 STEADY = 2335.0
+#: passages with their derivative of which one is timed
+_PASSAGES = 100
 _COLUMNS = ("method", "steps", "doubling", "error", "unsteady", "seconds_per_period")
 METHODS = ("Moreau-Jean", "penalty, central differences")
 
@@ -175,6 +177,7 @@ def run_doubling(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
         "machine": machine(), "effort": asdict(effort), "reference": DOUBLING, "exact": exact, "exact_by_runs": by_runs,
         "exact_error": abs(exact - DOUBLING) / DOUBLING,
         "exact_seconds_per_period": _seconds(partial(branch.settle, STEADY, effort.periods), effort.periods),
+        "seconds_per_passage": _seconds(partial(_pass, branch.map, branch.state(STEADY)), _PASSAGES),
         "unsteady": branch.alternation(STEADY, effort.periods),
         "points": points, "diagram": diagram, "wall_time_s": time.perf_counter() - started,
     })  # fmt: skip
@@ -196,7 +199,13 @@ def _point(branch: Branch, effort: Effort, exact: float, label: str, solver: Map
     }  # fmt: skip
 
 
-def _seconds(run: partial[Response], periods: int) -> float:
+def _pass(walked: PeriodMap, state: np.ndarray) -> None:
+    for _ in range(_PASSAGES):
+        walked(state)
+
+
+def _seconds(run: Callable[[], object], periods: int) -> float:
+    """Return the CPU time of one of the periods that a call takes, s."""
     begun = time.thread_time()
     run()
     return (time.thread_time() - begun) / periods
