@@ -140,7 +140,7 @@ def test_a_branch_that_nothing_continues_ends_at_the_place_and_says_so():
 
 def test_grazing_of_the_impact_oscillator():
     """Its linear response reaches the stop at A = c."""
-    (branch,) = diagram(maps.ImpactOscillator(), [0.0, 0.5], 0.05, 0.2, max_points=20).branches
+    (branch,) = diagram(maps.ImpactOscillator(), [0.0, 0.5], 0.05, 0.2, max_points=30).branches
     assert places(branch, "grazing")[:1] == pytest.approx([0.1], rel=CLOSE)
     linear = branch.sequence == ""
     decay = np.exp(-0.05 * 2 * np.pi)

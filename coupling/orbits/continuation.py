@@ -103,13 +103,14 @@ class Follower:
         if len(trace.points) >= self.table.max_points:
             self._end(trace, f"max_points ({self.table.max_points}) reached", trace.head.orbit)
             return
-        head, step, tried = trace.head, trace.step, trace.step
+        head, step, failed = trace.head, trace.step, trace.step
         while step >= self.table.min_step:
-            point, tried = self._reach(head, step), step
+            point = self._reach(head, step)
             if point is None:
-                step /= 2
+                failed, step = step, step / 4
                 continue
             if point.orbit.passage.sequence != head.orbit.passage.sequence:
+                failed = step
                 break
             if point.tangent @ head.tangent > _BENT or step <= 2 * self.table.min_step:
                 if not self._search(trace, head, point):
@@ -118,7 +119,7 @@ class Follower:
                 trace.step = min(1.5 * step, self.table.max_step) if quick else max(step, self.table.min_step)
                 return
             step /= 2
-        self._cross(trace, tried)
+        self._cross(trace, failed)
 
     # -- smooth pieces
 
@@ -238,7 +239,7 @@ class Follower:
             self._end(trace, self._refusal(last, step) or f"{what}; no orbit found beyond", last.orbit)
             return
         self._accept(trace, last, point)
-        trace.step = max(min(step, self.table.step) / 4, self.table.min_step)
+        trace.step = max(self.table.step / 8, self.table.min_step)
 
     def _refusal(self, last: Point, step: float) -> str:
         """Say why values of the parameter beyond a point make no scene; "" if they do."""

@@ -118,9 +118,19 @@ class PlanarMap:
         return frame.state_of(lying)
 
     def mirrored(self, state: np.ndarray) -> np.ndarray | None:
-        """Return the mirror image of a state half a period later, (k,); None for a scene without that symmetry."""
+        """Return the mirror image of a state half a period later, (k,); None for a scene without that symmetry.
+
+        None, too, where the engine does not come so far.
+        """
         image = self._frame.image
-        return None if image is None else image @ state
+        if image is None:
+            return None
+        walk = _Walk(self._frame, self.restart_of(state), self.scale, 1)
+        if walk.passage().status is PassageStatus.STOPPED:
+            return None
+        half, _ = walk.middle.after(0.5 * self._frame.system.period - walk.middle.time)
+        mirrored: np.ndarray = image @ self._frame.to_state @ half
+        return mirrored
 
 
 def planar_map(scene: Scene, parameter: str, periods: int) -> PlanarMap:
@@ -212,7 +222,7 @@ class _Frame:
 
     @cached_property
     def image(self) -> np.ndarray | None:
-        """Map (k, k) of states to their mirror images half a period later; None for a scene without that symmetry."""
+        """Map (k, k) of states to their mirror images; None for a scene without that symmetry."""
         system = self.system
         turned = _image_of(system)
         if turned is None:
@@ -294,6 +304,7 @@ class _Walk:
         self.run.state.state[inside] = np.where(pushes, SLIP_RIGHT, LEAVING)[inside]
         if frame.flows:
             self.run.flows = frame.flows[0]
+        self.middle: Segment  # in which half of the first period is over
         self.last: tuple[float, np.ndarray] | None = None  # time of the last event with a kick, and its shifts
 
     def passage(self) -> Passage:
@@ -326,6 +337,8 @@ class _Walk:
         self._look_at_idle_contacts(segment, self.frame.from_state * self.scale)
         M = segment.stopped() @ self.frame.from_state * self.scale
         while counters[PERIOD] < self.periods:
+            if counters[PERIOD] == 0 and segment.time <= 0.5 * self.system.period:
+                self.middle = segment
             run.guards.status[:] = BOUNDED
             st = run.state
             before = _Before(st.known.copy(), st.last_impact.copy(), float(st.ledger[IMPACT_LOSS]))
@@ -387,7 +400,7 @@ class _Walk:
         """Note the event of a segment that was nearest and did not happen."""
         nearest = segment.nearest(duration, event)
         if nearest is not None and nearest[0] < self.clearance[0]:
-            self.clearance = nearest[0], self.frame.names.possible(*nearest[1:])
+            self.clearance = max(nearest[0], 0.0), self.frame.names.possible(*nearest[1:])
 
     def _across(
         self, segment: Segment, duration: float, z: np.ndarray, M: np.ndarray, before: _Before
@@ -477,8 +490,8 @@ class _Walk:
         shifts: (k,) of the time of the event.
         """
         system, n, u = self.system, len(z) // 2, len(self.system.rest)
-        struck = [c for c in struck[:, 2].astype(int) if segment.state[c] == OPEN and (c, CLOSES) != (r, what)]
-        apart = [(np.r_[system.J[c], np.zeros(n)], system.play[c]) for c in struck]
+        begun = [c for c in struck[:, 2].astype(int) if segment.state[c] == OPEN and (c, CLOSES) != (r, what)]
+        apart = [(np.r_[system.J[c], np.zeros(n)], system.play[c]) for c in begun]
         slides = np.isin(segment.state, (SLIP_LEFT, SLIP_RIGHT)) & ~segment.held & (new.state != segment.state)
         slides &= (system.friction > 0.0) | (np.arange(u) >= system.contacts)
         stops = slides & (np.abs(system.J[u:] @ z[n:]) <= _ROUND_OFF * segment.speed)

@@ -33,6 +33,8 @@ from vanedamp.coupling.planar.planar_run import PlanarRun
 _TURN, _POINTS = 12, 240
 #: singular values that count as none
 _DEPENDENT = 1e-9
+#: share of its scale below which a margin is that of an event right before
+_BEGUN = 1e-9
 #: steps of Newton's method to a least margin
 _STEPS = 6
 
@@ -159,11 +161,12 @@ class Segment:
         count = int(min(max(8, fastest * duration * _TURN / (2 * np.pi)), _POINTS))
         times = duration / count * np.arange(count + 1)
         value, rate, _ = self._values(powers, waves, times)
-        turns = (rate[:, :-1] < 0.0) & (rate[:, 1:] > 0.0)
-        if not turns.any():
-            return None
         gaps = np.array([self.system.play[r] if what == CLOSES else np.inf for r, what in watched])
         scale = np.where(np.isfinite(gaps), gaps, np.abs(value).max(axis=1))
+        turns = (rate[:, :-1] < 0.0) & (rate[:, 1:] > 0.0)
+        turns[:, 0] &= value[:, 0] > _BEGUN * scale
+        if not turns.any():
+            return None
         low = np.where(turns, np.minimum(value[:, :-1], value[:, 1:]) / scale[:, None], np.inf)
         k, at = np.unravel_index(np.argmin(low), low.shape)
         start, end = times[at], times[at + 1]

@@ -28,7 +28,7 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.orbits.passage import Crossing, Passage, PassageStatus
 from vanedamp.coupling.orbits.saltation import LinearFlow
 from vanedamp.coupling.orbits.slider_dynamics import SliderDynamics
-from vanedamp.coupling.orbits.slider_event import Before, Untrusted, across, impact
+from vanedamp.coupling.orbits.slider_event import Across, Before, Untrusted, across, impact
 from vanedamp.coupling.orbits.slider_names import RowNames
 from vanedamp.coupling.orbits.slider_start import clipped, loose
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, new_records
@@ -166,18 +166,24 @@ class Walk:
         impulse = self.run.scratch.impulse if collides else np.zeros(len(before.state))
         after = self._agreed(before.u + dynamics.kick(impulse))
         met = {int(e[2]): float(e[3]) for chunk in self.run.log.chunks for e in chunk if e[1] == IMPACT}
-        S, speed, status = across(dynamics, before, st, after, impulse, met)
-        moment = int(st.counters[PERIOD]) * period + before.time
-        if not collides and moment <= SIMULTANEOUS * period:
-            S = dynamics.settled(st.state)  # rows at rest to round-off: the passage begins with them at rest
-        elif status is not PassageStatus.OK:
-            self._status = status
+        moment, hit = int(st.counters[PERIOD]) * period + before.time, np.flatnonzero(impulse)
+        begins = moment <= SIMULTANEOUS * period
+        if begins:
+            # rows at rest or in touch to round-off: the passage begins with them so
+            jump = impact(dynamics, hit, np.array([met.get(int(r), 0.0) for r in hit]), st.velocity[hit])
+            status = PassageStatus.GRAZING if before.order == POSITION else PassageStatus.OK
+            crossed = Across(dynamics.settled(st.state) @ jump, 0.0, status)
+        else:
+            crossed = across(dynamics, before, st, after, impulse, met)
+        S = crossed.S
+        if crossed.status is not PassageStatus.OK:
+            self._status = crossed.status
         self._check_order(S, moment)
         M = S @ M
         self._check_still(M)
-        name = self._names.event(before.state, st.state, np.flatnonzero(impulse))
-        if name:
-            self._crossings.append(Crossing(moment, name, speed, loss))
+        name = self._names.event(before.state, st.state, hit)
+        if name and (len(hit) or not begins):
+            self._crossings.append(Crossing(moment, name, crossed.speed, loss))
         return after, M
 
     def _state(self) -> np.ndarray:

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from vanedamp.coupling.numerics.function_address import address_of, call
 from vanedamp.coupling.numerics.jit import inlined
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw
-from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
+
+
+class Contacts(Protocol):
+    """What a system says of the restitutions (r,) of its contacts: coefficients, and the law that takes them."""
+
+    @property
+    def restitution(self) -> np.ndarray:
+        """(r,) of each contact, or the coefficient from which the law takes it."""
+
+    @property
+    def restitution_at(self) -> int:
+        """Address of that law; 0: the coefficient at every speed."""
+
 
 #: speeds at which a law is tried, m/s
 _SPEEDS = (0.0, *np.geomspace(1e-12, 1e3, 76))
@@ -41,7 +55,7 @@ def restitution_at(system, r, approach):
     return call(system.restitution_at, max(approach, 0.0), system.restitution[r])
 
 
-def restitutions_at(system: System, contacts: np.ndarray, approach: np.ndarray) -> np.ndarray:
+def restitutions_at(system: Contacts, contacts: np.ndarray, approach: np.ndarray) -> np.ndarray:
     """Return the restitutions (k,) of some contacts (k,) at their speeds of approach (k,), for uncompiled code."""
     coefficients: np.ndarray = system.restitution[contacts]
     if system.restitution_at == 0:

@@ -1,0 +1,352 @@
+"""Period maps of bodies in the plane: derivatives against 40 digits and differences, statuses, symmetry."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.reference.planar_sequence import PlanarSequence, walk
+from tests.tools.planar import planar_scene
+from tests.tools.planar_laws import scene_of, tables
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.orbits.passage import PassageStatus
+from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.orbits.planar_segment import Segment
+from vanedamp.coupling.planar.constraints import PlanarMotion, planar_motion
+from vanedamp.coupling.planar.planar_run import PlanarRun
+from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError
+
+EPS = np.finfo(float).eps
+LAWS = {
+    "newton": {}, "poisson": {"law": "poisson"}, "viscoelastic": {"law": "viscoelastic", "coefficient": 0.2},
+    "compliant": {"law": "compliant", "stiffness": 300.0},
+}  # fmt: skip
+STRUCTURE = {
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.02},
+    "initial": {"displacement": 0.4, "velocity": 0.7},
+}
+BLOCK = {"shape": "block", "length": 1.0, "height": 0.7, "mass": 0.1}
+DISC = {"shape": "disc", "radius": 0.4, "mass": 0.1, "lift": 0.02}
+SPRING = {"law": "compliant", "stiffness": 20.0}
+
+
+def shaken(frequency, force, gravity, law, body):
+    """A scene of one body in a rigid structure, angular frequency in units of the structure's."""
+    table = STRUCTURE | {
+        "excitation": {"frequency": frequency / (2 * math.pi), "force": force},
+        "gravity": {"acceleration": gravity}, "contact": law,
+    }  # fmt: skip
+    return planar_scene(table, body, gap=0.6, play=0.5)
+
+
+def frame_of(scene):
+    """The period map of a scene, its system with and without extent, and (q, q') at the start."""
+    found = period_map(scene)
+    flat, system = found._frame.flat, found._frame.system
+    motion = planar_motion(scene, flat, system)
+    return found, flat, system, np.r_[motion.q, motion.v]
+
+
+def start_of(found, z):
+    """The state of (q, q')."""
+    return found._frame.to_state @ z
+
+
+CASES = {
+    "block that rocks and hits": (
+        shaken(1.05, 0.3, 0.05, {"law": "newton"}, BLOCK | {
+            "friction": 0.3, "restitution": 0.7, "tilt": 0.2, "position": 0.05, "lift": 0.01, "tilt_rate": 0.2,
+        }), ("impact c1.floor.0.0", "impact c1.right.0.1", "impact c1.left.0.3"),
+    ),
+    "block that slides, comes to lie and sticks": (
+        shaken(3.81, 0.72, 0.26, {"law": "newton"}, BLOCK | {
+            "friction": 0.35, "restitution": 0.0, "tilt": 0.17, "velocity": 0.35, "tilt_rate": -0.24,
+        }), ("turns c1.floor.0.0 right", "rests c1.floor.0.1", "sticks c1.floor.0.0"),
+    ),
+    "block by Poisson's law": (
+        shaken(5.3, 0.65, 0.21, {"law": "poisson"}, BLOCK | {
+            "friction": 0.14, "restitution": 0.5, "tilt": 0.29, "velocity": 0.15, "tilt_rate": -0.14,
+        }), ("impact c1.floor.0.0", "impact c1.right.0.1", "impact c1.right.0.2"),
+    ),
+    "disc that rolls, slips and leaves": (
+        shaken(2.1, 0.81, 0.78, {"law": "newton"}, DISC | {
+            "friction": 0.12, "restitution": 0.0, "velocity": -0.17, "tilt_rate": -0.14,
+        }), ("sticks c1.floor.0", "slips c1.floor.0 right", "leaves c1.right.0"),
+    ),
+    "disc on springs": (
+        shaken(2.43, 0.31, 0.84, SPRING, DISC | {
+            "friction": 0.33, "restitution": 0.5, "velocity": -0.41, "tilt_rate": -0.04,
+        }), ("sticks c1.right.0", "slips c1.right.0 left", "lags c1.right.0"),
+    ),
+    "disc that a spring pushes again": (
+        shaken(6.35, 0.36, 0.68, SPRING, DISC | {
+            "friction": 0.41, "restitution": 0.5, "velocity": 0.22, "tilt_rate": 0.25,
+        }), ("lags c1.floor.0", "presses c1.floor.0", "impact c1.right.0"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_matches_a_fixed_sequence_in_40_digits(case):
+    """An error of a speed by round-off shifts an event by that over its rate."""
+    scene, expected = CASES[case]
+    found, flat, system, z = frame_of(scene)
+    passage = found(start_of(found, z))
+    assert passage.status is PassageStatus.OK
+    names = {part for name in passage.sequence for part in name.split(", ")}
+    assert set(expected) <= names
+    end, derivative = PlanarSequence(system, walk(flat, system, z)).passage(z)
+    slowest = min(abs(crossing.speed) for crossing in passage.crossings)
+    to_state, from_state = found._frame.to_state, found._frame.from_state
+    size = np.abs(passage.derivative).max()
+    np.testing.assert_allclose(passage.state, to_state @ end, atol=1e3 * EPS * size / slowest)
+    np.testing.assert_allclose(
+        passage.derivative, to_state @ derivative @ from_state, rtol=0, atol=1e3 * EPS * size / slowest
+    )
+
+
+# --- differences of the engine
+
+
+def directions(found, x):
+    """Directions (k, m), in units of the scale, in which a state may move without breaking closed contacts."""
+    frame = found._frame
+    motion = PlanarMotion(*np.split(frame.from_state @ x, 2))
+    run = PlanarRun(frame.flat, frame.system, motion, new_records(frame.flat, 1, 0), True, 0)
+    run.advance_to(1)
+    held = frame.to_state @ Segment(run).stopped() @ frame.from_state
+    left, sizes, _ = np.linalg.svd(held / found.scale[:, None] * found.scale)
+    return left[:, sizes > 1e-9]
+
+
+def difference(found, x, direction):
+    """The derivative along a direction by differences of several steps, and how far those are apart.
+
+    None where the engine does not reach the end from a neighbour.
+    """
+    best = None
+    for h in (1e-3, 1e-4, 1e-5, 1e-6):
+        ends = [found(x + way * h * direction * found.scale) for way in (1, -1, 2, -2)]
+        if any(end.status is PassageStatus.STOPPED for end in ends):
+            continue
+        one, two, three, four = (end.state / found.scale for end in ends)
+        coarse = (one - two) / (2 * h)
+        fine = (4 * coarse - (three - four) / (4 * h)) / 3
+        apart = np.abs(fine - coarse).max() + 50 * EPS * np.abs(one).max() / h
+        if best is None or apart < best[1]:
+            best = fine, apart
+    return best
+
+
+def compare(found, x):
+    """Compare the derivative with differences in all directions; returns in how many that could be done."""
+    passage, compared = found(x), 0
+    assert passage.status is PassageStatus.OK
+    derivative = passage.derivative / found.scale[:, None] * found.scale
+    size = max(np.abs(derivative).max(), 1.0)
+    slowest = min((abs(crossing.speed) for crossing in passage.crossings), default=1.0)
+    for direction in directions(found, x).T:
+        differed = difference(found, x, direction)
+        if differed is None or differed[1] > 1e-4 * size:
+            continue  # another sequence of events is nearer than any step
+        error = np.abs(derivative @ direction - differed[0]).max()
+        assert error <= 10 * differed[1] + size * (1e-9 + 200 * EPS / slowest)
+        compared += 1
+    return compared
+
+
+def random_start(seed, law):
+    """The map of a random scene and the state at its start; None for one with sliders only, or without a start."""
+    table = tables(seed) | {"contact": {"law": "newton"} | LAWS[law]}
+    if law == "viscoelastic":
+        for damper in table["damper"]:
+            damper.pop("restitution", None)
+    try:
+        scene = scene_of(table)
+        if not scene.planar:
+            return None
+        found, _, _, z = frame_of(scene)
+    except InputError:
+        return None
+    return found, start_of(found, z)
+
+
+@pytest.mark.parametrize(
+    ("law", "seed", "periods"),
+    [
+        ("newton", 11, 0), ("newton", 31, 0), ("newton", 64, 1), ("newton", 10, 1), ("poisson", 30, 0),
+        ("poisson", 46, 0), ("viscoelastic", 10, 0), ("compliant", 29, 0), ("compliant", 34, 1),
+    ],
+)  # fmt: skip
+def test_matches_differences_of_the_engine(law, seed, periods):
+    found, x = random_start(seed, law)
+    for _ in range(periods):
+        x = found(x).state
+    assert compare(found, x) >= 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", LAWS)
+def test_matches_differences_in_many_scenes(law):
+    compared = 0
+    for seed in range(60):
+        begun = random_start(seed, law)
+        if begun is None:
+            continue
+        found, x = begun
+        for _ in range(2):
+            passage = found(x)
+            if passage.status is PassageStatus.STOPPED:
+                break
+            if passage.status is PassageStatus.OK and len(passage.crossings) < 40:
+                compared += compare(found, x)
+            x = passage.state
+    assert compared > 20
+
+
+# --- motions that stay aligned
+
+
+def flat_block(law):
+    """A block that flies to and fro aligned with its cavity, without weight, and meets walls with two corners."""
+    body = BLOCK | {"friction": 0.0, "restitution": 0.8, "lift": 0.2, "velocity": 0.3}
+    return shaken(1.05, 0.3, 0.0, law, body)
+
+
+def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
+    """Of springs and dashpots the order in which two corners meet a wall is no matter, to first order."""
+    scene = flat_block(SPRING)
+    found, _, _, z = frame_of(scene)
+    x, periods = start_of(found, z), 4
+    passage = found.over(periods)(x)
+    assert passage.status is PassageStatus.OK
+    assert any("impact c1.right.0.1, impact c1.right.0.2" in name for name in passage.sequence)
+    tilt, rate = found.names.index("body 0 tilt"), found.names.index("body 0 tilt rate")
+    ends = []
+    for way in (1, -1):
+        tilted = x.copy()
+        tilted[tilt] += way * 1e-7
+        response = simulate(
+            scene.replace({"time.periods": periods, "time.transient": 0}), start=found.restart_of(tilted)
+        )
+        ends.append(found.state_of(response.final))
+    grown = (ends[0] - ends[1]) / 2e-7
+    growth = passage.derivative[:, tilt]
+    assert np.abs(growth[[tilt, rate]]).max() > 2.0
+    np.testing.assert_allclose(grown, growth, rtol=0, atol=1e-6 * np.abs(growth).max())
+
+
+def test_an_aligned_block_that_hits_rigid_walls_has_no_derivative_of_its_tilt():
+    """However small its tilt is, it leaves the wall with a rate of tilt that is not."""
+    found, _, _, z = frame_of(flat_block({"law": "newton"}))
+    x = start_of(found, z)
+    passage = found(x)
+    assert passage.status is PassageStatus.COINCIDENT
+    tilt, rate = found.names.index("body 0 tilt"), found.names.index("body 0 tilt rate")
+    assert passage.state[tilt] == passage.state[rate] == 0.0
+    for size in (1e-6, 1e-9):
+        tilted = x.copy()
+        tilted[tilt] += size
+        assert abs(found(tilted).state[rate]) > 1e-2
+    along = np.zeros(len(x))
+    along[found.names.index("body 0 slip")] = found.scale[found.names.index("body 0 slip")]
+    ends = [found(x + way * 1e-5 * along).state for way in (1, -1)]
+    np.testing.assert_allclose((ends[0] - ends[1]) / 2e-5, passage.derivative @ along, rtol=1e-6, atol=1e-8)
+
+
+# --- the contract
+
+
+def test_a_block_that_sticks_to_its_floor_is_an_orbit():
+    """The linear orbit comes back, and nothing is left of motions that friction and floor stop."""
+    scene = shaken(0.3, 0.01, 1.0, {"law": "newton"}, BLOCK | {"friction": 0.5, "restitution": 0.3, "position": 0.1})
+    found = period_map(scene)
+    x = found.linear_orbit()
+    passage = found(x)
+    assert passage.status is PassageStatus.OK
+    assert passage.sequence == ()
+    np.testing.assert_allclose(passage.state, x, rtol=0, atol=1e-13)
+    assert found.names == (
+        "mode 0", "mode 0 rate", "body 0 slip", "body 0 slip rate", "body 0 lift", "body 0 lift rate", "body 0 tilt",
+        "body 0 tilt rate",
+    )  # fmt: skip
+    assert len(found.scale) == 8
+    assert np.all(found.scale > 0.0)
+    assert np.linalg.matrix_rank(passage.derivative, tol=1e-12) == 3  # the structure's two, and where the block sticks
+    np.testing.assert_allclose(passage.peaks, np.hypot(x[0], x[1] / 0.3), rtol=1e-9)
+    multipliers = np.linalg.eigvals(passage.derivative)
+    mass, damping, period = 1.1, 2 * 0.02, 2 * math.pi / 0.3
+    expected = np.exp(-damping / (2 * mass) * period)
+    np.testing.assert_allclose(np.sort(np.abs(multipliers))[-3:], [expected, expected, 1.0], rtol=1e-10)
+
+
+def test_state_and_restart_are_inverse():
+    found, _, _, z = frame_of(CASES["disc on springs"][0])
+    x = start_of(found, z)
+    np.testing.assert_array_equal(found.state_of(found.restart_of(x)), x)
+
+
+def test_two_periods_are_one_after_the_other():
+    """Springs that are compressed as a period ends go on in the next one."""
+    found, _, _, z = frame_of(CASES["disc that a spring pushes again"][0])
+    x = start_of(found, z)
+    for _ in range(3):
+        one = found(x)
+        two, both = found(one.state), found.over(2)(x)
+        np.testing.assert_allclose(both.state, two.state, rtol=0, atol=1e-11)
+        scale = np.abs(both.derivative).max()
+        np.testing.assert_allclose(both.derivative, two.derivative @ one.derivative, rtol=0, atol=1e-8 * scale)
+        assert both.peaks == pytest.approx(np.r_[one.peaks, two.peaks])
+        x = one.state
+
+
+def test_mirror_image():
+    """The image of a motion half a period later is a motion: twice it is a period."""
+    found, _, _, z = frame_of(CASES["block that rocks and hits"][0])
+    x = start_of(found, z)
+    image = found.mirrored(x)
+    passage = found(x)
+    assert np.abs(image - passage.state).max() > 1e-2
+    np.testing.assert_allclose(found.mirrored(image), passage.state, rtol=0, atol=1e-10)
+
+
+def test_no_mirror_image_where_gravity_pulls_along():
+    scene = CASES["block that rocks and hits"][0].replace({"gravity.orientation_deg": 30.0})
+    found, _, _, z = frame_of(scene)
+    assert found.mirrored(start_of(found, z)) is None
+
+
+def grazed(share: float) -> Scene:
+    """A disc at rest in space in a cavity that swings to and fro by its free travel over 2 (1 + share)."""
+    table = {
+        "structure": {"model": "prescribed", "displacement_amplitude": 1.0},
+        "excitation": {"frequency": 1 / (2 * math.pi)}, "gravity": {"acceleration": 1.0},
+    }  # fmt: skip
+    body = DISC | {"friction": 0.0, "restitution": 0.5, "velocity": -1.0, "lift": 0.0}
+    return planar_scene(table, body, gap=2.0 * (1.0 + share), play=1.0)
+
+
+def test_a_tangential_impact_is_grazing():
+    found, _, _, z = frame_of(grazed(-1e-13))
+    passage = found(start_of(found, z))
+    assert passage.status is PassageStatus.GRAZING
+
+
+@pytest.mark.parametrize("share", [1e-2, 1e-6])
+def test_clearance_of_an_impact_that_nearly_happens(share):
+    found, _, _, z = frame_of(grazed(share))
+    passage = found(start_of(found, z))
+    assert passage.status is PassageStatus.OK
+    distance, name = passage.clearance
+    assert name in ("impact c1.left.0", "impact c1.right.0")
+    assert distance == pytest.approx(share / (2 * (1 + share)), rel=1e-6)
+
+
+def test_an_impact_that_friction_would_feed_takes_no_energy():
+    """All coefficients are smaller by one share that depends on the speeds, and the derivative knows it."""
+    found, x = random_start(14, "newton")
+    passage = found(x)
+    assert passage.status is not PassageStatus.UNDETERMINED
+    assert np.all(np.isfinite(passage.derivative))
