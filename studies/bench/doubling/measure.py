@@ -175,7 +175,7 @@ def run_doubling(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     exact = exact_doubling(branch.map, branch.state(STEADY))
     result = finite({
         "machine": machine(), "effort": asdict(effort), "reference": DOUBLING, "exact": exact, "exact_by_runs": by_runs,
-        "exact_error": abs(exact - DOUBLING) / DOUBLING,
+        "exact_error": abs(exact - DOUBLING) / DOUBLING, "exact_tolerance": CLOSE / DOUBLING,
         "exact_seconds_per_period": _seconds(partial(branch.settle, STEADY, effort.periods), effort.periods),
         "seconds_per_passage": _seconds(partial(_pass, branch.map, branch.state(STEADY)), _PASSAGES),
         "unsteady": branch.alternation(STEADY, effort.periods),
