@@ -1,4 +1,4 @@
-"""Where the scatter of the paper's figure 9 begins, for its three gaps: bifurcations, and runs beside them."""
+"""Bifurcations beside the scatter of the paper's figure 9, for its three gaps, and runs beside them."""
 
 import math
 from dataclasses import replace
@@ -46,7 +46,7 @@ def closed_form(gap):
 
 @pytest.mark.slow
 def test_half_the_gap_loses_its_symmetry_and_later_its_period():
-    """Two impacts up to a pitchfork, three up to a Neimark-Sacker point: there the scatter begins.
+    """Two impacts up to a pitchfork, three up to a Neimark-Sacker point: runs beyond do not repeat.
 
     The pitchfork is the closed form's but for friction, whose force is 1/1600 of the inertia of the body.
     """
@@ -63,7 +63,7 @@ def test_half_the_gap_loses_its_symmetry_and_later_its_period():
 
 
 @pytest.mark.slow
-def test_a_tenth_of_the_gap_scatters_from_a_period_doubling_on():
+def test_a_tenth_of_the_gap_doubles_its_period():
     found = places("period doubling", 0.1, 0.95, 0.953)[1]
     assert found == pytest.approx([0.95218538], abs=1e-7)
     for frequency, kind in ((found[0] - 2e-4, "periodic-1"), (found[0] + 4e-4, "periodic-2")):
@@ -72,7 +72,7 @@ def test_a_tenth_of_the_gap_scatters_from_a_period_doubling_on():
 
 
 @pytest.mark.slow
-def test_the_reference_gap_scatters_from_its_first_touch_on():
+def test_a_body_in_the_middle_of_the_reference_gap_is_touched_where_its_reach_ends():
     """A body in the middle is out of reach up to half an undamped amplitude; two impacts a period are not stable."""
     branch, found = places("grazing", 1.0, 0.995, 0.9975, position=0.0)
     assert branch.amplitude_mean[-1] / AMPLITUDE == pytest.approx(0.5, abs=1e-4)
