@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.tools.laws_by_event import check_events
 from tests.tools.random_scenes import random_reduced, random_scene
 from vanedamp.coupling.engine import simulate
@@ -32,36 +33,6 @@ def oscillator(force, **tables) -> Scene:
     return validate(Scene, data | tables, "scene")
 
 
-def one_impact_speed(force):
-    """Speed before the impact of the orbit with one impact a period.
-
-    After an impact at the phase p, x = -F cos t + e^(-c s / 2) (a cos w s + b sin w s), s = t - p and F = force / c, as
-    the response lags by a quarter at resonance: x(p) = x(p + T) = GAP give a and b, and x'(p) = -k x'(p + T) gives p.
-    """
-    turn, decay, period = math.sqrt(1 - DAMPING**2 / 4), DAMPING / 2, 2 * math.pi
-
-    def free(t):
-        e, c, s = math.exp(-decay * t), math.cos(turn * t), math.sin(turn * t)
-        place = np.array([e * c, e * s])
-        return place, np.array([-decay * place[0] - turn * e * s, -decay * place[1] + turn * e * c])
-
-    (start, start_rate), (end, end_rate) = free(0.0), free(period)
-
-    def orbit(phase):
-        forced, rate = -force / DAMPING * math.cos(phase), force / DAMPING * math.sin(phase)
-        a, b = np.linalg.solve(np.array([start, end]), [GAP - forced, GAP - forced])
-        before = rate + end_rate @ [a, b]
-        return before, rate + start_rate @ [a, b] + RESTITUTION * before
-
-    phases = np.linspace(0.0, 2 * math.pi, 400)
-    excess = [orbit(phase)[1] for phase in phases]
-    roots = [
-        brentq(lambda phase: orbit(phase)[1], low, high, xtol=1e-15)
-        for low, high, one, two in zip(phases, phases[1:], excess, excess[1:], strict=False) if one * two < 0
-    ]  # fmt: skip
-    return [orbit(root)[0] for root in roots if orbit(root)[0] > 0]
-
-
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize(("share", "hits"), [(1 - 1e-9, False), (1 + 1e-9, True)])
 def test_it_grazes_at_the_amplitude_of_the_gap(side, share, hits):
@@ -77,7 +48,7 @@ def test_one_impact_a_period_has_the_speed_of_its_closed_form():
     assert response.energy_residual < 1e-12
     hits = [event for event in response.event_list if event.kind == "impact"][-50:]
     assert {(event.side, event.damper) for event in hits} == {("stop", 0)}
-    (speed,) = [speed for speed in one_impact_speed(1.0) if abs(speed - 1.7) < 0.2]
+    speed = ImpactOscillator(k=1.0, c=DAMPING, A=1.0, w=1.0, d=GAP, e=RESTITUTION).speed
     # what is left of the transient: the orbit's multipliers are k^2 e^(-0.1 T) in product
     assert [event.relative_velocity_before for event in hits] == pytest.approx([-speed] * 50, rel=1e-12)
     assert [event.relative_velocity_after for event in hits] == pytest.approx([RESTITUTION * speed] * 50, rel=1e-12)

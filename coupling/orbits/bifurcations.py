@@ -8,10 +8,11 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import barycentric_interpolate
 from scipy.linalg import svd
 from scipy.optimize import brentq
 
-from vanedamp.coupling.orbits.corrector import corrected
+from vanedamp.coupling.orbits.corrector import near
 from vanedamp.coupling.orbits.multipliers import decided, indicators
 from vanedamp.coupling.orbits.newton import Orbit, Point, Problem, point_of, with_symmetry
 
@@ -72,14 +73,18 @@ def _root(
 ) -> tuple[float, Point] | None:
     """Return arclength and point of a test function's zero between two points; None if it jumps.
 
-    Beside a pitchfork the orbit is determined too badly to be corrected: there the zero is that of the chord.
+    Orbits are looked for on the parabola through the three nearest that are known: beside a pitchfork Newton's method,
+    whose derivative is singular there, has only a small part of its way left for it. Where even that is too much, the
+    zero is that of the chord.
     """
     length = float((after.y - before.y) @ before.tangent)
     points: dict[float, Point] = {0.0: before, length: after}
 
     def value(at: float) -> float:
         if at not in points:
-            orbit = corrected(problem, before, at)
+            known = sorted(points, key=lambda other: abs(other - at))[:3]
+            predicted = barycentric_interpolate(known, [points[other].y for other in known], at)
+            orbit = near(problem, predicted, before.tangent, before.slope, abs(length))
             if orbit is None or orbit.passage.sequence != before.orbit.passage.sequence:
                 raise _Lost
             points[at] = point_of(problem, orbit, before.tangent)

@@ -1,7 +1,7 @@
 """Orbits beyond the place where the sequence of events along a branch ends.
 
 An orbit of another sequence is looked for where the branch would go on, at the root of the distance along it where a
-new impact grazes, and in the image of it, where an event passes the start of the period.
+new impact grazes, and on the other side of the period's start (orbits.period_start).
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from vanedamp.coupling.orbits.newton import (
     least_squares,
     point_of,
     solve,
-    tangent_of,
 )  # fmt: skip
 from vanedamp.coupling.orbits.passage import Passage
+from vanedamp.coupling.orbits.period_start import past_the_start
 
 #: what happens to a body that comes to a wall and has room on the other side
 CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"
@@ -43,6 +43,8 @@ class OtherSide:
     def find(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
         sequence = last.orbit.passage.sequence
+        if (passed := past_the_start(self.problem, last)) is not None:
+            return passed, " at the start of the period"
         if (centred := self._centred(last)) is not None:
             return centred, CENTRED
         for size in self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
@@ -55,13 +57,6 @@ class OtherSide:
                 if orbit is not None:
                     away = self.problem.pack(orbit.state, orbit.parameter) - last.y
                     return point_of(self.problem, orbit, away / np.linalg.norm(away)), ""
-            # an event that passes the start of the period changes the state there, as the passage's end shows
-            image = self.problem.pack(passage.state, self.problem.parameter(y))
-            if np.linalg.norm(image - y) > 100 * size and (found := self.problem.passage(image)) is not None:
-                row = tangent_of(self.problem, found, self.problem.slope(image, found), last.tangent)
-                orbit = near(self.problem, image, last.tangent, last.slope, size)
-                if orbit is not None:
-                    return point_of(self.problem, orbit, row), " at the start of the period"
         for factor in (1.0, 2.0, 4.0):
             orbit = corrected(self.problem, last, factor * step)
             if orbit is not None:

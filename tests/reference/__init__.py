@@ -1,1 +1,1 @@
-"""Independent solutions: DOP853 with event location, multiprecision propagators, closed forms of one collision."""
+"""Independent solutions: DOP853 with event location, multiprecision propagators, closed forms of impacts and orbits."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from tests.reference import orbit_impact_oscillator
 from tests.tools.closed_form_compliant_scenes import stop
 from tests.tools.closed_form_scenes import ball, one_to_one, period_one_start, rubbing, scene, table
 from tests.validation.bar import bar_on_a_spring, bar_on_a_wall, falling_bar
@@ -21,38 +21,8 @@ from vanedamp.coupling.response.restart_state import RestartState
 GROUND = 1e15
 
 
-class ImpactOscillator:
-    """x'' + c x' + k x = A cos(w t) below a stop at d, x' -> -e x' there: its orbit with one impact a period.
-
-    The motion is the steady one of the oscillator without a stop, H exp(i w t), plus a free one that begins at the
-    impact with (d, -e v) less the steady state s(phi) and has become (d, v) - s(phi) a period later, by the flow E:
-
-        (E - 1) ((d, 0) - s(phi)) = (0, v) + E (0, e v),
-
-    linear in v. That |H| is given leaves a quadratic equation for the speed v, and then s(phi) names the phase phi of
-    the force (Shaw and Holmes 1983, J. Sound Vib. 90: the same orbit, by the same argument).
-    """
-
-    def __init__(self, k: float, c: float, A: float, w: float, d: float, e: float) -> None:
-        self.k, self.c, self.A, self.w, self.d, self.e = k, c, A, w, d, e
-        self.matrix = np.array([[0.0, 1.0], [-k, -c]])
-        self.steady = A / (k - w**2 + 1j * w * c)
-        flow = expm(self.matrix * 2 * np.pi / w)
-        share = np.linalg.solve(flow - np.eye(2), np.array([0.0, 1.0]) + flow @ np.array([0.0, e]))
-        # (d, 0) - s(phi) = share v, and s(phi) lies on the ellipse of the steady motion
-        quadratic = [share[0] ** 2 + (share[1] / w) ** 2, -2 * d * share[0], d**2 - abs(self.steady) ** 2]
-        self.speed = float(np.roots(quadratic).max())
-        place, rate = d - share[0] * self.speed, -share[1] * self.speed
-        self.phase = float(np.arctan2(-rate / w, place) - np.angle(self.steady))
-
-    def state(self, phase: float) -> np.ndarray:
-        """(x, x') at a phase of the force within a period after the impact's."""
-        free = np.array([self.d, -self.e * self.speed]) - self._steady(self.phase)
-        return expm(self.matrix * (phase - self.phase) / self.w) @ free + self._steady(phase)
-
-    def _steady(self, phase: float) -> np.ndarray:
-        turning = self.steady * np.exp(1j * phase)
-        return np.array([turning.real, (1j * self.w * turning).real])
+class ImpactOscillator(orbit_impact_oscillator.ImpactOscillator):
+    """The oscillator below a stop, with runs of the engine in which a heavy body is the stop."""
 
     def run(self, start: np.ndarray, periods: int) -> Response:
         """The engine's motion from a state at phase -pi/2, where its force A sin(w t) begins."""
