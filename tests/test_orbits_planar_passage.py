@@ -8,13 +8,13 @@ import pytest
 from tests.reference.planar_sequence import PlanarSequence, walk
 from tests.tools.planar import planar_scene
 from tests.tools.planar_laws import scene_of, tables
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.orbits.planar_segment import Segment
 from vanedamp.coupling.planar.constraints import PlanarMotion, planar_motion
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError
 
@@ -218,7 +218,7 @@ def flat_block(law):
 def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
     """Of springs and dashpots the order in which two corners meet a wall is no matter, to first order."""
     scene = flat_block(SPRING)
-    found, _, _, z = frame_of(scene)
+    found, flat, system, z = frame_of(scene)
     x, periods = start_of(found, z), 4
     passage = found.over(periods)(x)
     assert passage.status is PassageStatus.OK
@@ -227,15 +227,16 @@ def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
     ends = []
     for way in (1, -1):
         tilted = x.copy()
-        tilted[tilt] += way * 1e-7
-        response = simulate(
-            scene.replace({"time.periods": periods, "time.transient": 0}), start=found.restart_of(tilted)
-        )
-        ends.append(found.state_of(response.final))
-    grown = (ends[0] - ends[1]) / 2e-7
+        tilted[tilt] += way * 1e-8
+        start = PlanarMotion(*np.split(found._frame.from_state @ tilted, 2))
+        run = PlanarRun(flat, system, start, new_records(flat, periods, 0), False, 10**6)
+        assert run.advance_to(periods) is Status.OK
+        ends.append(found._frame.to_state @ np.r_[run.state.q, run.state.v])
+    grown = (ends[0] - ends[1]) / 2e-8
     growth = passage.derivative[:, tilt]
     assert np.abs(growth[[tilt, rate]]).max() > 2.0
-    np.testing.assert_allclose(grown, growth, rtol=0, atol=1e-6 * np.abs(growth).max())
+    # gaps that are zero to 1e-12 of the free travel close together
+    np.testing.assert_allclose(grown, growth, rtol=0, atol=5e-5 * np.abs(growth).max())
 
 
 def test_an_aligned_block_that_hits_rigid_walls_has_no_derivative_of_its_tilt():
@@ -245,7 +246,7 @@ def test_an_aligned_block_that_hits_rigid_walls_has_no_derivative_of_its_tilt():
     passage = found(x)
     assert passage.status is PassageStatus.COINCIDENT
     tilt, rate = found.names.index("body 0 tilt"), found.names.index("body 0 tilt rate")
-    assert passage.state[tilt] == passage.state[rate] == 0.0
+    assert np.abs(passage.state[[tilt, rate]]).max() < 1e-14
     for size in (1e-6, 1e-9):
         tilted = x.copy()
         tilted[tilt] += size

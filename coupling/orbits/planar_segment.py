@@ -174,8 +174,8 @@ class Segment:
         for _ in range(_STEPS):  # Newton's method, held between the bounds
             slope, curvature = self._values(powers[k : k + 1], waves[k : k + 1], np.array([t]))[1:, 0, 0]
             start, end = (t, end) if slope < 0.0 else (start, t)
-            step = t - slope / curvature if curvature > 0.0 else start
-            t = step if start < step < end else 0.5 * (start + end)
+            step = t - slope / curvature if curvature > 0.0 else 0.5 * (start + end)
+            t = min(max(step, start), end)
         least = self._values(powers[k : k + 1], waves[k : k + 1], np.array([t]))[0, 0, 0]
         return float(least / scale[k]), *watched[k]
 
