@@ -267,10 +267,8 @@ def test_what_needs_harmonics_refuses(tmp_path):
 @pytest.mark.parametrize(
     ("waveform", "message"),
     [
-        ({"shape": "pulse"}, "excitation.waveform.shape: must be one of 'pulses', 'measured', 'sine by values', "
-         "'odd orders', 'broken'.*"),
-        ({"start": 0.1}, "excitation.waveform.shape: must be one of pulses, measured, sine by values, odd orders, "
-         "broken.*"),
+        ({"shape": "pulse"}, "excitation.waveform.shape: must be one of .*'pulses', 'measured', 'sine by values'.*"),
+        ({"start": 0.1}, "excitation.waveform.shape: must be one of .*pulses, measured, sine by values.*"),
         ({"shape": "pulses", "start": -0.1}, r"excitation.waveform.start: should be greater than or equal to 0 .*"),
         ({"shape": "pulses", "begin": 0.1}, "excitation.waveform.begin: unknown key; known: shape, start, stop"),
         ({"shape": "measured"}, "excitation.waveform.points: missing; it is required here"),

@@ -60,7 +60,7 @@ SCENES = {
     "jenkins": (
         BASE | {"friction_damper": [{"normal_force": 0.1, "friction": 0.5, "stiffness": 0.7}], "damper": RUBBING}, 8,
     ),
-    "friction damper": (BASE | {"friction_damper": [{"normal_force": 0.1, "friction": 0.5}]}, 8),
+    "friction damper": (BASE | {"friction_damper": [{"normal_force": 0.1, "friction": 0.4}]}, 8),
     "stops": (
         BASE | {"stop": [{"side": "right", "gap": 0.5, "restitution": 0.8}, {"side": "left", "gap": 0.6}],
                 "initial": {"displacement": 0.3}}, 8,
@@ -71,7 +71,8 @@ SCENES = {
     ),
     "chatter that ends": (
         BASE | {"gravity": {"acceleration": 0.3, "orientation_deg": 90.0}, "cavity": [{"name": "c", "gap": 5.0}],
-                "damper": [BODY | {"position": -2.4, "restitution": 0.4}]}, 0,
+                "damper": [BODY | {"position": -2.4, "restitution": 0.4}], "initial": {"displacement": 0.05},
+                "excitation": {"frequency": 0.1, "force": 0.01}}, 0,
     ),
 }  # fmt: skip
 
@@ -97,11 +98,12 @@ def begun(mapped, state):
             speed = state[2 * n + b + i]
             states[str(i)] = "rest" if speed == 0.0 else "right" if speed > 0.0 else "left"
     for i, damper in enumerate(mapped.scene.friction_damper):
-        states[f"casing.{i}"] = "spring" if damper.stiffness else "right" if state[1] > 0.0 else "left"
-        if damper.stiffness and abs(state[-1]) * damper.stiffness >= damper.friction * damper.normal_force * (
-            1 - 1e-12
-        ):
-            states[f"casing.{i}"] = "right" if state[-1] > 0.0 else "left"
+        way, bound = "right" if state[1] > 0.0 else "left", (1 - 1e-12) * damper.friction * damper.normal_force
+        if damper.stiffness:
+            slides = abs(state[-1]) * damper.stiffness >= bound
+            states[f"casing.{i}"] = ("right" if state[-1] > 0.0 else "left") if slides else "spring"
+        else:
+            states[f"casing.{i}"] = "rest" if abs(state[1]) <= 1e-12 * mapped.scale[1] else way
     return states
 
 
@@ -144,7 +146,7 @@ def differences(mapped, state, passage):
     The step is the best of some: their error is that of a cubic, or round-off over the step.
     """
     ours, found = scaled(mapped, passage.derivative), []
-    for step in (1e-4, 1e-5, 1e-6, 1e-7):
+    for step in (1e-5, 1e-6):
         columns = []
         for j in range(len(state)):
             move = step * mapped.scale[j] * (np.arange(len(state)) == j)
@@ -178,7 +180,7 @@ def drawn(kind, seed, folder):
 @pytest.mark.parametrize("kind", ["rigid", "prescribed", "rom", "compliant", "compliant rom", "jenkins"])
 def test_the_derivative_is_that_of_differences_of_the_engine(kind, tmp_path):
     compared = 0
-    for seed in range(10):
+    for seed in range({"jenkins": 30, "rom": 5, "compliant rom": 5}.get(kind, 8)):
         made = drawn(kind, seed, tmp_path).replace({"time.periods": 15, "time.transient": 0})
         final = simulate(made).final
         mapped = period_map(made, FREQUENCY)
@@ -220,12 +222,22 @@ def test_the_phase_space_shrinks_by_impacts_and_damping():
 
 
 def test_sticking_leaves_a_multiplier_of_zero():
-    made = rubbing(12.0, force=14.0, friction=1.0)
+    made = rubbing(20.0, force=14.0, friction=1.0)
     mapped = period_map(made, FREQUENCY)
     passage = mapped(mapped.state_of(simulate(made.replace({"time.periods": 30, "time.transient": 0})).final))
     assert any("sticks casing.0" in event for event in passage.sequence)
     multipliers = np.sort(np.abs(np.linalg.eigvals(scaled(mapped, passage.derivative))))
     assert multipliers[0] < 1e-13 < multipliers[1]
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-17, -1e-17])
+def test_what_rests_at_the_start_to_round_off_rests(speed):
+    mapped = period_map(rubbing(20.0, force=5.0, friction=1.0), FREQUENCY)
+    passage = mapped(np.array([1e-4, speed]))
+    assert passage.status is PassageStatus.OK and not passage.crossings
+    assert passage.derivative == pytest.approx(np.diag([1.0, 0.0]), abs=1e-14)
+    # the spring and the force leave friction 10 N - 1 N - 5 N
+    assert passage.clearance == (pytest.approx(0.4, rel=1e-9), "slips casing.0")
 
 
 @pytest.mark.parametrize("excess", [-1e-4, -1e-13, 0.0, 1e-14, 1e-13, 1e-12, 1e-4])
@@ -241,7 +253,7 @@ def test_grazing_is_called_by_its_name(excess):
     if passage.status is PassageStatus.GRAZING:
         assert abs(excess) <= 1e-12
         return
-    assert passage.status is PassageStatus.OK and abs(excess) != 1e-14
+    assert passage.status is PassageStatus.OK
     if passage.crossings:
         assert excess > 0.0
         assert passage.crossings[0].speed == pytest.approx(-math.sqrt(2 * excess), rel=1e-2)
@@ -277,11 +289,11 @@ def test_a_body_pressed_on_its_wall_falls_back_on_it():
     assert passage.status is PassageStatus.OK
     for j, way in ((0, 1), (1, 1), (2, 1), (3, 1), (3, -1)):
         errors = []
-        for step in (1e-4, 1e-8):
+        for step in (1e-2, 1e-5):
             move = way * step * (np.arange(4) == j)
             change = (mapped(state + move).state - passage.state) / (way * step)
             errors.append(np.abs(change - passage.derivative[:, j]).max())
-        assert errors[1] < max(0.05 * errors[0], 1e-6), j
+        assert errors[1] < max(0.1 * errors[0], 1e-5), j
 
 
 def two_cavities(**structure):
@@ -297,7 +309,7 @@ def test_impacts_at_once_on_a_prescribed_motion_do_not_feel_each_other():
     both = mapped(np.array([0.01, 0.01, 0.3, 0.3]))
     alone = mapped(np.array([0.01, 0.013, 0.3, 0.31]))
     assert any(event.count("impact") == 2 for event in both.sequence) and both.status is PassageStatus.OK
-    assert both.derivative[0, 1] == both.derivative[1, 0] == 0.0
+    assert np.abs(both.derivative[np.ix_([0, 2], [1, 3])]).max() < 1e-13
     assert both.derivative[np.ix_([0, 2], [0, 2])] == pytest.approx(alone.derivative[np.ix_([0, 2], [0, 2])], rel=1e-9)
     assert both.derivative[np.ix_([1, 3], [1, 3])] == pytest.approx(both.derivative[np.ix_([0, 2], [0, 2])], rel=1e-9)
 
@@ -307,7 +319,9 @@ def test_impacts_at_once_on_a_structure_are_called_by_their_name():
     assert mapped(np.array([0.5, 0.1, 0.01, 0.01, 0.3, 0.3])).status is PassageStatus.COINCIDENT
 
 
-@pytest.mark.parametrize("name", ["newton, friction", "two bodies in a cavity", "jenkins", "two cavities"])
+@pytest.mark.parametrize(
+    "name", ["newton, friction", "two bodies in a cavity", "jenkins", "two cavities", "prescribed"]
+)
 def test_the_mirror_image_of_the_mirror_image_is_a_period_later(name):
     tables, periods = SCENES[name]
     if name == "two bodies in a cavity":
@@ -362,13 +376,35 @@ def test_hops_without_end_stop_the_passage():
     made = ball(1.0, 0.01)
     mapped = period_map(made, FREQUENCY)
     hop = 10.0 / 2 / 4000  # 4000 a second
-    passage = mapped(np.array([-1e3, hop - 2 * math.pi * 0.01 * 10.0 / (2 * math.pi) ** 2]))
+    passage = mapped(np.array([-1e3, hop]))
     assert passage.status is PassageStatus.STOPPED and np.isnan(passage.derivative).all()
+
+
+def test_a_resonance_without_damping_has_sizes_but_no_linear_orbit():
+    made = scene(**BASE | {
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping": 0.0}, "damper": [],
+        "excitation": {"frequency": 1 / (2 * math.pi), "force": 0.1},
+        "stop": [{"side": "right", "gap": 0.7, "restitution": 0.8}], "initial": {},
+    })  # fmt: skip
+    mapped = period_map(made, FREQUENCY)
+    assert np.all(np.isfinite(mapped.scale)) and np.all(mapped.scale > 0.0)
+    passage = mapped(np.array([0.4, 0.9]))
+    assert passage.status is PassageStatus.OK and passage.crossings
+    assert differences(mapped, np.array([0.4, 0.9]), passage) < 1e-6
+    with pytest.raises(InputError, match="resonance without damping"):
+        mapped.linear_orbit()
+
+
+def test_states_that_are_no_numbers_stop_the_passage():
+    mapped, state = passed(*SCENES["newton"])
+    for place, wrong in itertools.product(range(len(state)), (np.nan, np.inf)):
+        passage = mapped(np.where(np.arange(len(state)) == place, wrong, state))
+        assert passage.status is PassageStatus.STOPPED and np.isnan(passage.derivative).all()
 
 
 def test_other_methods_have_no_period_map():
     made = scene(**BASE | {"solver": {"method": "moreau"}})
-    with pytest.raises(InputError, match="solver.method: orbits are those of the exact engine"):
+    with pytest.raises(InputError, match=r"solver.method: orbits are those of the exact engine"):
         period_map(made, FREQUENCY)
 
 

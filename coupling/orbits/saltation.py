@@ -81,11 +81,14 @@ class LinearFlow:
         slopes = functionals @ self.generator
         value, slope = functionals @ motion.T, slopes @ motion.T
         noise = 1e-9 * np.abs(slopes) @ np.abs(motion).max(axis=0)
-        which, cell = np.nonzero((slope[:, :-1] < -noise[:, None]) & (slope[:, 1:] > noise[:, None]))
+        side = np.where(np.abs(slope) > noise[:, None], np.sign(slope), 0.0)
+        for i in range(1, steps):
+            side[:, i] = np.where(side[:, i] == 0.0, side[:, i - 1], side[:, i])
+        which, cell = np.nonzero((side[:, :-1] < 0.0) & (side[:, 1:] > 0.0))
         if not len(which):
             return np.inf, -1
         # where the slope's chord vanishes, for a choice; then Newton's method on the motion itself
-        one, other = slope[which, cell], slope[which, cell + 1]
+        one, other = np.minimum(slope[which, cell], 0.0), slope[which, cell + 1]
         share = one / (one - other)
         best = int(np.argmin(value[which, cell] + 0.5 * one * share * step))
         row, at, low, high = int(which[best]), float(share[best] * step), 0.0, step

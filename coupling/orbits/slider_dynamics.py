@@ -65,13 +65,16 @@ class SliderDynamics:
         self.from_state = (block_diag(absolute, absolute, springs) / units[:, None])[:, order]
 
     def glued_amplitude(self) -> np.ndarray:
-        """Return the complex amplitudes (e, n) of p with all bodies at rest on their floors."""
+        """Return the complex amplitudes (e, n) of p with all bodies at rest on their floors; inf where undamped."""
         system = self.system
         modes, bodies = system.of_structure, system.of_bodies
         load = modes.load + bodies.load @ system.floor
         omega = system.frequency[:, None, None]
         dynamic = np.diag(modes.stiffness) + 1j * omega * modes.damping - omega**2 * glued_mass(system)
-        amplitude: np.ndarray = np.linalg.solve(dynamic, load[:, :, None])[:, :, 0]
+        try:
+            amplitude: np.ndarray = np.linalg.solve(dynamic, load[:, :, None])[:, :, 0]
+        except np.linalg.LinAlgError:
+            return np.full(load.shape, np.inf + 0j)
         return amplitude
 
     def _typical_sizes(self) -> np.ndarray:
@@ -80,9 +83,11 @@ class SliderDynamics:
         reach = self.scale * np.abs(self.glued_amplitude()).sum(axis=0)
         travel = np.r_[self.free_travel, system.free_travel[system.friction_rows :]]
         travel = travel[np.isfinite(travel) & (travel > 0)]
-        # a structure that nothing excites moves by its start and the bodies
-        largest = reach.max(initial=0.0) or float(travel.max(initial=0.0)) or 1.0
-        reach = np.maximum(reach, 1e-6 * largest)
+        farthest = float(travel.max(initial=0.0))
+        # a structure that nothing excites, or nothing damps, moves by its start and the bodies
+        largest = reach.max(initial=0.0)
+        largest = largest if 0.0 < largest < np.inf else farthest or 1.0
+        reach = np.where(np.isfinite(reach), np.maximum(reach, 1e-6 * largest), largest)
         springs = system.limit[self.springs] / system.spring[self.springs]
         return frozen(np.r_[reach, omega * reach, self.free_travel, omega * self.free_travel, springs])
 

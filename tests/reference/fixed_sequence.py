@@ -178,7 +178,7 @@ class FixedSequence:
         return [*q[:m], *q[n : n + m], *slips, *speeds, *q[2 * n : self.width]]
 
     def _end(self, state, crossings, states, contact):
-        n, e, states, now = self.n, len(self.shares), dict(states), mp.mpf(0)
+        e, states, now = len(self.shares), dict(states), mp.mpf(0)
         period = mp.mpf(2 * math.pi / float(self.omega))
         z = mp.matrix([*self._absolute(state), 1, *[1] * e, *[0] * e])
         nominal = mp.mpf(0)
