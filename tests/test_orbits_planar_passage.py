@@ -345,6 +345,17 @@ def test_clearance_of_an_impact_that_nearly_happens(share):
     assert distance == pytest.approx(share / (2 * (1 + share)), rel=1e-6)
 
 
+def test_a_passage_that_begins_as_a_body_begins_to_slip_is_grazing():
+    """A neighbour that slips the other way comes to rest first: both sides have derivatives of their own."""
+    found, x = random_start(19, "newton")
+    assert found(x).status is PassageStatus.GRAZING
+
+
+def test_a_state_that_is_no_number_stops():
+    found, _, _, z = frame_of(CASES["disc on springs"][0])
+    assert found(np.full(len(z), np.nan)).status is PassageStatus.STOPPED
+
+
 def test_an_impact_that_friction_would_feed_takes_no_energy():
     """All coefficients are smaller by one share that depends on the speeds, and the derivative knows it."""
     found, x = random_start(14, "newton")

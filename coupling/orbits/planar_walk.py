@@ -114,9 +114,9 @@ class Walk:
         budget = _EVENTS_A_PERIOD * self.periods
         if run.advance_to(self.periods) is not Status.EVENT_BUDGET:
             return self._stopped()
-        if np.any(self._taken()[:, 1] == IMPACT):
-            self._worsen(PassageStatus.GRAZING)  # the period begins with an impact
         segment = Segment(run)
+        if np.any(self._taken()[:, 1] == IMPACT) or self._begins_at_event(segment):
+            self._worsen(PassageStatus.GRAZING)
         self._look_at_idle_contacts(segment, self.frame.from_state * self.scale)
         M = segment.stopped() @ self.frame.from_state * self.scale
         while counters[PERIOD] < self.periods:
@@ -146,6 +146,15 @@ class Walk:
             else:
                 return self._stopped()
         return M
+
+    def _begins_at_event(self, segment: Segment) -> bool:
+        """Return whether a contact parts, or begins to slip, as the passage begins."""
+        system, u = self.system, len(self.system.rest)
+        contact = np.arange(u) < system.contacts
+        parts = contact & (segment.state == OPEN) & (self.frame.gaps(segment.q) <= SIMULTANEOUS * system.play)
+        slides = np.isin(segment.state, (SLIP_LEFT, SLIP_RIGHT)) & ~segment.held & (~contact | (system.friction > 0.0))
+        slips = slides & (np.abs(system.J[u:] @ segment.v) <= _ROUND_OFF * segment.speed)
+        return bool(np.any(parts | slips))
 
     def _taken(self) -> np.ndarray:
         """Return the new entries of the log."""
