@@ -62,12 +62,12 @@ CASES = {
     ),
     "block that slides, comes to lie and sticks": (
         shaken(3.81, 0.72, 0.26, {"law": "newton"}, BLOCK | {
-            "friction": 0.35, "restitution": 0.0, "tilt": 0.17, "velocity": 0.35, "tilt_rate": -0.24,
+            "friction": 0.35, "restitution": 0.0, "tilt": 0.17, "velocity": 0.35, "tilt_rate": -0.24, "lift": 0.001,
         }), ("turns c1.floor.0.0 right", "rests c1.floor.0.1", "sticks c1.floor.0.0"),
     ),
     "block by Poisson's law": (
         shaken(5.3, 0.65, 0.21, {"law": "poisson"}, BLOCK | {
-            "friction": 0.14, "restitution": 0.5, "tilt": 0.29, "velocity": 0.15, "tilt_rate": -0.14,
+            "friction": 0.14, "restitution": 0.5, "tilt": 0.29, "velocity": 0.15, "tilt_rate": -0.14, "lift": 0.001,
         }), ("impact c1.floor.0.0", "impact c1.right.0.1", "impact c1.right.0.2"),
     ),
     "disc that rolls, slips and leaves": (
@@ -116,7 +116,7 @@ def directions(found, x):
     motion = PlanarMotion(*np.split(frame.from_state @ x, 2))
     run = PlanarRun(frame.flat, frame.system, motion, new_records(frame.flat, 1, 0), True, 0)
     run.advance_to(1)
-    held = frame.to_state @ Segment(run).stopped() @ frame.from_state
+    held = frame.to_state @ Segment(run).begun() @ frame.from_state
     left, sizes, _ = np.linalg.svd(held / found.scale[:, None] * found.scale)
     return left[:, sizes > 1e-9]
 

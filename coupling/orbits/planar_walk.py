@@ -118,7 +118,7 @@ class Walk:
         if np.any(self._taken()[:, 1] == IMPACT) or self._begins_at_event(segment):
             self._worsen(PassageStatus.GRAZING)
         self._look_at_idle_contacts(segment, self.frame.from_state * self.scale)
-        M = segment.stopped() @ self.frame.from_state * self.scale
+        M = segment.begun() @ self.frame.from_state * self.scale
         while counters[PERIOD] < self.periods:
             if counters[PERIOD] == 0 and segment.time <= 0.5 * self.system.period:
                 self.middle = segment
@@ -148,10 +148,11 @@ class Walk:
         return M
 
     def _begins_at_event(self, segment: Segment) -> bool:
-        """Return whether a contact parts, or begins to slip, as the passage begins."""
+        """Return whether a contact parts with a speed, or begins to slip, as the passage begins."""
         system, u = self.system, len(self.system.rest)
         contact = np.arange(u) < system.contacts
         parts = contact & (segment.state == OPEN) & (self.frame.gaps(segment.q) <= SIMULTANEOUS * system.play)
+        parts &= ~segment.rests()
         slides = np.isin(segment.state, (SLIP_LEFT, SLIP_RIGHT)) & ~segment.held & (~contact | (system.friction > 0.0))
         slips = slides & (np.abs(system.J[u:] @ segment.v) <= _ROUND_OFF * segment.speed)
         return bool(np.any(parts | slips))
