@@ -27,6 +27,7 @@ from vanedamp.coupling.numerics.codes import (
     ROOT,
     SLIP_LEFT,
     SLIP_RIGHT,
+    STICK,
     STOPS,
     TOUCHING,
 )
@@ -118,6 +119,8 @@ class Walk:
         if np.any(self._taken()[:, 1] == IMPACT) or self._begins_at_event(segment):
             self._worsen(PassageStatus.GRAZING)
         self._look_at_idle_contacts(segment, self.frame.from_state * self.scale)
+        if self._is_jammed(segment):
+            self._worsen(PassageStatus.UNDETERMINED)
         M = segment.begun() @ self.frame.from_state * self.scale
         while counters[PERIOD] < self.periods:
             if counters[PERIOD] == 0 and segment.time <= 0.5 * self.system.period:
@@ -156,6 +159,16 @@ class Walk:
         slides = np.isin(segment.state, (SLIP_LEFT, SLIP_RIGHT)) & ~segment.held & (~contact | (system.friction > 0.0))
         slips = slides & (np.abs(system.J[u:] @ segment.v) <= _ROUND_OFF * segment.speed)
         return bool(np.any(parts | slips))
+
+    def _is_jammed(self, segment: Segment) -> bool:
+        """Return whether springs press contacts that stick and whose slips depend on each other.
+
+        Their friction forces are left open, and what they have been the state does not say.
+        """
+        system, u = self.system, len(self.system.rest)
+        sticks = (segment.state == STICK) & np.isfinite(system.spring) & (system.friction > 0.0)
+        rows = system.J[u:][sticks] / np.sqrt(system.mass)
+        return bool(len(rows)) and int(np.linalg.matrix_rank(rows)) < len(rows)
 
     def _taken(self) -> np.ndarray:
         """Return the new entries of the log."""
