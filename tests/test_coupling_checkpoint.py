@@ -14,9 +14,10 @@ from tests.tools.processes import environment
 from tests.tools.sweep_processes import RESONANCE, command, kill_after_a_flush, scene, write
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.sweep import worker as module
-from vanedamp.coupling.sweep.checkpoint import Checkpoint, clear
+from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.store import StoreError, Variable, save
 from vanedamp.files.toml_input import InputError
 

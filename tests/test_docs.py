@@ -91,7 +91,7 @@ def completed(tables: dict, folder: Path) -> dict:
     """Tables of an example with those that it leaves out."""
     if "matrices" in tables:
         return tables
-    scene = {"structure", "excitation", "sweep", "continuation", "optimise"} & tables.keys()
+    scene = {"structure", "excitation", "sweep", "continuation", "optimise", "orbit"} & tables.keys()
     base = tomllib.loads(OSCILLATOR if scene else CLUSTER)
     if "structure" in tables:
         ReducedModel.from_matrices(np.eye(2), np.diag([2.26e8, 1e10]), {"tip": [1.0, 0.5]}, damping_ratio=0.01).save(
@@ -121,6 +121,8 @@ def test_files_are_read(example, tmp_path):
         assert External.read(path).interface.keys() == tables["interface"].keys()
     elif "optimise" in tables:
         assert Study.load(path).table.variables.bodies == (1, 4)
+    elif "orbit" in tables:
+        assert Scene.load(path).orbit is not None
     elif {"structure", "excitation", "sweep", "continuation"} & tables.keys():
         scene = Scene.load(path)
         axes, points = scene.sweep_points()
@@ -132,8 +134,8 @@ def test_files_are_read(example, tmp_path):
 
 @pytest.mark.parametrize("path", sorted((ROOT / "docs" / "examples").glob("*.toml")), ids=lambda path: path.name)
 def test_example_files_are_read(path):
-    loaded = (Study if "[optimise]" in path.read_text() else Scene).load(path)
-    assert loaded.scene.damper
+    scene = Study.load(path).scene if "[optimise]" in path.read_text() else Scene.load(path)
+    assert scene.damper
 
 
 # programs

@@ -14,9 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vanedamp.coupling.engine import simulate
+    from vanedamp.coupling.orbits.branch import Branches
+    from vanedamp.coupling.orbits.orbits import find_orbit, orbits
     from vanedamp.coupling.response.response import Response, Status
     from vanedamp.coupling.scene.scene import Scene
     from vanedamp.coupling.sweep.record import Sweep
+    from vanedamp.coupling.sweep.steady_states import steady_states
     from vanedamp.coupling.sweep.sweep import sweep
     from vanedamp.files.errors import VanedampError
     from vanedamp.files.toml_input import InputError
@@ -29,12 +32,14 @@ if TYPE_CHECKING:
     from vanedamp.studies.case.tables import Case
 
 __all__ = [
-    "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "Scene", "Status", "Sweep",
-    "SystemMatrices", "VanedampError", "reduce", "rigid_model", "simulate", "solve_modes", "sweep",
+    "Branches", "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "Scene", "Status",
+    "Sweep", "SystemMatrices", "VanedampError", "find_orbit", "orbits", "reduce", "rigid_model", "simulate",
+    "solve_modes", "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
 _HOMES = {
+    "Branches": "coupling.orbits.branch",
     "Case": "studies.case.tables",
     "InputError": "files.toml_input",
     "Interface": "rom.interface",
@@ -47,10 +52,13 @@ _HOMES = {
     "Sweep": "coupling.sweep.sweep",
     "SystemMatrices": "modal.matrices",
     "VanedampError": "files.errors",
+    "find_orbit": "coupling.orbits.orbits",
+    "orbits": "coupling.orbits.orbits",
     "reduce": "rom.reduction",
     "rigid_model": "modal.rigid_model",
     "simulate": "coupling.engine",
     "solve_modes": "modal.eigen",
+    "steady_states": "coupling.sweep.steady_states",
     "sweep": "coupling.sweep.sweep",
 }
 

@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.scene import Scene
 
 
 class PassageStatus(StrEnum):
@@ -68,6 +69,10 @@ class Passage(NamedTuple):
 
 class PeriodMap(Protocol):
     """A period map of a scene."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene with the map's parameter at its value."""
 
     @property
     def names(self) -> tuple[str, ...]:

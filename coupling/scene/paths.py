@@ -11,6 +11,13 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, InputError, Real, Whole, nearest
 
+_UNITS = {
+    "frequency": "Hz", "gap": "m", "mass": "kg", "stiffness": "N/m", "damping": "N s/m", "force": "N",
+    "base_acceleration": "m/s^2", "acceleration": "m/s^2", "resonance_amplitude": "m", "displacement_amplitude": "m",
+    "position": "m", "displacement": "m", "velocity": "m/s", "normal_load": "N", "normal_force": "N",
+    "orientation_deg": "degree", "phase": "degree",
+}  # fmt: skip
+
 
 @dataclass(frozen=True, config=STRICT)
 class Range:
@@ -59,3 +66,37 @@ def _entries(nodes: list[Any], head: str, steps: list[str], path: str) -> tuple[
         names = [str(node["name"]) for node in nodes if "name" in node]
         raise InputError(f"scene: {path}: no entry '{head}'; {nearest(head, names) if names else 'use its index'}")
     return nodes, steps
+
+
+def number_at(node: Any, path: str) -> float:
+    """Return the number at the end of a path in plain scene data, of a list's entries the one that all have.
+
+    Raises InputError for a place that is unknown, or holds no number or several.
+    """
+    nodes = [node]
+    steps = path.split(".")
+    while steps:
+        head, *steps = steps
+        inner = []
+        for one in nodes:
+            if isinstance(one, list):
+                entries, rest = _entries(one, head, [head, *steps], path)
+                if len(rest) > len(steps):  # the step is a key of every entry
+                    entries = [entry[head] for entry in entries if head in entry]
+                inner += entries
+            elif isinstance(one, dict) and head in one:
+                inner.append(one[head])
+            else:
+                known = f"; {nearest(head, list(one))}" if isinstance(one, dict) else ""
+                raise InputError(f"scene: {path}: the scene holds no '{head}' there{known}")
+        nodes = inner
+    values = {float(value) for value in nodes if isinstance(value, int | float) and not isinstance(value, bool)}
+    if len(values) != 1 or len(nodes) == 0:
+        shown = "several numbers; name one entry by its index" if len(values) > 1 else "no number"
+        raise InputError(f"scene: {path}: names {shown}")
+    return values.pop()
+
+
+def unit_of(path: str) -> str:
+    """Return the unit of the number at a path, "1" if it has none."""
+    return _UNITS.get(path.rsplit(".", 1)[-1], "1")

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.scene.paths import unit_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import FREQUENCY
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
@@ -17,12 +18,6 @@ from vanedamp.files.store import Variable, frozen, load, save
 from vanedamp.files.toml_input import validate
 
 _KIND = "sweep"
-_UNITS = {
-    "frequency": "Hz", "gap": "m", "mass": "kg", "stiffness": "N/m", "damping": "N s/m", "force": "N",
-    "base_acceleration": "m/s^2", "acceleration": "m/s^2", "resonance_amplitude": "m", "displacement_amplitude": "m",
-    "position": "m", "displacement": "m", "velocity": "m/s", "normal_load": "N", "normal_force": "N",
-    "orientation_deg": "degree", "phase": "degree",
-}  # fmt: skip
 #: tops of the linear curves over the swept frequencies and their units, each an array over the other axes
 PEAKS = {
     "undamped_peak": "m", "undamped_peak_frequency": "Hz", "half_power_width": "Hz",
@@ -79,7 +74,7 @@ class Sweep:
 
     def units(self) -> dict[str, str]:
         """Return the unit of every axis by its path."""
-        return {path: _UNITS.get(path.rsplit(".", 1)[-1], "1") for path in self.axes}
+        return {path: unit_of(path) for path in self.axes}
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data: axes and units by path, measures as nested lists (nan where there is none)."""

@@ -34,7 +34,7 @@ def sweep(
 
     scene: with its grid, if the caller has made it; progress: called with the number of points done and their total, at
     the beginning, too; checkpoint: a file to which finished points are written and from which a sweep that was killed
-    goes on; the caller removes it once the result is safe (sweep.checkpoint.clear).
+    goes on; the caller removes it once the result is safe (files.checkpoint_file.clear).
     Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks, or
     takes its worker with it, is a point with the status "error: ...". Raises StoreError when the checkpoint cannot be
     written, SweepError when the executor has lost its workers for good.

@@ -43,23 +43,19 @@ def run(arguments: Namespace) -> None:
     from vanedamp.files.store import clear_leftovers
     from vanedamp.files.toml_input import InputError
     from vanedamp.studies.commands.support.messages import write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs, checkpoint_file
+    from vanedamp.studies.commands.support.outputs import check_outputs, check_resume, checkpoint_file
     from vanedamp.studies.workers import workers
 
     checkpoint = checkpoint_file(arguments.output)
     outputs = check_outputs(arguments, beside=checkpoint, peak=(".h5",))
-    if arguments.resume and (checkpoint is None or not checkpoint.exists()):
-        raise InputError(
-            "--resume: name the result with -o, its checkpoint lies beside it"
-            if checkpoint is None
-            else f"--resume: nothing to resume, there is no checkpoint {checkpoint}; leave --resume out to begin"
-        )
+    check_resume(arguments, checkpoint)
     from vanedamp.studies.commands.support.scenes import load_scene, print_choices, print_resonance
 
     scene = load_scene(arguments.input, outputs)
-    from vanedamp.coupling.sweep.checkpoint import Checkpoint, clear
+    from vanedamp.coupling.sweep.checkpoint import Checkpoint
     from vanedamp.coupling.sweep.grid import grid
     from vanedamp.coupling.sweep.sweep import sweep
+    from vanedamp.files.checkpoint_file import clear
     from vanedamp.files.provenance import versions
     from vanedamp.studies.commands.support.budget import check_run, check_sweep
     from vanedamp.studies.report.forced_response import forced_responses

@@ -20,9 +20,9 @@ from typing import Any
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.sweep.checkpoint import clear
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import StoreError, digest, finite, load, write_json
 from vanedamp.files.toml_input import InputError, nearest, read_toml, validate

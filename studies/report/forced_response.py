@@ -84,7 +84,7 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
         point: tuple[Any, ...] = (*combination[:along], order, *combination[along:])
         units = sweep.units()
         values = [
-            f"{path.split('.', 1)[-1]} = {quantity(axis[index], units[path])}"
+            setting(path, axis[index], units[path])
             for path, axis, index in zip(labels, others, combination, strict=True)
         ]
         responses.append(_response(sweep, point, paths[along], ", ".join([name or model_name(sweep.scene), *values])))
@@ -140,6 +140,11 @@ def quantity(value: Any, units: str) -> str:
     if factor != 1.0 and not isinstance(value, str):
         return f"{value * factor:.4g} {larger}"
     return f"{format_value(value)} {units}".removesuffix(" 1")
+
+
+def setting(path: str, value: Any, units: str) -> str:
+    """Return a key and its value in short, such as "c1.gap = 20 µm"."""
+    return f"{path.split('.', 1)[-1]} = {quantity(value, units)}"
 
 
 def resonance_grid(start: float, stop: float, peaks: list[float], width: float, num: int) -> np.ndarray:

@@ -76,8 +76,18 @@ def output_folder(arguments: Namespace) -> Path:
 
 
 def checkpoint_file(output: str | None) -> Path | None:
-    """Return where a sweep keeps finished points: beside its result, if that is a file."""
+    """Return where a command keeps what is finished: beside its result, if that is a file."""
     return None if output is None or destination(output) is None else Path(f"{output}.partial")
+
+
+def check_resume(arguments: Namespace, checkpoint: Path | None) -> None:
+    """Refuse `--resume` where there is nothing to resume. Raises InputError."""
+    if arguments.resume and (checkpoint is None or not checkpoint.exists()):
+        raise InputError(
+            "--resume: name the result with -o, its checkpoint lies beside it"
+            if checkpoint is None
+            else f"--resume: nothing to resume, there is no checkpoint {checkpoint}; leave --resume out to begin"
+        )
 
 
 def _trouble(path: Path) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +11,18 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.steady_states import SteadyState, is_start, steady_states
 from vanedamp.coupling.sweep.sweep import LOSSES
 from vanedamp.studies.report.body_advice import body_note
 from vanedamp.studies.report.charts import Chart
+from vanedamp.studies.report.coexistence_charts import (
+    basin_axes,
+    basin_panels,
+    basins_figure,
+    count_axes,
+    count_figure,
+    state_rows,
+)
 from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, model_name
 from vanedamp.studies.report.forced_response_charts import (
     bodies_in_plane,
@@ -21,7 +31,7 @@ from vanedamp.studies.report.forced_response_charts import (
     plane_figure,
     responses_figure,
 )
-from vanedamp.studies.report.map_chart import map_axes, map_figure, map_rows
+from vanedamp.studies.report.map_chart import map_axes, map_figure, map_rows, panel_rows
 from vanedamp.studies.report.page import Page, format_setting
 from vanedamp.studies.report.results import Result
 
@@ -29,6 +39,8 @@ ORDER = 10
 KIND = "sweep"
 #: curves of a section's charts, and of one sweep that a map shows as a whole; of more, evenly chosen ones are drawn
 _MOST_CURVES, _MOST_BESIDE_MAP = 12, 5
+#: steady states in the table below basins
+_MOST_STATES = 24
 #: figure and measures of each chart of responses
 _CHARTS = {
     "response": (responses_figure, ("undamped", "fixed", "damped_max", "damped_mean")),
@@ -45,11 +57,12 @@ def load(path: Path) -> Result:
 
 
 def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
-    """Return the groups of responses that share an axis, the maps, and what is to be said about the bodies."""
+    """Return groups of responses that share an axis, maps, where runs end, and what is to be said about the bodies."""
     sweeps = {file: result.record for file, result in results.items()}
     return {
         "groups": [_group(group, page) for group in _by_axis(_responses(sweeps, page))],
         "maps": [_map(file, sweep, page) for file, sweep in sweeps.items() if map_axes(sweep)],
+        "ends": [_ends(file, sweep, page) for file, sweep in sweeps.items() if basin_axes(sweep) or count_axes(sweep)],
         "notes": list(dict.fromkeys(filter(None, map(_body_note, sweeps.values())))),
     }
 
@@ -69,6 +82,10 @@ def _scene(sweep: Sweep) -> dict[str, Any]:
 
 def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
     """Return the curves of sweeps; those of a study are named after their files, others after their models."""
+    # a sweep of starts only has no response along an axis
+    sweeps = {
+        file: sweep for file, sweep in sweeps.items() if not (basin_axes(sweep) and all(map(is_start, sweep.axes)))
+    }
     models = [model_name(sweep.scene) for sweep in sweeps.values()]
     responses = []
     for model, (file, sweep) in zip(models, sweeps.items(), strict=True):
@@ -83,7 +100,7 @@ def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
 
 def _curves(file: str, sweep: Sweep, name: str, most: int) -> list[ForcedResponse]:
     responses = [replace(response, source=file) for response in forced_responses(sweep, name)]
-    if map_axes(sweep) is not None:
+    if map_axes(sweep) or basin_axes(sweep):
         most = min(most, _MOST_BESIDE_MAP)
     if len(responses) <= most:
         return responses
@@ -135,6 +152,21 @@ def _key_figures(response: ForcedResponse) -> dict[str, Any]:
         "headline": response.headline,
         "impacts": float(np.nan_to_num(response.impacts_per_period).max()),
     }
+
+
+def _ends(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
+    """Return the charts of where the runs of a sweep over starts end, and the states in the basins' panels."""
+    states = steady_states(sweep)
+    shown: dict[str, Any] = {"starts": states.starts, "basins": None, "counts": None, "rows": []}
+    if axes := basin_axes(sweep):
+        rows = panel_rows(basin_panels(sweep, states))
+        shown["basins"] = page.chart("basins", basins_figure(sweep, states), ("panel", *axes, "motion"), rows, [file])
+        shown["parameters"] = states.parameters
+        shown["rows"] = list(itertools.islice(state_rows(sweep, states), _MOST_STATES))
+    if count_axes(sweep):
+        header = (*states.parameters, "state", *SteadyState._fields)
+        shown["counts"] = page.chart("states", count_figure(sweep, states), header, state_rows(sweep, states), [file])
+    return shown
 
 
 def _map(file: str, sweep: Sweep, page: Page) -> Chart:

@@ -1,0 +1,269 @@
+"""The records of branches of orbits, in memory and on disk."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.scene.paths import unit_of
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.toml_input import validate
+
+if TYPE_CHECKING:
+    import xarray
+
+KIND = "orbits"
+#: measures of an orbit and their units, each an array over the points of a branch
+MEASURES = {"amplitude_mean": "m", "amplitude_max": "m", "impacts_per_period": "1"}
+FLAGS = ("stable", "symmetric")
+
+
+class BranchPoint(NamedTuple):
+    """An orbit of a branch, as a branch keeps it: see Branch and Orbit."""
+
+    parameter: float
+    state: np.ndarray
+    multipliers: np.ndarray
+    neutral: int
+    stable: bool
+    amplitude_mean: float
+    amplitude_max: float
+    impacts_per_period: float
+    sequence: str
+    symmetric: bool
+
+    @classmethod
+    def of(cls, orbit: Orbit) -> BranchPoint:
+        """Return an orbit as a branch keeps it."""
+        return cls(
+            orbit.parameter, orbit.state, orbit.multipliers, orbit.neutral, orbit.stable, orbit.amplitude_mean,
+            orbit.amplitude_max, orbit.impacts_per_period, "; ".join(orbit.passage.sequence), orbit.symmetric,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint:
+    """A bifurcation, a change of the event sequence or the end of a branch.
+
+    index: of the branch's point before it; kind: "fold", "period doubling", "neimark-sacker", "pitchfork", "grazing",
+    "sequence" or "end"; note: what happens there; state: (k,) at the start of the period.
+    """
+
+    index: int
+    parameter: float
+    kind: str
+    note: str
+    state: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A branch of m orbits with states of k coordinates, in the order in which it was followed.
+
+    periods             of the excitation that its orbits take
+    parameter           (m,)
+    state               (m, k) at the start of a period, in the units of Branches.names
+    multipliers         (m, k) complex, the largest first
+    neutral             (m,) how many of them are 1 because the orbit may be moved, as a body at rest or in free flight
+    stable              (m,) whether all others lie inside the unit circle
+    amplitude_mean      (m,) m, mean of the periods' largest displacements of the response, as a sweep's
+    amplitude_max       (m,) m
+    impacts_per_period  (m,)
+    sequence            (m,) names of the events in order, joined by "; "
+    symmetric           (m,) whether an orbit is its own mirror image half a period later
+    special             bifurcations, changes of the sequence, and the end
+    end                 why it was not followed further
+    source              the branch, and its special point, from which this one goes out; None for the first
+    """
+
+    periods: int
+    parameter: np.ndarray
+    state: np.ndarray
+    multipliers: np.ndarray
+    neutral: np.ndarray
+    stable: np.ndarray
+    amplitude_mean: np.ndarray
+    amplitude_max: np.ndarray
+    impacts_per_period: np.ndarray
+    sequence: np.ndarray
+    symmetric: np.ndarray
+    special: tuple[SpecialPoint, ...]
+    end: str
+    source: tuple[int, int] | None = None
+
+    @classmethod
+    def of(
+        cls, points: Sequence[BranchPoint], periods: int, special: Sequence[SpecialPoint], end: str,
+        source: tuple[int, int] | None,
+    ) -> Branch:  # fmt: skip
+        """Return the branch of some points."""
+        columns = dict(zip(BranchPoint._fields, zip(*points, strict=True), strict=True))
+        types = {"multipliers": complex, "neutral": int, "sequence": object} | dict.fromkeys(FLAGS, bool)
+        arrays = {name: frozen(column, types.get(name, float)) for name, column in columns.items()}
+        return cls(periods=periods, special=tuple(special), end=end, source=source, **arrays)
+
+    @property
+    def points(self) -> list[BranchPoint]:
+        """Its orbits one by one."""
+        columns = (getattr(self, name) for name in BranchPoint._fields)
+        return [BranchPoint(*entry) for entry in zip(*columns, strict=True)]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return a summary as plain data."""
+        return {
+            "points": len(self.parameter), "parameter_min": float(self.parameter.min()),
+            "parameter_max": float(self.parameter.max()), "stable_points": int(self.stable.sum()),
+            "periods": self.periods, "end": self.end,
+            "from": None if self.source is None else {"branch": self.source[0], "special_point": self.source[1]},
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """Branches of periodic orbits of a scene over one of its numbers.
+
+    scene: with its [orbit] table; names, scale: (k,) of the coordinates of states; branches: in the order in which they
+    were found; iterations: of Newton's method; warnings: to be read before figures are used; provenance: versions and
+    further data of the caller (JSON-able).
+    """
+
+    scene: Scene
+    names: tuple[str, ...]
+    scale: np.ndarray
+    branches: tuple[Branch, ...]
+    iterations: int
+    warnings: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def parameter(self) -> str:
+        """Dotted path of the number that changes along the branches."""
+        assert self.scene.orbit is not None
+        return self.scene.orbit.parameter
+
+    def to_json(self) -> dict[str, Any]:
+        """Return a summary as plain data: branches and special points."""
+        special = [
+            {
+                "branch": number, "index": point.index, "parameter": point.parameter, "kind": point.kind,
+                "note": point.note,
+            }
+            for number, branch in enumerate(self.branches)
+            for point in branch.special
+        ]  # fmt: skip
+        return {
+            "parameter": self.parameter, "unit": unit_of(self.parameter),
+            "branches": [branch.to_json() for branch in self.branches], "special_points": special,
+            "iterations": self.iterations, "warnings": list(self.warnings),
+        }  # fmt: skip
+
+    def variables(self) -> dict[str, Variable]:
+        """Return the variables of a file: the points of all branches one after the other, special points, branches."""
+        unit, branches = unit_of(self.parameter), self.branches
+        special = [(number, point) for number, branch in enumerate(branches) for point in branch.special]
+        k = len(self.names)
+
+        def joined(name: str) -> np.ndarray:
+            return np.concatenate([getattr(branch, name) for branch in branches])
+
+        of_points = {
+            "branch_of_point": np.repeat(np.arange(len(branches)), [len(branch.parameter) for branch in branches]),
+            "neutral": joined("neutral"), "sequence": joined("sequence"),
+            **{name: joined(name).astype(np.int8) for name in FLAGS},
+        }  # fmt: skip
+        sources = [(-1, -1) if branch.source is None else branch.source for branch in branches]
+        of_special = {
+            "special_branch": np.array([number for number, _ in special], int),
+            "special_index": np.array([point.index for _, point in special], int),
+            "special_kind": np.array([point.kind for _, point in special], object),
+            "special_note": np.array([point.note for _, point in special], object),
+        }
+        of_branches = {
+            "periods": np.array([branch.periods for branch in branches], int),
+            "end": np.array([branch.end for branch in branches], object),
+            "source_branch": np.array([source[0] for source in sources], int),
+            "source_special": np.array([source[1] for source in sources], int),
+        }
+        return {
+            "coordinate": Variable(np.array(self.names, object), ("coordinate",)),
+            "scale": Variable(self.scale, ("coordinate",)),
+            "parameter": Variable(joined("parameter"), ("point",), unit),
+            "state": Variable(joined("state"), ("point", "coordinate")),
+            "multiplier_real": Variable(joined("multipliers").real, ("point", "multiplier")),
+            "multiplier_imag": Variable(joined("multipliers").imag, ("point", "multiplier")),
+            **{name: Variable(joined(name), ("point",), units) for name, units in MEASURES.items()},
+            **{name: Variable(values, ("point",)) for name, values in of_points.items()},
+            "special_parameter": Variable([point.parameter for _, point in special], ("special",), unit),
+            "special_state": Variable(
+                np.reshape([point.state for _, point in special], (len(special), k)), ("special", "coordinate")
+            ),
+            **{name: Variable(values, ("special",)) for name, values in of_special.items()},
+            **{name: Variable(values, ("branch",)) for name, values in of_branches.items()},
+        }
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of a file."""
+        return {
+            "parameter_path": self.parameter, "scene": self.scene.to_dict(), "iterations": self.iterations,
+            "warnings": json.dumps(list(self.warnings)), "provenance": dict(self.provenance),
+        }  # fmt: skip
+
+    def save(self, path: str | Path) -> None:
+        """Write HDF5 that xarray opens."""
+        save(path, KIND, self.variables(), self.attributes())
+
+    @classmethod
+    def load(cls, path: str | Path) -> Branches:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        return cls.of(*load(path, KIND), str(path))
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str) -> Branches:
+        """Return the record in the variables and attributes of a file."""
+        multipliers = values["multiplier_real"] + 1j * values["multiplier_imag"]
+        types = {"neutral": int, "sequence": object} | dict.fromkeys(FLAGS, bool)
+        branches = []
+        for number, periods in enumerate(values["periods"]):
+            own = values["branch_of_point"] == number
+            columns = {
+                name: frozen(values[name][own], types.get(name, float))
+                for name in BranchPoint._fields
+                if name != "multipliers"
+            }
+            special = [
+                SpecialPoint(
+                    int(values["special_index"][s]), float(values["special_parameter"][s]), values["special_kind"][s],
+                    values["special_note"][s], frozen(values["special_state"][s]),
+                )
+                for s in np.flatnonzero(values["special_branch"] == number)
+            ]  # fmt: skip
+            source = int(values["source_branch"][number]), int(values["source_special"][number])
+            branches.append(
+                Branch(
+                    periods=int(periods), special=tuple(special), end=values["end"][number],
+                    source=None if source[0] < 0 else source, multipliers=frozen(multipliers[own], complex), **columns,
+                )
+            )  # fmt: skip
+        return cls(
+            scene=validate(Scene, json.loads(attributes["scene"]), path),
+            names=tuple(values["coordinate"]),
+            scale=frozen(values["scale"]),
+            branches=tuple(branches),
+            iterations=int(attributes["iterations"]),
+            warnings=tuple(json.loads(attributes["warnings"])),
+            provenance=json.loads(attributes["provenance"]),
+        )
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the variables of the file as a data set of xarray, which must be installed."""
+        from xarray import Dataset
+
+        data = {name: (item.dims, item.values, {"units": item.units}) for name, item in self.variables().items()}
+        return Dataset(data, attrs={"parameter_path": self.parameter})

@@ -1,0 +1,233 @@
+"""Pseudo-arclength continuation of a branch of orbits, over folds, bifurcations and changes of the event sequence.
+
+Between events the period map is smooth, and so is a branch as long as the sequence of events along the orbit stays.
+Where the sequence changes a branch may have a kink, turn back or end. That point is located from the side where the
+branch comes from; then an orbit of the other sequence is looked for (orbits.other_side).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
+from vanedamp.coupling.orbits.branch import Branch, BranchPoint, SpecialPoint
+from vanedamp.coupling.orbits.corrector import HALVINGS, ITERATIONS, corrected
+from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Point, Problem, point_of, solve, with_symmetry
+from vanedamp.coupling.orbits.other_side import CENTRED, OtherSide
+from vanedamp.coupling.orbits.sequence_changes import change, forecast
+from vanedamp.coupling.scene.orbit import Orbit as Table
+from vanedamp.files.toml_input import InputError
+
+#: iterations up to which, and cosines of the angle between tangents from which, steps grow; and are good enough
+_QUICK, _STRAIGHT, _BENT = 3, 0.985, 0.9
+#: scaled distance of an orbit from itself half of its periods later, where it is known by its root
+_SAME = 1e-4
+#: relative error of the parameter where the sequence changes
+_CLOSE = 1e-10
+#: attempts at the place of a change of sequence, at least every third one a bisection
+_ATTEMPTS = 120
+
+
+@dataclass(eq=False)
+class Trace:
+    """A branch while it is followed: its orbits, the last of them with its tangent, and the next step.
+
+    source: the branch and the special point that it was switched from; end: why it is not followed further, "" while
+    it is.
+    """
+
+    points: list[BranchPoint]
+    special: list[SpecialPoint]
+    head: Point
+    step: float
+    source: tuple[int, int] | None = None
+    end: str = ""
+
+
+class Follower:
+    """Continuation of the branches of one problem, within its range of the parameter."""
+
+    def __init__(self, problem: Problem, table: Table) -> None:
+        self.problem, self.table = problem, table
+        self.other_side = OtherSide(problem, table.step, table.min_step)
+
+    def begin(self, orbit: Orbit, row: np.ndarray, source: tuple[int, int] | None = None) -> Trace:
+        """Return a branch of one orbit that goes on in the direction of `row` (k + 1,)."""
+        head = point_of(self.problem, orbit, row)
+        return Trace([BranchPoint.of(with_symmetry(self.problem, orbit))], [], head, self.table.step, source)
+
+    def resume(self, branch: Branch, tangent: np.ndarray, step: float) -> Trace | None:
+        """Return a branch that was interrupted, from its last point and the tangent there; None if that is no orbit."""
+        last = branch.points[-1]
+        y = self.problem.pack(last.state, last.parameter)
+        passage = self.problem.passage(y)
+        if passage is None:
+            return None
+        missed = float(np.abs(self.problem.residual(y, passage)).max(initial=0.0))
+        orbit = Orbit(
+            OrbitStatus.OK, last.parameter, last.state, branch.periods, self.problem.map.scale, passage, missed, 0
+        )
+        head = Point(y, orbit, self.problem.slope(y, passage), tangent)
+        return Trace(branch.points, list(branch.special), head, step, branch.source, branch.end)
+
+    def branch(self, trace: Trace) -> Branch:
+        """Return the record of a branch, whole or not."""
+        return Branch.of(trace.points, self.problem.map.periods, trace.special, trace.end, trace.source)
+
+    def advance(self, trace: Trace) -> None:
+        """Add the next point to a branch, with the special points before it, or end it."""
+        if len(trace.points) >= self.table.max_points:
+            self._end(trace, f"max_points ({self.table.max_points}) reached", trace.head.orbit)
+            return
+        head, step, failed = trace.head, trace.step, trace.step
+        while step >= self.table.min_step:
+            point = self._reach(head, step)
+            if point is None:
+                failed, step = step, step / 4
+                continue
+            if point.orbit.passage.sequence != head.orbit.passage.sequence:
+                failed = step
+                break
+            if point.tangent @ head.tangent > _BENT or step <= 2 * self.table.min_step:
+                if not self._search(trace, head, point):
+                    self._accept(trace, head, point)
+                quick = point.orbit.iterations <= _QUICK and point.tangent @ head.tangent > _STRAIGHT
+                trace.step = min(1.5 * step, self.table.max_step) if quick else max(step, self.table.min_step)
+                return
+            step /= 2
+        self._cross(trace, failed)
+
+    # -- smooth pieces
+
+    def _reach(self, head: Point, step: float) -> Point | None:
+        """Return the point at an arclength from another, at most the end of the range; None if there is none."""
+        orbit = corrected(self.problem, head, step)
+        if orbit is None:
+            return None
+        y = self.problem.pack(orbit.state, orbit.parameter)
+        edge = 1.0 if y[-1] > 1.0 else 0.0
+        if not 0.0 <= y[-1] <= 1.0 and 0.0 <= head.y[-1] <= 1.0:
+            share = (edge - head.y[-1]) / (y[-1] - head.y[-1])
+            start = head.y + share * (y - head.y)
+            start[-1] = edge
+            row = np.append(np.zeros(self.problem.size), 1.0)
+            at_edge = solve(self.problem, start, row, head.slope, ITERATIONS, HALVINGS)
+            if at_edge.status is OrbitStatus.OK:
+                orbit = at_edge
+        return point_of(self.problem, orbit, head.tangent)
+
+    def _accept(self, trace: Trace, before: Point, point: Point) -> None:
+        """Add a point, and the end if it is one."""
+        trace.points.append(BranchPoint.of(with_symmetry(self.problem, point.orbit)))
+        trace.head = point
+        share = point.y[-1]
+        if share >= 1.0 or share <= 0.0:
+            self._end(trace, "the end of the parameter's range", point.orbit)
+        elif len(trace.points) > 3 and self._returned(trace, before, point):
+            self._end(trace, "closed: back at its first orbit", point.orbit)
+
+    def _search(self, trace: Trace, before: Point, point: Point) -> bool:
+        """Note the bifurcations between two points. Returns whether the branch has ended on one: joined another."""
+        for found in bifurcations(self.problem, before, point):
+            # where a branch meets its own mirror image it turns, so that it looks like a fold, too
+            turns = found.kind in ("fold", "pitchfork")
+            if turns and (why := self._joined(trace, found.orbit)):
+                self._note(trace, Located(found.orbit, "pitchfork", "branches meet"))
+                self._end(trace, why, found.orbit)
+                return True
+            self._note(trace, found)
+        return False
+
+    def _joined(self, trace: Trace, orbit: Orbit) -> str:
+        """Say on which branch of more symmetric orbits this one ends; "" if it does not."""
+        if not trace.points[-1].symmetric and with_symmetry(self.problem, orbit).symmetric:
+            return "joins a branch of symmetric orbits"
+        periods = self.problem.map.periods
+        if periods % 2 == 0 and not self._repeats(trace.head.orbit) and self._repeats(orbit):
+            return f"joins a branch of orbits of {periods // 2} period{'s' if periods > 2 else ''}"
+        return ""
+
+    def _repeats(self, orbit: Orbit) -> bool:
+        """Say whether an orbit repeats after half of its periods."""
+        passage = self.problem.at(orbit.parameter).over(orbit.periods // 2)(orbit.state)
+        return bool(np.abs((passage.state - orbit.state) / orbit.scale).max() < _SAME)
+
+    def _note(self, trace: Trace, found: Located) -> None:
+        orbit = found.orbit
+        trace.special.append(
+            SpecialPoint(len(trace.points) - 1, orbit.parameter, found.kind, found.note, orbit.state)
+        )  # fmt: skip
+
+    def _returned(self, trace: Trace, before: Point, point: Point) -> bool:
+        """Say whether the branch passes its first orbit between two points."""
+        piece = point.y - before.y
+        first = self.problem.pack(trace.points[0].state, trace.points[0].parameter)
+        share = (first - before.y) @ piece / max(float(piece @ piece), np.finfo(float).tiny)
+        away = np.linalg.norm(first - before.y - share * piece)
+        return bool(0.0 <= share < 1.0 and away < 0.05 * np.linalg.norm(piece))
+
+    def _end(self, trace: Trace, why: str, orbit: Orbit) -> None:
+        self._note(trace, Located(orbit, "end", why))
+        trace.end = why
+
+    # -- changes of the event sequence
+
+    def _cross(self, trace: Trace, step: float) -> None:
+        """Go on with the next sequence of events from where the present one ends, within a step; or end the branch."""
+        head = trace.head
+        last, point = self._last(head, step)
+        if last is not head and self._search(trace, head, last):
+            return
+        how = ""
+        if point is None:
+            point, how = self.other_side.find(last, step)
+        if point is not None and point.tangent[-1] * last.tangent[-1] < 0:
+            how += ": the branch turns"
+        after = self.other_side.passage(last) if point is None or how == CENTRED else point.orbit.passage
+        kind, what = change(last.orbit.passage, after)
+        self._note(trace, Located(last.orbit, kind, f"{what}{how}"))
+        if point is None:
+            self._end(trace, self._refusal(last, step) or f"{what}; no orbit found beyond", last.orbit)
+            return
+        self._accept(trace, last, point)
+        trace.step = max(self.table.step / 8, self.table.min_step)
+
+    def _refusal(self, last: Point, step: float) -> str:
+        """Say why values of the parameter beyond a point make no scene; "" if they do."""
+        try:
+            self.problem.at(self.problem.parameter(last.y + step * last.tangent))
+        except InputError as error:
+            return str(error)
+        return ""
+
+    def _last(self, head: Point, step: float) -> tuple[Point, Point | None]:
+        """Return the last point of the present sequence within a step, and the first beyond it, None if none is near.
+
+        Test functions that vanish where sequences change (speeds of crossings, clearances, times between events) say
+        where to look; bisection makes it sure.
+        """
+        low, high, seen = 0.0, step, [(0.0, head.orbit)]
+        beyond: Orbit | None = None
+        close = _CLOSE * min(1.0, abs(head.orbit.parameter / self.problem.span) or 1.0)
+        for attempt in range(_ATTEMPTS):
+            if high - low <= close:
+                break
+            at, margin = (
+                forecast([(where, found.passage) for where, found in seen[-2:]]),
+                max(1e-3 * (high - low), close / 4),
+            )
+            middle = (low + high) / 2
+            if at is None or attempt % 3 == 2:
+                at = middle
+            else:
+                at = float(np.clip(at + (margin if attempt % 3 else -margin), low + margin / 2, high - margin / 2))
+            orbit = corrected(self.problem, head, at)
+            if orbit is not None and orbit.passage.sequence == head.orbit.passage.sequence:
+                low = at
+                seen.append((at, orbit))
+            else:
+                high, beyond = at, orbit
+        last = head if len(seen) == 1 else point_of(self.problem, seen[-1][1], head.tangent)
+        return last, None if beyond is None else point_of(self.problem, beyond, head.tangent)

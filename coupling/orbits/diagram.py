@@ -1,0 +1,186 @@
+"""A diagram of branches: the first one, and those that go out from its period doublings and pitchforks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from vanedamp.coupling.orbits.bifurcations import SWITCHES, direction
+from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
+from vanedamp.coupling.orbits.continuation import Follower, Trace
+from vanedamp.coupling.orbits.multipliers import null_space
+from vanedamp.coupling.orbits.newton import OrbitStatus, Problem, solve
+from vanedamp.coupling.orbits.passage import PeriodMap
+from vanedamp.coupling.scene.orbit import Orbit as Table
+from vanedamp.files.toml_input import InputError
+
+#: branches, and periods of their orbits, that are followed
+_MOST_BRANCHES, _MOST_PERIODS = 32, 64
+#: how often the first step onto another branch, `step`, is quartered
+_QUARTERS = 6
+#: distance of two special points that are one, as a share of the range and of the coordinates' scale
+_SAME = 1e-3
+
+_MEANING = {
+    OrbitStatus.NOT_CONVERGED: "Newton's method does not converge",
+    OrbitStatus.FORBIDDEN: "every step of Newton's method leads to another sequence of events, which forbids the orbit",
+    OrbitStatus.STOPPED: "the engine does not come to the end of the period, or its derivative is undetermined",
+}
+
+
+class Diagram:
+    """The branches of a period map, found one after the other.
+
+    table: how to follow them; low, to: range of the parameter, to: None for a single orbit; start: returns the state
+    (k,) from which the first orbit is looked for; notes: what could not be done.
+    """
+
+    def __init__(
+        self, period_map: PeriodMap, table: Table, low: float, to: float | None, start: Callable[[], np.ndarray]
+    ) -> None:
+        self.map, self.table, self.low, self.to, self.start = period_map, table, low, to, start
+        self.problems: dict[int, Problem] = {}
+        self.finished: list[Branch] = []
+        self.current: tuple[Follower, Trace] | None = None
+        self.notes: list[str] = []
+        self._before = 0
+
+    @property
+    def branches(self) -> list[Branch]:
+        """The branches found so far, the last one perhaps unfinished."""
+        growing = [] if self.current is None else [self.current[0].branch(self.current[1])]
+        return self.finished + growing
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of Newton's method so far."""
+        return self._before + sum(problem.count["iterations"] for problem in self.problems.values())
+
+    @property
+    def place(self) -> tuple[np.ndarray, float]:
+        """Tangent (k + 1,) and step with which the last branch goes on."""
+        if self.current is None:
+            return np.zeros(len(self.map.scale) + 1), 0.0
+        trace = self.current[1]
+        return trace.head.tangent, trace.step
+
+    def resume(self, branches: Sequence[Branch], tangent: np.ndarray, step: float, iterations: int) -> None:
+        """Take up what an interrupted search has found."""
+        *self.finished, last = branches
+        self._before = iterations
+        follower = self._follower(last.periods)
+        trace = follower.resume(last, tangent, step)
+        if trace is None:
+            raise InputError("the last orbit of the checkpoint is none any more; delete the checkpoint to start again")
+        self.current = follower, trace
+
+    def follow(self, changed: Callable[[int, int], None]) -> None:
+        """Find all branches; changed: called with the number of orbits found and of those that there may be."""
+        while True:
+            self.current = self.current or self._next()
+            if self.current is None:
+                return
+            follower, trace = self.current
+            if self.to is None:
+                trace.end = "a single orbit: `to` is not given"
+            while True:
+                done = sum(len(branch.parameter) for branch in self.finished) + len(trace.points)
+                changed(done, self.table.max_points * (len(self.finished) + 1))
+                if trace.end:
+                    break
+                follower.advance(trace)
+            self.finished.append(follower.branch(trace))
+            self.current = None
+
+    def _next(self) -> tuple[Follower, Trace] | None:
+        """Return the next branch to follow; None if there is none."""
+        if not self.finished:
+            return self._first()
+        if not self.table.switch:
+            return None
+        for number, branch in enumerate(self.finished):
+            for place, point in enumerate(branch.special):
+                if point.kind not in SWITCHES or self._known(number, place, branch, point):
+                    continue
+                if len(self.finished) >= _MOST_BRANCHES:
+                    self.notes.append(f"only the first {_MOST_BRANCHES} branches were followed")
+                    return None
+                if (found := self._switched(number, place, branch, point)) is not None:
+                    return found
+        return None
+
+    def _first(self) -> tuple[Follower, Trace]:
+        """Return the branch through the first orbit. Raises InputError if there is none."""
+        follower = self._follower(self.table.periods)
+        problem = follower.problem
+        start, row = problem.pack(self.start(), self.low), _along_parameter(problem)
+        orbit = solve(problem, start, row, np.zeros(problem.size))
+        problem.count["iterations"] += orbit.iterations
+        if orbit.status is not OrbitStatus.OK:
+            other = '"linear"' if self.table.start == "run" else '"run"'
+            raise InputError(
+                f"orbit: no orbit of {problem.map.periods} excitation period(s) at {self.table.parameter} = "
+                f"{self.low:g}: {_MEANING[orbit.status]}; try other periods, another `from`, or start = {other}"
+            )
+        return follower, follower.begin(orbit, row)
+
+    @property
+    def _span(self) -> float:
+        """Range of the parameter, with its sign; 1 for a single orbit."""
+        return 1.0 if self.to is None else self.to - self.low
+
+    def _follower(self, periods: int) -> Follower:
+        problem = self.problems.setdefault(periods, Problem(self.map.over(periods), self.low, self._span))
+        return Follower(problem, self.table)
+
+    def _known(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> bool:
+        """Say whether a bifurcation's other branch was followed already, from here or to here."""
+        scale, span = self.map.scale, self._span
+        periods = branch.periods * (2 if point.kind == "period doubling" else 1)
+        for other in self.finished:
+            last = other.special[-1]
+            if other.source == (number, place):
+                return True
+            if other.source is None or other.periods != periods or not last.note.startswith("joins"):
+                continue
+            away = max(abs((last.parameter - point.parameter) / span), np.abs((last.state - point.state) / scale).max())
+            if away < _SAME:
+                return True
+        return point.note == "branches meet" and branch.special[-1].note.startswith("joins")
+
+    def _switched(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> tuple[Follower, Trace] | None:
+        """Return the branch that goes out from a bifurcation; None, with a note, if no orbit of it is found."""
+        doubled = point.kind == "period doubling"
+        periods = branch.periods * (2 if doubled else 1)
+        if periods > _MOST_PERIODS:
+            return None
+        parent, follower = self._follower(branch.periods).problem, self._follower(periods)
+        problem, y = follower.problem, follower.problem.pack(point.state, point.parameter)
+        here = parent.passage(y)
+        regular = parent.passage(parent.pack(branch.state[point.index], float(branch.parameter[point.index])))
+        if here is None or regular is None:
+            return None
+        scaled = problem.map.scale / problem.map.scale[:, None]
+        neutral = null_space(regular.derivative * scaled)
+        row = np.append(direction(here.derivative * scaled, point.kind, neutral), 0.0)
+        for quarters in range(_QUARTERS):
+            step = self.table.step / 4.0**quarters
+            start = y + step * row
+            if (passage := problem.passage(start)) is None:
+                continue
+            # the slope at the bifurcation itself says nothing of the other branch
+            orbit = solve(problem, start, row, problem.slope(start, passage))
+            problem.count["iterations"] += orbit.iterations
+            if orbit.status is OrbitStatus.OK:
+                onward = problem.pack(orbit.state, orbit.parameter) - y
+                if np.linalg.norm(onward) < 3 * step:
+                    return follower, follower.begin(orbit, onward / np.linalg.norm(onward), (number, place))
+        self.notes.append(
+            f"no orbit found on the other branch at the {point.kind} at {self.table.parameter} = {point.parameter:.9g}"
+        )
+        return None
+
+
+def _along_parameter(problem: Problem) -> np.ndarray:
+    return np.append(np.zeros(problem.size), 1.0)

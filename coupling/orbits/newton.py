@@ -1,0 +1,333 @@
+"""Newton's method for periodic orbits: a state that the period map takes to itself.
+
+Orbits and their parameter are zeros of one function of y = (state, parameter), both scaled: the state by the map's
+scale and the square root of its size, the parameter by the range of the branch. A last row says which zero is meant:
+the one of a given parameter, or the one at a given arclength (Keller 1977).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import lstsq
+
+from vanedamp.coupling.orbits.multipliers import NULL, decided, multipliers, null_space
+from vanedamp.coupling.orbits.passage import Passage, PassageStatus, PeriodMap
+from vanedamp.files.toml_input import InputError
+
+#: scaled length of a Newton step after which the orbit is known to round-off, because its square is
+_SMALL = 1e-8
+#: scaled residual of an orbit, over the size of its map's derivative, which is what round-off of the state grows by
+_RESIDUAL = 1e-13
+#: that of an orbit whose map's derivative is nearly singular, so that steps do not become small
+_ROUND_OFF = 1e-13
+#: relative step of differences in the parameter: a map known to some 1e-14, over which its third derivative is of
+#: order one, has the smallest error (some 1e-9) at the cube root
+_DIFFERENCE = 3e-5
+#: by which steps are shortened where the passage is not smooth over them, and how far from straight it may be
+_SHRINKS, _BEND = (1.0, 1e-2, 1e-4, 1e-6), 1e-2
+#: smallest size of a parameter, as a share of the branch's range, that its differences are relative to
+_FLOOR = 1e-3
+#: scaled distance of an orbit from its mirror image
+_SYMMETRIC = 1e-6
+
+
+class OrbitStatus(StrEnum):
+    """How the search for an orbit ended.
+
+    FORBIDDEN: the orbits that Newton's method heads for have another sequence of events than it assumes.
+    """
+
+    OK = "ok"
+    NOT_CONVERGED = "not_converged"
+    FORBIDDEN = "sequence_forbidden"
+    STOPPED = "engine_stopped"
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic orbit, or the last state of a search for one.
+
+    parameter: of the branch, nan without one; state: (k,) at the start of the excitation's period; periods: of the
+    excitation; scale: (k,) by which coordinates are compared; passage: its own; residual: largest share of the scale by
+    which it misses itself; iterations: of Newton's method; symmetric: whether it is its own mirror image half a period
+    later.
+    """
+
+    status: OrbitStatus
+    parameter: float
+    state: np.ndarray
+    periods: int
+    scale: np.ndarray
+    passage: Passage
+    residual: float
+    iterations: int
+    symmetric: bool = False
+
+    @cached_property
+    def derivative(self) -> np.ndarray:
+        """The derivative (k, k) of the period map in scaled coordinates."""
+        return np.asarray(self.passage.derivative * (self.scale / self.scale[:, None]))
+
+    @cached_property
+    def _multipliers(self) -> tuple[np.ndarray, int]:
+        return multipliers(self.derivative)
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Multipliers (k,) complex, the largest first."""
+        return self._multipliers[0]
+
+    @property
+    def neutral(self) -> int:
+        """How many multipliers are 1 because the orbit may be moved: of bodies at rest or in free flight."""
+        return self._multipliers[1]
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers but the neutral ones lie inside the unit circle."""
+        return bool(np.all(np.abs(decided(*self._multipliers)) < 1.0))
+
+    @property
+    def amplitude_mean(self) -> float:
+        """Mean of the periods' largest displacements of the response, m."""
+        return float(self.passage.peaks.mean())
+
+    @property
+    def amplitude_max(self) -> float:
+        """Largest displacement of the response, m."""
+        return float(self.passage.peaks.max())
+
+    @property
+    def impacts_per_period(self) -> float:
+        """Impacts in one period of the excitation."""
+        return sum(name.count("impact ") for name in self.passage.sequence) / self.periods
+
+
+class Point(NamedTuple):
+    """An orbit on a branch: y = (state, parameter) scaled (k + 1,), slope of the residual by the parameter (k,),
+    unit tangent of the branch (k + 1,)."""
+
+    y: np.ndarray
+    orbit: Orbit
+    slope: np.ndarray
+    tangent: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Orbits of a period map over a range of its parameter, scaled.
+
+    origin: parameter at which the scaled one is 0, nan for a map without; span: range of the parameter; count: of
+    passages so far.
+    """
+
+    map: PeriodMap
+    origin: float = math.nan
+    span: float = 1.0
+    count: Counter[str] = field(default_factory=Counter)
+    _maps: dict[float, PeriodMap] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates of a state."""
+        return len(self.map.scale)
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """Sizes (k,) by which states are divided: the mean square of a scaled state counts."""
+        return np.asarray(self.map.scale * math.sqrt(self.size))
+
+    def at(self, parameter: float) -> PeriodMap:
+        """Return the map at a value of the parameter. Raises InputError for one that is no scene."""
+        if math.isnan(parameter):
+            return self.map
+        if parameter not in self._maps:
+            made = self.map.at(parameter)
+            self._maps.clear()  # the next passage is often one of the same scene; more would fill the memory
+            self._maps[parameter] = made
+        return self._maps[parameter]
+
+    def parameter(self, y: np.ndarray) -> float:
+        """Return the parameter, nan for a map without."""
+        return self.origin + self.span * float(y[-1])
+
+    def pack(self, state: np.ndarray, parameter: float) -> np.ndarray:
+        """Return y (k + 1,)."""
+        share = 0.0 if math.isnan(self.origin) else (parameter - self.origin) / self.span
+        return np.append(state / self.weight, share)
+
+    def passage(self, y: np.ndarray) -> Passage | None:
+        """Return the passage of y; None if its parameter makes no scene, or the passage has no end or no derivative."""
+        return self._passage(y[:-1] * self.weight, self.parameter(y))
+
+    def _passage(self, state: np.ndarray, parameter: float) -> Passage | None:
+        self.count["passages"] += 1
+        try:
+            passage = self.at(parameter)(state)
+        except InputError:
+            return None
+        known = passage.status not in (PassageStatus.STOPPED, PassageStatus.UNDETERMINED)
+        return passage if known and np.isfinite(passage.state).all() and np.isfinite(passage.derivative).all() else None
+
+    def residual(self, y: np.ndarray, passage: Passage) -> np.ndarray:
+        """Return by how much an orbit misses itself, scaled (k,)."""
+        return np.asarray(passage.state / self.weight - y[:-1])
+
+    def slope(self, y: np.ndarray, passage: Passage) -> np.ndarray:
+        """Return the derivative of the residual by the scaled parameter (k,).
+
+        Central differences of the passage, over steps that shrink as long as the sequence of events changes within
+        them, or the passage bends as it does near a grazing impact; where one side stays another motion, one-sided.
+        """
+        parameter = self.parameter(y)
+        state, here = y[:-1] * self.weight, passage.state
+        known = 1e3 * np.finfo(float).eps * np.abs(here)
+        found = None
+        for shrink in _SHRINKS:
+            h = shrink * _DIFFERENCE * max(abs(parameter), _FLOOR * abs(self.span))
+            sides = [self._passage(state, parameter + way * h) for way in (1, -1)]
+            above, below = (side.state if side and side.sequence == passage.sequence else None for side in sides)
+            if above is not None and below is not None:
+                found = (above - below) / (2 * h)
+                if np.all(np.abs(above - 2 * here + below) <= _BEND * np.abs(above - below).max() + known):
+                    break
+            elif found is None and (above is not None or below is not None):
+                found = (above - here) / h if above is not None else (here - below) / h
+        return np.zeros(self.size) if found is None else np.asarray(found / self.weight * self.span)
+
+
+def find_orbit(period_map: PeriodMap, start: np.ndarray) -> Orbit:
+    """Return the periodic orbit that Newton's method finds from a state (k,), or its last state and why it is none."""
+    problem = Problem(period_map)
+    fixed = np.append(np.zeros(problem.size), 1.0)
+    orbit = solve(problem, problem.pack(np.asarray(start, float), math.nan), fixed, np.zeros(problem.size))
+    return with_symmetry(problem, orbit) if orbit.status is OrbitStatus.OK else orbit
+
+
+def solve(
+    problem: Problem, start: np.ndarray, row: np.ndarray, slope: np.ndarray, iterations: int = 20, halvings: int = 10
+) -> Orbit:
+    """Return the orbit in the plane through `start` (k + 1,) normal to `row` (k + 1,).
+
+    slope: derivative of the residual by the parameter (k,), near the orbit: the steps mend it on the way.
+    Steps are least squares of least norm, so that neutral coordinates stay where they are; a step that does not lessen
+    the residual, such as one into another sequence of events, is halved.
+    """
+    y, passage = start, problem.passage(start)
+    if passage is None:
+        return _stopped(problem, start)
+    residual, status, count = problem.residual(y, passage), OrbitStatus.NOT_CONVERGED, 0
+    relative = problem.map.scale / problem.map.scale[:, None]
+    for count in range(1, iterations + 1):  # noqa: B007
+        right = np.append(-residual, -row @ (y - start))
+        step = least_squares(bordered(problem, passage, slope, row), right)
+        size = 1.0 + float(np.linalg.norm(y))
+        last = float(np.linalg.norm(step)) <= _SMALL * size
+        taken, changed = _taken(
+            problem, y, step, passage, math.inf if last else float(np.linalg.norm(residual)), halvings
+        )
+        if taken is None:
+            # beside a bifurcation a residual at round-off is an orbit, and the next step is noise
+            if float(np.abs(residual).max(initial=0.0)) <= _ROUND_OFF * _reach(passage, relative, size):
+                status = OrbitStatus.OK
+            else:
+                status = OrbitStatus.FORBIDDEN if changed else status
+            break
+        moved = taken[0] - y
+        y, passage, residual = taken
+        # what an exact slope would have left is of second order (Broyden's update, of this column only)
+        slope = slope + residual * (moved[-1] / max(float(moved @ moved), np.finfo(float).tiny))
+        missed = float(np.abs(residual).max(initial=0.0))
+        if last and missed <= _RESIDUAL * _reach(passage, relative, size):
+            status = OrbitStatus.OK
+            break
+    missed, scale = float(np.abs(residual).max(initial=0.0)) * math.sqrt(problem.size), problem.map.scale
+    return Orbit(
+        status, problem.parameter(y), y[:-1] * problem.weight, problem.map.periods, scale, passage, missed, count
+    )
+
+
+def _reach(passage: Passage, relative: np.ndarray, size: float) -> float:
+    """Return the size of what a passage adds up: scaled states times its derivative."""
+    return size * (1.0 + float(np.abs(passage.derivative * relative).max(initial=0.0)))
+
+
+def _taken(
+    problem: Problem,
+    y: np.ndarray,
+    step: np.ndarray,
+    passage: Passage,
+    bound: float,
+    halvings: int,
+) -> tuple[tuple[np.ndarray, Passage, np.ndarray] | None, bool]:
+    """Take a step, or the largest part of it that brings the residual below a bound.
+
+    Returns y, its passage and its residual, or None, and whether the sequence of events changes on the way.
+    """
+    changed, share = False, 1.0
+    for _ in range(halvings):
+        trial = y + share * step
+        found = problem.passage(trial) if np.isfinite(trial).all() else None
+        if found is not None:
+            residual = problem.residual(trial, found)
+            if np.linalg.norm(residual) < (1.0 - 1e-3 * share) * bound:
+                return (trial, found, residual), changed
+            changed = changed or found.sequence != passage.sequence
+        share /= 2
+    return None, changed
+
+
+def bordered(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """Return the derivative of the residual by y, and a row below it (k + 1, k + 1)."""
+    scale = problem.map.scale
+    matrix = np.empty((problem.size + 1, problem.size + 1))
+    matrix[:-1, :-1] = passage.derivative * (scale / scale[:, None]) - np.eye(problem.size)
+    matrix[:-1, -1], matrix[-1] = slope, row
+    return matrix
+
+
+def tangent_of(problem: Problem, passage: Passage, slope: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """Return the unit tangent of the branch (k + 1,), on the side of `row`, without a share of neutral coordinates."""
+    tangent = least_squares(bordered(problem, passage, slope, row), np.append(np.zeros(problem.size), 1.0))
+    length = float(np.linalg.norm(tangent))
+    return tangent / length if length > 0.0 else row
+
+
+def point_of(problem: Problem, orbit: Orbit, row: np.ndarray) -> Point:
+    """Return an orbit as a point of a branch that goes on in the direction of `row` (k + 1,)."""
+    y = problem.pack(orbit.state, orbit.parameter)
+    slope = problem.slope(y, orbit.passage)
+    return Point(y, orbit, slope, tangent_of(problem, orbit.passage, slope, row))
+
+
+def least_squares(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the solution (k + 1,) of least norm, in which neutral coordinates do not move."""
+    solution = lstsq(matrix, right, cond=NULL, check_finite=False)[0]
+    return np.asarray(solution)
+
+
+def with_symmetry(problem: Problem, orbit: Orbit) -> Orbit:
+    """Return the orbit with whether it is symmetric, which takes another half of a period."""
+    found = problem.at(orbit.parameter).mirrored(orbit.state)
+    if found is None:
+        return orbit
+    difference, size = (found - orbit.state) / orbit.scale, 1.0 + float(np.abs(orbit.state / orbit.scale).max())
+    for free in null_space(orbit.derivative):  # where a body rests is nothing that a mirror could change
+        difference = difference - free * (free @ difference)
+    return replace(orbit, symmetric=bool(np.abs(difference).max() < _SYMMETRIC * size))
+
+
+def _stopped(problem: Problem, y: np.ndarray) -> Orbit:
+    """Return a search that could not begin."""
+    k, periods = problem.size, problem.map.periods
+    unknown, matrix = np.full(k, np.nan), np.full((k, k), np.nan)
+    passage = Passage(unknown, matrix, (), (math.inf, ""), PassageStatus.STOPPED, np.full(periods, np.nan))
+    state = y[:-1] * problem.weight
+    return Orbit(OrbitStatus.STOPPED, problem.parameter(y), state, periods, problem.map.scale, passage, math.nan, 0)

@@ -1,0 +1,136 @@
+"""Periodic orbits of scenes, and the branches that they form over one of the scene's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.model_order.choices import choices_of, leaves_open, with_choices
+from vanedamp.coupling.model_order.selection import warnings_of
+from vanedamp.coupling.orbits import newton
+from vanedamp.coupling.orbits.branch import Branches
+from vanedamp.coupling.orbits.checkpoint import Checkpoint
+from vanedamp.coupling.orbits.diagram import Diagram
+from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.orbits.passage import PeriodMap
+from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.orbit import Orbit as Table
+from vanedamp.coupling.scene.paths import number_at
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import InputError
+
+_FREQUENCY = "excitation.frequency"
+#: tables whose numbers are none of the motion's equations
+_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "initial")
+
+
+def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
+    """Return the periodic orbit of a scene that its [orbit] table describes, at the table's `from`.
+
+    start: a state near it, in place of the table's `start`. Raises InputError for a scene that the exact engine cannot
+    run, or a parameter that is no number of it; an orbit that is not found is a status of the result.
+    """
+    search = _Search(scene)
+    state = search.start() if start is None else search.map.state_of(start)
+    return replace(newton.find_orbit(search.map, state), parameter=search.low)
+
+
+def orbits(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    checkpoint: str | Path | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Branches:
+    """Follow the periodic orbits of a scene over a number of it, as its [orbit] table says.
+
+    progress: called with the number of points found and of those that there may be; checkpoint: a file to which found
+    points are written and from which an interrupted call goes on; the caller removes it once the result is safe
+    (files.checkpoint_file.clear).
+    Raises InputError for a scene without the table, one that the exact engine cannot run, a parameter that is no
+    number of it, and a start from which no orbit is found.
+    """
+    if scene.orbit is None:
+        raise InputError("orbit: missing; name the branch in a table [orbit], such as from = 95.0 and to = 105.0")
+    search = _Search(scene)
+    diagram = Diagram(search.map, search.table, search.low, search.to, search.start)
+    described = replace(scene, orbit=search.table)
+    data = dict(provenance or {})
+
+    def found() -> Branches:
+        notes = (*warnings_of(search.first), *dict.fromkeys(diagram.notes))
+        names, scale = tuple(search.map.names), frozen(search.map.scale)
+        return Branches(described, names, scale, tuple(diagram.branches), diagram.iterations, notes, data)
+
+    with Checkpoint(checkpoint, scene, data, lambda: (found(), *diagram.place)) as kept:
+        if kept.found is not None:
+            diagram.resume(kept.found.branches, kept.tangent, kept.step, kept.found.iterations)
+
+        def changed(done: int, total: int) -> None:
+            kept.changed()
+            if progress is not None:
+                progress(done, total)
+
+        diagram.follow(changed)
+    return found()
+
+
+def map_along(scene: Scene) -> PeriodMap:
+    """Return the period map at the `from` of a scene's [orbit] table: orbits of its branches are fixed points of it."""
+    return _Search(scene).map
+
+
+class _Search:
+    """A scene with its [orbit] table: the range of the parameter, and the period map at its begin."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Raise InputError for a parameter that is no number of the motion's equations, or bad at an end."""
+        self.scene, self.table = scene, scene.orbit or Table()
+        path, self.to = self.table.parameter, self.table.to
+        if path.split(".")[0] in _NO_PARAMETERS:
+            raise InputError(
+                f"orbit.parameter: {path} is no number of the motion's equations; take one such as {_FREQUENCY}"
+            )
+        try:
+            given = number_at(scene.to_dict(), path)
+        except InputError as error:
+            raise InputError(f"orbit.parameter: {str(error).removeprefix('scene: ')}") from None
+        self.low = given if self.table.from_ is None else self.table.from_
+        if self.to == self.low:
+            raise InputError(f"orbit.to: {self.to:g} is where the branch begins; give another value")
+        base = replace(scene, sweep={}, orbit=None)
+        if path == _FREQUENCY and self.to is not None and scene.excitation.resonance_near is None:
+            # the level is that of one resonance along the branch, as in a sweep
+            near = (min(self.low, self.to), max(self.low, self.to))
+            base = replace(base, excitation=replace(base.excitation, resonance_near=near))
+        ends = [_at(base, path, value) for value in (self.low, self.to) if value is not None]
+        if leaves_open(base):
+            choices = choices_of(ends)
+            ends = [with_choices(end, choices).scene for end in ends]
+        self.first = ends[0]
+        self.map: PeriodMap = period_map(self.first, path, self.table.periods)
+
+    def start(self) -> np.ndarray:
+        """Return the state (k,) from which the first orbit is looked for. Raises InputError if the run ends early."""
+        if self.table.start == "linear":
+            return self.map.linear_orbit()
+        response = simulate(self.first)
+        if response.final is None:
+            raise InputError(
+                f'orbit.start: the run of the scene ends early ({response.status}); take start = "linear", or change '
+                "the scene"
+            )
+        return self.map.state_of(response.final)
+
+
+def _at(scene: Scene, path: str, value: float) -> Scene:
+    try:
+        return scene.replace({path: value})
+    except InputError as error:
+        raise InputError(f"orbit: at {path} = {value:g}: {str(error).removeprefix('scene: ')}") from None

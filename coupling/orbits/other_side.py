@@ -1,0 +1,183 @@
+"""Orbits beyond the place where the sequence of events along a branch ends.
+
+An orbit of another sequence is looked for where the branch would go on, at the root of the distance along it where a
+new impact grazes, and in the image of it, where an event passes the start of the period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq
+
+from vanedamp.coupling.orbits.corrector import HALVINGS, ITERATIONS, corrected, near
+from vanedamp.coupling.orbits.multipliers import null_space
+from vanedamp.coupling.orbits.newton import (
+    Orbit,
+    OrbitStatus,
+    Point,
+    Problem,
+    bordered,
+    least_squares,
+    point_of,
+    solve,
+    tangent_of,
+)  # fmt: skip
+from vanedamp.coupling.orbits.passage import Passage
+
+#: what happens to a body that comes to a wall and has room on the other side
+CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"
+#: scaled distance within which a neutral coordinate is looked for an end
+_FARTHEST = 10.0
+#: how often the search for the place of a new event is widened
+_WIDENINGS = 6
+
+
+class OtherSide:
+    """The search for orbits of other sequences; step, min_step: of the arclength of the branch."""
+
+    def __init__(self, problem: Problem, step: float, min_step: float) -> None:
+        self.problem, self.step, self.min_step = problem, step, min_step
+
+    def find(self, last: Point, step: float) -> tuple[Point | None, str]:
+        """Return an orbit beyond a change of sequence and how it was found."""
+        sequence = last.orbit.passage.sequence
+        if (centred := self._centred(last)) is not None:
+            return centred, CENTRED
+        for size in self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
+            y = last.y + size * last.tangent
+            passage = self.problem.passage(y)
+            if passage is None:
+                continue
+            if passage.sequence != sequence:
+                orbit = self._beside(last, y, passage)
+                if orbit is not None:
+                    away = self.problem.pack(orbit.state, orbit.parameter) - last.y
+                    return point_of(self.problem, orbit, away / np.linalg.norm(away)), ""
+            # an event that passes the start of the period changes the state there, as the passage's end shows
+            image = self.problem.pack(passage.state, self.problem.parameter(y))
+            if np.linalg.norm(image - y) > 100 * size and (found := self.problem.passage(image)) is not None:
+                row = tangent_of(self.problem, found, self.problem.slope(image, found), last.tangent)
+                orbit = near(self.problem, image, last.tangent, last.slope, size)
+                if orbit is not None:
+                    return point_of(self.problem, orbit, row), " at the start of the period"
+        for factor in (1.0, 2.0, 4.0):
+            orbit = corrected(self.problem, last, factor * step)
+            if orbit is not None:
+                return point_of(self.problem, orbit, last.tangent), f", stepped over by {factor * step:.2g}"
+        return None, ""
+
+    def passage(self, last: Point) -> Passage | None:
+        """Return a passage of the next sequence of events, of a state close to the last orbit; None if none is near."""
+        for size in self.step * 10.0 ** np.arange(-6.0, 0.0):
+            passage = self.problem.passage(last.y + size * last.tangent)
+            if passage is not None and passage.sequence != last.orbit.passage.sequence:
+                return passage
+        return None
+
+    def _centred(self, last: Point) -> Point | None:
+        """Return the orbit with its neutral coordinates amid those of its sequence; None if they are there already.
+
+        A body that may rest anywhere has come to a wall, though its motion has room on the other side. The tangent
+        takes it on along the middle.
+        """
+        y = self._amid(last.y, last)
+        if y is None or np.linalg.norm(y - last.y) < self.min_step:
+            return None
+        orbit = self._at_parameter(y, last)
+        if orbit is None:
+            return None
+        tangent = last.tangent
+        for ahead in (0.1 * self.step, 1e-3 * self.step):
+            other = self._at_parameter(y + ahead * last.tangent, last)
+            moved = None if other is None else self._amid(self.problem.pack(other.state, other.parameter), last)
+            if moved is not None:
+                tangent = (moved - y) / np.linalg.norm(moved - y)
+                break
+        return point_of(self.problem, orbit, tangent)
+
+    def _at_parameter(self, y: np.ndarray, last: Point) -> Orbit | None:
+        """Return the orbit of the same sequence at the parameter of y; None if there is none."""
+        row = np.append(np.zeros(self.problem.size), 1.0)
+        orbit = solve(self.problem, y, row, last.slope, ITERATIONS, HALVINGS)
+        same = orbit.passage.sequence == last.orbit.passage.sequence
+        return orbit if orbit.status is OrbitStatus.OK and same else None
+
+    def _amid(self, y: np.ndarray, last: Point) -> np.ndarray | None:
+        """Return y with its neutral coordinates amid those of its sequence; None for an orbit without any."""
+        neutral = null_space(last.orbit.derivative)
+        for free in neutral:
+            direction, base = np.append(free, 0.0), y
+
+            def stays(at: float, base: np.ndarray = base, direction: np.ndarray = direction) -> bool:
+                passage = self.problem.passage(base + at * direction)
+                return passage is not None and passage.sequence == last.orbit.passage.sequence
+
+            reaches = [_reach(stays, sign) for sign in (-1.0, 1.0)]
+            if max(map(abs, reaches)) < _FARTHEST:
+                y = y + sum(reaches) / 2 * direction
+        return y if len(neutral) else None
+
+    def _beside(self, last: Point, y: np.ndarray, passage: Passage) -> Orbit | None:
+        """Return an orbit of another sequence that begins where the present one ends; None if none is found.
+
+        y, passage: beyond the end, along the tangent. The new event adds v k to the residual, k a direction and v a
+        measure of the event, such as the speed of a grazing impact: a root of the distance along the tangent, so that
+        orbits lie at last.y + v alpha to first order, (D - 1) alpha = -k (Nordmark 1991). What is of second order, as
+        that distance is, is a root along the tangent.
+        """
+        problem, sequence = self.problem, last.orbit.passage.sequence
+        residual = problem.residual(y, passage)
+        kick = float(np.linalg.norm(residual))
+        if kick == 0.0:
+            return None
+        here = bordered(problem, last.orbit.passage, last.slope, last.tangent)
+        alpha = least_squares(here, np.append(-residual / kick, 0.0))
+        length, away = float(np.linalg.norm(alpha)), float(np.linalg.norm(y - last.y))
+        for share in (1e-3, 1e-2, 1e-1, 1.0):
+            measure = share * self.step / length
+            distance = self._root(
+                last, last.y + measure * alpha, away * min(measure / kick, (measure / kick) ** 2), residual
+            )
+            if distance is None:
+                continue
+            start = last.y + measure * alpha + distance * last.tangent
+            found = problem.passage(start)
+            if found is None:
+                continue
+            orbit = near(self.problem, start, alpha / length, problem.slope(start, found), 2 * length * measure)
+            if orbit is not None and orbit.passage.sequence != sequence:
+                return orbit
+        return None
+
+    def _root(self, last: Point, base: np.ndarray, distance: float, residual: np.ndarray) -> float | None:
+        """Return how far along the tangent from `base` the residual has no part in another; None if nowhere near."""
+
+        def part(at: float) -> float:
+            passage = self.problem.passage(base + at * last.tangent)
+            return (
+                np.nan
+                if passage is None
+                else float(residual @ self.problem.residual(base + at * last.tangent, passage))
+            )
+
+        for _ in range(_WIDENINGS):
+            if part(-distance) * part(distance) < 0.0:
+                try:
+                    return float(brentq(part, -distance, distance, xtol=1e-3 * distance, maxiter=60))
+                except ValueError:
+                    return None
+            distance *= 10
+        return None
+
+
+def _reach(stays: Callable[[float], bool], sign: float) -> float:
+    """Return how far a condition holds from 0 in a direction, at most some _FARTHEST."""
+    low, high = 0.0, 1e-9
+    while stays(sign * high) and high < _FARTHEST:
+        low, high = high, 2 * high
+    for _ in range(20):
+        middle = (low + high) / 2
+        low, high = (middle, high) if stays(sign * middle) else (low, middle)
+    return sign * low

@@ -1,0 +1,92 @@
+"""A file that a long command keeps while it works, and from which the same command goes on after a kill.
+
+Each write makes a new file, which takes the place of the old one when it is complete, so that a kill at any moment
+leaves one that can be read. Writing takes at most a thirtieth of the time.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from vanedamp.files.store import StoreError, Variable, clear_leftovers, digest, load, save
+from vanedamp.files.toml_input import InputError
+
+_SHARE = 30
+
+
+class CheckpointFile:
+    """The checkpoint of one command (path None: nothing is kept).
+
+    kind: of its record; belongs: by attribute what it is the checkpoint of, and the word for that in messages; content:
+    returns variables and further attributes of the record, and how much is finished, in words.
+    """
+
+    def __init__(
+        self, path: str | Path | None, kind: str, belongs: Mapping[str, tuple[str, Mapping[str, Any]]],
+        content: Callable[[], tuple[Mapping[str, Variable], Mapping[str, Any], str]],
+    ) -> None:  # fmt: skip
+        self._path = None if path is None else Path(path)
+        self._kind, self._belongs, self._content = kind, belongs, content
+        self._next = 0.0
+        self._unsaved = False
+
+    def read(self) -> tuple[dict[str, Any], dict[str, Any]] | None:
+        """Return variables and attributes of the file, None if there is none.
+
+        Raises InputError for a file of something else, or one that cannot be read.
+        """
+        path = self._path
+        if path is None or not path.exists():
+            return None
+        try:
+            variables, attributes = load(path, self._kind)
+            found = {name: json.loads(attributes[name]) for name in self._belongs}
+        except (StoreError, KeyError) as error:
+            raise InputError(
+                f"{path}: a checkpoint that cannot be read ({error}); nothing was done to it: move it away, or delete "
+                "it to start again"
+            ) from error
+        for name, (what, data) in self._belongs.items():
+            if found[name] != json.loads(json.dumps(data)):
+                raise InputError(
+                    f"{path}: the checkpoint of another {what}; nothing was done to it: move it away, or delete it to "
+                    "start again"
+                )
+        return variables, attributes
+
+    def changed(self) -> None:
+        """Write the file, unless the last time is too short ago. Raises StoreError, such as for a full disk."""
+        self._unsaved = True
+        if time.perf_counter() >= self._next:
+            self.write()
+
+    def write(self) -> None:
+        """Write what has changed. Raises StoreError, such as for a full disk."""
+        if self._path is None or not self._unsaved:
+            return
+        started = time.perf_counter()
+        variables, attributes, finished = self._content()
+        try:
+            belongs = {name: dict(data) for name, (_, data) in self._belongs.items()}
+            save(self._path, self._kind, variables, belongs | dict(attributes))
+        except StoreError as error:
+            kept = "what was finished before is in it" if self._path.exists() else "nothing is kept"
+            raise StoreError(f"{error}; {finished}, {kept}; make room and run the same command again") from error
+        self._unsaved = False
+        ended = time.perf_counter()
+        self._next = ended + _SHARE * (ended - started)
+
+
+def clear(path: str | Path) -> None:
+    """Remove a checkpoint whose result is safe, and temporary files of interrupted writes."""
+    Path(path).unlink(missing_ok=True)
+    clear_leftovers(path)
+
+
+def digests(files: list[str]) -> dict[str, str]:
+    """Return the digest of every file that is there, by its path."""
+    return {file: digest(file) for file in files if Path(file).is_file()}

@@ -1,0 +1,81 @@
+"""`vanedamp orbits`: periodic orbits over a number of the scene; what is found is kept and survives a kill."""
+
+from __future__ import annotations
+
+import time
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
+from vanedamp.studies.terminal import progress
+
+if TYPE_CHECKING:
+    from vanedamp.coupling.orbits.branch import Branches
+
+ORDER = 85
+SUMMARY = "branches of periodic orbits, their stability and bifurcations, as the scene's [orbit] table says"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a scene and the result files."""
+    add_input(parser, "SCENE.toml")
+    add_output(parser, "BRANCH.h5")
+    add_json(parser)
+    parser.add_argument(
+        "--resume", action="store_true",
+        help="resume from the checkpoint, or fail; without it, resume if there is a checkpoint, otherwise start",
+    )  # fmt: skip
+
+
+def run(arguments: Namespace) -> None:
+    """Follow the branches."""
+    from vanedamp.files.store import clear_leftovers
+    from vanedamp.studies.commands.support.messages import print_warnings, write_result
+    from vanedamp.studies.commands.support.outputs import check_outputs, check_resume, checkpoint_file
+
+    checkpoint = checkpoint_file(arguments.output)
+    outputs = check_outputs(arguments, beside=checkpoint)
+    check_resume(arguments, checkpoint)
+    from vanedamp.studies.commands.support.scenes import load_scene, print_resonance
+
+    scene = load_scene(arguments.input, outputs)
+    from vanedamp.coupling.orbits.orbits import orbits
+    from vanedamp.files.checkpoint_file import clear
+    from vanedamp.files.provenance import versions
+    from vanedamp.studies.commands.support.budget import check_run
+
+    check_run(scene)
+    resonance = print_resonance(arguments.input, scene)
+    started = time.perf_counter()
+    with progress("orbits") as report:
+        result = orbits(scene, report, checkpoint, {"versions": versions()})
+    if arguments.output:
+        result.save(arguments.output)
+    seconds = time.perf_counter() - started
+    print_warnings(arguments.input, result.warnings)
+    # times are not kept in the result, which is the same however it came about
+    write_result(arguments.json, result.to_json() | {"wall_time_s": seconds} | resonance)
+    if checkpoint is not None:
+        clear(checkpoint)
+        clear_leftovers(arguments.output)
+    if arguments.json != "-":
+        _print_summary(result)
+        print(f"{sum(len(branch.parameter) for branch in result.branches)} orbits in {seconds:.1f} s")
+
+
+def _print_summary(result: Branches) -> None:
+    """Print where branches run, and their special points."""
+    name = result.parameter
+    for number, branch in enumerate(result.branches):
+        source = ""
+        if branch.source is not None:
+            parent, place = branch.source
+            source = f", from the {result.branches[parent].special[place].kind} of branch {parent}"
+        low, high = branch.parameter.min(), branch.parameter.max()
+        print(
+            f"branch {number}{source}: {len(branch.parameter)} orbits of {branch.periods} period(s), {name} = "
+            f"{low:.6g} to {high:.6g}, {branch.stable.sum()} of them stable; {branch.end}"
+        )
+        for point in branch.special:
+            if point.kind != "end":
+                print(f"  {point.kind} at {name} = {point.parameter:.9g}" + (f": {point.note}" if point.note else ""))

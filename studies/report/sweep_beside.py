@@ -1,0 +1,54 @@
+"""Points of a sweep that belong beside branches: runs of the same scene at values of the branches' parameter."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from vanedamp.coupling.scene.paths import assign
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.steady_states import is_start
+from vanedamp.files.toml_input import InputError
+
+#: tables that say how a scene is run and what of it is kept, and nothing about its steady states
+_ABOUT_RUNS = ("time", "initial", "continuation", "sweep", "orbit")
+
+
+def points_beside(scene: Scene, parameter: str, sweep: Sweep) -> tuple[np.ndarray, np.ndarray]:
+    """Return parameter (n,) and mean amplitude (n,) m of the runs that are ok of a sweep of a scene.
+
+    Scenes are the same but for their parameter and how their runs begin. Empty where the sweep has another scene, or
+    not the parameter as an axis.
+    """
+    paths = list(sweep.axes)
+    if parameter not in paths:
+        return np.zeros(0), np.zeros(0)
+    mine, shown = system_of(scene, {}, parameter), np.zeros(sweep.shape, bool)
+    others = [index for index, path in enumerate(paths) if path != parameter and not is_start(path)]
+    for combination in itertools.product(*(range(sweep.shape[index]) for index in others)):
+        place: list[int | slice] = [slice(None)] * len(paths)
+        for index, value in zip(others, combination, strict=True):
+            place[index] = value
+        values = {paths[i]: sweep.axes[paths[i]].tolist()[j] for i, j in zip(others, combination, strict=True)}
+        shown[tuple(place)] = system_of(sweep.scene, values, parameter) == mine
+    shown &= sweep.status == "ok"
+    along = np.meshgrid(*sweep.axes.values(), indexing="ij")[paths.index(parameter)]
+    return along[shown], sweep.amplitude_mean[shown]
+
+
+def system_of(scene: Scene, values: Mapping[str, Any], parameter: str) -> dict[str, Any] | None:
+    """Return a scene at some values as data, without its parameter and how it is run; None if it has no such keys."""
+    data = {name: table for name, table in scene.to_dict().items() if name not in _ABOUT_RUNS}
+    try:
+        for path, value in (*values.items(), (parameter, None)):
+            assign(data, path.split("."), value, path)
+    except InputError:
+        return None
+    data["damper"] = [
+        {key: value for key, value in damper.items() if not is_start(f"damper.{key}")} for damper in data["damper"]
+    ]
+    return data
