@@ -8,13 +8,13 @@ import pytest
 from tests.reference.planar_sequence import PlanarSequence, walk
 from tests.tools.planar import planar_scene
 from tests.tools.planar_laws import scene_of, tables
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.orbits.planar_segment import Segment
 from vanedamp.coupling.planar.constraints import PlanarMotion, planar_motion
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError
 
@@ -62,12 +62,12 @@ CASES = {
     ),
     "block that slides, comes to lie and sticks": (
         shaken(3.81, 0.72, 0.26, {"law": "newton"}, BLOCK | {
-            "friction": 0.35, "restitution": 0.0, "tilt": 0.17, "velocity": 0.35, "tilt_rate": -0.24,
+            "friction": 0.35, "restitution": 0.0, "tilt": 0.17, "velocity": 0.35, "tilt_rate": -0.24, "lift": 0.001,
         }), ("turns c1.floor.0.0 right", "rests c1.floor.0.1", "sticks c1.floor.0.0"),
     ),
     "block by Poisson's law": (
         shaken(5.3, 0.65, 0.21, {"law": "poisson"}, BLOCK | {
-            "friction": 0.14, "restitution": 0.5, "tilt": 0.29, "velocity": 0.15, "tilt_rate": -0.14,
+            "friction": 0.14, "restitution": 0.5, "tilt": 0.29, "velocity": 0.15, "tilt_rate": -0.14, "lift": 0.001,
         }), ("impact c1.floor.0.0", "impact c1.right.0.1", "impact c1.right.0.2"),
     ),
     "disc that rolls, slips and leaves": (
@@ -116,7 +116,7 @@ def directions(found, x):
     motion = PlanarMotion(*np.split(frame.from_state @ x, 2))
     run = PlanarRun(frame.flat, frame.system, motion, new_records(frame.flat, 1, 0), True, 0)
     run.advance_to(1)
-    held = frame.to_state @ Segment(run).stopped() @ frame.from_state
+    held = frame.to_state @ Segment(run).begun() @ frame.from_state
     left, sizes, _ = np.linalg.svd(held / found.scale[:, None] * found.scale)
     return left[:, sizes > 1e-9]
 
@@ -218,7 +218,7 @@ def flat_block(law):
 def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
     """Of springs and dashpots the order in which two corners meet a wall is no matter, to first order."""
     scene = flat_block(SPRING)
-    found, _, _, z = frame_of(scene)
+    found, flat, system, z = frame_of(scene)
     x, periods = start_of(found, z), 4
     passage = found.over(periods)(x)
     assert passage.status is PassageStatus.OK
@@ -227,15 +227,16 @@ def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
     ends = []
     for way in (1, -1):
         tilted = x.copy()
-        tilted[tilt] += way * 1e-7
-        response = simulate(
-            scene.replace({"time.periods": periods, "time.transient": 0}), start=found.restart_of(tilted)
-        )
-        ends.append(found.state_of(response.final))
-    grown = (ends[0] - ends[1]) / 2e-7
+        tilted[tilt] += way * 1e-8
+        start = PlanarMotion(*np.split(found._frame.from_state @ tilted, 2))
+        run = PlanarRun(flat, system, start, new_records(flat, periods, 0), False, 10**6)
+        assert run.advance_to(periods) is Status.OK
+        ends.append(found._frame.to_state @ np.r_[run.state.q, run.state.v])
+    grown = (ends[0] - ends[1]) / 2e-8
     growth = passage.derivative[:, tilt]
     assert np.abs(growth[[tilt, rate]]).max() > 2.0
-    np.testing.assert_allclose(grown, growth, rtol=0, atol=1e-6 * np.abs(growth).max())
+    # gaps that are zero to 1e-12 of the free travel close together
+    np.testing.assert_allclose(grown, growth, rtol=0, atol=5e-5 * np.abs(growth).max())
 
 
 def test_an_aligned_block_that_hits_rigid_walls_has_no_derivative_of_its_tilt():
@@ -245,7 +246,7 @@ def test_an_aligned_block_that_hits_rigid_walls_has_no_derivative_of_its_tilt():
     passage = found(x)
     assert passage.status is PassageStatus.COINCIDENT
     tilt, rate = found.names.index("body 0 tilt"), found.names.index("body 0 tilt rate")
-    assert passage.state[tilt] == passage.state[rate] == 0.0
+    assert np.abs(passage.state[[tilt, rate]]).max() < 1e-14
     for size in (1e-6, 1e-9):
         tilted = x.copy()
         tilted[tilt] += size
@@ -342,6 +343,17 @@ def test_clearance_of_an_impact_that_nearly_happens(share):
     distance, name = passage.clearance
     assert name in ("impact c1.left.0", "impact c1.right.0")
     assert distance == pytest.approx(share / (2 * (1 + share)), rel=1e-6)
+
+
+def test_a_passage_that_begins_as_a_body_begins_to_slip_is_grazing():
+    """A neighbour that slips the other way comes to rest first: both sides have derivatives of their own."""
+    found, x = random_start(19, "newton")
+    assert found(x).status is PassageStatus.GRAZING
+
+
+def test_a_state_that_is_no_number_stops():
+    found, _, _, z = frame_of(CASES["disc on springs"][0])
+    assert found(np.full(len(z), np.nan)).status is PassageStatus.STOPPED
 
 
 def test_an_impact_that_friction_would_feed_takes_no_energy():

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
@@ -26,6 +27,7 @@ from vanedamp.coupling.numerics.codes import (
     STOPS,
     TOUCHING,
 )
+from vanedamp.coupling.planar.contact_decisions import AT_REST
 from vanedamp.coupling.planar.contact_flow import ContactFlows
 from vanedamp.coupling.planar.planar_run import PlanarRun
 
@@ -69,7 +71,7 @@ class Segment:
         self._amplitude, self._project = st.amplitude[:modes].copy(), flows.project[s, :modes]
         self._bend, self._bend_held = st.bend.copy(), flows.bend_held[s]
         self._force, self._force_held = st.force.copy(), flows.force_held[s]
-        self._snap, self._snap_rate, self.held = flows.snap[s], flows.snap_rate[s], flows.held[s]
+        self.held = flows.held[s]
 
     def _derivative(self, order: int, t: float) -> np.ndarray:
         """Return the amplitudes (m,) of the modes' derivative of an order after a time t."""
@@ -97,20 +99,30 @@ class Segment:
         acceleration: np.ndarray = self._bend + (self._shape @ self._derivative(2, t)).real
         return acceleration
 
-    def stopped(self) -> np.ndarray:
-        """Return the projector (2N, 2N) of states onto those that the closed contacts hold, as the engine's."""
-        n, u, system = len(self.q), len(self.system.rest), self.system
-        still = np.zeros((2 * n, 2 * n))
-        still[:n, :n] = np.eye(n) - self._snap @ system.J[:u]
-        still[n:, n:] = np.eye(n) - self._snap_rate @ system.J
-        return still
+    def begun(self) -> np.ndarray:
+        """Return the projector (2N, 2N) of states onto those that begin as this one, with its contacts closed.
+
+        A contact that is closed and at rest, but parts from now on, has been closed until now.
+        """
+        return self._kept(np.isinf(self.system.spring) & ((self.state != OPEN) | self.rests()))
+
+    def rests(self) -> np.ndarray:
+        """Return whether units are open contacts without gap and speed, (u,)."""
+        system, u = self.system, len(self.state)
+        gap, rate = system.rest + system.J[:u] @ self.q, system.J[:u] @ self.v
+        shut = (gap <= SIMULTANEOUS * system.play) & (np.abs(rate) <= AT_REST * self.speed)
+        return (self.state == OPEN) & (np.arange(u) < system.contacts) & shut
 
     def carried(self) -> np.ndarray:
-        """Return the projector (2N, 2N), in the mass metric, of states onto those that contacts with a force hold."""
+        """Return the projector (2N, 2N) of states onto those that contacts with a force hold."""
+        return self._kept(np.isinf(self.system.spring) & (self.state < OPEN))
+
+    def _kept(self, closed: np.ndarray) -> np.ndarray:
+        """Return the projector (2N, 2N), in the mass metric, that keeps contacts closed (u,) and stops stuck slips."""
         system, root, n, u = self.system, np.sqrt(self.system.mass), len(self.q), len(self.state)
-        closed = system.J[:u][(self.state < OPEN) & np.isinf(system.spring)] / root
+        normal = system.J[:u][closed & (np.arange(u) < system.contacts)] / root
         held = np.eye(2 * n)
-        for part, rows in enumerate((closed, np.vstack([closed, system.J[u:][self.state == STICK] / root]))):
+        for part, rows in enumerate((normal, np.vstack([normal, system.J[u:][self.state == STICK] / root]))):
             own = slice(part * n, (part + 1) * n)
             held[own, own] -= np.linalg.pinv(rows, rcond=_DEPENDENT) @ rows * root / root[:, None]
         return held
@@ -174,8 +186,8 @@ class Segment:
         for _ in range(_STEPS):  # Newton's method, held between the bounds
             slope, curvature = self._values(powers[k : k + 1], waves[k : k + 1], np.array([t]))[1:, 0, 0]
             start, end = (t, end) if slope < 0.0 else (start, t)
-            step = t - slope / curvature if curvature > 0.0 else start
-            t = step if start < step < end else 0.5 * (start + end)
+            step = t - slope / curvature if curvature > 0.0 else 0.5 * (start + end)
+            t = min(max(step, start), end)
         least = self._values(powers[k : k + 1], waves[k : k + 1], np.array([t]))[0, 0, 0]
         return float(least / scale[k]), *watched[k]
 

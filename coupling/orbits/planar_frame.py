@@ -1,0 +1,156 @@
+"""States of scenes with bodies in the plane: in the order of RestartState, as the engine has them, mirror images."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from vanedamp.coupling.orbits.planar_names import UnitNames
+from vanedamp.coupling.planar.constraints import PlanarSystem, planar_system
+from vanedamp.coupling.planar.contact_flow import ContactFlows
+from vanedamp.coupling.planar.restart import planar_restart_state
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble, physical_scale
+from vanedamp.files.store import frozen
+
+
+class Frame:
+    """A scene's system, and its states (k,) in the order of RestartState against those of the engine, (q, q')."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.flat = assemble(scene)
+        self.system, self.scale = planar_system(scene, self.flat), physical_scale(scene, self.flat)
+        self.names, self.scene = UnitNames(scene, self.system), scene
+        self.flows: list[ContactFlows] = []  # that all passages share
+        self.extended = np.flatnonzero(self.system.tilt >= 0)
+        size = len(self.system.mass)
+        units = np.eye(2 * size)
+        self.to_state = np.column_stack([self.state_of(self.restart_at(z[:size], z[size:])) for z in units])
+        self.from_state = np.linalg.inv(self.to_state)
+
+    def gaps(self, q: np.ndarray) -> np.ndarray:
+        """Return the gaps (u,) at coordinates (N,), m."""
+        gaps: np.ndarray = self.system.rest + self.system.J[: len(self.system.rest)] @ q
+        return gaps
+
+    def restart_at(self, q: np.ndarray, v: np.ndarray) -> RestartState:
+        """Return the restart state of coordinates (N,) and their rates."""
+        return planar_restart_state(self.flat, self.system, self.scale, q, v)
+
+    def state_of(self, restart: RestartState) -> np.ndarray:
+        """Return the state (k,) of a restart state."""
+        out_of_line = (restart.lift, restart.lift_velocity, restart.tilt, restart.tilt_rate)
+        return np.concatenate([
+            restart.displacement, restart.velocity, restart.slip, restart.slip_velocity,
+            *(part[self.extended] for part in out_of_line),
+        ])  # fmt: skip
+
+    def restart_of(self, state: np.ndarray) -> RestartState:
+        """Return the restart state of a state (k,)."""
+        n, b, more, friction = self.flat.modes, self.flat.bodies, len(self.extended), self.flat.friction_rows
+        parts = np.split(np.asarray(state, float), np.cumsum([n, n, b, b, more, more, more]))
+        whole = np.zeros((4, b))
+        whole[:, self.extended] = parts[4:]
+        return RestartState(
+            *map(frozen, (*parts[:4], np.zeros(friction - b), self.flat.free_travel[friction:], *whole))
+        )
+
+    def glued(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return complex amplitudes (e, n) of the structure with all bodies at rest on their floors; its sag (n,).
+
+        Amplitudes are inf at a resonance without damping.
+        """
+        system, n = self.system, self.flat.modes
+        lying = np.eye(len(system.mass))[:, :n]
+        for b, x in enumerate(system.along):
+            lying[x] = system.floor[b, :n]
+            if system.tilt[b] >= 0:
+                lying[x + 1], lying[x + 2] = system.rise[b, :n], system.turn[b, :n]
+        mass, stiffness, damping = (
+            lying.T @ part @ lying for part in (np.diag(system.mass), system.stiffness, system.damping)
+        )
+        omega = system.frequency[:, None, None]
+        dynamic = stiffness + 1j * omega * damping - omega**2 * mass
+        sag = np.linalg.solve(stiffness, system.weight @ lying)
+        try:
+            return np.linalg.solve(dynamic, (system.load @ lying)[:, :, None])[:, :, 0], sag
+        except np.linalg.LinAlgError:
+            return np.full((len(omega), n), np.inf + 0j), sag
+
+    def rates(self, amplitude: np.ndarray) -> np.ndarray:
+        """Return the rates (n,) at phase zero of complex amplitudes (e, n)."""
+        rates: np.ndarray = ((1j * self.system.frequency) @ amplitude).real
+        return rates
+
+    def sizes(self) -> np.ndarray:
+        """Return sizes (k,) of the coordinates: linear response, plays, tilts that take them, and these times omega."""
+        system, omega = self.system, float(self.system.frequency[0])
+        reach = self.scale * np.abs(self.glued()[0]).sum(axis=0)
+        damper = self.scene.damper
+        cavity = [self.scene.cavity[index] for index in system.cavity]
+        gap = np.array([each.gap for each in cavity])
+        lift, tilt = np.ones(len(gap)), np.ones(len(gap))
+        for b in self.extended:
+            lift[b] = cavity[b].play or gap[b]
+            tilt[b] = lift[b] / (2.0 * max(damper[b].half_extent))
+        # a structure that nothing excites, or nothing damps, moves by its start and the bodies
+        largest = np.abs(reach).max(initial=0.0)
+        largest = largest if 0.0 < largest < np.inf else float(gap.max(initial=0.0)) or 1.0
+        reach = np.where(np.isfinite(reach), np.maximum(np.abs(reach), 1e-6 * largest), largest)
+        size = RestartState(
+            *map(frozen, (reach, omega * reach, gap, omega * gap, (), (), lift, omega * lift, tilt, omega * tilt))
+        )
+        return frozen(self.state_of(size))
+
+    @cached_property
+    def image(self) -> np.ndarray | None:
+        """Map (k, k) of states to their mirror images; None for a scene without that symmetry."""
+        system = self.system
+        turned = image_of(system)
+        if turned is None:
+            return None
+        both = np.kron(np.eye(2), turned)
+        image: np.ndarray = self.to_state @ both @ self.from_state
+        return image
+
+
+def image_of(system: PlanarSystem) -> np.ndarray | None:
+    """Return the map (N, N) of coordinates to those of the mirror image; None where that is another scene."""
+    size, u, bodies = len(system.mass), len(system.rest), len(system.along)
+    image = np.zeros((size, size))
+    image[: size if not bodies else system.along[0]] = -np.eye(size)[: size if not bodies else system.along[0]]
+    for index in set(system.cavity.tolist()):
+        row = np.flatnonzero(system.cavity == index)
+        for b, partner in zip(row, row[::-1], strict=True):
+            x, y = system.along[b], system.along[partner]
+            if (system.tilt[b] >= 0) != (system.tilt[partner] >= 0):
+                return None
+            image[x, y] = -1.0
+            if system.tilt[b] >= 0:
+                image[x + 1, y + 1], image[x + 2, y + 2] = 1.0, -1.0
+    same = lambda a, b: np.allclose(a, b, rtol=1e-12, atol=1e-14 * np.abs(a).max(initial=0.0))  # noqa: E731
+    half = np.exp(1j * np.pi * np.round(system.frequency / system.frequency[0]))
+    if not (
+        same(image.T @ np.diag(system.mass) @ image, np.diag(system.mass))
+        and same(image.T @ system.stiffness @ image, system.stiffness)
+        and same(image.T @ system.damping @ image, system.damping)
+        and same(system.load * half[:, None] @ image, system.load)
+        and same(system.weight @ image, system.weight)
+    ):
+        return None
+    kinds = np.column_stack(
+        [system.friction, system.limit, system.restitution, system.dashpot, np.nan_to_num(system.spring, posinf=-1.0),
+         np.nan_to_num(system.rest), np.nan_to_num(system.play, posinf=-1.0)]
+    )  # fmt: skip
+    normal, slip = system.J[:u], system.J[u:]
+    for r in range(u):
+        partners = [
+            o for o in range(u)
+            if same(normal[r], normal[o] @ image) and same(kinds[r], kinds[o])
+            and (same(slip[r], -slip[o] @ image) or same(slip[r], slip[o] @ image))
+        ]  # fmt: skip
+        if not partners:
+            return None
+    return image
