@@ -38,7 +38,7 @@ def woodpecker():
         speed=float((np.abs(J) @ np.abs(weight)).max() * RECORDED), J=J,
         rest=np.array([L_M + L_G - L_S - R_0, R_M - R_0, R_M - R_0]), delassus=J @ J.T, friction=np.full(3, MU),
         limit=three, restitution=np.array([BEAK, 0.0, 0.0]), restitution_at=0,
-        spring=np.full(3, np.inf), dashpot=np.zeros(3), two_phases=False, moment=1e-6 * RECORDED,
+        spring=np.full(3, np.inf), dashpot=np.zeros(3), tangential=np.zeros(0), elongation=np.zeros((0, 3)), two_phases=False, moment=1e-6 * RECORDED,
         play=np.full(3, 2 * (R_M - R_0)),
         body=np.zeros(3, np.int64), surface=np.array([LEFT, LEFT, RIGHT]), corner=np.array([-1, 0, 1]),
         along=np.zeros(1, np.int64), tilt=np.full(1, 2), floor=one, turn=one, rise=one, cavity=np.zeros(1, np.int64),
