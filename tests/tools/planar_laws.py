@@ -220,7 +220,7 @@ def crowd(seed: int, folder: Path) -> dict:
 
 
 def jenkins(seed: int, folder: Path) -> dict:
-    """Tables of a scene of `crowd` with at least one friction damper, most of which have springs before their sliders."""
+    """Tables of a scene of `crowd` with at least one Jenkins element, and springs before most other sliders, too."""
     rng = np.random.default_rng([seed, 17])
     between = lambda low, high: float(np.exp(rng.uniform(math.log(low), math.log(high))))  # noqa: E731
     data = crowd(seed, folder)
@@ -710,14 +710,14 @@ def positions(stepper: Stepper, times: np.ndarray, unique: bool = False) -> np.n
     return np.reshape(found, (len(found), len(before.q)))
 
 
-def image_parts(seed: int) -> int:
-    """Compare a random scene with its mirror image at points in time. Returns at how many.
+def image_parts(seed: int, data: dict | None = None) -> int:
+    """Compare a random scene, or that of other tables, with its mirror image at points in time. Returns at how many.
 
     Up to where scenes with other masses, by PERTURBATION, have parted from it; there the image may be as far from it.
     A chatter may end a flight earlier or later, and an impact of many contacts with friction may have several
     solutions: there the comparison ends, too.
     """
-    data = tables(seed)
+    data = tables(seed) if data is None else data
     try:
         steppers = [Stepper(scene_of(each)) for each in (data, mirrored(data), *map(_perturbed(data), (1, -1)))]
     except InputError:

@@ -79,7 +79,7 @@ class Unforced:
         return np.concatenate([z, np.ones((1, *phase.shape[1:])), np.cos(phase), np.sin(phase)])
 
     def ways_of_slider(self, r: int, now: np.ndarray, sizes: np.ndarray, speed: float, slow: float) -> list[int]:
-        """Return the states that a Jenkins element (unit r) may have: its slider moves where its spring is at its bound.
+        """Return the states that a Jenkins element (unit r) may have: its slider moves with its spring at its bound.
 
         now, sizes: (extent,) the state and its terms; speed: of what draws it, m/s.
         """
