@@ -7,6 +7,8 @@ import math
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
+    AT_HIGH,
+    AT_LOW,
     AT_ONCE,
     CLOSES,
     DONE,
@@ -199,6 +201,8 @@ def _happen(system, st, rec, log, work, r, what):
     elif what == RECLOSES:
         st.state[r] = SLIP_RIGHT  # decided next; the ledger has taken the energy that the spring has
         st.ledger[CONTACT] -= 0.5 * system.spring[r] * gap(system, r, st.q) ** 2
+    elif r >= len(system.rest) - len(system.tangential) and (what == AT_LOW or what == AT_HIGH):
+        st.state[r] = SLIP_RIGHT if what == AT_LOW else SLIP_LEFT  # decided next: its spring is at its bound
     # at any event another gap may be closed as well, within the resolution of gaps
     if _approaches(system, st) and not collide(system, st, rec, log, work):
         return False

@@ -39,7 +39,7 @@ class PlanarSystem(NamedTuple):
     """
 
     contacts: int
-    mass: np.ndarray  # (N,) 1 for a mode; kg; kg m^2; of a slider, which has none, that of what draws it: a scale
+    mass: np.ndarray  # (N,) 1 for a mode; kg; kg m^2; of a slider, which has none, a scale
     stiffness: np.ndarray  # (N, N) without the springs of Jenkins elements
     damping: np.ndarray  # (N, N)
     load: np.ndarray  # (e, N) complex amplitudes
@@ -174,8 +174,6 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             if normal is not None:
                 load[:, x + 1] = -body.damper.mass * (base @ normal)
             mass[x + 2] = body.damper.moment_of_inertia
-    mobility = (elongation[:, :n] ** 2).sum(axis=1)
-    mass[size - len(drawn) :] = 1 / np.where(mobility > 0.0, mobility, 1.0)
     units: list[_Unit] = []
     law = _Law(scene.contact, basis, mass)
     for index, cavity in enumerate(scene.cavity):
@@ -195,21 +193,21 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             )  # fmt: skip
     contacts = len(units)
     _check_friction(units, size, mass)
-    firm = [row for row in range(flat.friction_rows) if flat.limit[row] > 0.0 and row not in drawn]
-    for row in [*firm, *drawn]:
-        if not (row < len(bodies) and bodies[row].damper.shape != "slider"):
+    sliders = dict(zip(drawn, np.eye(size)[size - len(drawn) :], strict=True))
+    for row in sorted(range(flat.friction_rows), key=sliders.__contains__):
+        if flat.limit[row] > 0.0 and not (row < len(bodies) and bodies[row].damper.shape != "slider"):
             functional = np.zeros(size)
-            if row in drawn:
-                functional[size - len(drawn) + drawn.index(row)] = 1.0
-            else:
-                functional[:n] = flat.J[row, :n]
+            functional[:n] = flat.J[row, :n]
             if row < len(bodies):
                 functional[bodies[row].x] = 1.0
             surface, number = (FLOOR, row) if row < len(bodies) else (CASING, row - len(bodies))
             limit = float(flat.limit[row])
             units.append(
-                _Unit(np.zeros(size), functional, 0.0, 0.0, Element(0.0), np.inf, number, surface, limit=limit)
-            )
+                _Unit(
+                    np.zeros(size), sliders.get(row, functional), 0.0, 0.0, Element(0.0), np.inf, number, surface,
+                    limit=limit,
+                )
+            )  # fmt: skip
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
     stiffness[:n, :n], damping[:n, :n] = np.diag(flat.stiffness[:n]), flat.damping[:n, :n]
@@ -225,11 +223,13 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     column = lambda name: np.array([getattr(unit, name) for unit in units])  # noqa: E731
     elements = np.reshape([unit.element for unit in units], (len(units), 3)).astype(float)
     yields = np.isfinite(elements[:, 1])
-    tangential = flat.spring[drawn]
-    rates = np.r_[elements[yields, 1], tangential] * (
-        np.vstack([J[: len(units)][yields], elongation + J[len(J) - len(drawn) :]]) ** 2 / mass
-    ).sum(axis=1)
-    fastest = np.sqrt(rates.max(initial=0.0))
+    springs = np.r_[elements[yields, 1], flat.spring[drawn]]
+    pulled = (elongation[:, :n] ** 2).sum(axis=1)
+    mobility = np.r_[(J[: len(units)][yields] ** 2 / mass).sum(axis=1), pulled]
+    fastest = np.sqrt((springs * mobility).max(initial=0.0))
+    # rows of sliders are not to be small beside others
+    massive = slice(size - len(drawn))
+    mass[massive.stop :] = 1 / (np.r_[(J[:, massive] ** 2 / mass[massive]).sum(axis=1), pulled].max(initial=0.0) or 1.0)
     shortest = min(flat.period, 2 * np.pi / fastest) if fastest > 0.0 else flat.period
     return PlanarSystem(
         contacts=contacts, mass=mass, stiffness=stiffness, damping=damping, load=load, weight=weight,
@@ -239,8 +239,8 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         rest=column("rest").astype(float), delassus=(J / mass) @ J.T, friction=column("friction").astype(float),
         limit=column("limit").astype(float), restitution=elements[:, 0],
         restitution_at=law_address(scene.contact, elements[:contacts, 0]), spring=elements[:, 1],
-        dashpot=elements[:, 2], tangential=tangential, elongation=elongation, two_phases=scene.contact.two_phases,
-        play=column("play").astype(float), body=column("body").astype(np.int64),
+        dashpot=elements[:, 2], tangential=flat.spring[drawn], elongation=elongation,
+        two_phases=scene.contact.two_phases, play=column("play").astype(float), body=column("body").astype(np.int64),
         surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
         along=np.array([body.x for body in bodies], np.int64),
         tilt=np.array([-1 if body.damper.shape == "slider" else body.x + 2 for body in bodies], np.int64),

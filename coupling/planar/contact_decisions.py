@@ -18,8 +18,8 @@ from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
 _NOTHING, _NEXT_TO_NOTHING = 1e-9, 1e-12
 #: share of the speeds in a scene that is round-off
 AT_REST = 10 * ROUND_OFF
-#: share of its terms by which an elongation may be short of its bound
-_NEARLY = 1e-12
+#: shares of its bound, and of its terms, by which an elongation may be short of that
+_NEARLY, _DIFFERENCE = 1e-12, 1e-15
 _NORMAL, _SLIP = 1, 2
 #: what a contact that yields and touches without speed does
 _RESTS, _PRESSED, _OPENS = 1, 2, 3
@@ -139,7 +139,8 @@ def follow(system, state, q, v):
 def _hold_sliders(system, st, work, slow):
     """Decide which sliders rest, and which what draws them moves: those whose springs are at their bounds.
 
-    One whose spring is at its bound while what draws it is at rest is marked: its acceleration decides.
+    One whose spring is at its bound while what draws it is at rest is marked: its acceleration decides. Sliders that
+    have moved until now are at their bounds.
     """
     sliders, size = len(system.tangential), len(st.q)
     for j in range(sliders):
@@ -151,8 +152,11 @@ def _hold_sliders(system, st, work, slow):
         for i in range(size - sliders):
             speed += system.elongation[j, i] * st.v[i]
         most, way = system.limit[r] / system.tangential[j], 1.0 if stretched > 0.0 else -1.0
+        at_bound = abs(stretched) >= most - _NEARLY * most - _DIFFERENCE * terms
+        if st.state[r] == SLIP_RIGHT or st.state[r] == SLIP_LEFT:
+            at_bound, way = True, 1.0 if st.state[r] == SLIP_RIGHT else -1.0
         st.state[r], work.sliding[r], work.resting[r] = STICK, 0, 0
-        if abs(stretched) >= most - _NEARLY * (most + terms) and way * speed >= -slow:
+        if at_bound and way * speed >= -slow:
             st.state[r] = SLIP_RIGHT if way > 0.0 else SLIP_LEFT
             work.resting[r] = _AT_BOUND if way * speed <= slow else 0
     follow(system, st.state, st.q, st.v)
@@ -163,7 +167,7 @@ def _draw_sliders(system, st, work, nothing):
     """Decide by accelerations whether what is at rest draws its slider on. Returns how many stay in doubt, drawn."""
     u, sliders, doubts = len(system.rest), len(system.tangential), 0
     for j in range(sliders):
-        r, acceleration = u - sliders + j, 0.0
+        r, acceleration, mobility = u - sliders + j, 0.0, 0.0
         if work.resting[r] != _AT_BOUND:
             continue
         for i in range(len(st.q) - sliders):
@@ -171,8 +175,9 @@ def _draw_sliders(system, st, work, nothing):
             for row in range(2 * u):
                 total += system.J[row, i] * work.impulse[row] / system.mass[i]
             acceleration += system.elongation[j, i] * total
+            mobility += system.elongation[j, i] * system.elongation[j, i] / system.mass[i]
         acceleration *= 1.0 if st.state[r] == SLIP_RIGHT else -1.0
-        if abs(acceleration) <= nothing * math.sqrt(system.delassus[u + r, u + r]):
+        if abs(acceleration) <= nothing * math.sqrt(mobility):
             doubts += 1
         else:
             work.resting[r] = 0

@@ -25,6 +25,8 @@ from vanedamp.coupling.planar.constraints import PlanarSystem
 _DEPENDENT = 1e-9
 #: frequencies below this share of the excitation's are refused: displacements would be quotients of round-off
 _SLOW = 1e-6
+#: and springs of Jenkins elements beyond the square of this many times it: their forces would be round-off
+_STIFF = 1e4
 
 
 class ContactFlows(NamedTuple):
@@ -136,6 +138,9 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     stiffness, damping = stiffness + push @ spring, damping + push @ dashpot
     if len(holds):
         stretch = system.elongation[holds] / root
+        mobility = (stretch[:, : size - sliders] ** 2).sum(axis=1)
+        if (system.tangential[holds] * mobility).max() > (_STIFF * system.frequency[0]) ** 2:
+            raise IllConditioned("the spring of a friction damper is as good as rigid")
         stiffness = stiffness + stretch.T @ (system.tangential[holds, None] * stretch)
     basis = _stretched(system, np.vstack([system.J[pressed], system.elongation[holds]]))
     allowed = np.eye(len(basis))
@@ -147,6 +152,7 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     held = basis.T @ basis - basis.T @ allowed @ allowed.T @ basis if k < len(basis) else np.zeros((size, size))
     held[np.abs(held) < 1e-15] = 0.0
     inner = allowed.T @ basis  # eta = inner sqrt(M) q
+    inner[:, size - sliders :] = 0.0  # sliders rest, or follow
     own, loss = (inner @ oblique @ part @ inner.T for part in (stiffness, damping))
     preload = system.spring[pressed] * system.rest[pressed]
     weight = system.weight / root + applied
