@@ -229,7 +229,7 @@ def test_a_run_in_two_parts_is_the_run_in_one(cut):
 
 
 def test_a_smaller_bound_unloads_the_spring():
-    """A slider's run hands over its elongation as well, and a spring beyond its bound begins at it."""
+    """A spring beyond its new bound begins at it."""
     final = simulate(thrown(2)).final
     weak = [element | {"friction": 1e-3 * element["friction"]} for element in HELD["friction_damper"]]
     case = thrown(1, friction_damper=weak)
