@@ -259,7 +259,7 @@ def test_laws(first, tmp_path):
         worst, code = check_laws(seed, data=tables_with_elements(seed, tmp_path))
         ends += code not in (DONE, EVENT_BUDGET)
         steps += worst.steps if worst is not None else 0
-    assert ends <= (first > 0)  # one of a hundred and more may give up, as beside other friction dampers
+    assert ends <= (1 if first == 0 else 3)  # of wedged bodies whose friction forces have no solution
     assert steps >= 2000
 
 
