@@ -7,6 +7,8 @@ import math
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
+    AT_HIGH,
+    AT_LOW,
     AT_ONCE,
     CLOSES,
     DONE,
@@ -32,6 +34,8 @@ from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import (
     AT_REST,
     decide,
+    elongation,
+    follow,
     gap,
     is_rigid,
     is_shut,
@@ -197,6 +201,8 @@ def _happen(system, st, rec, log, work, r, what):
     elif what == RECLOSES:
         st.state[r] = SLIP_RIGHT  # decided next; the ledger has taken the energy that the spring has
         st.ledger[CONTACT] -= 0.5 * system.spring[r] * gap(system, r, st.q) ** 2
+    elif r >= len(system.rest) - len(system.tangential) and (what == AT_LOW or what == AT_HIGH):
+        st.state[r] = SLIP_RIGHT if what == AT_LOW else SLIP_LEFT  # decided next: its spring is at its bound
     # at any event another gap may be closed as well, within the resolution of gaps
     if _approaches(system, st) and not collide(system, st, rec, log, work):
         return False
@@ -266,6 +272,7 @@ def _enter(system, flows, st):
     s, size, loss = st.counters[FLOW], len(st.q), 0.0
     for r in range(len(st.prestress)):
         st.prestress[r] = 0.0
+    size -= len(system.tangential)  # sliders have no mass
     for i in range(size):
         loss += 0.5 * system.mass[i] * st.v[i] * st.v[i]
     _snap(system, flows, st, s)
@@ -293,6 +300,8 @@ def _snap(system, flows, st, s):
     for i in range(size):  # the smallest doubles are slow
         st.q[i] = st.q[i] if abs(st.q[i]) > _TINY else 0.0
         st.v[i] = st.v[i] if abs(st.v[i]) > _TINY else 0.0
+    if len(system.tangential) > 0:
+        follow(system, st.state, st.q, st.v)
 
 
 @inlined
@@ -314,7 +323,7 @@ def _shares(system, flows, st):
         differs = differs or st.state[r] != st.other[r]
     if not differs:
         return True
-    for r in range(u):
+    for r in range(u - len(system.tangential)):
         if r < system.contacts and st.state[r] < OPEN and _is_beyond(system, flows, st, r, 1.0, 0.0):
             return False
         if st.state[r] == STICK:
@@ -459,11 +468,13 @@ def _begin_segment(system, flows, st):
 
 @inlined
 def _spring_energy(system, st):
-    """Return the energy in the springs of closed contacts, J."""
+    """Return the energy in the springs of closed contacts and of Jenkins elements, J."""
     energy = 0.0
     for r in range(system.contacts):
         if yields(system, r) and st.state[r] < OPEN:
             energy += 0.5 * system.spring[r] * gap(system, r, st.q) ** 2
+    for j in range(len(system.tangential)):
+        energy += 0.5 * system.tangential[j] * elongation(system, j, st.q) ** 2
     return energy
 
 

@@ -3,7 +3,8 @@
 Coordinates q = (p, bodies): modes of the structure, then of each body x along its cavity, and of one with extent y
 across it and its tilt theta, all relative to the base. x and y count from where the bodies of a cavity stand side by
 side on the floor, in the middle of the free travel. Tilts are small: a point (a, b) of a body, from its centre, moves
-by (x - theta b, y + theta a).
+by (x - theta b, y + theta a). Behind the bodies come the sliders of Jenkins elements, friction dampers with a spring
+before their slider: each is a coordinate without mass, which rests, or follows what draws it as far as the spring goes.
 """
 
 from __future__ import annotations
@@ -33,12 +34,13 @@ class PlanarSystem(NamedTuple):
     """Matrices of a scene: N coordinates, e harmonics, u units, b bodies. Compiled functions take it as it is.
 
     A unit is a contact with its normal row and its slip, or, behind the contacts, a friction element with a constant
-    limit, which has only a slip. Rows (2u, N): normals first, then slips.
+    limit, which has only a slip. The last j units are Jenkins elements, whose slip is that of their slider; the sliders
+    are the last j coordinates. Rows (2u, N): normals first, then slips.
     """
 
     contacts: int
-    mass: np.ndarray  # (N,) 1 for a mode; kg; kg m^2
-    stiffness: np.ndarray  # (N, N)
+    mass: np.ndarray  # (N,) 1 for a mode; kg; kg m^2; of a slider, which has none, a scale
+    stiffness: np.ndarray  # (N, N) without the springs of Jenkins elements
     damping: np.ndarray  # (N, N)
     load: np.ndarray  # (e, N) complex amplitudes
     weight: np.ndarray  # (N,)
@@ -57,6 +59,8 @@ class PlanarSystem(NamedTuple):
     restitution_at: int  # address of that law (system.restitution); 0: the coefficient at every speed
     spring: np.ndarray  # (u,) stiffness of a contact that yields, N/m; inf: rigid, and friction elements
     dashpot: np.ndarray  # (u,) N s/m
+    tangential: np.ndarray  # (j,) stiffness of the springs of Jenkins elements, N/m
+    elongation: np.ndarray  # (j, N) of these springs
     two_phases: bool  # whether impacts have a phase of compression and one of expansion
     play: np.ndarray  # (u,) m, the scale of a contact's gap
     body: np.ndarray  # (u,) number of the unit's body
@@ -145,6 +149,10 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         a, b = damper.half_extent
         bodies.append(_Body(number, damper, size, a, b))
         size += 1 if damper.shape == "slider" else 3
+    drawn = [row for row in range(len(bodies), flat.friction_rows) if flat.limit[row] > 0 and flat.spring[row] < np.inf]
+    elongation = np.zeros((len(drawn), size + len(drawn)))
+    elongation[:, :n], elongation[:, size:] = flat.J[drawn, :n], -np.eye(len(drawn))
+    size += len(drawn)
     owner = [[cavity.name for cavity in scene.cavity].index(damper.cavity) for damper in scene.damper]
     cavities = [_surfaces(scene, basis, index) for index in range(len(scene.cavity))]
     base = base_acceleration(scene, basis)
@@ -185,7 +193,8 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             )  # fmt: skip
     contacts = len(units)
     _check_friction(units, size, mass)
-    for row in range(flat.friction_rows):
+    sliders = dict(zip(drawn, np.eye(size)[size - len(drawn) :], strict=True))
+    for row in sorted(range(flat.friction_rows), key=sliders.__contains__):
         if flat.limit[row] > 0.0 and not (row < len(bodies) and bodies[row].damper.shape != "slider"):
             functional = np.zeros(size)
             functional[:n] = flat.J[row, :n]
@@ -194,8 +203,11 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
             surface, number = (FLOOR, row) if row < len(bodies) else (CASING, row - len(bodies))
             limit = float(flat.limit[row])
             units.append(
-                _Unit(np.zeros(size), functional, 0.0, 0.0, Element(0.0), np.inf, number, surface, limit=limit)
-            )
+                _Unit(
+                    np.zeros(size), sliders.get(row, functional), 0.0, 0.0, Element(0.0), np.inf, number, surface,
+                    limit=limit,
+                )
+            )  # fmt: skip
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
     stiffness[:n, :n], damping[:n, :n] = np.diag(flat.stiffness[:n]), flat.damping[:n, :n]
@@ -211,8 +223,13 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     column = lambda name: np.array([getattr(unit, name) for unit in units])  # noqa: E731
     elements = np.reshape([unit.element for unit in units], (len(units), 3)).astype(float)
     yields = np.isfinite(elements[:, 1])
-    mobility = (J[: len(units)][yields] ** 2 / mass).sum(axis=1)
-    fastest = np.sqrt((elements[yields, 1] * mobility).max(initial=0.0))
+    springs = np.r_[elements[yields, 1], flat.spring[drawn]]
+    pulled = (elongation[:, :n] ** 2).sum(axis=1)
+    mobility = np.r_[(J[: len(units)][yields] ** 2 / mass).sum(axis=1), pulled]
+    fastest = np.sqrt((springs * mobility).max(initial=0.0))
+    # rows of sliders are not to be small beside others
+    massive = slice(size - len(drawn))
+    mass[massive.stop :] = 1 / (np.r_[(J[:, massive] ** 2 / mass[massive]).sum(axis=1), pulled].max(initial=0.0) or 1.0)
     shortest = min(flat.period, 2 * np.pi / fastest) if fastest > 0.0 else flat.period
     return PlanarSystem(
         contacts=contacts, mass=mass, stiffness=stiffness, damping=damping, load=load, weight=weight,
@@ -222,14 +239,23 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         rest=column("rest").astype(float), delassus=(J / mass) @ J.T, friction=column("friction").astype(float),
         limit=column("limit").astype(float), restitution=elements[:, 0],
         restitution_at=law_address(scene.contact, elements[:contacts, 0]), spring=elements[:, 1],
-        dashpot=elements[:, 2], two_phases=scene.contact.two_phases,
-        play=column("play").astype(float), body=column("body").astype(np.int64),
+        dashpot=elements[:, 2], tangential=flat.spring[drawn], elongation=elongation,
+        two_phases=scene.contact.two_phases, play=column("play").astype(float), body=column("body").astype(np.int64),
         surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
         along=np.array([body.x for body in bodies], np.int64),
         tilt=np.array([-1 if body.damper.shape == "slider" else body.x + 2 for body in bodies], np.int64),
         floor=floor, turn=turn, rise=rise, cavity=np.array(owner, np.int64),
         neglected=np.array([_neglected(body, scene.cavity[owner[body.number]]) for body in bodies]),
     )  # fmt: skip
+
+
+def on_structure(system: PlanarSystem) -> PlanarSystem:
+    """Return the system whose slips of Jenkins elements are those of what draws them, in place of their sliders'."""
+    if not len(system.tangential):
+        return system
+    J = system.J.copy()
+    J[-len(system.tangential) :] += system.elongation
+    return system._replace(J=J, delassus=(J / system.mass) @ J.T)
 
 
 def _centres(bodies: list[_Body], owner: list[int]) -> np.ndarray:
@@ -509,6 +535,7 @@ def planar_motion(scene: Scene, flat: System, system: PlanarSystem) -> PlanarMot
             # a tilted block stands on its corner unless it is lifted higher
             q[x + 1 : x + 3] = damper.lift + lifted + system.rise[k] @ q, damper.tilt + system.turn[k] @ q
             v[x + 1 : x + 3] = damper.lift_velocity + system.rise[k] @ v, damper.tilt_rate + system.turn[k] @ v
+    place_sliders(system, q, np.zeros(len(system.tangential)))
     gaps = system.rest + system.J[: len(system.rest)] @ q
     for unit in range(system.contacts):
         if gaps[unit] < -1e-12 * system.play[unit]:
@@ -517,3 +544,9 @@ def planar_motion(scene: Scene, flat: System, system: PlanarSystem) -> PlanarMot
                 f"{SURFACES[system.surface[unit]]}; change position, lift or tilt"
             )
     return PlanarMotion(q, v)
+
+
+def place_sliders(system: PlanarSystem, q: np.ndarray, elongation: np.ndarray) -> None:
+    """Place the sliders of Jenkins elements in q (N,) so that their springs have an elongation (j,), m."""
+    sliders = slice(len(q) - len(elongation), None)
+    q[sliders] += system.elongation @ q - elongation

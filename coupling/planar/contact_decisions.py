@@ -18,9 +18,13 @@ from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
 _NOTHING, _NEXT_TO_NOTHING = 1e-9, 1e-12
 #: share of the speeds in a scene that is round-off
 AT_REST = 10 * ROUND_OFF
+#: shares of its bound, and of its terms, by which an elongation may be short of that
+_NEARLY, _DIFFERENCE = 1e-12, 1e-15
 _NORMAL, _SLIP = 1, 2
 #: what a contact that yields and touches without speed does
 _RESTS, _PRESSED, _OPENS = 1, 2, 3
+#: of a Jenkins element: its spring is at its bound, and what draws it is at rest
+_AT_BOUND = 4
 #: unknowns of a contact beside _NORMAL: friction to the right, to the left, and the speed that it leaves
 _RIGHT, _LEFT, _SPEED = 3, 4, 5
 
@@ -101,6 +105,84 @@ def free_acceleration(system, work, q, v, time):
             total -= spring + dashpot
             terms += abs(spring) + abs(dashpot)
         work.free[i], work.terms[i] = total / system.mass[i], terms / system.mass[i]
+    for j in range(len(system.tangential)):
+        force = system.tangential[j] * elongation(system, j, q)
+        for i in range(size - len(system.tangential)):
+            part = system.elongation[j, i] * force / system.mass[i]
+            work.free[i] -= part
+            work.terms[i] += abs(part)
+
+
+@inlined
+def elongation(system, j, q):
+    """Return the elongation of the spring of a Jenkins element, m; of velocities, its rate."""
+    total = 0.0
+    for i in range(len(q)):
+        total += system.elongation[j, i] * q[i]
+    return total
+
+
+@kernel
+def follow(system, state, q, v):
+    """Bring sliders to where they are: at rest, or as far behind what draws them as their springs go."""
+    sliders, size = len(system.tangential), len(q)
+    for j in range(sliders):
+        r, a = len(system.rest) - sliders + j, size - sliders + j
+        v[a] = 0.0
+        if state[r] != STICK:
+            way = 1.0 if state[r] == SLIP_RIGHT else -1.0
+            q[a] += elongation(system, j, q) - way * system.limit[r] / system.tangential[j]
+            v[a] = elongation(system, j, v)
+
+
+@kernel
+def _hold_sliders(system, st, work, slow):
+    """Decide which sliders rest, and which what draws them moves: those whose springs are at their bounds.
+
+    One whose spring is at its bound while what draws it is at rest is marked: its acceleration decides. Sliders that
+    have moved until now are at their bounds.
+    """
+    sliders, size = len(system.tangential), len(st.q)
+    for j in range(sliders):
+        r, stretched, terms, speed = len(system.rest) - sliders + j, 0.0, 0.0, 0.0
+        for i in range(size):
+            part = system.elongation[j, i] * st.q[i]
+            stretched += part
+            terms += abs(part)
+        for i in range(size - sliders):
+            speed += system.elongation[j, i] * st.v[i]
+        most, way = system.limit[r] / system.tangential[j], 1.0 if stretched > 0.0 else -1.0
+        at_bound = abs(stretched) >= most - _NEARLY * most - _DIFFERENCE * terms
+        if st.state[r] == SLIP_RIGHT or st.state[r] == SLIP_LEFT:
+            at_bound, way = True, 1.0 if st.state[r] == SLIP_RIGHT else -1.0
+        st.state[r], work.sliding[r], work.resting[r] = STICK, 0, 0
+        if at_bound and way * speed >= -slow:
+            st.state[r] = SLIP_RIGHT if way > 0.0 else SLIP_LEFT
+            work.resting[r] = _AT_BOUND if way * speed <= slow else 0
+    follow(system, st.state, st.q, st.v)
+
+
+@kernel
+def _draw_sliders(system, st, work, nothing):
+    """Decide by accelerations whether what is at rest draws its slider on. Returns how many stay in doubt, drawn."""
+    u, sliders, doubts = len(system.rest), len(system.tangential), 0
+    for j in range(sliders):
+        r, acceleration, mobility = u - sliders + j, 0.0, 0.0
+        if work.resting[r] != _AT_BOUND:
+            continue
+        for i in range(len(st.q) - sliders):
+            total = work.free[i]
+            for row in range(2 * u):
+                total += system.J[row, i] * work.impulse[row] / system.mass[i]
+            acceleration += system.elongation[j, i] * total
+            mobility += system.elongation[j, i] * system.elongation[j, i] / system.mass[i]
+        acceleration *= 1.0 if st.state[r] == SLIP_RIGHT else -1.0
+        if abs(acceleration) <= nothing * math.sqrt(mobility):
+            doubts += 1
+        else:
+            work.resting[r] = 0
+            st.state[r] = STICK if acceleration < 0.0 else st.state[r]
+    return doubts
 
 
 @kernel
@@ -309,7 +391,10 @@ def decide(system, st, work, scale):
     scale: the speeds in the scene, m/s, whose round-off counts as rest.
     """
     u, count = len(system.rest), 0
-    for r in range(u):
+    sliders = len(system.tangential)
+    if sliders > 0:
+        _hold_sliders(system, st, work, AT_REST * scale)
+    for r in range(u - sliders):
         work.sliding[r], work.resting[r] = 0, 0
         slip = row_speed(system, u + r, st.v)
         way = 0 if abs(slip) <= AT_REST * scale else (1 if slip > 0.0 else -1)
@@ -336,12 +421,16 @@ def decide(system, st, work, scale):
         return False
     _classify(system, work, count, _NOTHING, work.verdict)
     doubts = _press_or_open(system, work, count, _NOTHING * terms)
+    if sliders > 0:
+        doubts += _draw_sliders(system, st, work, _NOTHING * terms)
     for p in range(count):
         doubts += work.doubtful[p]
     if doubts > 0:
         if not _look_ahead(system, st, work, count):
             return False
         _stick_in_doubt(system, work, count)
+    if sliders > 0:
+        follow(system, st.state, st.q, st.v)
     for r in range(u):
         st.other[r] = st.state[r]
     for p in range(count):
@@ -437,6 +526,8 @@ def _look_ahead(system, st, work, count):
             total += system.J[r, i] * work.impulse[r] / system.mass[i]
         work.ahead[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
         work.ahead[1, i] = st.v[i] + moment * total
+    if len(system.tangential) > 0:
+        follow(system, st.state, work.ahead[0], work.ahead[1])
     for p in range(count):
         work.first[p], work.doubt[p] = work.verdict[p], work.doubtful[p]
     terms = loaded_acceleration(system, st, work, work.ahead[0], work.ahead[1], st.time[0] + moment)
@@ -452,6 +543,8 @@ def _look_ahead(system, st, work, count):
         if sure and not (carriers and (work.verdict[p] == TOUCHING or work.attempt[0] > 0)):
             work.verdict[p], work.doubtful[p] = work.first[p], work.doubt[p]
     _press_or_open(system, work, count, _NEXT_TO_NOTHING * terms)
+    if len(system.tangential) > 0:
+        _draw_sliders(system, st, work, _NEXT_TO_NOTHING * terms)
     return True
 
 

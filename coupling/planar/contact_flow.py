@@ -25,6 +25,8 @@ from vanedamp.coupling.planar.constraints import PlanarSystem
 _DEPENDENT = 1e-9
 #: frequencies below this share of the excitation's are refused: displacements would be quotients of round-off
 _SLOW = 1e-6
+#: and springs of Jenkins elements beyond the square of this many times it: their forces would be round-off
+_STIFF = 1e4
 
 
 class ContactFlows(NamedTuple):
@@ -57,7 +59,8 @@ class ContactFlows(NamedTuple):
 def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
     """Room for `capacity` flows."""
     size, u, e = len(system.mass), len(system.rest), len(system.frequency)
-    m = e + 2 * len(_stretched(system, np.flatnonzero(np.isfinite(system.spring))))
+    springs = np.vstack([system.J[:u][np.isfinite(system.spring)], system.elongation])
+    m = e + 2 * len(_stretched(system, springs))
     z = lambda *shape: np.zeros((capacity, *shape), complex)  # noqa: E731
     f = lambda *shape: np.zeros((capacity, *shape))  # noqa: E731
     return ContactFlows(
@@ -90,12 +93,12 @@ def add_flow(flows: ContactFlows, system: PlanarSystem, state: np.ndarray) -> Co
 _ROOM = 2**28
 
 
-def _stretched(system: PlanarSystem, pressed: np.ndarray) -> np.ndarray:
-    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, with some contacts as springs."""
+def _stretched(system: PlanarSystem, springs: np.ndarray) -> np.ndarray:
+    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, and those of springs (s, N)."""
     root = np.sqrt(system.mass)
     matrix = system.stiffness / root / root[:, None]
     size = np.sqrt(np.abs(np.diag(matrix)).max(initial=0.0))
-    rows = system.J[pressed] / root
+    rows = springs / root
     rows *= (size**2 or 1.0) / np.linalg.norm(rows, axis=1)[:, None]
     both = np.vstack([matrix, size * system.damping / root / root[:, None], rows])
     touched = np.flatnonzero(both.any(axis=0))
@@ -121,14 +124,25 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     constraints = rows[kept]
     drag = way * system.friction
     wrench = np.vstack([rows[closed] - drag[closed, None] * rows[u + closed], rows[u + stick]]).T
+    sliders = len(system.tangential)
+    holds, follows = (np.flatnonzero((state[u - sliders :] == STICK) == rests) for rests in (True, False))
+    # a slider that moves hands its force on to what draws it
+    drawn = rows[u:].copy()
+    drawn[u - sliders :] += system.elongation / root
     slides = np.flatnonzero((units >= system.contacts) & (way != 0))
-    applied = -(way * system.limit)[slides] @ rows[u + slides]
+    applied = -(way * system.limit)[slides] @ drawn[slides]
     carried, oblique = _forces(constraints, wrench)
     stiffness, damping = (part / root / root[:, None] for part in (system.stiffness, system.damping))
     push = (rows[pressed] - drag[pressed, None] * rows[u + pressed]).T
     spring, dashpot = (part[pressed, None] * rows[pressed] for part in (system.spring, system.dashpot))
     stiffness, damping = stiffness + push @ spring, damping + push @ dashpot
-    basis = _stretched(system, pressed)
+    if len(holds):
+        stretch = system.elongation[holds] / root
+        mobility = (stretch[:, : size - sliders] ** 2).sum(axis=1)
+        if (system.tangential[holds] * mobility).max() > (_STIFF * system.frequency[0]) ** 2:
+            raise IllConditioned("the spring of a friction damper is as good as rigid")
+        stiffness = stiffness + stretch.T @ (system.tangential[holds, None] * stretch)
+    basis = _stretched(system, np.vstack([system.J[pressed], system.elongation[holds]]))
     allowed = np.eye(len(basis))
     if len(basis) and len(constraints):
         # both are orthonormal: singular values are sines, and what constraints hold has none above round-off
@@ -138,6 +152,7 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     held = basis.T @ basis - basis.T @ allowed @ allowed.T @ basis if k < len(basis) else np.zeros((size, size))
     held[np.abs(held) < 1e-15] = 0.0
     inner = allowed.T @ basis  # eta = inner sqrt(M) q
+    inner[:, size - sliders :] = 0.0  # sliders rest, or follow
     own, loss = (inner @ oblique @ part @ inner.T for part in (stiffness, damping))
     preload = system.spring[pressed] * system.rest[pressed]
     weight = system.weight / root + applied
@@ -160,9 +175,12 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     net_constant, net_held = weight - stiffness @ inner.T @ rest, -stiffness @ (held + inner.T @ rest_held)
     motion = (oblique @ net) / rate**2
     bend, bend_held = oblique @ net_constant, oblique @ net_held
-    if len(pressed):  # the forces of stiff contacts nearly cancel: of what they stretch, more is known than their sum
+    if len(pressed) or len(holds):  # forces of stiff springs nearly cancel: of what they stretch, more is known
         motion += inner.T @ (eta - inner @ motion)
         bend, bend_held = bend - inner.T @ inner @ bend, bend_held - inner.T @ inner @ bend_held
+    for a, row in zip(size - sliders + follows, system.elongation[follows] / root, strict=True):
+        for part in (motion, bend, bend_held):
+            part[a] = root[a] * (row[:-sliders] @ part[:-sliders])
     # a coordinate that constraints hold is at rest, not at round-off
     motion[np.abs(motion) <= 1e-15 * np.abs(net / rate**2).max(axis=0, initial=0.0)] = 0.0
     flows.key[s], flows.modes[s] = state, count
@@ -203,8 +221,8 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     flows.snap[s][:, touching] = np.linalg.pinv(rows[touching], rcond=_DEPENDENT) / root[:, None]
     still_rows = np.r_[touching, u + stick]
     flows.snap_rate[s][:, still_rows] = np.linalg.pinv(rows[still_rows], rcond=_DEPENDENT) / root[:, None]
-    free = rows[u:] - rows[u:] @ np.linalg.pinv(constraints, rcond=_DEPENDENT) @ constraints
-    flows.held[s] = np.linalg.norm(free, axis=1) <= _DEPENDENT * np.linalg.norm(rows[u:], axis=1)
+    free = drawn - drawn @ np.linalg.pinv(constraints, rcond=_DEPENDENT) @ constraints
+    flows.held[s] = np.linalg.norm(free, axis=1) <= _DEPENDENT * np.linalg.norm(drawn, axis=1)
     speeds = flows.motion[s, :, :count] * rate
     drag = system.damping @ speeds
     flows.drag[s, :, :count] = drag

@@ -269,7 +269,7 @@ def jam(system, st, rec, log, work):
 def _accelerate(system, st, work):
     """Set accelerations of the rows (work.speed) without contact forces. Returns the speed they give in CHATTER."""
     u, largest = len(system.rest), 0.0
-    for r in range(u):
+    for r in range(u - len(system.tangential)):
         work.sliding[r] = 0
         if r >= system.contacts or (yields(system, r) and rubs(system, r) and st.state[r] < OPEN):
             slip = row_speed(system, u + r, st.v)

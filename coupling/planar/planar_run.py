@@ -84,7 +84,7 @@ class PlanarRun:
             if code == NEEDS_FLOW:
                 try:
                     self.flows = add_flow(self.flows, self.system, self.state.state)
-                except IllConditioned:
+                except (IllConditioned, np.linalg.LinAlgError):  # the latter: an excitation at an undamped resonance
                     self.ended = True
                     return Status.ILL_CONDITIONED
             elif code != LOG_FULL:

@@ -69,7 +69,7 @@ def _samples(
 
 @entry
 def record_section(system, st, rec, springs):
-    """Record section, energies and ledger at the start of a period. springs: energy in those of contacts, J."""
+    """Record section, energies and ledger at the start of a period. springs: energy in those of units, J."""
     size, bodies, period = len(st.q), len(system.along), st.counters[PERIOD]
     entry, part = rec.section[period], rec.parts[period]
     x, rate, momentum, energy = 0.0, 0.0, 0.0, springs
@@ -83,7 +83,7 @@ def record_section(system, st, rec, springs):
         for k in range(size):
             force += system.stiffness[i, k] * st.q[k]
         energy += 0.5 * st.q[i] * force
-    first = size if bodies == 0 else system.along[0]
+    first = size - len(system.tangential) if bodies == 0 else system.along[0]
     for i in range(first):
         energy += 0.5 * system.mass[i] * st.v[i] * st.v[i]
     part[0] = energy

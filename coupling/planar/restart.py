@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
+from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem, place_sliders
 from vanedamp.coupling.response.restart import before_stops, check_size
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.system.system import System
@@ -24,8 +24,10 @@ def planar_restart_state(
     n, friction = flat.modes, flat.friction_rows
     slip, lift, tilt = _in_cavities(system, q)
     speed, lift_velocity, tilt_rate = _in_cavities(system, v)
+    elongation = np.zeros(friction - flat.bodies)
+    elongation[_drawn(system)] = system.elongation @ q
     parts = (
-        scale * q[:n], scale * v[:n], slip, speed, np.zeros(friction - flat.bodies), flat.free_travel[friction:],
+        scale * q[:n], scale * v[:n], slip, speed, elongation, flat.free_travel[friction:],
         lift, lift_velocity, tilt, tilt_rate,
     )  # fmt: skip
     return RestartState(*(frozen(part) for part in parts))
@@ -35,7 +37,8 @@ def planar_restart(flat: System, system: PlanarSystem, scale: float, start: Rest
     """Return the motion at the start of a run of another scene, whose cavities may be smaller.
 
     There bodies, all of a cavity by the same share, go back to where they lie flat in the middle, as far as it takes.
-    A structure beyond a stop is moved to it. Raises InputError for a scene of another size.
+    A structure beyond a stop is moved to it, and springs of friction dampers are unloaded to the limits of their
+    sliders. Raises InputError for a scene of another size.
     """
     check_size(flat, start, planar=True)
     size, n = len(system.mass), flat.modes
@@ -57,7 +60,14 @@ def planar_restart(flat: System, system: PlanarSystem, scale: float, start: Rest
             for b in inside:
                 own = slice(system.along[b], system.along[b] + (3 if system.tilt[b] >= 0 else 1))
                 q[own] = rest[own] + max(share, 0.0) * (moved[own] - rest[own])
+    most = system.limit[len(system.limit) - len(system.tangential) :] / system.tangential
+    place_sliders(system, q, np.clip(start.elongation[_drawn(system)], -most, most))
     return PlanarMotion(q, v)
+
+
+def _drawn(system: PlanarSystem) -> np.ndarray:
+    """Return the numbers (j,) of the friction dampers that are Jenkins elements."""
+    return system.body[len(system.body) - len(system.tangential) :]
 
 
 def _in_cavities(system: PlanarSystem, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -166,12 +166,6 @@ class Scene:
                 f'contact.law: "{self.contact.law}" beside shape = "auto", which is for rigid contacts; say which body '
                 "each is"
             )
-        for index, friction_damper in enumerate(self.friction_damper):
-            if friction_damper.stiffness is not None:
-                raise ValueError(
-                    f"friction_damper[{index}].stiffness: beside bodies with extent, stiffness or dashpot, and with "
-                    "impacts of two phases, a friction damper is rigid; leave it out"
-                )
 
     def _check_contact(self, key: str, restitution: float, mass: float) -> None:
         try:

@@ -219,6 +219,23 @@ def crowd(seed: int, folder: Path) -> dict:
     return data
 
 
+def jenkins(seed: int, folder: Path) -> dict:
+    """Tables of a scene of `crowd` with at least one Jenkins element, and springs before most other sliders, too."""
+    rng = np.random.default_rng([seed, 17])
+    between = lambda low, high: float(np.exp(rng.uniform(math.log(low), math.log(high))))  # noqa: E731
+    data = crowd(seed, folder)
+    one = {
+        "normal_force": between(0.02, 0.3),
+        "friction": float(rng.uniform(0.1, 0.6)),
+        "stiffness": between(0.1, 10.0),
+    }
+    others = [
+        damper | ({"stiffness": between(0.02, 200.0)} if rng.random() < 0.7 else {})
+        for damper in data["friction_damper"]
+    ]
+    return data | {"friction_damper": [one, *others]}
+
+
 def scene_of(data: dict) -> Scene:
     """The scene of such tables."""
     return validate(Scene, data, "scene")
@@ -330,6 +347,8 @@ class Motion:
         free[:, :n], free[:, n : 2 * n] = -system.stiffness, -system.damping
         free[:, 2 * n : 2 * n + e], free[:, 2 * n + e : -1] = system.load.real.T, -system.load.imag.T
         free[:, -1] = system.weight + slip.T @ slides
+        sprung = np.arange(u) >= u - len(system.tangential)
+        free[:, :n] -= system.elongation.T @ (system.tangential[:, None] * system.elongation)
         springs = np.zeros((2 * u, free.shape[1]))
         springs[pressed, :n] = -system.spring[pressed, None] * normal[pressed]
         springs[pressed, n : 2 * n] = -system.dashpot[pressed, None] * normal[pressed]
@@ -343,6 +362,11 @@ class Motion:
         self.force = spread @ forces + springs
         self.force[u:, -1] += slides
         self.acceleration = free + (system.J.T @ spread @ forces) / system.mass[:, None]
+        # sliders have no mass: those that move go with what draws them
+        self.massive = n - len(system.tangential)
+        for a, row in zip(np.flatnonzero(sprung) - u + n, system.elongation, strict=True):
+            if way[a - n]:
+                self.acceleration[a] = row[: self.massive] @ self.acceleration[: self.massive]
         self.terms = np.abs(free) + (np.abs(system.J.T) @ np.abs(spread @ forces)) / system.mass[:, None]
         self.matrix = np.zeros((len(free.T),) * 2)
         self.matrix[:n, n : 2 * n] = np.eye(n)
@@ -472,6 +496,10 @@ class Checker:
         worst.note("penetration", -share[:, leaves].min(initial=0.0), where)
         beyond = np.abs(friction) - (system.friction * np.maximum(pushes, 0.0) + system.limit)
         worst.note("cone", (beyond / (size[u:] + size[:u])).max(initial=0.0), where)
+        sliders = len(system.tangential)
+        pull = np.abs(path[:, :n] @ system.elongation.T) * system.tangential
+        short = (system.limit[u - sliders :] - pull)[:, slides[u - sliders :]]
+        worst.note("cone", np.abs(short).max(initial=0.0) / size[0], where)
         rubs = slides & ((system.friction > 0) | ~self.contact)
         against = -slip * np.where(state == SLIP_RIGHT, 1.0, -1.0)
         worst.note("along_slip", against[:, rubs].max(initial=0.0) / self.speed, where)
@@ -494,9 +522,13 @@ class Checker:
         self.worst.note("starts", (-way * acceleration[u:])[starts].max(initial=0.0) / size, where)
 
     def _jump(self, v: np.ndarray, after: Moment, impulse: np.ndarray, allowed: float, where: str) -> None:
-        """Impulses explain the change of the velocities, up to the share `allowed` of the fastest."""
+        """Impulses explain the change of the velocities, up to the share `allowed` of the fastest.
+
+        Sliders have no mass, and may begin to move at once.
+        """
         root = np.sqrt(self.system.mass)
         error = root * (after.v - v) - (self.system.J.T @ impulse) / root
+        error = error[: len(error) - len(self.system.tangential)]
         excess = np.abs(error).max() / (root * self.fastest).max() - allowed
         self.worst.note("momentum", max(excess, 0.0), where)
 
@@ -608,7 +640,8 @@ class Checker:
         shift = (system.rest + system.J[: self.u] @ moment.q)[pressed]
         return float(
             0.5 * (system.spring[pressed] * shift**2).sum()
-            + 0.5 * (system.mass * moment.v**2).sum()
+            + 0.5 * (system.tangential * (system.elongation @ moment.q) ** 2).sum()
+            + 0.5 * (system.mass * moment.v**2)[: len(moment.v) - len(system.tangential)].sum()
             + 0.5 * moment.q @ system.stiffness @ moment.q
             - system.weight @ moment.q
         )
@@ -677,14 +710,14 @@ def positions(stepper: Stepper, times: np.ndarray, unique: bool = False) -> np.n
     return np.reshape(found, (len(found), len(before.q)))
 
 
-def image_parts(seed: int) -> int:
-    """Compare a random scene with its mirror image at points in time. Returns at how many.
+def image_parts(seed: int, data: dict | None = None) -> int:
+    """Compare a random scene, or that of other tables, with its mirror image at points in time. Returns at how many.
 
     Up to where scenes with other masses, by PERTURBATION, have parted from it; there the image may be as far from it.
     A chatter may end a flight earlier or later, and an impact of many contacts with friction may have several
     solutions: there the comparison ends, too.
     """
-    data = tables(seed)
+    data = tables(seed) if data is None else data
     try:
         steppers = [Stepper(scene_of(each)) for each in (data, mirrored(data), *map(_perturbed(data), (1, -1)))]
     except InputError:

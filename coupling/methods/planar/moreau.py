@@ -12,11 +12,17 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.methods.planar.step_records import account_step, follow_contacts, record_sample, record_start
+from vanedamp.coupling.methods.planar.step_records import (
+    account_step,
+    drag_slider,
+    follow_contacts,
+    record_sample,
+    record_start,
+)
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD, SOLVES, UNDECIDED
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.constraints import PlanarSystem
-from vanedamp.coupling.planar.contact_decisions import gap, row_speed
+from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
 from vanedamp.coupling.system.restitution import restitution_at
 
 #: problems that a step may take, the last with all contacts at once
@@ -30,11 +36,17 @@ _ROUND_OFF = 1e-12
 
 
 def step_matrices(system: PlanarSystem, step: float, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the inverse of the iteration matrix (N, N), its product with J^T (N, 2u), and the mobility (2u, 2u)."""
+    """Return the inverse of the iteration matrix (N, N), its product with J^T (N, 2u), and the mobility (2u, 2u).
+
+    The mobility of a Jenkins element has its spring's part: the force is its mean over a step, as that of all springs.
+    """
     matrix = np.diag(system.mass) + step * theta * (system.damping + step * theta * system.stiffness)
     inverse = np.linalg.inv(matrix)
     turned = inverse @ system.J.T
-    return inverse, turned, system.J @ turned
+    mobility = system.J @ turned
+    sliders = np.arange(len(mobility) - len(system.tangential), len(mobility))
+    mobility[sliders, sliders] += 1 / (step * theta) ** 2 / system.tangential
+    return inverse, turned, mobility
 
 
 @entry
@@ -57,11 +69,13 @@ def march(system, times, motion, records, log, inverse, turned, mobility, theta,
                 free[i] = v[i]
                 for j in range(size):
                     free[i] += h * inverse[i, j] * rhs[j]
-            if not _impulses(system, motion, mobility, turned, h):
+            if not _impulses(system, motion, mobility, turned, h, theta):
                 return UNDECIDED
             for i in range(size):
                 motion.v[i] = free[i]
                 motion.q[i] = q[i] + h * (theta * free[i] + (1.0 - theta) * v[i])
+            for j in range(len(system.tangential)):
+                drag_slider(system, j, motion.q)
             follow_contacts(system, times, motion, records, log, k)
             code = account_step(system, times, motion, records, k, deepest)
             if code != DONE:
@@ -74,7 +88,7 @@ def march(system, times, motion, records, log, inverse, turned, mobility, theta,
 
 
 @kernel
-def _impulses(system, motion, mobility, turned, h):
+def _impulses(system, motion, mobility, turned, h, theta):
     """Set the impulses of a step and the velocities (motion.free) that they leave. Returns False if undecided.
 
     A contact that parts as the step begins waits: where impulses of others drive it together, it meets an impact of its
@@ -98,7 +112,7 @@ def _impulses(system, motion, mobility, turned, h):
                 for i in range(len(free)):
                     free[i] += turned[i, r] * motion.impulse[r]
     for turn in range(_TURNS):
-        count = _list_units(system, motion, turn)
+        count = _list_units(system, motion, turn, h, theta)
         if count == 0:
             return True
         motion.counters[SOLVES] += 1
@@ -152,9 +166,10 @@ def _two_phases(system, motion, mobility, h, tolerance):
 
 
 @inlined
-def _list_units(system, motion, turn):
+def _list_units(system, motion, turn, h, theta):
     """List the units that take part in a turn, with what Newton's law leaves of their speeds. Return their number."""
     u, count, free, slowest = len(system.rest), 0, motion.free[1], motion.slowest[0]
+    first = u - len(system.tangential)
     for r in range(u):
         if r < system.contacts:
             if motion.closed[r] == 0:
@@ -167,6 +182,10 @@ def _list_units(system, motion, turn):
             if not system.two_phases:
                 motion.left[r] += restitution_at(system, r, -before) * min(before, 0.0)
         motion.left[u + r] = row_speed(system, u + r, free)
+        if r >= first:  # at rest is a spring whose mean force over the step is the impulse
+            j, ahead = r - first, theta * h
+            stretched = elongation(system, j, motion.q) + (1.0 - theta) * ahead * motion.before[u + r]
+            motion.left[u + r] += (stretched + motion.impulse[u + r] / (h * system.tangential[j])) / (theta * ahead)
         motion.listed[count] = r
         count += 1
     return count

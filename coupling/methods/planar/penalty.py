@@ -11,11 +11,17 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, contact_spring
-from vanedamp.coupling.methods.planar.step_records import account_step, follow_contacts, record_sample, record_start
+from vanedamp.coupling.methods.planar.step_records import (
+    account_step,
+    drag_slider,
+    follow_contacts,
+    record_sample,
+    record_start,
+)
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD
 from vanedamp.coupling.numerics.jit import entry, inlined
 from vanedamp.coupling.planar.constraints import STOP, PlanarSystem
-from vanedamp.coupling.planar.contact_decisions import gap, row_speed
+from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
 from vanedamp.files.toml_input import InputError
 
 
@@ -106,9 +112,12 @@ def march(system, times, motion, records, log, penalty, inverse, periods, budget
 
 @inlined
 def _set_forces(system, penalty, q, v):
-    """Set the forces of all units at coordinates q and velocities v."""
-    u = len(system.rest)
-    for r in range(u):
+    """Set the forces of all units at coordinates q and velocities v; sliders of Jenkins elements follow in q."""
+    u, sliders = len(system.rest), len(system.tangential)
+    for j in range(sliders):
+        drag_slider(system, j, q)
+        penalty.force[2 * u - sliders + j] = -system.tangential[j] * elongation(system, j, q)
+    for r in range(u - sliders):
         bound = system.limit[r]
         if r < system.contacts:
             overlap, push = -gap(system, r, q), 0.0

@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid, time_grid
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem, planar_motion, planar_system
+from vanedamp.coupling.planar.constraints import (
+    PlanarMotion,
+    PlanarSystem,
+    on_structure,
+    planar_motion,
+    planar_system,
+)
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Loads, assemble
 from vanedamp.coupling.system.system import System
@@ -16,9 +22,10 @@ from vanedamp.coupling.system.system import System
 def planar_start(scene: Scene, flat: System, steps: int) -> tuple[PlanarSystem, PlanarMotion, TimeGrid]:
     """Return system, motion at time zero and the steps of a period. flat: the scene with every body as a slider.
 
-    Raises InputError for what bodies with extent do not allow.
+    The slips of Jenkins elements are those of what draws their sliders. Raises InputError for what bodies with extent
+    do not allow.
     """
-    system, signal = planar_system(scene, flat), scene.excitation.signal
+    system, signal = on_structure(planar_system(scene, flat)), scene.excitation.signal
     if signal is None:
         return system, planar_motion(scene, flat, system), time_grid(flat, steps, _harmonics(flat, system))
     sine = replace(scene, excitation=replace(scene.excitation, waveform=None))

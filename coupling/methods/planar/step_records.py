@@ -18,7 +18,7 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.jit import inlined
 from vanedamp.coupling.planar.constraints import FLOOR, PlanarMotion, PlanarSystem
-from vanedamp.coupling.planar.contact_decisions import gap
+from vanedamp.coupling.planar.contact_decisions import elongation, gap
 from vanedamp.coupling.planar.recorder import note_tilts, put_sample, record_section
 from vanedamp.coupling.response.recorder import cubic_peak
 from vanedamp.coupling.response.records import (
@@ -104,12 +104,22 @@ def _response(system, times, k, q, v):
 
 @inlined
 def record_start(system, motion, records):
-    """Record section, energies and ledger at the start of a period, those of contact springs included."""
+    """Record section, energies and ledger at the start of a period, those of all springs included."""
     springs = 0.0
     for r in range(system.contacts):
         if motion.spring[r] > 0.0:
             springs += 0.5 * motion.spring[r] * min(gap(system, r, motion.q), 0.0) ** 2
+    for j in range(len(system.tangential)):
+        springs += 0.5 * system.tangential[j] * elongation(system, j, motion.q) ** 2
     record_section(system, motion, records, springs)
+
+
+@inlined
+def drag_slider(system, j, q):
+    """Let the slider of a Jenkins element follow, in q, where the spring would go beyond its bound."""
+    most = system.limit[len(system.limit) - len(system.tangential) + j] / system.tangential[j]
+    stretched = elongation(system, j, q)
+    q[len(q) - len(system.tangential) + j] += stretched - min(max(stretched, -most), most)
 
 
 @inlined
@@ -149,6 +159,9 @@ def account_step(system, times, motion, records, k, deepest):
             if motion.spring[r] > 0.0:
                 stored = min(now, 0.0) ** 2 - min(gap(system, r, q), 0.0) ** 2
                 motion.ledger[CONTACT] -= 0.5 * motion.spring[r] * stored
+    for j in range(len(system.tangential)):
+        stored = elongation(system, j, motion.q) ** 2 - elongation(system, j, q) ** 2
+        motion.ledger[FRICTION] -= 0.5 * system.tangential[j] * stored
     motion.deepest[0] = max(motion.deepest[0], deep)
     note_tilts(system, motion, motion.q, p)
     for b in range(len(system.along)):

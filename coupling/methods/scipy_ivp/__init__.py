@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.planar.constraints import planar_motion, planar_system
+from vanedamp.coupling.planar.constraints import on_structure, planar_motion, planar_system
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
@@ -53,5 +53,5 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
     """
     from vanedamp.coupling.methods.scipy_ivp.planar_run import PlanarIvpRun
 
-    system = planar_system(scene, flat)
+    system = on_structure(planar_system(scene, flat))
     return PlanarIvpRun(flat, system, options, planar_motion(scene, flat, system), records, events)

@@ -47,7 +47,11 @@ class Wrong(NamedTuple):
 
 
 class Unforced:
-    """A system without forces of its contacts, on the extended state: size 2N, extent, slices, accelerations."""
+    """A system without forces of its contacts, on the extended state: size 2N, extent, slices, accelerations.
+
+    Those of the springs of Jenkins elements are in it: they do not depend on whether their sliders, the last units
+    (sprung (u,)), move. pull (j, extent): their forces on what draws them. The sliders' speeds in the state are zero.
+    """
 
     def __init__(self, system: PlanarSystem) -> None:
         n, e = len(system.mass), len(system.frequency)
@@ -59,6 +63,11 @@ class Unforced:
         forces = self.load.copy()
         forces[:, self.q], forces[:, self.v] = -system.stiffness, -system.damping
         forces[:, self.one] = system.weight
+        sliders = len(system.tangential)
+        self.sliders, self.sprung = self.q.stop - sliders, np.arange(self.u) >= self.u - sliders
+        self.pull = np.zeros((sliders, self.extent))
+        self.pull[:, self.q] = -system.tangential[:, None] * system.elongation
+        forces[: self.sliders] += system.elongation[:, : self.sliders].T @ self.pull
         self.accelerations = forces / system.mass[:, None]
         self.normal, self.slip = system.J[: self.u], system.J[self.u :]
         self.contact = np.arange(self.u) < system.contacts
@@ -68,6 +77,18 @@ class Unforced:
         """Return the states (2N, ...) at times t (...) with 1, cos and sin below them."""
         phase = np.multiply.outer(self.system.frequency, np.asarray(t, float))
         return np.concatenate([z, np.ones((1, *phase.shape[1:])), np.cos(phase), np.sin(phase)])
+
+    def ways_of_slider(self, r: int, now: np.ndarray, sizes: np.ndarray, speed: float, slow: float) -> list[int]:
+        """Return the states that a Jenkins element (unit r) may have: its slider moves with its spring at its bound.
+
+        now, sizes: (extent,) the state and its terms; speed: of what draws it, m/s.
+        """
+        pull = self.pull[r - self.u]
+        force, limit = float(pull @ now), self.system.limit[r]
+        way = RIGHT if force < 0.0 else LEFT
+        if abs(force) < limit - ROUND_OFF * (limit + float(np.abs(pull) @ sizes)) or _WAY[way] * speed < -slow:
+            return [STICK]
+        return [way] if _WAY[way] * speed > slow else [STICK, way]
 
     def gaps(self, q: np.ndarray) -> np.ndarray:
         """Return the gaps (contacts,) at coordinates q (N,), m."""
@@ -85,7 +106,7 @@ class Holding:
         system = free.system
         self.state = state
         self.closed = np.flatnonzero((state != OPEN) & free.contact)
-        self.stick = np.flatnonzero((state == STICK) & free.rubs)
+        self.stick = np.flatnonzero((state == STICK) & free.rubs & ~free.sprung)
         self.drag = (_WAY[state] * system.friction)[self.closed]
         self.rows = np.vstack([free.normal[self.closed], free.slip[self.stick]])
         self.wrench = self.rows.copy()
@@ -118,19 +139,22 @@ class Motion:
         holding = Holding(free, state)
         self.state, self.possible = state, holding.possible
         force = np.zeros((2 * u, free.extent))
-        slides = np.where(free.contact, 0.0, -_WAY[state] * system.limit)
+        slides = np.where(free.contact | free.sprung, 0.0, -_WAY[state] * system.limit)
         force[u:, free.one] = slides
         pushed = free.accelerations + (system.J / system.mass).T @ force
         force += holding.spread(-holding.inverse @ (holding.rows @ pushed), u)
-        self.force = force
         self.rate = np.zeros((free.extent, free.extent))
         self.rate[free.q, free.v] = np.eye(free.n)
+        drawn = free.sprung & (state != STICK)
+        self.rate[free.sliders + np.flatnonzero(drawn[free.sprung]), free.v] = free.slip[drawn]
         self.rate[free.v] = free.accelerations + (system.J / system.mass).T @ force
         self.rate[free.cosine, free.sine] = -np.diag(system.frequency)
         self.rate[free.sine, free.cosine] = np.diag(system.frequency)
         #: of the sums that rates are: those of coordinates that contacts hold cancel
         self.terms = np.abs(self.rate)
         self.terms[free.v] = np.abs(free.accelerations) + (np.abs(system.J) / system.mass).T @ np.abs(force)
+        force[u:][free.sprung] = free.pull
+        self.force = force
         guards, self.wrong = _guards(free, state, force)
         self.guard = np.reshape(guards, (len(guards), free.extent))
         self.order = np.zeros(len(guards), int)
@@ -237,6 +261,8 @@ def decide(free: Unforced, now: np.ndarray, sizes: np.ndarray, present: np.ndarr
         ways = [STICK, RIGHT, LEFT] if abs(slip[r]) <= slow else [RIGHT if slip[r] > 0.0 else LEFT]
         if not free.rubs[r]:
             ways = [RIGHT] if free.contact[r] else [OPEN]
+        if free.sprung[r]:
+            ways = free.ways_of_slider(r, now, sizes, slip[r], slow)
         if free.contact[r]:
             ways = [*ways, OPEN] if gaps[r] <= touch[r] and speed[r] <= slow else [OPEN]
         options.append(ways)

@@ -64,7 +64,8 @@ class PlanarRecorder:
     def sizes(self, omega: float) -> np.ndarray:
         """Return typical sizes of state and integrals (2N + count,), for a motion through the smallest play."""
         system = self.system
-        reach = float(system.play[: system.contacts].min())
+        most = system.limit[self.free.sprung] / system.tangential
+        reach = float(np.r_[system.play[: system.contacts], most].min())
         largest = np.abs(system.J).max(axis=0)
         largest = np.where(largest > 0, largest, np.abs(system.response))
         place = reach / np.where(largest > 0, largest, 1.0)
@@ -165,7 +166,11 @@ class PlanarRecorder:
         counters[PERIOD] = self.period
         ledger[[EXCITATION, VISCOUS, FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
         ledger[IMPACT_LOSS] = self.impact_loss
-        record_section(self.system, _Moment(counters, y[free.q].copy(), y[free.v].copy(), ledger), self.records, 0.0)
+        # what Jenkins elements have taken is in their springs, or lost
+        springs = 0.5 * float(self.system.tangential @ (self.system.elongation @ y[free.q]) ** 2)
+        ledger[FRICTION] -= springs
+        moment = _Moment(counters, y[free.q].copy(), y[free.v].copy(), ledger)
+        record_section(self.system, moment, self.records, springs)
         extended = free.extended(0.0, y[: free.size])
         self.last = 0.0, self.watched @ extended, self.speeds @ extended
         self.before = integrals.copy()

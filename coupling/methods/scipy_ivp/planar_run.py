@@ -188,7 +188,7 @@ class PlanarIvpRun(EventLoop):
         """Return the impulses of a step of Moreau's scheme of length _CHATTER, without restitution."""
         free, system = self.free, self.system
         accelerations = free.accelerations @ free.extended(self.time, np.concatenate([self.y[free.q], v]))
-        slides = np.where(free.contact, 0.0, -system.limit * np.sign(free.slip @ v))
+        slides = np.where(free.contact | free.sprung, 0.0, -system.limit * np.sign(free.slip @ v))
         accelerations += (free.slip / system.mass).T @ slides
         ahead = v + _CHATTER * system.period * accelerations
         return impact(free, ahead, np.flatnonzero(closed).tolist(), np.zeros(free.u))
