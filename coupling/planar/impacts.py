@@ -48,6 +48,8 @@ _HALVINGS = 40
 _EDGE = 1e-9
 #: share of CHATTER that a flight must last at least to be flown, however elastic it is
 _SHORTEST = 0.1
+#: share of the motion by which a step is measured, at least: its round-off is below what a pivot resolves then
+_ROUGH = 1e-4
 #: how much more than the loads alone the forces of other contacts may press
 _FAR = 100.0
 
@@ -229,8 +231,8 @@ def _catch(system, st, work, count, tiny):
     """Stop contacts that would part for less than CHATTER: those that push in a step of that length.
 
     The step is one of Moreau's scheme, and one for all of them: over steps of several lengths the forces of contacts at
-    rest would push others more, or less, than they do. A chatter takes 1/(1 - k) times its next flight. Returns False if
-    that cannot be decided.
+    rest would push others more, or less, than they do. A chatter takes 1/(1 - k) times its next flight. Returns False
+    if that cannot be decided.
     """
     slow, near, flight = _FAR * _accelerate(system, st, work), False, 1.0
     for p in range(count):
@@ -289,13 +291,18 @@ def _accelerate(system, st, work):
 
 @inlined
 def _step(system, st, work, count, share):
-    """Find the impulses (work.impulse) of a step of Moreau's scheme, a share of CHATTER long. Returns if there are any."""
-    u, ahead = len(system.rest), CHATTER * system.period * share
+    """Find the impulses (work.impulse) of a step of Moreau's scheme, a share of CHATTER long. False if there are none.
+
+    Speeds of so short a step are small, those of rows that depend on each other no less off by round-off of the motion.
+    """
+    u, ahead, motion = len(system.rest), CHATTER * system.period * share, 0.0
+    for i in range(len(st.v)):
+        motion += system.mass[i] * st.v[i] * st.v[i]
     for p in range(count):
         r = work.listed[p]
         work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0, system.limit)
+    return solve_rows(system, work, count, work.speed, _ROUGH * math.sqrt(motion), system.limit)
 
 
 @inlined
