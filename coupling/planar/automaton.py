@@ -49,7 +49,7 @@ from vanedamp.coupling.response.records import CONTACT, DETACHES, IMPACT_LOSS, R
 #: overlap, as a share of the play, beyond which round-off has lost a contact
 _LOST = 1e-7
 #: gap, as a share of the play, below which round-off may tell whether it is shut
-_CLOSE = 1e-10
+_CLOSE = 1e-11
 #: events at one instant after which contacts are said to be undecided, for each unit
 _AT_ONCE = 20
 #: events at one instant after which a decision that repeats itself is made anew, for each unit
@@ -142,7 +142,7 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
         _phase(system, st)
         if st.counters[AT_ONCE] > _AT_ONCE * len(system.rest):
             return UNDECIDED
-        if _is_close(system, st):
+        if guards.what[who] == CLOSES and _is_close(system, st):
             _snap(system, flows, st, st.counters[FLOW])
         if not _happen(system, st, rec, log, work, guards.unit[who], guards.what[who]):
             return UNDECIDED

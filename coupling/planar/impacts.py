@@ -48,7 +48,7 @@ _HALVINGS = 40
 _EDGE = 1e-9
 #: share of CHATTER that a flight must last at least to be flown, however elastic it is
 _SHORTEST = 0.1
-#: share of the motion by which a step is measured, at least: its round-off is below what a pivot resolves then
+#: share of the motion by which a step is measured, at least: round-off is below what a pivot resolves then
 _ROUGH = 1e-4
 #: how much more than the loads alone the forces of other contacts may press
 _FAR = 100.0
@@ -293,7 +293,8 @@ def _accelerate(system, st, work):
 def _step(system, st, work, count, share):
     """Find the impulses (work.impulse) of a step of Moreau's scheme, a share of CHATTER long. False if there are none.
 
-    Speeds of so short a step are small, those of rows that depend on each other no less off by round-off of the motion.
+    Speeds of so short a step may be so small that round-off of the motion contradicts rows that depend on each other:
+    then they are measured by the motion.
     """
     u, ahead, motion = len(system.rest), CHATTER * system.period * share, 0.0
     for i in range(len(st.v)):
@@ -302,7 +303,9 @@ def _step(system, st, work, count, share):
         r = work.listed[p]
         work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
-    return solve_rows(system, work, count, work.speed, _ROUGH * math.sqrt(motion), system.limit)
+    return solve_rows(system, work, count, work.speed, 0.0, system.limit) or solve_rows(
+        system, work, count, work.speed, _ROUGH * math.sqrt(motion), system.limit
+    )
 
 
 @inlined

@@ -482,7 +482,7 @@ class Checker:
         sticks, slides = state == STICK, (state == SLIP_LEFT) | (state == SLIP_RIGHT)
         worst.note("apart", np.abs(slip[:, sticks]).max(initial=0.0) / self.speed, where)
         pushes, friction = force[:, :u], force[:, u:]
-        # what an instant leaves open is decided by the forces a moment later: till then they may lack what they change by
+        # what an instant leaves open is decided by the forces a moment later: so far they may lack what they change by
         left = np.maximum(system.moment - np.linspace(0.0, span, POINTS + 1), 0.0)[:, None]
         open_yet = left * np.abs(path @ (motion.force @ motion.matrix).T).max()
         pull = ((-pushes - open_yet) / size[:u])[:, self.contact & (state != OPEN)]
