@@ -40,7 +40,7 @@ def test_laws_of_thousands(first):
     assert sum(ends.values()) <= 2
 
 
-#: scenes of more than a million whose runs had been wrong, or had given up, by rounding errors and by what they upset
+#: scenes whose runs have once broken a law, or given up
 @pytest.mark.parametrize(
     ("seed", "law"),
     [

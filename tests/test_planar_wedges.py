@@ -46,7 +46,7 @@ def test_a_block_that_leans_within_its_friction_cones_stays(mu):
 def test_a_block_that_leans_almost_upright_stays(slim):
     """One corner almost above the other: its contacts' rows depend on each other but for the share a/b.
 
-    It may creep by a share of 1e-13 of the load, over half a period's square three times.
+    In each of three periods T it may creep by a share of 1e-13 of what the load moves a free body, g T^2/2.
     """
     play = 1e-4 * slim
     table = still_table(10.0)
