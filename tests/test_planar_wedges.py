@@ -42,6 +42,29 @@ def test_a_block_that_leans_within_its_friction_cones_stays(mu):
     assert abs(ledger(run)) <= 1e-12
 
 
+@pytest.mark.parametrize("slim", [1e-3, 1e-5, 1e-6])
+def test_a_block_that_leans_almost_upright_stays(slim):
+    """One corner almost above the other: its contacts' rows depend on each other but for the share a/b.
+
+    In each of three periods T it may creep by a share of 1e-13 of what the load moves a free body, g T^2/2.
+    """
+    play = 1e-4 * slim
+    table = still_table(10.0)
+    table["gravity"] |= {"orientation_deg": 20.0}
+    block = {
+        "shape": "block",
+        "length": 2 * slim * B,
+        "height": 2 * B,
+        "mass": 1.3,
+        "friction": 0.6,
+        "restitution": 0.0,
+    }
+    run = planar_run(table, block | {"tilt": play / (2 * slim * B)}, periods=3, play=play)
+    assert run.status is Status.OK
+    np.testing.assert_allclose(run.state.q, [0.0, play / 2, play / (2 * slim * B)], rtol=1e-9, atol=1.5e-14)
+    assert np.count_nonzero(run.state.state != OPEN) == 2
+
+
 def test_it_slides_where_the_line_is_outside_the_cones():
     mu = 0.8 * A / B
     run = leaning(mu, 1.5 * mu)

@@ -52,6 +52,8 @@ from vanedamp.coupling.response.records import CONTACT, DETACHES, IMPACT_LOSS, R
 
 #: overlap, as a share of the play, beyond which round-off has lost a contact
 _LOST = 1e-7
+#: gap, as a share of the play, below which round-off may tell whether it is shut
+_CLOSE = 1e-11
 #: events at one instant after which contacts are said to be undecided, for each unit
 _AT_ONCE = 20
 #: events at one instant after which a decision that repeats itself is made anew, for each unit
@@ -144,6 +146,8 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
         _phase(system, st)
         if st.counters[AT_ONCE] > _AT_ONCE * len(system.rest):
             return UNDECIDED
+        if guards.what[who] == CLOSES and _is_close(system, st):
+            _snap(system, flows, st, st.counters[FLOW])
         if not _happen(system, st, rec, log, work, guards.unit[who], guards.what[who]):
             return UNDECIDED
         if not _inside(system, st):
@@ -157,6 +161,20 @@ def _approaches(system, st):
     for r in range(system.contacts):
         if is_rigid(system, r) and is_shut(system, st, r) and row_speed(system, r, st.v) < -AT_REST * st.scale[0]:
             return True
+    return False
+
+
+@inlined
+def _is_close(system, st):
+    """Whether an open contact is so close that round-off of the closed ones may decide whether it is shut, too.
+
+    The other corner of a face that lands flat is off by what a body has turned against the wall that holds it.
+    """
+    for r in range(system.contacts):
+        if st.state[r] == OPEN:
+            part = gap(system, r, st.q) / system.play[r]
+            if SIMULTANEOUS < part <= _CLOSE:
+                return True
     return False
 
 

@@ -16,6 +16,8 @@ from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
 
 #: what is small beside the largest term, now and a moment later
 _NOTHING, _NEXT_TO_NOTHING = 1e-9, 1e-12
+#: factor of the moment after which is decided what an instant leaves open, each time that a decision is made anew
+_SOONER = 0.1
 #: share of the speeds in a scene that is round-off
 AT_REST = 10 * ROUND_OFF
 #: shares of its bound, and of its terms, by which an elongation may be short of that
@@ -518,8 +520,11 @@ def loaded_acceleration(system, st, work, q, v, time):
 
 @kernel
 def _look_ahead(system, st, work, count):
-    """Decide what was left open by the accelerations a moment later. Returns False if that cannot be solved."""
-    u, size, moment = len(system.rest), len(st.q), system.moment
+    """Decide what was left open by the accelerations a moment later. Returns False if that cannot be solved.
+
+    Where forces have only begun, they may all be others after that moment: a decision made anew looks less far ahead.
+    """
+    u, size, moment = len(system.rest), len(st.q), system.moment * _SOONER ** work.attempt[0]
     for i in range(size):
         total = work.free[i]
         for r in range(2 * u):

@@ -23,6 +23,8 @@ from vanedamp.coupling.planar.constraints import PlanarSystem
 
 #: share of their size below which singular values are zero: rows that depend on each other
 _DEPENDENT = 1e-9
+#: share of a load that accelerates what is held, above which forces are found without the square of the rows' condition
+_SQUARED = 1e-13
 #: frequencies below this share of the excitation's are refused: displacements would be quotients of round-off
 _SLOW = 1e-6
 #: and springs of Jenkins elements beyond the square of this many times it: their forces would be round-off
@@ -250,8 +252,36 @@ def _forces(constraints: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np
     inverse = np.linalg.pinv(mobility * scale * scale[:, None], rcond=_DEPENDENT) * scale * scale[:, None]
     carried = -inverse @ constraints
     oblique = np.eye(size) + wrench @ carried
-    if np.abs((constraints @ oblique) * scale[:, None]).max() > LOST:
-        raise IllConditioned("its friction forces have no solution")
+    if _yielding(constraints, oblique, scale) > _SQUARED:
+        carried, oblique = _forces_of_near_dependent(constraints, wrench, scale, carried, oblique)
+        if _yielding(constraints, oblique, scale) > LOST:
+            raise IllConditioned("its friction forces have no solution")
+    return carried, oblique
+
+
+def _yielding(constraints: np.ndarray, oblique: np.ndarray, scale: np.ndarray) -> float:
+    """Return the largest acceleration that is left in a row that is to have none, per unit of load and length."""
+    return float(np.abs((constraints @ oblique) * scale[:, None]).max())
+
+
+def _forces_of_near_dependent(
+    constraints: np.ndarray, wrench: np.ndarray, scale: np.ndarray, carried: np.ndarray, oblique: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return forces and accelerations as `_forces` does, for rows that nearly depend on each other.
+
+    The mobility of a block that stands wedged on two corners, one almost above the other, has the square of their
+    constraints' condition. Not so the projector N (Y^T N)^-1 Y^T on the motions N that the constraints leave, along the
+    wrenches, to which Y is normal. Where there is none, as wrenches and constraints differ in rank, those given are
+    returned.
+    """
+    wrench = wrench * scale
+    free = null_space(constraints * scale[:, None], rcond=_DEPENDENT)
+    normal = null_space(wrench.T, rcond=_DEPENDENT)
+    meeting = normal.T @ free  # cosines
+    if free.shape != normal.shape or np.linalg.svd(meeting, compute_uv=False).min(initial=1.0) < _DEPENDENT:
+        return carried, oblique
+    oblique = free @ np.linalg.solve(meeting, normal.T)
+    carried = np.linalg.pinv(wrench, rcond=_DEPENDENT) @ (oblique - np.eye(len(oblique))) * scale[:, None]
     return carried, oblique
 
 

@@ -38,12 +38,18 @@ from vanedamp.coupling.system.restitution import restitution_at
 
 #: energy that an impact may bring, as a share of what is in it, before it is solved again
 _GAIN = 1e-12
+#: round-off of a sum, relative to the sum of its terms' sizes, over the share above
+_CANCELLED = 4.0 * 2.0**-52 / _GAIN
 #: factor of the coefficients below which it is zero: of a wedged block, whose contacts cannot part all together
 _WEDGED = 1e-6
 #: bisections of the factor of the coefficients
 _HALVINGS = 40
 #: share by which friction is short of its bound where a contact sticks
 _EDGE = 1e-9
+#: share of CHATTER that a flight must last at least to be flown, however elastic it is
+_SHORTEST = 0.1
+#: share of the motion by which a step is measured, at least: round-off is below what a pivot resolves then
+_ROUGH = 1e-4
 #: how much more than the loads alone the forces of other contacts may press
 _FAR = 100.0
 
@@ -156,16 +162,19 @@ def _restitution(system, st, work, r):
 
 @inlined
 def _brings_energy(system, st, work):
-    """Whether the impulses bring more energy than round-off of what there is."""
-    u, loss, there = len(system.rest), 0.0, 0.0
-    for r in range(2 * u):
-        if work.impulse[r] != 0.0:
-            after = work.before_impact[r]
-            for o in range(2 * u):
-                after += system.delassus[r, o] * work.impulse[o]
-            loss -= 0.5 * work.impulse[r] * (work.before_impact[r] + after)
+    """Whether the impulses bring more energy than round-off of what there is.
+
+    By the velocities that they change: of a wedged block, large impulses nearly balance each other.
+    """
+    loss, there = 0.0, 0.0
     for i in range(len(st.v)):
-        there += 0.5 * system.mass[i] * st.v[i] * st.v[i]
+        pushed, terms = 0.0, 0.0
+        for r in range(len(work.impulse)):
+            part = system.J[r, i] * work.impulse[r]
+            pushed += part
+            terms += abs(part)
+        loss -= pushed * (st.v[i] + 0.5 * pushed / system.mass[i])
+        there += 0.5 * system.mass[i] * st.v[i] * st.v[i] + _CANCELLED * terms * abs(st.v[i])
     return loss < -_GAIN * there
 
 
@@ -221,19 +230,19 @@ def log_event(system, st, log, kind, r, before, after, normal, tangential, loss)
 def _catch(system, st, work, count, tiny):
     """Stop contacts that would part for less than CHATTER: those that push in a step of that length.
 
-    The step is one of Moreau's scheme; a chatter takes 1/(1 - k) times its next flight. Returns False if that cannot be
-    decided.
+    The step is one of Moreau's scheme, and one for all of them: over steps of several lengths the forces of contacts at
+    rest would push others more, or less, than they do. A chatter takes 1/(1 - k) times its next flight. Returns False
+    if that cannot be decided.
     """
-    slow, near = _FAR * _accelerate(system, st, work), False
+    slow, near, flight = _FAR * _accelerate(system, st, work), False, 1.0
     for p in range(count):
-        near = near or tiny < row_speed(system, work.listed[p], st.v) < slow
+        speed = row_speed(system, work.listed[p], st.v)
+        if tiny < speed < slow:
+            near, flight = True, min(flight, max(1.0 - restitution_at(system, work.listed[p], speed), _SHORTEST))
     if not near:
         return True
-    if not _step(system, st, work, count, 0.1):
-        # steps of several lengths may ask a wedged block to part: one length has a solution
-        _accelerate(system, st, work)
-        if not _step(system, st, work, count, 1.0):
-            return False
+    if not _step(system, st, work, count, flight):
+        return False
     near = False
     for p in range(count):
         r = work.listed[p]
@@ -281,19 +290,22 @@ def _accelerate(system, st, work):
 
 
 @inlined
-def _step(system, st, work, count, shortest):
-    """Find the impulses (work.impulse) of a step of Moreau's scheme of length CHATTER. Returns if there are any.
+def _step(system, st, work, count, share):
+    """Find the impulses (work.impulse) of a step of Moreau's scheme, a share of CHATTER long. False if there are none.
 
-    shortest: share of the step to which a contact's restitution shortens it at most.
+    Speeds of so short a step may be so small that round-off of the motion contradicts rows that depend on each other:
+    then they are measured by the motion.
     """
-    u = len(system.rest)
+    u, ahead, motion = len(system.rest), CHATTER * system.period * share, 0.0
+    for i in range(len(st.v)):
+        motion += system.mass[i] * st.v[i] * st.v[i]
     for p in range(count):
         r = work.listed[p]
-        normal = row_speed(system, r, st.v)
-        ahead = CHATTER * system.period * max(1.0 - restitution_at(system, r, abs(normal)), shortest)
-        work.speed[r] = normal + ahead * work.speed[r]
+        work.speed[r] = row_speed(system, r, st.v) + ahead * work.speed[r]
         work.speed[u + r] = row_speed(system, u + r, st.v) + ahead * work.speed[u + r]
-    return solve_rows(system, work, count, work.speed, 0.0, system.limit)
+    return solve_rows(system, work, count, work.speed, 0.0, system.limit) or solve_rows(
+        system, work, count, work.speed, _ROUGH * math.sqrt(motion), system.limit
+    )
 
 
 @inlined
