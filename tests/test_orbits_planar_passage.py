@@ -362,3 +362,10 @@ def test_an_impact_that_friction_would_feed_takes_no_energy():
     passage = found(x)
     assert passage.status is not PassageStatus.UNDETERMINED
     assert np.all(np.isfinite(passage.derivative))
+
+
+def test_springs_of_friction_dampers_in_the_plane_are_refused_in_one_line():
+    scene = shaken(1.05, 0.3, 0.05, {"law": "newton"}, BLOCK)
+    data = scene.to_dict() | {"friction_damper": [{"normal_force": 1.0, "friction": 0.1, "stiffness": 2.0}]}
+    with pytest.raises(InputError, match=r"^friction_damper\[0\].stiffness: .* leave it out$"):
+        period_map(Scene.of(data, "scene.toml"))

@@ -43,10 +43,10 @@ class OtherSide:
     def find(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
         sequence = last.orbit.passage.sequence
-        if (passed := past_the_start(self.problem, last)) is not None:
-            return passed, " at the start of the period"
         if (centred := self._centred(last)) is not None:
             return centred, CENTRED
+        if (passed := past_the_start(self.problem, last)) is not None:
+            return passed, " at the start of the period"
         for size in self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
             y = last.y + size * last.tangent
             passage = self.problem.passage(y)

@@ -100,4 +100,10 @@ class PlanarMap:
 def planar_map(scene: Scene, parameter: str, periods: int) -> PlanarMap:
     """Return the period map of a scene with bodies in the plane. Raises InputError for one that it cannot run."""
     check_waveform(scene, "exact")
+    for index, damper in enumerate(scene.friction_damper):
+        if damper.stiffness is not None:
+            raise InputError(
+                f"friction_damper[{index}].stiffness: beside bodies with extent, stiffness or dashpot, and with "
+                "impacts of two phases, orbits are those of rigid friction dampers; leave it out"
+            )
     return PlanarMap(scene, parameter, periods, Frame(scene).sizes())

@@ -51,6 +51,8 @@ POINTS = 12
 LONGEST = 150
 #: share of the largest singular value below which rows depend on each other
 DEPENDENT = 1e-9
+#: round-off of a gap, and of a speed in it over a time constant of its spring, as a share of the play
+GAP_ROUND_OFF = 1e-12
 #: points of a period at which a scene is compared with its image; perturbation that measures chaos; where that ends
 PLACES, PERTURBATION, PARTED = 20, 1e-11, 1e-6
 #: limits of the violations, each as a share of the terms that it is a difference of. A nearly singular wedge has had a
@@ -496,8 +498,8 @@ class Checker:
         worst.note("pull", np.abs(balance).max() / max(pressed.max(), 1e-300), where)
         # forces are differences of these, in a wedged block of those of its other contacts
         size = np.full(2 * u, (motion.size(path) @ np.abs(motion.force).T).max() + 1e-300)
-        pressed = np.isfinite(system.spring) & (state < OPEN)  # a gap has the round-off of its play
-        size += 1e-7 * (system.spring * system.play)[pressed].max(initial=0.0)
+        pressed = np.isfinite(system.spring) & (state < OPEN)
+        size += GAP_ROUND_OFF / LIMITS["pull"] * (system.spring * system.play)[pressed].max(initial=0.0)
         open_, closed = self.contact & (state == OPEN), self.rigid & (state != OPEN)
         share = -gap / np.where(self.contact, system.play, 1.0)
         worst.note("penetration", share[:, open_].max(initial=0.0), where)
