@@ -63,6 +63,18 @@ def test_half_the_gap_loses_its_symmetry_and_later_its_period():
 
 
 @pytest.mark.slow
+def test_from_rest_in_the_middle_half_the_gap_scatters_by_a_doubling_of_three_impacts():
+    branch, found = places("period doubling", 0.5, 0.98, 0.983, position=0.0)
+    assert found == pytest.approx([0.981309], abs=2e-5) and set(branch.impacts_per_period) == {3}
+    long = {"time": {"periods": 8000, "transient": 7000}, "position": 0.0}
+    for frequency, kind in ((0.976, "no-contact"), (0.98125, "periodic-1"), (0.9815, "periodic-2")):
+        assert simulate(figure9(0.5, frequency, **long)).classification == kind
+    # as a whole: no contact below, and a motion that its transient has brought to the walls above
+    for frequency, kind in ((0.9885, "no-contact"), (0.9895, "non-periodic")):
+        assert simulate(figure9(1.0, frequency, **long)).classification == kind
+
+
+@pytest.mark.slow
 def test_a_tenth_of_the_gap_doubles_its_period():
     found = places("period doubling", 0.1, 0.95, 0.953)[1]
     assert found == pytest.approx([0.95218538], abs=1e-7)

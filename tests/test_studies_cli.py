@@ -315,7 +315,10 @@ def test_newtons_law_on_several_modes_is_told(command, tables, modes, told, fold
         (["modal", "case.toml", "--vtk", "modes.stl"], "expected a file name ending in .vtu or .vtk"),
         (["mesh", "case.toml", "-o", "block.vtk"], "expected a file name ending in .msh"),
         (["report", "case.toml", "-o", "report.html"], "case.toml: not a readable HDF5 file"),
-        (["report", ".", "-o", "report.html"], "no results that a report shows (sweep, orbits, response, .claims.json, "),
+        (
+            ["report", ".", "-o", "report.html"],
+            "no results that a report shows (sweep, orbits, response, .claims.json, ",
+        ),
         (["report", "nowhere", "-o", "report.html"], "nowhere: no such file or folder"),
         (["report", ".", "-o", "report.pdf"], "expected a file name ending in .html"),
     ],
