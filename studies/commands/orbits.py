@@ -6,7 +6,7 @@ import time
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, add_resume
 from vanedamp.studies.terminal import progress
 
 if TYPE_CHECKING:
@@ -21,10 +21,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_input(parser, "SCENE.toml")
     add_output(parser, "BRANCH.h5")
     add_json(parser)
-    parser.add_argument(
-        "--resume", action="store_true",
-        help="resume from the checkpoint, or fail; without it, resume if there is a checkpoint, otherwise start",
-    )  # fmt: skip
+    add_resume(parser)
 
 
 def run(arguments: Namespace) -> None:

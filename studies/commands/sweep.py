@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, add_workers
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, add_resume, add_workers
 from vanedamp.studies.terminal import progress
 
 if TYPE_CHECKING:
@@ -32,10 +32,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--peak", metavar="RESPONSE.h5",
         help="run the point with the highest mean once more and keep its events and samples, for the report",
     )  # fmt: skip
-    parser.add_argument(
-        "--resume", action="store_true",
-        help="resume from the checkpoint, or fail; without it, resume if there is a checkpoint, otherwise start",
-    )  # fmt: skip
+    add_resume(parser)
 
 
 def run(arguments: Namespace) -> None:

@@ -24,6 +24,14 @@ def add_json(parser: ArgumentParser) -> None:
     )
 
 
+def add_resume(parser: ArgumentParser) -> None:
+    """Take `--resume`: go on from the checkpoint beside the result."""
+    parser.add_argument(
+        "--resume", action="store_true",
+        help="resume from the checkpoint, or fail; without it, resume if there is a checkpoint, otherwise start",
+    )  # fmt: skip
+
+
 def add_workers(parser: ArgumentParser) -> None:
     """Take `--workers`: a number of processes."""
     parser.add_argument("--workers", type=positive_count, metavar="N", help="processes (default: one for every core)")
