@@ -132,7 +132,9 @@ def test_a_body_in_a_gap_has_the_orbit_of_masri_and_caughey(omega, larger):
     assert [abs(crossing.speed) for crossing in passage.crossings] == pytest.approx([orbit.approach] * 2, rel=1e-11)
     assert multipliers(passage.derivative) == pytest.approx(multipliers(orbit.half @ orbit.half), rel=1e-9, abs=1e-9)
     product = orbit.restitution**4 * math.exp(-orbit.damping * orbit.period / orbit.mass)
-    assert np.linalg.det(passage.derivative) == pytest.approx(product, rel=1e-9)
+    # small beside its terms where one multiplier is large: its round-off is that of the condition
+    rounded = 100 * np.finfo(float).eps * np.linalg.cond(passage.derivative)
+    assert np.linalg.det(passage.derivative) == pytest.approx(product, rel=max(1e-9, rounded))
 
 
 def test_the_symmetric_motion_is_stable_within_its_limits():

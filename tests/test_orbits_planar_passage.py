@@ -152,7 +152,8 @@ def compare(found, x):
         if differed is None or differed[1] > 1e-4 * size:
             continue  # another sequence of events is nearer than any step
         error = np.abs(derivative @ direction - differed[0]).max()
-        assert error <= 10 * differed[1] + size * (1e-9 + 200 * EPS / slowest)
+        # contacts close to 1e-12 of their play, which steps of 1e-5 and less enlarge
+        assert error <= 10 * differed[1] + size * (1e-7 + 200 * EPS / slowest)
         compared += 1
     return compared
 
