@@ -181,7 +181,9 @@ class Follower:
         if last is not head and self._search(trace, head, last):
             return
         how = ""
-        if point is None:
+        if (centred := self.other_side.centred(last)) is not None:
+            point, how = centred, CENTRED
+        elif point is None:
             point, how = self.other_side.find(last, step)
         if point is not None and point.tangent[-1] * last.tangent[-1] < 0:
             how += ": the branch turns"

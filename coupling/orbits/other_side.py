@@ -43,8 +43,6 @@ class OtherSide:
     def find(self, last: Point, step: float) -> tuple[Point | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
         sequence = last.orbit.passage.sequence
-        if (centred := self._centred(last)) is not None:
-            return centred, CENTRED
         if (passed := past_the_start(self.problem, last)) is not None:
             return passed, " at the start of the period"
         for size in self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
@@ -71,7 +69,7 @@ class OtherSide:
                 return passage
         return None
 
-    def _centred(self, last: Point) -> Point | None:
+    def centred(self, last: Point) -> Point | None:
         """Return the orbit with its neutral coordinates amid those of its sequence; None if they are there already.
 
         A body that may rest anywhere has come to a wall, though its motion has room on the other side. The tangent
