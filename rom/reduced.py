@@ -44,8 +44,11 @@ _ARRAYS = {
     "output_rows": (("output", "column"), "1"),
     "output_residual": (("output", "force"), "1"),
     "residual_recovery": (("dof", "force"), "m/N"),
+    "centrifugal_stiffness": (("row", "column"), "kg"),
+    "rotation_axis": (("axis",), "1"),
+    "rotation_point": (("axis",), "m"),
 }
-_SYMMETRIC = ("mass", "damping", "stiffness", "residual_flexibility")
+_SYMMETRIC = ("mass", "damping", "stiffness", "residual_flexibility", "centrifugal_stiffness")
 _REQUIRED = ("mass", "damping", "stiffness", "selection", "directions", "base_load")
 
 
@@ -77,6 +80,9 @@ class ReducedModel:
     recovery, coordinates     (N, n) basis T with full displacements T q, dof = 3 * node + component, and the (N / 3, 3)
                               positions of its nodes; None when not kept
     residual_recovery         (N, k) m/N, additional displacements per unit interface force; with residual_flexibility
+    centrifugal_stiffness     (n, n) kg, what a squared speed (rad/s) adds to the stiffness; None: does not rotate
+    rotation_axis             (3,) unit vector, with rotation_point (3,), m, the axis that it rotates about; or None
+    greatest_speed            rad/s, up to which the basis holds
 
     Raises ReducedModelError.
     """
@@ -103,6 +109,10 @@ class ReducedModel:
     normals: np.ndarray | None = None
     positions: np.ndarray | None = None
     arms: np.ndarray | None = None
+    centrifugal_stiffness: np.ndarray | None = None
+    rotation_axis: np.ndarray | None = None
+    rotation_point: np.ndarray | None = None
+    greatest_speed: float = 0.0
 
     def __post_init__(self) -> None:
         for name, value in _checked(self).items():
@@ -225,6 +235,7 @@ class ReducedModel:
     def projected(self, basis: np.ndarray, **changes: Any) -> ReducedModel:
         """Return the Ritz model in the coordinates y of q = basis @ y, basis (n, m), with `changes` of its fields."""
         mass, stiffness = (symmetric_part(basis.T @ matrix @ basis) for matrix in (self.mass, self.stiffness))
+        added = self.centrifugal_stiffness
         if self.damping_ratio is None:
             damping = symmetric_part(basis.T @ self.damping @ basis)
         else:
@@ -235,10 +246,36 @@ class ReducedModel:
             "stiffness": stiffness,
             "selection": self.selection @ basis,
             "base_load": basis.T @ self.base_load,
+            "centrifugal_stiffness": None if added is None else symmetric_part(basis.T @ added @ basis),
             "output_rows": None if self.output_rows is None else self.output_rows @ basis,
             "recovery": None if self.recovery is None else self.recovery @ basis,
         }
         return replace(self, **(values | changes))
+
+    def at_speed(self, speed: float) -> ReducedModel:
+        """Return the model as it vibrates while it rotates at a constant speed, rad/s: K + speed^2 K1.
+
+        A damping ratio holds for the modes at that speed. Raises ReducedModelError for a model that does not rotate, a
+        speed beyond those of its basis, and one at which the structure is unstable.
+        """
+        if speed == 0.0:
+            return self
+        if self.centrifugal_stiffness is None:
+            raise ReducedModelError(
+                "the model does not rotate (it has no centrifugal_stiffness); give its case a [rotation] table and "
+                "reduce again"
+            )
+        if not 0.0 < speed <= self.greatest_speed * (1.0 + 1e-12):
+            raise ReducedModelError(
+                f"speed: the basis holds from 0 to {self.greatest_speed:.6g} rad/s, not at {speed:.6g}; reduce again"
+            )
+        stiffness = self.stiffness + speed**2 * self.centrifugal_stiffness
+        if spectrum(self.mass, stiffness)[0][0] <= 0.0:
+            raise ReducedModelError(f"speed: at {speed:.6g} rad/s the structure is unstable: lower the speed")
+        changes = {"stiffness": stiffness, "centrifugal_stiffness": None, "greatest_speed": 0.0}
+        if self.damping_ratio is not None:
+            changes["damping"] = modal_damping(self.mass, stiffness, self.damping_ratio)
+        return replace(self, **changes)
 
     def with_masses(self, masses: Iterable[tuple[str, float]]) -> ReducedModel:
         """Return the model with masses (kg) fixed to interface coordinates, such as bodies glued to their cavities.
@@ -361,6 +398,8 @@ def _save(model: ReducedModel, path: str | os.PathLike[str]) -> None:
     }
     if model.damping_ratio is not None:
         attributes["damping_ratio"] = model.damping_ratio
+    if model.greatest_speed:
+        attributes["greatest_speed"] = model.greatest_speed
     store.save(path, _KIND, variables, attributes)
 
 
@@ -382,5 +421,6 @@ def _fields(path: str | os.PathLike[str]) -> dict[str, Any]:
         damping_ratio=attributes.get("damping_ratio"),
         fixed_interface_modes=attributes["fixed_interface_modes"],
         free_modes=attributes.get("free_modes", 0),
+        greatest_speed=attributes.get("greatest_speed", 0.0),
         provenance=json.loads(attributes["provenance"]),
     )

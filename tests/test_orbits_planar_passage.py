@@ -124,7 +124,8 @@ def directions(found, x):
 def difference(found, x, direction, size):
     """The derivative along a direction by differences of several steps, and how far those are apart.
 
-    size: largest entry of the derivative, by which round-off on the way grows. None where the engine does not reach the end from a neighbour.
+    size: largest entry of the derivative, by which round-off on the way grows. None where the engine does not reach the
+    end from a neighbour.
     """
     best = None
     for h in (1e-3, 1e-4, 1e-5, 1e-6):

@@ -206,7 +206,7 @@ def _begin(scene: Scene, index: int, state: RestartState, periods: int, earlier:
     share, lift = _TILTS[index], _LIFT
     if abs(share) == _SMALL:
         play = min(cavity.play for cavity in scene.cavity if cavity.play is not None)
-        fallen = scene.gravity.acceleration / 2 * (_FALL / scene.excitation.frequency * (index + 1) / len(_TILTS)) ** 2
+        fallen = scene.gravity.acceleration / 2 * (_FALL / scene.frequency * (index + 1) / len(_TILTS)) ** 2
         lift = min(max(fallen / play, _BARELY), _LIFT)
     blocks = _watched(_changed(scene, {"shape": "block"}), periods)
     run = run_of(blocks, start=_tilted(scene, state, share, lift))

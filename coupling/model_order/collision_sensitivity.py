@@ -45,7 +45,9 @@ def sensitivity(
     for frequency in frequencies:
         driven = replace(
             scene,
-            excitation=replace(scene.excitation, frequency=frequency, resonance_near=scene.excitation.resonance_range),
+            excitation=replace(
+                scene.excitation, frequency=frequency, engine_order=None, resonance_near=scene.resonance_range
+            ),
         )
         as_it_is = _amplitude(driven, modes, growth - 1.0, spring)
         less = abs(_amplitude(driven, modes, weaker - 1.0, spring) - as_it_is) / (1.0 - weaker / growth)

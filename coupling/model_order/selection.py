@@ -193,7 +193,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     for label in labels:
         if label not in model.interface:
             raise InputError(f"structure: no interface label '{label}'; it has {', '.join(model.interface)}")
-    driven = [scene.excitation.frequency * order for scene in scenes for order in scene.excitation.shares]
+    driven = [scene.frequency * order for scene in scenes for order in scene.excitation.shares]
     frequencies = frequency_grid(model, min(driven), max(driven))
 
     def collisions(smaller: ReducedModel) -> list[Collision]:

@@ -44,7 +44,7 @@ def orbit_history(period_map: PeriodMap, state: np.ndarray) -> OrbitHistory:
     impacts = [event for event in response.event_list if event.kind == "impact"]
     moments = np.array([event.time for event in impacts])
     # the orbit ends where it began
-    time = np.append(response.time, periods / scene.excitation.frequency)
+    time = np.append(response.time, periods / scene.frequency)
     displacement, slip = (
         np.concatenate([each, each[:1]]) for each in (response.displacement, response.body_displacement)
     )

@@ -152,7 +152,7 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
             extent["in_plane"] = run.plane.samples(records.samples[: done * samples, 0])
     return Response(
         status=status,
-        frequency=scene.excitation.frequency,
+        frequency=scene.frequency,
         amplitude_max=float(peaks.max(initial=0.0)),
         amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
         amplitude_mean_confidence=mean_confidence(peaks),

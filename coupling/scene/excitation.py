@@ -35,6 +35,8 @@ class Harmonic:
 class Excitation:
     """Periodic excitation at `frequency` (Hz): one of force (N), base_acceleration (m/s^2), resonance_amplitude (m).
 
+    engine_order: in place of the frequency, periods a revolution, so that the frequency follows the speed
+    (Scene.frequency).
     resonance_amplitude is the displacement to which the force brings a resonance of the structure without bodies: of a
     model with several, the one that responds most within `resonance_near`, a frequency or [lowest, highest] (Hz);
     default: the excitation's frequency, or the range over which it is swept.
@@ -44,7 +46,8 @@ class Excitation:
     waveform: another signal over the period in place of the sines, by a class of other code (scene.waveform).
     """
 
-    frequency: Positive
+    frequency: Positive | None = None
+    engine_order: Positive | None = None
     force: NonNegative | None = None
     base_acceleration: NonNegative | None = None
     resonance_amplitude: Positive | None = None
@@ -54,11 +57,13 @@ class Excitation:
     waveform: AnyWaveform | None = None
 
     def __post_init__(self) -> None:
+        if (self.frequency is None) == (self.engine_order is None):
+            raise ValueError("give one of frequency (Hz) and engine_order (periods a revolution)")
         given = [self.force, self.base_acceleration, self.resonance_amplitude]
         if sum(value is not None for value in given) > 1:
             raise ValueError("give at most one of force, base_acceleration and resonance_amplitude")
-        low, high = self.resonance_range
-        if low > high:
+        if isinstance(self.resonance_near, tuple) and self.resonance_near[0] > self.resonance_near[1]:
+            low, high = self.resonance_near
             raise ValueError(f"resonance_near: expected [lowest, highest], not [{low:g}, {high:g}]")
         orders = [harmonic.order for harmonic in self.harmonic]
         for index, order in enumerate(orders):
@@ -66,12 +71,6 @@ class Excitation:
                 raise ValueError(f"harmonic[{index}].order: {order} is given twice; orders must differ")
         if self.waveform is not None and self.harmonic:
             raise ValueError("give one of harmonic and waveform")
-
-    @property
-    def resonance_range(self) -> tuple[float, float]:
-        """Lowest and highest frequency, Hz, near which the resonance of resonance_amplitude is sought."""
-        near = self.frequency if self.resonance_near is None else self.resonance_near
-        return near if isinstance(near, tuple) else (near, near)
 
     @property
     def shares(self) -> dict[int, complex]:

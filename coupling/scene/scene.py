@@ -20,6 +20,7 @@ from vanedamp.coupling.scene.contact_laws.registry import Contact
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
+from vanedamp.coupling.scene.rotation import Rotation
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
 from vanedamp.files.toml_input import (
@@ -107,6 +108,7 @@ class Scene:
     stop: tuple[Stop, ...] = ()
     initial: Initial = field(default_factory=Initial)
     gravity: Gravity = field(default_factory=Gravity)
+    rotation: Rotation | None = None
     contact: Contact = field(default_factory=Newton)
     time: Time = field(default_factory=Time)
     solver: Solver = field(default_factory=partial(options_of, {}))
@@ -132,7 +134,28 @@ class Scene:
             self._check_row(cavity)
         if self.planar:
             self._check_plane()
+        if self.excitation.engine_order is not None and not self.speed:
+            raise ValueError("excitation.engine_order: its frequency follows the speed; give [rotation] a speed or rpm")
         self._check_structure()
+
+    @property
+    def speed(self) -> float:
+        """Speed of rotation, rad/s."""
+        return 0.0 if self.rotation is None else self.rotation.omega
+
+    @property
+    def frequency(self) -> float:
+        """Frequency of the excitation, Hz: its own, or that of its engine order."""
+        if self.excitation.engine_order is not None:
+            return self.excitation.engine_order * self.speed / (2 * math.pi)
+        assert self.excitation.frequency is not None
+        return self.excitation.frequency
+
+    @property
+    def resonance_range(self) -> tuple[float, float]:
+        """Lowest and highest frequency, Hz, near which the resonance of resonance_amplitude is sought."""
+        near = self.excitation.resonance_near or self.frequency
+        return near if isinstance(near, tuple) else (near, near)
 
     @property
     def planar(self) -> bool:

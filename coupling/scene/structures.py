@@ -21,24 +21,37 @@ class Prescribed:
 
 @dataclass(frozen=True, config=STRICT)
 class Rigid:
-    """One mode: mass (kg) on a spring (N/m) with viscous damping (ratio, or N s/m)."""
+    """One mode: mass (kg) on a spring (N/m) with viscous damping (ratio, or N s/m).
+
+    centrifugal_stiffness: kg, N/m a squared speed, which the spring gains by rotation (Southwell's coefficient times
+    the mass); below zero where spin softening prevails.
+    """
 
     model: Literal["rigid"]
     mass: Positive
     stiffness: Positive
     damping_ratio: NonNegative | None = None
     damping: NonNegative | None = None
+    centrifugal_stiffness: Real = 0.0
 
     def __post_init__(self) -> None:
         if (self.damping_ratio is None) == (self.damping is None):
             raise ValueError("give one of damping_ratio and damping")
 
+    def stiffness_at(self, speed: float) -> float:
+        """Return the stiffness, N/m, at a speed of rotation, rad/s."""
+        return self.stiffness + speed**2 * self.centrifugal_stiffness
+
     @property
     def viscous(self) -> float:
-        """Viscous damping, N s/m."""
+        """Viscous damping at standstill, N s/m."""
+        return self.viscous_at(0.0)
+
+    def viscous_at(self, speed: float) -> float:
+        """Return the viscous damping, N s/m, at a speed of rotation, rad/s."""
         if self.damping is not None:
             return self.damping
-        return 2 * (self.damping_ratio or 0.0) * math.sqrt(self.mass * self.stiffness)
+        return 2 * (self.damping_ratio or 0.0) * math.sqrt(self.mass * self.stiffness_at(speed))
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -150,7 +150,7 @@ def _linear(scene: Scene) -> list[float]:
     """Return the amplitude without bodies, and with every body glued to its cavity's floor, m; nan if unknown."""
     if scene.excitation.signal is not None:
         return [np.nan, np.nan]
-    frequency = np.array([scene.excitation.frequency])
+    frequency = np.array([scene.frequency])
     return [float(response.amplitude(frequency)[0]) for response in linear_responses(scene)]
 
 

@@ -38,7 +38,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     Raises InputError for an unknown label or an unusable model.
     """
     basis = basis or basis_of(scene)
-    omega, n, shares = 2 * np.pi * scene.excitation.frequency, len(basis.stiffness), scene.excitation.shares
+    omega, n, shares = 2 * np.pi * scene.frequency, len(basis.stiffness), scene.excitation.shares
     frequency, share = omega * np.array(list(shares)), np.array(list(shares.values()))[:, None]
     check_directions(scene, basis)
     at = forced_label(scene)
@@ -83,7 +83,7 @@ def base_acceleration(scene: Scene, basis: ModalBasis) -> np.ndarray:
     excitation, direction = scene.excitation, basis.directions[forced_label(scene)]
     share = np.array(list(excitation.shares.values()))[:, None]
     if isinstance(scene.structure, Prescribed):
-        frequency = 2 * np.pi * excitation.frequency * np.array(list(excitation.shares))[:, None]
+        frequency = 2 * np.pi * scene.frequency * np.array(list(excitation.shares))[:, None]
         return np.asarray(-(frequency**2) * (share * -1j * scene.structure.displacement_amplitude) * direction)
     return np.asarray(share * (excitation.base_acceleration or 0.0) * -1j * direction)
 

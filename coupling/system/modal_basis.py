@@ -78,20 +78,25 @@ def basis_of(scene: Scene) -> ModalBasis:
     """Return the modes of a scene's structure. Raises InputError for an unusable model."""
     structure = scene.structure
     if isinstance(structure, Rigid):
-        root = np.sqrt(structure.mass)
+        root, stiffness = np.sqrt(structure.mass), structure.stiffness_at(scene.speed)
+        if not stiffness > 0.0:
+            raise InputError(
+                f"rotation: at {scene.speed:.6g} rad/s the stiffness of the structure is {stiffness:.4g} N/m: it is "
+                f"unstable from {np.sqrt(-structure.stiffness / structure.centrifugal_stiffness):.6g} rad/s on"
+            )
         return ModalBasis(
-            frozen([structure.stiffness / structure.mass]), frozen([[structure.viscous / structure.mass]]),
+            frozen([stiffness / structure.mass]), frozen([[structure.viscous_at(scene.speed) / structure.mass]]),
             frozen([root * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {},
         )  # fmt: skip
     if isinstance(structure, Prescribed):
         none = np.zeros(0)
         return ModalBasis(none, np.zeros((0, 0)), np.zeros((0, 3)), {"structure": none}, {"structure": _AXIS}, {})
-    return _rom_basis(structure, file_stamp(structure.file))
+    return _rom_basis(structure, scene.speed, file_stamp(structure.file))
 
 
 @lru_cache(maxsize=8)
-def _rom_basis(structure: Rom, _stamp: int) -> ModalBasis:
-    return modal_basis(reduced_model(structure))
+def _rom_basis(structure: Rom, speed: float, _stamp: int) -> ModalBasis:
+    return modal_basis(reduced_model(structure, speed))
 
 
 def modal_basis(model: ReducedModel) -> ModalBasis:

@@ -64,7 +64,7 @@ def _chosen(scene: Scene, basis: ModalBasis, response: np.ndarray) -> Resonance:
             "excitation.resonance_amplitude: an undamped resonance has no amplitude; give damping or force"
         )
     # each mode at the frequency of the range that is nearest to its own
-    low, high = (2 * np.pi * frequency for frequency in scene.excitation.resonance_range)
+    low, high = (2 * np.pi * frequency for frequency in scene.resonance_range)
     omega = np.clip(np.sqrt(basis.stiffness), low, high)
     dynamic = basis.stiffness - omega**2 + 1j * omega * np.diag(basis.damping)
     mode = int(np.argmax(response**2 / np.abs(dynamic)))

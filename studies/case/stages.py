@@ -25,6 +25,7 @@ from vanedamp.modal.mesh_import import convert
 from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import ParticipationError, effective_masses, first_bending
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
+from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.stress import HotSpot, hot_spot
 from vanedamp.modal.units import doubts
 from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
@@ -50,11 +51,15 @@ _START, _MOST = 16, 64
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """A case with its finite elements: the solid on its mesh, and the matrices."""
+    """A case with its finite elements: the solid on its mesh, and the matrices.
+
+    rotating: those of a case that rotates, of which `matrices` are the ones at its speed.
+    """
 
     case: Case
     solid: Solid
     matrices: SystemMatrices
+    rotating: RotatingMatrices | None = None
 
 
 def assemble(case: Case) -> Structure:

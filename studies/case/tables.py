@@ -27,6 +27,7 @@ from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.modal.units import absurdity
 from vanedamp.studies.case.calibration_tables import CalibrationTable
+from vanedamp.studies.case.rotation_tables import RotationTable
 
 if TYPE_CHECKING:
     from vanedamp.modal.elasticity import ElasticSupport, Material
@@ -271,6 +272,7 @@ class Case:
     modes: ModesTable = field(default_factory=ModesTable)
     interface: dict[str, InterfaceTable] = field(default_factory=dict)
     calibration: CalibrationTable | None = None
+    rotation: RotationTable | None = None
 
     def __post_init__(self) -> None:
         given = {table.damping_ratio for table in self.material.values()} - {None}

@@ -153,7 +153,7 @@ def motion_of(
 
     time: (t,) s; displacement: (t,) m; along: (t, b) m in the cavity; impacts: time (s) and place as of an event.
     """
-    period = 1.0 / scene.excitation.frequency
+    period = 1.0 / scene.frequency
     sampled = round(period / (time[1] - time[0])) if len(time) > 1 else 1
     stride = -(-sampled // _MOST_FRAMES)
     frames = slice(max(len(time) // sampled - _PERIODS, 0) * sampled, None, stride)

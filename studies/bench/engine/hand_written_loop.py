@@ -49,7 +49,7 @@ class ImpactOscillator(NamedTuple):
         assert isinstance(structure, Rigid) and damper.friction == 0 and along == 0 and not scene.excitation.harmonic
         return cls(
             structure.mass, structure.viscous, structure.stiffness, excitation_force(scene),
-            2 * math.pi * scene.excitation.frequency, damper.mass, cavity.gap, damper.restitution,
+            2 * math.pi * scene.frequency, damper.mass, cavity.gap, damper.restitution,
             scene.initial.displacement, scene.initial.velocity, damper.position, damper.velocity,
         )  # fmt: skip
 

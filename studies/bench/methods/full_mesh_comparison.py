@@ -61,7 +61,7 @@ def ladder(folder: Path, counts: tuple[int, ...], rounds: int, rng: np.random.Ge
     }
     best = peaks[counts[-1]]
     errors = [float(np.abs(peak / best - 1).max()) for peak in peaks.values()]
-    full = explicit_run(*cluster.elements(), finest, 2 * math.pi * finest.excitation.frequency, _FIRST)
+    full = explicit_run(*cluster.elements(), finest, 2 * math.pi * finest.frequency, _FIRST)
     # the least number of modes from which on all models are good enough
     enough = counts[max((i + 1 for i, error in enumerate(errors) if error > _GOOD), default=0)]
     per_period = full.seconds_per_step * full.steps
@@ -119,7 +119,7 @@ def _amplitude(scene: Scene) -> float:
 
 def _peak_of(scene: Scene, fixed: bool) -> float:
     """Return the frequency of the first resonance, Hz, by a fine grid around the model's own."""
-    grid = scene.excitation.frequency * np.linspace(0.93, 1.03, 20_001)
+    grid = scene.frequency * np.linspace(0.93, 1.03, 20_001)
     return float(grid[np.abs(receptance(scene, grid, fixed)).argmax()])
 
 

@@ -1,0 +1,29 @@
+"""Rotation of a scene: everything stands in a frame that turns at a constant speed."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic.dataclasses import dataclass
+
+from vanedamp.files.toml_input import STRICT, NonNegative
+
+
+@dataclass(frozen=True, config=STRICT)
+class Rotation:
+    """Speed of the frame that structure and bodies turn with: `speed` (rad/s) or `rpm` (revolutions a minute).
+
+    The axis is that of the reduced model; a rigid structure gives a radius for each of its cavities instead.
+    """
+
+    speed: NonNegative | None = None
+    rpm: NonNegative | None = None
+
+    def __post_init__(self) -> None:
+        if (self.speed is None) == (self.rpm is None):
+            raise ValueError("give one of speed (rad/s) and rpm")
+
+    @property
+    def omega(self) -> float:
+        """Speed, rad/s."""
+        return 2 * math.pi / 60 * self.rpm if self.rpm is not None else (self.speed or 0.0)
