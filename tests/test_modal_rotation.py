@@ -212,7 +212,7 @@ def test_modal_command_at_a_speed(tmp_path, capsys):
         (
             "[rotation]\naxis = [1, 0, 0]\nrpm = 10.0\n"
             '[calibration.tune]\nvary = ["material.block"]\nfrequencies = [16.0]\n',
-            "calibration.tune: takes frequencies measured at standstill; leave the speed out",
+            "calibration.tune: takes frequencies measured at standstill and without [temperature]; leave them out",
         ),
     ],
 )
