@@ -149,7 +149,7 @@ def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
     # the energy is linear in the share: past the first unstable one there is no stable one
     low, high = 0.0, 1.0
     while high - low > _SHARE_DIGITS * high:
-        middle = 0.5 * (low + high)
+        middle = 0.5 * (low + high) if low else 0.1 * high
         low, high = (low, middle) if unstable(middle) else (middle, high)
     return low
 

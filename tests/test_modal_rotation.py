@@ -205,6 +205,9 @@ def test_modal_command_at_a_speed(tmp_path, capsys):
     values, attributes = load(tmp_path / "m.h5", "modes")
     assert attributes["speed"] == 50.0
     assert values["gyroscopic_shape_real"].shape == values["shape"].shape
+    assert main(["report", str(tmp_path / "m.h5"), "-o", str(tmp_path / "report.html")]) == 0
+    page = (tmp_path / "report.html").read_text()
+    assert "at 50 rad/s without the gyroscopic coupling" in page and "whirl: 1 with the rotation" in page
 
 
 @pytest.mark.parametrize(
