@@ -17,7 +17,10 @@ from vanedamp.modal.algebra import affine_fields, leading_sign, ritz_values
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.petsc import Factorization, SolverError
 
-__all__ = ["Factorization", "Modes", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes"]
+__all__ = [
+    "Factorization", "Modes", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes",
+    "stable_share", "static_shape",
+]  # fmt: skip
 
 _KIND = "modes"
 # of the lowest straining eigenvalue: below every elastic mode, far enough from the rigid ones to factorise safely
@@ -27,6 +30,8 @@ _SPARE = 3
 _GAP = 1e-6
 # more modes than this are found faster slice by slice
 _SLICE = 50
+# of a share of stiffness that is stable
+_SHARE_DIGITS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +133,28 @@ def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
     return _Pencil(*(m[free][:, free] for m in (matrices.stiffness, matrices.mass))).below(_eigenvalue(frequency_hz))
 
 
+def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
+    """Return the largest share (0 to 1) of a stiffness (N, N) that leaves the structure stable when it is added.
+
+    Stable: the free stiffness is positive definite, as it is without the addition. To three digits below 1.
+    """
+    free = matrices.free
+    given, added = matrices.stiffness[free][:, free], added[free][:, free]
+
+    def unstable(share: float) -> bool:
+        return petsc.negative_eigenvalues(sparse.csr_array(given + share * added)) > 0
+
+    if not unstable(1.0):
+        return 1.0
+    # the energy is linear in the share: past the first unstable one, such as that of a single DOF, none is stable
+    softer = added.diagonal() < 0.0
+    low, high = 0.0, float(np.min(-given.diagonal()[softer] / added.diagonal()[softer], initial=1.0))
+    while high - low > _SHARE_DIGITS * high:
+        middle = 0.5 * (low + high) if low else 0.1 * high
+        low, high = (low, middle) if unstable(middle) else (middle, high)
+    return low
+
+
 def factorize(matrix: sparse.csr_array) -> Factorization:
     """Factorise a regular symmetric matrix, such as the stiffness of the free DOFs (MUMPS, LDL^T).
 
@@ -135,6 +162,14 @@ def factorize(matrix: sparse.csr_array) -> Factorization:
     frees it. Raises SolverError for a singular matrix.
     """
     return Factorization(matrix)
+
+
+def static_shape(matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
+    """Return the displacements (N,), m, under a static load (N,), N. Raises SolverError if the supports do not hold."""
+    free, shape = matrices.free, np.zeros(matrices.size)
+    with factorize(matrices.stiffness[free][:, free]) as factors:
+        shape[free] = factors.solve(load[free])
+    return shape
 
 
 class _Pencil(NamedTuple):

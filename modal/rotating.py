@@ -16,7 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from vanedamp.files.errors import VanedampError
+from vanedamp.modal.eigen import stable_share
 from vanedamp.modal.matrices import SystemMatrices
+
+
+class UnstableError(VanedampError):
+    """A structure that leaves its equilibrium, heated or at a speed; the message names what it bears."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +44,30 @@ class RotatingMatrices:
     point: np.ndarray
 
     def at(self, speed: float) -> SystemMatrices:
-        """Return the matrices at a speed, rad/s, without the gyroscopic coupling."""
-        stiffness = self.standing.stiffness + speed**2 * self.centrifugal_stiffness
+        """Return the matrices at a speed, rad/s, without the gyroscopic coupling.
+
+        Raises UnstableError where their stiffness is not positive definite. Gyroscopic forces might still hold the
+        structure there, but not together with its own damping, however little (Thomson and Tait).
+        """
+        added = speed**2 * self.centrifugal_stiffness
+        share = stable_share(self.standing, added)
+        if share < 1.0:
+            raise UnstableError(
+                f"speed: at {speed:.6g} rad/s the structure is unstable, since the spin softening outweighs its "
+                f"stiffness above {np.sqrt(share) * speed:.4g} rad/s; stay below it"
+            )
         provenance = dict(self.standing.provenance) | {"speed": speed}
-        return replace(self.standing, stiffness=stiffness, provenance=provenance)
+        return replace(self.standing, stiffness=self.standing.stiffness + added, provenance=provenance)
+
+
+def nodal_product(mass: sparse.csr_array, matrix: np.ndarray) -> sparse.csr_array:
+    """Return the matrix of the integral of rho (A u) . v, A (3, 3), from a solid's mass, that of A = 1.
+
+    Each component of a solid has the same inertia, so that its mass is one of the nodes times the unit matrix.
+    """
+    return sparse.csr_array(sparse.kron(mass[::3, ::3], matrix, format="csr"))
+
+
+def cross_matrix(axis: np.ndarray) -> np.ndarray:
+    """Return the (3, 3) matrix of the cross product with an axis, u -> axis x u."""
+    return np.cross(np.eye(3), axis)
