@@ -1,6 +1,7 @@
 """Bodies under centrifugal load: friction and pull by hand, and concave tracks whose frequency follows the speed."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,12 +9,14 @@ from scipy.linalg import eigh
 
 from tests.test_planar_methods import last, run_by
 from tests.tools.planar import run_planar
+from tests.tools.processes import ROOT
 from vanedamp import InputError, ReducedModel, Scene
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.records import FRICTION
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.body_loads import body_loads, load_warnings
+from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.modal_basis import basis_of
 from vanedamp.files.toml_input import validate
 
@@ -219,6 +222,26 @@ def test_gravity_counts_along_the_axis_only(tmp_path):
     pull = [loads_of(scene(**tables, **gravity)).along[0] for gravity in ({}, across, along)]
     assert pull[1] == pytest.approx(pull[0], abs=1e-12)
     assert pull[2] == pytest.approx(pull[0] - 9.81, rel=1e-12)
+
+
+def test_the_self_tuning_damper_of_the_documentation():
+    """Out of reach of its walls it absorbs the engine order at every speed, where a constant spring has one."""
+    rolling = replace(Scene.load(ROOT / "docs" / "examples" / "self_tuning.toml"), sweep={})
+    tables = rolling.replace({"cavity.trough.gap": 0.01}).to_dict()
+    (body,) = tables["damper"]
+    tuned = 2 * math.pi * 6100 / 60
+    sprung = body | {"stiffness": body["mass"] * tuned**2 * (1 + 7 / 5 * 16)}
+    del sprung["track_radius"]
+    for rpm in (5700.0, 6100.0, 6500.0):
+        amplitude = []
+        for used in (body, sprung):
+            made = validate(Scene, tables | {"damper": [used], "rotation": {"rpm": rpm}}, "scene")
+            response = simulate(made)
+            assert response.status is Status.OK
+            undamped = float(linear_responses(made)[0].amplitude(np.array([made.frequency]))[0])
+            amplitude.append(response.amplitude_harmonic / undamped)
+        assert amplitude[0] < 1e-2
+        assert (amplitude[1] < 1e-2) is (rpm == 6100.0)
 
 
 # --- methods
