@@ -90,6 +90,16 @@ def test_a_spring_is_softened_by_the_gradient():
     assert order_of(swinging) == pytest.approx(3.0, rel=1e-9)
 
 
+def test_the_gradient_is_felt_where_the_cavity_has_moved():
+    """Absolute motion y = X sin(omega t) + s obeys y'' = W^2 y - N s/(m rho), from rest in the cavity."""
+    reach, omega, square = 1e-5, 2 * SPEED, SPEED**2 * R / RHO
+    run = run_planar(scene({"track_radius": RHO}, structure=TABLE | {"displacement_amplitude": reach}), 1, samples=8)
+    t, natural = np.arange(8) * math.pi / (4 * omega), math.sqrt(square)
+    forced = (omega**2 + SPEED**2) * reach / (square - omega**2)
+    expected = forced * (np.sin(omega * t) - omega / natural * np.sin(natural * t))
+    np.testing.assert_allclose(run.records.samples[:8, 1], expected, rtol=0, atol=1e-9 * reach)
+
+
 @pytest.mark.parametrize(("share", "slips"), [(0.999, False), (1.001, True)])
 def test_rolling_takes_friction(share, slips):
     """A solid disc that rolls needs a third of what the track brings back, of which friction has mu N."""

@@ -59,7 +59,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     on_structure, on_bodies = made.J[:, :n], made.J[:, n:]
     mass = np.array([damper.mass for damper in scene.damper])
     along = np.reshape([basis.directions[label] for label in made.floors], (-1, 3))
-    accelerated = base @ along.T
+    accelerated, loads = base @ along.T, body_loads(scene, basis)
     bodies = len(mass)
     damping = np.zeros((n + bodies, n + bodies))
     damping[:n, :n] = basis.damping
@@ -67,8 +67,8 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         modes=n, bodies=bodies, friction_rows=made.friction_rows, mass=np.concatenate([np.ones(n), mass]),
         stiffness=np.concatenate([basis.stiffness, np.zeros(bodies)]), damping=damping,
         proportional=bool(np.count_nonzero(basis.damping - np.diag(np.diag(basis.damping))) == 0),
-        load=np.hstack([force, -mass * accelerated]) + 0j,
-        weight=np.concatenate([np.zeros(n), mass * body_loads(scene, basis).along]),
+        load=np.hstack([force, loads.gradient * table - mass * accelerated]) + 0j,
+        weight=np.concatenate([np.zeros(n), mass * loads.along]),
         alike=bool(np.all(accelerated == accelerated[:, :1])),
         response=np.concatenate([response, np.zeros(bodies)]), table=table.ravel(), frequency=frequency,
         omega=omega, period=2 * np.pi / omega, floor=made.floor, J=made.J, rest=made.rest,
