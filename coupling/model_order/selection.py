@@ -25,6 +25,7 @@ from vanedamp.coupling.model_order.collision_sensitivity import sensitivity
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.body_loads import load_warnings
 from vanedamp.coupling.system.reduced_model_file import reduced_model
 from vanedamp.coupling.system.resonance import excitation_force
 from vanedamp.coupling.system.transient import timed
@@ -127,10 +128,10 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
-    """Return the warnings of a scene without open choices: of its method, and of impact laws on several modes."""
+    """Return the warnings of a scene without open choices: of its method, impact laws on several modes, and loads."""
     rubs = any(damper.shape != "slider" and damper.friction > 0.0 for damper in scene.damper)
     warning = getattr(METHODS.part(scene.solver.method), "RUBBING_WARNING", None) if rubs else None
-    return (*([] if warning is None else [f"solver.method: {warning}"]), *_of_impact_laws(scene))
+    return (*([] if warning is None else [f"solver.method: {warning}"]), *_of_impact_laws(scene), *load_warnings(scene))
 
 
 def _of_impact_laws(scene: Scene) -> tuple[str, ...]:

@@ -89,6 +89,12 @@ class Excitation:
         return self.waveform if self.waveform is not None and self.waveform.shares is None else None
 
 
+def pulled(field: np.ndarray, cavity: np.ndarray, normal: np.ndarray | None) -> tuple[float, float]:
+    """Return the parts of a field (3,) along a cavity and across it, as of Gravity.components."""
+    across = np.linalg.norm(np.cross(field, cavity)) if normal is None else -field @ normal
+    return float(field @ cavity), float(across)
+
+
 @dataclass(frozen=True, config=STRICT)
 class Gravity:
     """Gravity, by its angle to all cavities, or by its `direction` in space (of any length), which a reduced model's
@@ -117,8 +123,7 @@ class Gravity:
             along, across = -math.sin(angle), math.cos(angle)
         else:
             down = np.array(self.direction) / np.linalg.norm(self.direction)
-            along = float(down @ cavity)
-            across = float(np.linalg.norm(np.cross(down, cavity)) if normal is None else -down @ normal)
+            along, across = pulled(down, cavity, normal)
         if abs(across) < 1e-15:  # upright is upright
             across = 0.0
         return self.acceleration * along, self.acceleration * across

@@ -27,7 +27,8 @@ class ModalBasis:
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); base: (n, 3) load of an acceleration of the
     base. By interface label, in one order: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), and
     positions (3,), m, where they are known. rotations: labels of angles. residual: (k, k) m/N, flexibility of the
-    interface that the modes lack; None: nothing.
+    interface that the modes lack; None: nothing. rotation_axis, rotation_point: (3,) unit vector, and m, the axis that
+    the structure can rotate about; None: not known.
     """
 
     stiffness: np.ndarray
@@ -39,6 +40,8 @@ class ModalBasis:
     positions: dict[str, np.ndarray] = field(default_factory=dict)
     rotations: frozenset[str] = frozenset()
     residual: np.ndarray | None = None
+    rotation_axis: np.ndarray | None = None
+    rotation_point: np.ndarray | None = None
 
     def across(self, label: str) -> np.ndarray | None:
         """Return the direction (3,) of the motion across beside that of an interface label; None where unknown."""
@@ -131,5 +134,6 @@ def modal_basis(model: ReducedModel) -> ModalBasis:
     arms = np.zeros(len(model.interface)) if model.arms is None else model.arms
     rotations = frozenset(label for label, arm in zip(model.interface, arms, strict=True) if arm > 0.0)
     return ModalBasis(
-        frozen(squares), frozen(damping), base, rows, directions, normals, places, rotations, model.residual_flexibility
+        frozen(squares), frozen(damping), base, rows, directions, normals, places, rotations,
+        model.residual_flexibility, model.rotation_axis, model.rotation_point,
     )  # fmt: skip

@@ -230,7 +230,9 @@ def _check(scene: Scene) -> None:
     if not scene.damper:
         raise InputError("damper: missing; the first one says what the bodies are like")
     if any(damper.planar for damper in scene.damper):
-        raise InputError("damper: the search is for sliders without springs; leave shape, stiffness and dashpot out")
+        raise InputError(
+            "damper: the search is for sliders without springs; leave shape, stiffness, dashpot and track_radius out"
+        )
     if scene.excitation.base_acceleration:
         raise InputError(
             "excitation.base_acceleration: name force or resonance_amplitude, the level that is to be damped"
