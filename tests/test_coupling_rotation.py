@@ -5,8 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from vanedamp import InputError, ReducedModel, Scene
+from vanedamp import InputError, ReducedModel, Scene, simulate
+from vanedamp.coupling.response.restart import at_speed_of
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModelError
 
@@ -54,6 +58,52 @@ def test_a_reduced_model_is_taken_at_the_speed_of_the_scene(tmp_path):
         linear_responses(turning.replace({"rotation.speed": 60.0}))
     with pytest.raises(ReducedModelError, match="does not rotate"):
         model.at_speed(10.0).at_speed(20.0)
+
+
+@pytest.fixture
+def turning_model(tmp_path):
+    """A file of a model of six coordinates whose modes turn into each other as the speed rises."""
+    rng = np.random.default_rng(3)
+    factor, added = rng.standard_normal((2, 6, 6))
+    rows = dict(zip(("tip", "left", "right"), np.eye(6)[:3], strict=True))
+    model = ReducedModel.from_matrices(
+        np.eye(6) + 0.1 * factor @ factor.T, 1e3 * (factor @ factor.T + np.eye(6)), rows, damping_ratio=0.01,
+        centrifugal_stiffness=added @ added.T, rotation_axis=[0.0, 0.0, 1.0], rotation_point=[0.0, 0.0, 0.0],
+        greatest_speed=100.0,
+    )  # fmt: skip
+    model.save(tmp_path / "turning.h5")
+    return model, str(tmp_path / "turning.h5")
+
+
+def test_a_state_stays_where_it_is_when_the_speed_changes(turning_model):
+    model, file = turning_model
+    structure = Rom("rom", file)
+    p = np.random.default_rng(4).standard_normal(6)
+    transfer = modal_transfer(structure, 0.0, 100.0)
+    before, after = model.natural[1], model.at_speed(100.0).natural[1]
+    assert np.abs(transfer - np.eye(6)).max() > 0.1, "the modes do not turn"
+    assert after @ transfer @ p == pytest.approx(before @ p, rel=1e-10, abs=1e-12)
+    fewer = Rom("rom", file, modes=2, natural=True)
+    assert modal_transfer(fewer, 100.0, 100.0) == pytest.approx(np.eye(2), abs=1e-12)
+
+
+def test_a_run_goes_on_at_another_speed_from_where_it_was(turning_model):
+    _, file = turning_model
+    body = {"cavity": "c", "mass": 0.01, "friction": 0.1, "restitution": 0.5}
+    at_first = scene(
+        structure={"model": "rom", "file": file}, excitation={"frequency": 7.0, "force": 1.0, "at": "tip"},
+        cavity=[{"name": "c", "gap": 1e-3, "left": "left", "right": "right", "floor": "tip"}], damper=[body],
+        rotation={"speed": 0.0}, time={"periods": 12, "transient": 2}, contact={"law": "newton"},
+    )  # fmt: skip
+    final = simulate(at_first).final
+    faster = at_first.replace({"rotation.speed": 80.0})
+    start = at_speed_of(faster, final)
+    rows = [assemble(each).of_structure.J for each in (at_first, faster)]
+    displacement = [row @ state.displacement for row, state in zip(rows, (final, start), strict=True)]
+    size = np.abs(displacement[0]).max()
+    assert size > 0.0 and displacement[1] == pytest.approx(displacement[0], rel=1e-10, abs=1e-12 * size)
+    assert simulate(faster, start=final).final.speed == pytest.approx([80.0])
+    assert at_speed_of(faster, start) is start
 
 
 def test_speeds_that_mean_nothing_are_refused():

@@ -19,6 +19,7 @@ from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.orbits.passage import PeriodMap
 from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.coupling.scene.paths import number_at
@@ -38,7 +39,7 @@ def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
     run, or a parameter that is no number of it; an orbit that is not found is a status of the result.
     """
     search = _Search(scene)
-    state = search.start() if start is None else search.map.state_of(start)
+    state = search.start() if start is None else search.map.state_of(at_speed_of(search.first, start))
     return replace(newton.find_orbit(search.map, state), parameter=search.low)
 
 

@@ -10,7 +10,12 @@ import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
-from vanedamp.coupling.system.reduced_model_file import file_stamp, reduced_model
+from vanedamp.coupling.system.reduced_model_file import (
+    coordinates_in_file,
+    file_stamp,
+    mass_in_file,
+    reduced_model,
+)
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.dense_modes import rounding
@@ -94,9 +99,26 @@ def basis_of(scene: Scene) -> ModalBasis:
     return _rom_basis(structure, scene.speed, file_stamp(structure.file))
 
 
-@lru_cache(maxsize=8)
+# a basis is small, and a sweep over speeds comes back to each of them
+@lru_cache(maxsize=256)
 def _rom_basis(structure: Rom, speed: float, _stamp: int) -> ModalBasis:
     return modal_basis(reduced_model(structure, speed))
+
+
+def modal_transfer(structure: Rom, before: float, after: float) -> np.ndarray:
+    """Return the modal coordinates (n, n) at a speed of rotation, rad/s, of each mode at another speed before.
+
+    Phi'^T M Phi: the structure stays where it is if the modes at both speeds span the same motions; else, as natural
+    modes of a smaller number, it goes to the nearest motion that they have (in kinetic energy).
+    """
+    one, other = (_modes_in_file(structure, speed, file_stamp(structure.file)) for speed in (before, after))
+    return other.T @ mass_in_file(structure) @ one
+
+
+@lru_cache(maxsize=256)
+def _modes_in_file(structure: Rom, speed: float, _stamp: int) -> np.ndarray:
+    """Return the real modes (N, n) at a speed in the coordinates of the model's file."""
+    return coordinates_in_file(structure, speed) @ reduced_model(structure, speed).natural[1]
 
 
 def modal_basis(model: ReducedModel) -> ModalBasis:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+
+import numpy as np
 
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
@@ -18,29 +21,50 @@ def file_stamp(file: str) -> int:
     return path.stat().st_mtime_ns if path.is_file() else 0
 
 
-def reduced_model(structure: Rom, speed: float = 0.0) -> ReducedModel:
+def reduced_model(structure: Rom, speed: float) -> ReducedModel:
     """Return the reduced model of a structure at a speed of rotation (rad/s), with its number of modes.
 
     Raises InputError for an open choice, and for a speed that the model does not have.
     """
     if structure.modes == "auto":
         raise InputError('structure.modes: "auto" is still open; model_order.selection.select_model_order chooses')
-    return _restricted(
-        structure.file, file_stamp(structure.file), speed, structure.modes, structure.natural, structure.attached
-    )
+    return _restricted(structure, speed, file_stamp(structure.file))
+
+
+def coordinates_in_file(structure: Rom, speed: float) -> np.ndarray:
+    """Return the coordinates (N, n) of `reduced_model` in those of the model's file, q of the file = these @ q."""
+    whole = _loaded(structure.file, file_stamp(structure.file))
+    # outputs are functionals of the coordinates, which follow these through every change: so do the coordinates
+    own = tuple(str(index) for index in range(whole.size))
+    marked = replace(whole, outputs=own, output_rows=np.eye(whole.size), output_residual=None)
+    rows = _cut(marked.at_speed(speed), structure).output_rows
+    assert rows is not None
+    return rows
+
+
+def mass_in_file(structure: Rom) -> np.ndarray:
+    """Return the mass matrix (N, N) in the coordinates of the model's file, kg."""
+    return _loaded(structure.file, file_stamp(structure.file)).mass
 
 
 @lru_cache(maxsize=8)
-def _restricted(file: str, stamp: int, speed: float, modes: int | None, natural: bool, attached: bool) -> ReducedModel:
+def _restricted(structure: Rom, speed: float, stamp: int) -> ReducedModel:
     try:
-        model = _loaded(file, stamp).at_speed(speed)
+        model = _loaded(structure.file, stamp).at_speed(speed)
     except ReducedModelError as error:
-        raise InputError(f"rotation: {file}: {error}") from None
+        raise InputError(f"rotation: {structure.file}: {error}") from None
+    return _cut(model, structure)
+
+
+def _cut(model: ReducedModel, structure: Rom) -> ReducedModel:
+    """Return a model at its speed with the structure's number of modes."""
+    modes = structure.modes
     if modes is None:
         return model
-    if attached:
+    assert isinstance(modes, int)
+    if structure.attached:
         return with_attachment_modes(model, modes)
-    return massless(model, modes) if natural else truncated(model, modes)
+    return massless(model, modes) if structure.natural else truncated(model, modes)
 
 
 @lru_cache(maxsize=8)
