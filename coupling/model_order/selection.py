@@ -31,7 +31,7 @@ from vanedamp.coupling.system.transient import timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.contact_pulse import Collision, pulse
 from vanedamp.rom.dense_modes import spectrum
-from vanedamp.rom.error_estimate import Choice, Rung, choose, frequency_grid, natural_ladder, rigid_errors
+from vanedamp.rom.error_estimate import Choice, Rung, choose, frequency_grid, natural_ladder, rigid_errors, worst_rungs
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
 
@@ -203,7 +203,7 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
         found.append(_ladders(own, model, frequency_grid(model, min(driven), max(driven)), at, labels))
     rigid = max(ladders.rigid for ladders in found)
     choices = [
-        choose(_worst([ladders.rungs[attached] for ladders in found]), structure.tolerance, rigid)
+        choose(worst_rungs([ladders.rungs[attached] for ladders in found]), structure.tolerance, rigid)
         for attached in (False, True)
     ]
     # the first of equals: natural modes without attachment modes
@@ -242,19 +242,6 @@ def _ladders(
         for attached in (False, True)
     )
     return _Ladders(float(rigid_errors(model, frequencies, at, labels, [at]).max()), (loose, attached))
-
-
-def _worst(ladders: Sequence[list[Rung]]) -> list[Rung]:
-    """Return the largest errors of several ladders by their numbers of modes, of those that all of them have."""
-    by_modes = [{rung.modes: rung for rung in ladder} for ladder in ladders]
-    return [
-        Rung(
-            modes, max(rung.size for rung in rungs), max(rung.receptance for rung in rungs),
-            max(rung.collision for rung in rungs), max(rung.above for rung in rungs), any(r.attached for r in rungs),
-        )
-        for modes in by_modes[0]
-        if len(rungs := [ladder[modes] for ladder in by_modes if modes in ladder]) == len(ladders)
-    ]  # fmt: skip
 
 
 def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
