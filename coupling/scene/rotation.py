@@ -9,6 +9,16 @@ from pydantic.dataclasses import dataclass
 from vanedamp.files.toml_input import STRICT, NonNegative
 
 
+def frequency_of(order: float, speed: float) -> float:
+    """Return the frequency, Hz, of an engine order at a speed, rad/s."""
+    return order * speed / (2 * math.pi)
+
+
+def speed_of(order: float, frequency: float) -> float:
+    """Return the speed, rad/s, at which an engine order has a frequency, Hz."""
+    return 2 * math.pi * frequency / order
+
+
 @dataclass(frozen=True, config=STRICT)
 class Rotation:
     """Speed of the frame that structure and bodies turn with: `speed` (rad/s) or `rpm` (revolutions a minute).

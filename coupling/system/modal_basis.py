@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
+from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom, Structure
 from vanedamp.coupling.system.reduced_model_file import (
     coordinates_in_file,
     file_stamp,
@@ -80,23 +80,27 @@ def interface_row(basis: ModalBasis, label: str, key: str) -> np.ndarray:
 
 
 def basis_of(scene: Scene) -> ModalBasis:
-    """Return the modes of a scene's structure. Raises InputError for an unusable model."""
-    structure = scene.structure
+    """Return the modes of a scene's structure at its speed. Raises InputError for an unusable model."""
+    return structure_basis(scene.structure, scene.speed)
+
+
+def structure_basis(structure: Structure, speed: float) -> ModalBasis:
+    """Return the modes of a structure at a speed of rotation, rad/s. Raises InputError for an unusable model."""
     if isinstance(structure, Rigid):
-        root, stiffness = np.sqrt(structure.mass), structure.stiffness_at(scene.speed)
+        root, stiffness = np.sqrt(structure.mass), structure.stiffness_at(speed)
         if not stiffness > 0.0:
             raise InputError(
-                f"rotation: at {scene.speed:.6g} rad/s the stiffness of the structure is {stiffness:.4g} N/m: it is "
+                f"rotation: at {speed:.6g} rad/s the stiffness of the structure is {stiffness:.4g} N/m: it is "
                 f"unstable from {np.sqrt(-structure.stiffness / structure.centrifugal_stiffness):.6g} rad/s on"
             )
         return ModalBasis(
-            frozen([stiffness / structure.mass]), frozen([[structure.viscous_at(scene.speed) / structure.mass]]),
+            frozen([stiffness / structure.mass]), frozen([[structure.viscous_at(speed) / structure.mass]]),
             frozen([root * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {},
         )  # fmt: skip
     if isinstance(structure, Prescribed):
         none = np.zeros(0)
         return ModalBasis(none, np.zeros((0, 0)), np.zeros((0, 3)), {"structure": none}, {"structure": _AXIS}, {})
-    return _rom_basis(structure, scene.speed, file_stamp(structure.file))
+    return _rom_basis(structure, speed, file_stamp(structure.file))
 
 
 # a basis is small, and a sweep over speeds comes back to each of them
