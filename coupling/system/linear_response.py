@@ -103,6 +103,23 @@ class LinearResponse:
         return np.divide.outer(natural, self.order).ravel(), np.divide.outer(widths, self.order).ravel()
 
 
+def linear_amplitudes(scene: Scene, frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the amplitudes (f,) of `linear_responses`, m, at frequencies (f,), Hz, of the scene's engine order if any.
+
+    Raises InputError as that does.
+    """
+    order = scene.excitation.engine_order
+    if order is None:
+        free, glued = (response.amplitude(frequencies) for response in linear_responses(scene))
+        return free, glued
+    curves = []
+    for frequency in frequencies:
+        turning = replace(scene, rotation=Rotation(speed=speed_of(order, frequency)))
+        curves.append([response.amplitude(np.array([frequency]))[0] for response in linear_responses(turning)])
+    free, glued = np.transpose(curves)
+    return free, glued
+
+
 def linear_peaks(scene: Scene, low: float, high: float) -> tuple[LinearPeak, LinearPeak]:
     """Return the peaks of `linear_responses` from low to high: Hz, or rad/s along the scene's engine order.
 
