@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from vanedamp import InputError, ReducedModel, Scene, Sweep, simulate, sweep
+from vanedamp import InputError, ReducedModel, Scene, Sweep, orbits, simulate, sweep
 from vanedamp.coupling.model_order.choices import with_choices
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.scene.structures import Rom
@@ -223,6 +223,26 @@ def test_a_prescribed_structure_may_turn():
         rotation={"rpm": 600.0},
     )  # fmt: skip
     assert simulate(driven).frequency == pytest.approx(20.0, rel=1e-14)
+
+
+def test_a_branch_of_orbits_over_the_speed(turning_model):
+    """Without contact its amplitude is that of the linear curve along the engine order, at one level."""
+    table = {"parameter": "rotation.speed", "from": 4.6, "to": 5.4, "start": "linear"}
+    apart = scene(
+        excitation={"engine_order": 4, "resonance_amplitude": 1e-3}, orbit=table,
+        cavity=[{"name": "c", "gap": 1.0}], damper=[{"cavity": "c", "mass": 1e-9, "friction": 1e9, "restitution": 0.5}],
+    )  # fmt: skip
+    (branch,) = orbits(apart).branches
+    assert branch.parameter[0] == 4.6 and branch.parameter[-1] == pytest.approx(5.4)
+    k, omega = STIFFNESS + branch.parameter**2 * ADDED, 4 * branch.parameter
+    curve = 1 / np.abs(k - MASS * omega**2 + 2j * 0.01 * np.sqrt(k * MASS) * omega)
+    crossing = STIFFNESS / (MASS * 4**2 - ADDED)
+    force = 1e-3 * 2 * 0.01 * (STIFFNESS + crossing * ADDED)
+    assert branch.amplitude_max == pytest.approx(force * curve, rel=1e-3)  # the level errs by the damping's square
+    with pytest.raises(InputError, match=r"^orbit\.parameter: rotation\.speed turns a reduced model's modes"):
+        orbits(
+            reduced_sweep(turning_model[1], [10.0]).replace({"sweep": {}, "orbit": table | {"from": 10.0, "to": 11.0}})
+        )
 
 
 def test_speeds_that_mean_nothing_are_refused():

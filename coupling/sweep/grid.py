@@ -14,16 +14,13 @@ from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
 from vanedamp.coupling.model_order.choices import NOTHING, Choices, Chosen, choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.scene.paths import assign, axis_values
-from vanedamp.coupling.scene.rotation import frequency_of
+from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.modal_basis import structure_basis
 from vanedamp.files.toml_input import InputError, nearest, validate
 
-FREQUENCY = "excitation.frequency"
-#: axes of the speed of rotation, and what one of their units is, rad/s
-SPEEDS = {"rotation.speed": 1.0, "rotation.rpm": 2 * math.pi / 60}
 _DIRECTION, _ALONG = "continuation.direction", "continuation.along"
 #: values that cannot change from one run to the next: their states would not fit
 _FIXED = ("structure.model", "structure.file", "structure.modes", "structure.natural", "structure.tolerance")
@@ -172,13 +169,11 @@ def resonance_axis(scene: Scene, axes: Iterable[str]) -> tuple[str | None, float
 
     That of the frequency, or of the speed along an engine order; None without.
     """
-    paths, order = list(axes), scene.excitation.engine_order
-    if FREQUENCY in paths:
-        return FREQUENCY, 1.0
-    if order is not None and "excitation.engine_order" not in paths:
-        for path, unit in SPEEDS.items():
-            if path in paths:
-                return path, frequency_of(order, unit)
+    paths = list(axes)
+    order = None if "excitation.engine_order" in paths else scene.excitation.engine_order
+    for path in (FREQUENCY, *SPEEDS):
+        if path in paths and math.isfinite(hertz := hertz_of(path, order)):
+            return path, hertz
     return None, math.nan
 
 

@@ -14,10 +14,10 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.bodies import Damper
 from vanedamp.coupling.scene.paths import Range, axis_values
-from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
+from vanedamp.coupling.scene.rotation import Rotation, hertz_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom
-from vanedamp.coupling.sweep.grid import SPEEDS, Points
+from vanedamp.coupling.sweep.grid import Points
 from vanedamp.coupling.sweep.sweep import tops
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_peaks
@@ -145,8 +145,7 @@ class Optimise:
                 f"optimise.{self.key}: a frequency follows the speed by excitation.engine_order only; name that in "
                 "place of excitation.frequency, or give a band in Hz"
             )
-        unit = SPEEDS["rotation.rpm" if self.key == "rpm" else "rotation.speed"]
-        return frequency_of(order, unit) * self.values
+        return hertz_of("rotation.rpm" if self.key == "rpm" else "rotation.speed", order) * self.values
 
 
 class Design(NamedTuple):

@@ -24,9 +24,9 @@ import tomli_w
 from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
 
+from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rigid, Rom
-from vanedamp.coupling.sweep.grid import FREQUENCY
 from vanedamp.coupling.system.reduced_model_file import reduced_model
 from vanedamp.files.store import load, replacing
 from vanedamp.files.toml_input import STRICT, InputError, Positive, Whole, read_toml, validate

@@ -10,7 +10,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from vanedamp.coupling.sweep.grid import SPEEDS
+from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.files.store import csv_text
 
 COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#7e22ce", "#0e7490", "#a16207", "#be185d", "#475569")

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
-from vanedamp.coupling.sweep.grid import FREQUENCY, SPEEDS, resonance_axis
+from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.files.store import frozen
 from vanedamp.studies.headline import Headline, format_value, headline, reference_of
