@@ -1,5 +1,6 @@
 """Reduced models of structures that rotate: one basis from standstill to the greatest speed."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,17 +8,20 @@ import pytest
 
 from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.reduction_errors import frequency_errors, full_receptance, static_stiffness_error
-from vanedamp.files.toml_input import InputError
+from vanedamp import Scene, simulate
+from vanedamp.coupling.output_histories import histories
+from vanedamp.files.toml_input import InputError, validate
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.modal.elasticity import Material, Solid
 from vanedamp.modal.rotating import UnstableError
 from vanedamp.rom.bases.projection import ReductionError
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
+from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 from vanedamp.rom.rotation import SpeedBases, reduce_rotating
 from vanedamp.rom.truncation import massless, truncated
-from vanedamp.studies.case.stages import assemble, reduction, with_hot_spots
+from vanedamp.studies.case.stages import assemble, interface, reduction, with_hot_spots
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import main
 
@@ -178,6 +182,62 @@ def test_hot_spots_are_those_at_the_speed_of_the_case(tmp_path):
     place = structure.solid.stress_points()[np.argmax(stress)]
     assert spotted.provenance["hot_spots"]["hot1"] == pytest.approx(place)
     assert spotted.at_speed(5000.0).outputs == spotted.outputs
+
+
+def test_stresses_at_a_speed_are_those_of_modal_superposition(tmp_path):
+    """Of a scene that names its speed, against the finite elements' own modes and their stresses there."""
+    speed = 5000.0
+    structure = assemble(Case.load(turning_block(tmp_path, f"max_speed = {speed}")))
+    reduced = with_hot_spots(structure, reduction(structure, 12, keep_recovery=True))
+    replace(reduced, recovery=None, coordinates=None).save(tmp_path / "rom.h5")
+    modes = solve_modes(structure.rotating.at(speed), 24)
+    rows = modes.shapes @ interface(structure.case, structure.matrices).vectors
+    place = np.argmin(np.linalg.norm(structure.solid.stress_points() - reduced.provenance["hot_spots"]["hot1"], axis=1))
+    stresses = np.array([structure.solid.stress_components(shape, [place])[:, 0] for shape in modes.shapes])
+    full = ReducedModel.from_matrices(
+        np.eye(len(modes)), np.diag(modes.angular_frequencies**2), dict(zip(reduced.interface, rows.T, strict=True)),
+        damping_ratio=reduced.damping_ratio,
+    )  # fmt: skip
+    with_stresses(full, {"hot1": stresses.T}).save(tmp_path / "full.h5")
+    driven = {
+        "structure": {"model": "rom", "file": str(tmp_path / "rom.h5")}, "rotation": {"speed": speed},
+        "excitation": {"frequency": 0.99 * modes.frequencies_hz[0], "force": 10.0, "at": "tip"},
+        "time": {"periods": 12, "transient": 0},
+    }  # fmt: skip
+    turning = validate(Scene, driven, "scene")
+    other = turning.replace({"structure.file": str(tmp_path / "full.h5")}).to_dict()
+    del other["rotation"]
+    own, known = (histories(each, ["hot1.xx"], 50).values for each in (turning, validate(Scene, other, "scene")))
+    assert np.abs(known).max() > 1e6
+    assert np.abs(own - known).max() < 0.01 * np.abs(known).max()
+    standing = histories(turning.replace({"rotation.speed": 0.0}), ["hot1.xx"], 50).values
+    assert np.abs(standing - known).max() > 0.1 * np.abs(known).max()
+
+
+def test_a_scene_without_a_speed_is_warned(tmp_path):
+    model = ReducedModel.from_matrices(
+        np.eye(1), np.eye(1), {"tip": [1.0]}, damping_ratio=0.1, centrifugal_stiffness=np.eye(1), greatest_speed=3.0
+    )
+    model.save(tmp_path / "rom.h5")
+    data = {
+        "structure": {"model": "rom", "file": str(tmp_path / "rom.h5")}, "time": {"periods": 2, "transient": 0},
+        "excitation": {"frequency": 0.1, "force": 1.0, "at": "tip"},
+    }  # fmt: skip
+    (told,) = simulate(validate(Scene, data, "scene")).warnings
+    assert told.startswith(
+        "rotation: missing, so that the structure stands still; its model is for speeds up to 3 rad/s"
+    )
+    assert simulate(validate(Scene, data | {"rotation": {"speed": 0.0}}, "scene")).warnings == ()
+
+
+def test_the_report_shows_the_speeds_of_a_model(tmp_path, capsys):
+    path = turning_block(tmp_path)
+    assert main(["reduce", str(path), "-o", str(tmp_path / "rom.h5"), "--modes", "4"]) == 0
+    assert main(["report", str(tmp_path / "rom.h5"), "-o", str(tmp_path / "report.html")]) == 0
+    text = (tmp_path / "report.html").read_text()
+    fastest = ReducedModel.load(tmp_path / "rom.h5")
+    assert "It holds up to\n6283.19 rad/s (basis of the speeds 0, 6283 rad/s: " in text
+    assert f"<td>{fastest.at_speed(fastest.greatest_speed).natural_frequencies_hz[0]:.2f}</td>" in text
 
 
 def test_bad_cases_of_rotation_are_refused_in_one_line(tmp_path):

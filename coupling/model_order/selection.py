@@ -132,7 +132,20 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
     """Return the warnings of a scene without open choices: of its method, and of impact laws on several modes."""
     rubs = any(damper.shape != "slider" and damper.friction > 0.0 for damper in scene.damper)
     warning = getattr(METHODS.part(scene.solver.method), "RUBBING_WARNING", None) if rubs else None
-    return (*([] if warning is None else [f"solver.method: {warning}"]), *_of_impact_laws(scene))
+    return (*([] if warning is None else [f"solver.method: {warning}"]), *_of_rotation(scene), *_of_impact_laws(scene))
+
+
+def _of_rotation(scene: Scene) -> tuple[str, ...]:
+    """Return a warning of a model that is for speeds in a scene that names none."""
+    if scene.rotation is not None or not isinstance(scene.structure, Rom):
+        return ()
+    greatest = reduced_model(replace(scene.structure, modes=None), 0.0).greatest_speed
+    if greatest == 0.0:
+        return ()
+    return (
+        f"rotation: missing, so that the structure stands still; its model is for speeds up to {greatest:.6g} rad/s, "
+        "and speed = 0 says that standstill is meant",
+    )
 
 
 def _of_impact_laws(scene: Scene) -> tuple[str, ...]:
