@@ -25,7 +25,7 @@ from vanedamp.coupling.model_order.collision_sensitivity import sensitivity
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.reduced_model_file import reduced_model
+from vanedamp.coupling.system.reduced_model_file import greatest_speed, reduced_model
 from vanedamp.coupling.system.resonance import excitation_force
 from vanedamp.coupling.system.transient import timed
 from vanedamp.files.toml_input import InputError
@@ -139,7 +139,7 @@ def _of_rotation(scene: Scene) -> tuple[str, ...]:
     """Return a warning of a model that is for speeds in a scene that names none."""
     if scene.rotation is not None or not isinstance(scene.structure, Rom):
         return ()
-    greatest = reduced_model(replace(scene.structure, modes=None), 0.0).greatest_speed
+    greatest = greatest_speed(scene.structure)
     if greatest == 0.0:
         return ()
     return (

@@ -42,6 +42,11 @@ def coordinates_in_file(structure: Rom, speed: float) -> np.ndarray:
     return rows
 
 
+def greatest_speed(structure: Rom) -> float:
+    """Return the speed of rotation, rad/s, up to which the model of a file holds; 0 for one that does not rotate."""
+    return _loaded(structure.file, file_stamp(structure.file)).greatest_speed
+
+
 def mass_in_file(structure: Rom) -> np.ndarray:
     """Return the mass matrix (N, N) in the coordinates of the model's file, kg."""
     return _loaded(structure.file, file_stamp(structure.file)).mass
