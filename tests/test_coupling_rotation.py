@@ -8,6 +8,7 @@ import pytest
 from vanedamp import InputError, ReducedModel, Scene, Sweep, orbits, simulate, sweep
 from vanedamp.coupling.model_order.choices import with_choices
 from vanedamp.coupling.response.restart import at_speed_of
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.system.assembly import assemble
@@ -108,6 +109,8 @@ def test_a_run_goes_on_at_another_speed_from_where_it_was(turning_model):
     assert size > 0.0 and displacement[1] == pytest.approx(displacement[0], rel=1e-10, abs=1e-12 * size)
     assert simulate(faster, start=final).final.speed == pytest.approx([80.0])
     assert at_speed_of(faster, start) is start
+    again = at_speed_of(faster, RestartState.from_list(final.to_list()))
+    assert np.array_equal(again.displacement, start.displacement) and np.array_equal(again.velocity, start.velocity)
 
 
 def along_order(order=4, **changes):
@@ -207,11 +210,17 @@ def test_modes_are_chosen_for_the_slowest_and_the_fastest_points(turning_model):
     assert points.estimate["modes"] >= max(each.estimate["modes"] for each in alone)
 
 
-def test_speeds_of_a_sweep_are_checked_before_its_runs(turning_model):
+def test_speeds_of_a_sweep_are_checked_before_its_runs(turning_model, tmp_path):
     with pytest.raises(InputError, match=r"rotation: .*basis holds from 0 to 100 rad/s, not at 101"):
         grid(reduced_sweep(turning_model[1], [10.0, 101.0]))
     with pytest.raises(InputError, match=r"sweep: at rotation.speed = 0.0: .*engine_order"):
         grid(reduced_sweep(turning_model[1], [0.0, 10.0]))
+    ReducedModel.from_matrices(np.eye(2), np.eye(2), {"tip": [0.0, 1.0]}, damping_ratio=0.01).save(
+        tmp_path / "still.h5"
+    )
+    still = {"model": "rom", "file": str(tmp_path / "still.h5")}
+    with pytest.raises(InputError, match=r"^rotation: .*still.h5: the model does not rotate .* reduce again$"):
+        grid(reduced_sweep(turning_model[1], [10.0]).replace({"structure": still, "cavity": [], "damper": []}))
     softened = {"model": "rigid", "mass": 2.0, "stiffness": 800.0, "damping_ratio": 0.01, "centrifugal_stiffness": -1.0}
     with pytest.raises(InputError, match=r"unstable from 28\.2843 rad/s on"):
         grid(along_order(structure=softened).replace({"sweep": {"rotation.speed": [1.0, 29.0]}}))

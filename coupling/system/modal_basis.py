@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom, Structure
-from vanedamp.coupling.system.reduced_model_file import (
-    coordinates_in_file,
-    file_stamp,
-    mass_in_file,
-    reduced_model,
-)
+from vanedamp.coupling.system.reduced_model_file import file_stamp, restricted
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.dense_modes import rounding
@@ -32,7 +27,8 @@ class ModalBasis:
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); base: (n, 3) load of an acceleration of the
     base. By interface label, in one order: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), and
     positions (3,), m, where they are known. rotations: labels of angles. residual: (k, k) m/N, flexibility of the
-    interface that the modes lack; None: nothing.
+    interface that the modes lack; None: nothing. in_file, inertia: (N, n) shapes in the coordinates of a model's file, and
+    its mass matrix times these; None for structures whose shapes do not change with the speed.
     """
 
     stiffness: np.ndarray
@@ -44,6 +40,8 @@ class ModalBasis:
     positions: dict[str, np.ndarray] = field(default_factory=dict)
     rotations: frozenset[str] = frozenset()
     residual: np.ndarray | None = None
+    in_file: np.ndarray | None = None
+    inertia: np.ndarray | None = None
 
     def across(self, label: str) -> np.ndarray | None:
         """Return the direction (3,) of the motion across beside that of an interface label; None where unknown."""
@@ -106,7 +104,11 @@ def structure_basis(structure: Structure, speed: float) -> ModalBasis:
 # a basis is small, and a sweep over speeds comes back to each of them
 @lru_cache(maxsize=256)
 def _rom_basis(structure: Rom, speed: float, _stamp: int) -> ModalBasis:
-    return modal_basis(reduced_model(structure, speed))
+    found = restricted(structure, speed)
+    basis, shapes = modal_basis(found.model), found.model.natural[1]
+    if found.in_file is None or found.inertia is None:
+        return basis
+    return replace(basis, in_file=frozen(found.in_file @ shapes), inertia=frozen(found.inertia @ shapes))
 
 
 def modal_transfer(structure: Rom, before: float, after: float) -> np.ndarray:
@@ -115,14 +117,9 @@ def modal_transfer(structure: Rom, before: float, after: float) -> np.ndarray:
     Phi'^T M Phi: the structure stays where it is if the modes at both speeds span the same motions; else, as natural
     modes of a smaller number, it goes to the nearest motion that they have (in kinetic energy).
     """
-    one, other = (_modes_in_file(structure, speed, file_stamp(structure.file)) for speed in (before, after))
-    return other.T @ mass_in_file(structure) @ one
-
-
-@lru_cache(maxsize=256)
-def _modes_in_file(structure: Rom, speed: float, _stamp: int) -> np.ndarray:
-    """Return the real modes (N, n) at a speed in the coordinates of the model's file."""
-    return coordinates_in_file(structure, speed) @ reduced_model(structure, speed).natural[1]
+    one, other = structure_basis(structure, before).in_file, structure_basis(structure, after).inertia
+    assert one is not None and other is not None  # a model that does not rotate has no other speed
+    return other.T @ one
 
 
 def modal_basis(model: ReducedModel) -> ModalBasis:
