@@ -27,8 +27,8 @@ class ModalBasis:
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); base: (n, 3) load of an acceleration of the
     base. By interface label, in one order: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), and
     positions (3,), m, where they are known. rotations: labels of angles. residual: (k, k) m/N, flexibility of the
-    interface that the modes lack; None: nothing. in_file, inertia: (N, n) shapes in the coordinates of a model's file, and
-    its mass matrix times these; None for structures whose shapes do not change with the speed.
+    interface that the modes lack; None: nothing. in_file, inertia: (N, n) shapes in the coordinates of a model's file,
+    and its mass matrix times these; None where shapes do not change with the speed.
     """
 
     stiffness: np.ndarray
