@@ -39,7 +39,8 @@ class Excitation:
     (Scene.frequency).
     resonance_amplitude is the displacement to which the force brings a resonance of the structure without bodies: of a
     model with several, the one that responds most within `resonance_near`, a frequency or [lowest, highest] (Hz);
-    default: the excitation's frequency, or the range over which it is swept.
+    default: the excitation's frequency, or the range over which it is swept. With an engine order and a range it is the
+    one that the order's line meets, at the speed where it does.
     `at` is the interface label of force and response on a reduced model; the base moves in its direction.
     harmonic: sines whose sum excites, at multiples of the frequency; that of order 1 has amplitude 1 and phase 0 unless
     it is among them. resonance_amplitude speaks of a sine of order 1 and amplitude 1.

@@ -20,7 +20,7 @@ from vanedamp.coupling.scene.contact_laws.registry import Contact
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
-from vanedamp.coupling.scene.rotation import Rotation
+from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
 from vanedamp.files.toml_input import (
@@ -148,7 +148,7 @@ class Scene:
     def frequency(self) -> float:
         """Frequency of the excitation, Hz: its own, or that of its engine order."""
         if self.excitation.engine_order is not None:
-            return self.excitation.engine_order * self.speed / (2 * math.pi)
+            return frequency_of(self.excitation.engine_order, self.speed)
         assert self.excitation.frequency is not None
         return self.excitation.frequency
 
