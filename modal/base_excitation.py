@@ -9,7 +9,7 @@ import numpy as np
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
-from vanedamp.modal.eigen import Modes, factorize
+from vanedamp.modal.eigen import Modes, static_shape
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
 
 
@@ -70,14 +70,6 @@ def base_response(
         relative = relative - residual[:, None]
     rigid = observed.T @ translation
     return BaseResponse(frozen(omega / (2.0 * np.pi)), frozen(relative, complex), _absolute(rigid, omega, relative))
-
-
-def static_shape(matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
-    """Return the displacements (N,), m, under a static load (N,), N. Raises SolverError if the supports do not hold."""
-    free, shape = matrices.free, np.zeros(matrices.size)
-    with factorize(matrices.stiffness[free][:, free]) as factors:
-        shape[free] = factors.solve(load[free])
-    return shape
 
 
 def _absolute(rigid: np.ndarray, omega: np.ndarray, relative: np.ndarray) -> np.ndarray:

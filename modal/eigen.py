@@ -17,7 +17,10 @@ from vanedamp.modal.algebra import affine_fields, leading_sign, ritz_values
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.petsc import Factorization, SolverError
 
-__all__ = ["Factorization", "Modes", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes"]
+__all__ = [
+    "Factorization", "Modes", "SolverError", "count_below", "factorize", "negative_eigenvalues", "shape_signs",
+    "solve_modes", "static_shape",
+]  # fmt: skip
 
 _KIND = "modes"
 # of the lowest straining eigenvalue: below every elastic mode, far enough from the rigid ones to factorise safely
@@ -128,6 +131,15 @@ def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
     return _Pencil(*(m[free][:, free] for m in (matrices.stiffness, matrices.mass))).below(_eigenvalue(frequency_hz))
 
 
+def negative_eigenvalues(matrices: SystemMatrices) -> int:
+    """Return the number of negative eigenvalues of the free stiffness: of directions in which a structure is unstable.
+
+    The stiffness is regular: that of a structure that is held against every rigid motion.
+    """
+    free = matrices.free
+    return petsc.negative_eigenvalues(matrices.stiffness[free][:, free])
+
+
 def factorize(matrix: sparse.csr_array) -> Factorization:
     """Factorise a regular symmetric matrix, such as the stiffness of the free DOFs (MUMPS, LDL^T).
 
@@ -135,6 +147,14 @@ def factorize(matrix: sparse.csr_array) -> Factorization:
     frees it. Raises SolverError for a singular matrix.
     """
     return Factorization(matrix)
+
+
+def static_shape(matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
+    """Return the displacements (N,), m, under a static load (N,), N. Raises SolverError if the supports do not hold."""
+    free, shape = matrices.free, np.zeros(matrices.size)
+    with factorize(matrices.stiffness[free][:, free]) as factors:
+        shape[free] = factors.solve(load[free])
+    return shape
 
 
 class _Pencil(NamedTuple):

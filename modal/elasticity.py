@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
@@ -14,7 +14,9 @@ from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
-from vanedamp.modal.matrices import Patch, SystemMatrices
+from vanedamp.modal.eigen import SolverError, static_shape
+from vanedamp.modal.matrices import Patch, SystemMatrices, unit_direction
+from vanedamp.modal.rotating import RotatingMatrices, cross_matrix, nodal_product
 
 DEFAULT = "default"
 _COMPONENTS = "xyz"
@@ -141,6 +143,33 @@ class Solid:
             },
         )
 
+    def rotating(self, matrices: SystemMatrices, axis: Sequence[float], point: Sequence[float]) -> RotatingMatrices:
+        """Return what rotation about an axis through a point (m) makes of the matrices at standstill.
+
+        The stress is that of the static solution under the centrifugal load, linear in the squared speed; supports turn
+        with the structure. Raises ElasticityError for a structure that is free to move, MatricesError for an axis of
+        length zero.
+        """
+        direction, origin = unit_direction(axis), np.array(point, dtype=float)
+        softening = nodal_product(matrices.mass, np.eye(3) - np.outer(direction, direction))
+        load = softening @ (matrices.coordinates - origin).ravel()
+        try:
+            displacement = static_shape(matrices, load)
+        except SolverError:
+            raise ElasticityError(
+                "rotation: the structure is not held against every rigid motion, so that the centrifugal load has no "
+                "static solution; clamp a group in [support], or give it springs"
+            ) from None
+        stress = self.stress(fenicsx.field(self.space, displacement))
+        return RotatingMatrices(
+            standing=matrices,
+            centrifugal_stiffness=sparse.csr_array(self._geometric_stiffness(stress) - softening),
+            gyroscopic=nodal_product(matrices.mass, 2.0 * cross_matrix(direction)),
+            load=load,
+            axis=direction,
+            point=origin,
+        )
+
     def stiffness_parts(self) -> dict[str, sparse.csr_array]:
         """Return the parts of the stiffness, (N, N) N/m each: "material.<volume group>" and "support.<facet group>".
 
@@ -190,6 +219,13 @@ class Solid:
     def _material_stiffness(self, measure: Any) -> sparse.csr_array:
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         return fenicsx.matrix(ufl.inner(self.stress(trial), ufl.sym(ufl.grad(test))) * measure)
+
+    def _geometric_stiffness(self, stress: Any) -> sparse.csr_array:
+        """Return the matrix of the integral of sigma_jk u_i,j v_i,k: the stiffness of a stress at rest."""
+        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        # exact for straight tetrahedra; the degree that UFL estimates takes four times as many points in hexahedra
+        measure = ufl.dx(metadata={"quadrature_degree": 2 * self.degree + 1})
+        return fenicsx.matrix(ufl.inner(ufl.grad(trial) * stress, ufl.grad(test)) * measure)
 
     def _support_stiffness(self, name: str) -> sparse.csr_array:
         support, domain = self.elastic[name], self.domain

@@ -16,7 +16,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from vanedamp.files.errors import VanedampError
+from vanedamp.modal.eigen import negative_eigenvalues
 from vanedamp.modal.matrices import SystemMatrices
+
+# of the highest stable speed, relative, in a message
+_SPEED_DIGITS = 1e-3
+
+
+class UnstableError(VanedampError):
+    """A structure that leaves its equilibrium, heated or at a speed; the message names the highest stable speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +47,44 @@ class RotatingMatrices:
     point: np.ndarray
 
     def at(self, speed: float) -> SystemMatrices:
-        """Return the matrices at a speed, rad/s, without the gyroscopic coupling."""
+        """Return the matrices at a speed, rad/s, without the gyroscopic coupling.
+
+        Raises UnstableError where their stiffness is not positive definite. Gyroscopic forces might still hold the
+        structure there, but not together with its own damping, however little (Thomson and Tait).
+        """
+        found = self._at(speed)
+        if negative_eigenvalues(found):
+            raise UnstableError(self._unstable(speed))
+        return found
+
+    def _at(self, speed: float) -> SystemMatrices:
         stiffness = self.standing.stiffness + speed**2 * self.centrifugal_stiffness
         provenance = dict(self.standing.provenance) | {"speed": speed}
         return replace(self.standing, stiffness=stiffness, provenance=provenance)
+
+    def _unstable(self, speed: float) -> str:
+        """Say why there is no motion about the equilibrium at a speed, and up to which one there is."""
+        if negative_eigenvalues(self.standing):
+            return "the structure buckles at standstill, by the stress of its temperature"
+        # the potential energy is linear in the squared speed: past the first unstable one there is no stable one
+        stable, unstable = 0.0, speed
+        while unstable - stable > _SPEED_DIGITS * unstable:
+            middle = 0.5 * (stable + unstable)
+            stable, unstable = (stable, middle) if negative_eigenvalues(self._at(middle)) else (middle, unstable)
+        return (
+            f"speed: at {speed:.6g} rad/s the structure is unstable: the spin softening outweighs its stiffness above "
+            f"{stable:.4g} rad/s; stay below it"
+        )
+
+
+def nodal_product(mass: sparse.csr_array, matrix: np.ndarray) -> sparse.csr_array:
+    """Return the matrix of the integral of rho (A u) . v, A (3, 3), from a solid's mass, that of A = 1.
+
+    Each component of a solid has the same inertia, so that its mass is one of the nodes times the unit matrix.
+    """
+    return sparse.csr_array(sparse.kron(mass[::3, ::3], matrix, format="csr"))
+
+
+def cross_matrix(axis: np.ndarray) -> np.ndarray:
+    """Return the (3, 3) matrix of the cross product with an axis, u -> axis x u."""
+    return np.cross(np.eye(3), -axis)

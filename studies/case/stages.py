@@ -73,7 +73,10 @@ def assemble(case: Case) -> Structure:
         matrices = solid.assemble(case.support.clamped, case.damping_ratio)
     if label is not None:
         _functional(case, matrices, label)
-    return Structure(case, solid, matrices)
+    if case.rotation is None:
+        return Structure(case, solid, matrices)
+    rotating = solid.rotating(matrices, case.rotation.axis, case.rotation.point)
+    return Structure(case, solid, rotating.at(case.rotation.omega), rotating)
 
 
 @contextlib.contextmanager
