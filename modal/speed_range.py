@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, sparse
 
-from vanedamp.modal.algebra import orthonormal
+from vanedamp.modal.algebra import orthogonal, orthonormal, symmetric_part
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.rotating import RotatingMatrices
 
-# of the unit length of a shape: what is left of it in momenta is round-off
-_NO_MOMENTUM = 1e-8
+# shares of the unit length of a shape: what the basis lacks of it for a field more, and momenta that are round-off
+_LACKING, _NO_MOMENTUM = 1e-10, 1e-8
 
 
 class SpeedModes(NamedTuple):
@@ -63,8 +63,8 @@ class SpeedRange:
         # a structure with free motions has a regular matrix, too
         straining = first.angular_frequencies[first.frequencies_hz > 0.0]
         self._shift = float(straining[0] ** 2) if straining.size else 1.0
-        middle = 0.5 * (low**2 + high**2)
-        self._factor = factorize(sparse.csr_array(stiffness + middle * centrifugal + self._shift * mass))
+        self._middle = 0.5 * (low**2 + high**2)
+        self._factor = factorize(sparse.csr_array(stiffness + self._middle * centrifugal + self._shift * mass))
         self._join(high, first)
         self.add(low)
 
@@ -103,8 +103,8 @@ class SpeedRange:
         """Return the estimated relative errors (m,) of the frequencies at a speed.
 
         The error of an eigenvalue is r^T (K - lambda M)^-1 r over the modes that the basis lacks. It is bounded by the
-        residual r in the norm of the inverse of A = K + shift M at the middle of the range, times the largest ratio of
-        the two over those modes; the lowest of them is taken to be the next Ritz value.
+        residual r in the norm of the inverse of A = K + shift M at the middle of the range, times the largest ratios of
+        that to A at the speed, in the basis, and of A to K - lambda M, at the next Ritz value.
         """
         modes = self.modes(speed)
         if self._basis.shape[1] == self._free.size:
@@ -115,6 +115,8 @@ class SpeedRange:
             parts.append(1j * speed * omega * shapes)
         joined = np.vstack(parts)
         residual = np.abs(np.einsum("im,im->m", joined.conj(), self._gram @ joined))
+        middle, here = (self._stiffness(squared) + self._shift * np.eye(len(shapes)) for squared in (self._middle, speed**2))
+        residual /= linalg.eigh(here, middle, eigvals_only=True, subset_by_index=[0, 0])
         beyond = self._ceilings.get(speed)
         ratio = 1.0 if beyond is None else (beyond + self._shift) / np.maximum(beyond - omega**2, 1e-3 * beyond)
         scale = np.maximum(omega, np.sqrt(self._shift))
@@ -125,7 +127,10 @@ class SpeedRange:
 
     def _join(self, speed: float, modes: Modes) -> None:
         self.solved.append(speed)
-        fields = orthonormal(modes.shapes[:, self._free].T, self._operators[2], [self._basis])
+        mass, known = self._operators[2], [self._basis]
+        rest = orthogonal(modes.shapes[:, self._free].T, mass, known)
+        lacking = np.einsum("ij,ij->j", rest, mass @ rest) > _LACKING**2
+        fields = orthonormal(rest[:, lacking], mass, known)
         if not fields.shape[1]:
             return
         self._basis = np.hstack([self._basis, fields])
@@ -139,14 +144,16 @@ class SpeedRange:
         self._ceilings: dict[float, float] = {}
 
     def _ritz(self, speed: float) -> SpeedModes:
-        stiffness = self._small[0] + speed**2 * self._small[1]
-        values, vectors = linalg.eigh(0.5 * (stiffness + stiffness.T))
+        values, vectors = linalg.eigh(self._stiffness(speed**2))
         frequencies = np.sqrt(np.maximum(values, 0.0))
         if self.gyroscopic:
             frequencies, vectors = self._turning(speed, frequencies, vectors)
         if len(frequencies) > self._solved_count:
             self._ceilings[speed] = float(frequencies[self._solved_count] ** 2)
         return SpeedModes(speed, frequencies[: self.count], vectors[:, : self.count])
+
+    def _stiffness(self, squared_speed: float) -> np.ndarray:
+        return symmetric_part(self._small[0] + squared_speed * self._small[1])
 
     def _turning(self, speed: float, still: np.ndarray, modes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return frequencies and complex shapes with the gyroscopic coupling, from the modes without it.
