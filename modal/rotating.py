@@ -87,4 +87,4 @@ def nodal_product(mass: sparse.csr_array, matrix: np.ndarray) -> sparse.csr_arra
 
 def cross_matrix(axis: np.ndarray) -> np.ndarray:
     """Return the (3, 3) matrix of the cross product with an axis, u -> axis x u."""
-    return np.cross(np.eye(3), -axis)
+    return np.cross(np.eye(3), axis)

@@ -1,16 +1,22 @@
 """Structures that rotate: prestressed modes against beam theory, stresses against closed forms."""
 
+import json
+
 import numpy as np
 import pytest
+from scipy import sparse
 
+from vanedamp.files.store import load
 from vanedamp.files.toml_input import InputError
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
-from vanedamp.modal.matrices import MatricesError
-from vanedamp.modal.rotating import UnstableError
+from vanedamp.modal.gyroscopic import gyroscopic_modes
+from vanedamp.modal.matrices import MatricesError, SystemMatrices
+from vanedamp.modal.rotating import RotatingMatrices, UnstableError, cross_matrix
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.case.tables import Case
+from vanedamp.studies.cli import main
 
 YOUNG, DENSITY = 2e11, 8000.0
 LENGTH, SIDE = 1.0, 0.02
@@ -113,3 +119,107 @@ def test_case_at_a_speed(tmp_path):
 def test_case_with_an_axis_of_length_zero(tmp_path):
     with pytest.raises(InputError, match=r"case.toml: rotation.axis: expected three numbers, not all zero"):
         case(tmp_path, "[rotation]\naxis = [0, 0, 0]\nrpm = 100.0\n")
+
+
+def foucault(mass, natural, across=None):
+    """A mass on springs that turn about z: `natural` rad/s along x, `across` along y, 3 natural along z."""
+    stiffness = mass * np.diag([natural, across or natural, 3.0 * natural]) ** 2
+    standing = SystemMatrices(*map(sparse.csr_array, (stiffness, mass * np.eye(3))), np.zeros((1, 3)), [], {}, 0.0)
+    axis, plane = np.array([0.0, 0.0, 1.0]), np.diag([1.0, 1.0, 0.0])
+    gyroscopic = sparse.csr_array(2.0 * mass * cross_matrix(axis))
+    softening = sparse.csr_array(-mass * plane)
+    return RotatingMatrices(standing, softening, gyroscopic, np.zeros(3), axis, np.zeros(3))
+
+
+def test_whirl_of_a_mass_on_springs():
+    """In the frame of the springs the mass of Foucault and Jeffcott whirls forward at w0 - W and backward at w0 + W."""
+    modes = gyroscopic_modes(foucault(2.0, 100.0), 30.0, 3)
+    assert 2 * np.pi * modes.frequencies_hz == pytest.approx([70.0, 130.0, 300.0], rel=1e-12)
+    assert modes.whirl == pytest.approx([1.0, -1.0, 0.0], abs=1e-12)
+    assert modes.shapes[0, 1] / modes.shapes[0, 0] == pytest.approx(-1j, rel=1e-9)
+
+
+def test_whirl_on_springs_of_two_stiffnesses():
+    """omega^4 - (a^2 + b^2 + 2 W^2) omega^2 + (a^2 - W^2) (b^2 - W^2) = 0, the determinant of Q."""
+    a, b, speed = 100.0, 160.0, 70.0
+    modes = gyroscopic_modes(foucault(3.0, a, b), speed, 2)
+    squares = np.roots([1.0, -(a**2 + b**2 + 2 * speed**2), (a**2 - speed**2) * (b**2 - speed**2)])
+    assert 2 * np.pi * modes.frequencies_hz == pytest.approx(np.sqrt(np.sort(squares)), rel=1e-12)
+
+
+def test_whirl_of_a_shaft(beam):
+    """A square beam that spins about itself: each pair of bendings becomes w0 - W and w0 + W, rotary inertia apart."""
+    rotating = beam.rotating(beam.assemble({"root": "xyz"}, 0.0), [1, 0, 0], [0.0, 0.0, 0.5 * SIDE])
+    standing = solve_modes(rotating.standing, 4).angular_frequencies
+    speed = 0.5 * standing[0]
+    modes = gyroscopic_modes(rotating, speed, 4)
+    expected = [standing[0] - speed, standing[0] + speed, standing[2] - speed, standing[2] + speed]
+    assert 2 * np.pi * modes.frequencies_hz == pytest.approx(expected, rel=(SIDE / LENGTH) ** 2)
+    assert modes.whirl == pytest.approx([1, -1, 1, -1], abs=2e-3)
+
+
+def test_gyroscopic_modes_against_the_dense_problem(tmp_path):
+    """A stout skew blade: eigenvalues of the whole first-order system, residuals, and the norm of the shapes."""
+    block = Block(0.1, 0.03, 0.02, divisions=(4, 1, 1))
+    solid = Solid(build(block, tmp_path / "blade.msh"), {"default": Material(YOUNG, 0.3, DENSITY)})
+    rotating = solid.rotating(solid.assemble({"root": "xyz"}, 0.0), [1, 2, 1], [0, 0.01, 0])
+    speed, free = 9000.0, rotating.standing.free
+    modes = gyroscopic_modes(rotating, speed, 5)
+    matrices = (rotating.at(speed).stiffness, rotating.standing.mass, rotating.gyroscopic)
+    stiffness, mass, gyroscopic = (matrix[free][:, free].toarray() for matrix in matrices)
+    lower = -np.linalg.solve(mass, np.hstack([stiffness, speed * gyroscopic]))
+    values = np.linalg.eigvals(np.block([[np.zeros_like(mass), np.eye(free.size)], [lower]])).imag
+    assert 2 * np.pi * modes.frequencies_hz == pytest.approx(np.sort(values[values > 0.0])[:5], rel=1e-8)
+    shapes = modes.shapes[:, free]
+    assert np.einsum("ij,jk,ik->i", shapes.conj(), mass, shapes) == pytest.approx(1.0, rel=1e-9)
+    still = solve_modes(rotating.at(speed), 5).angular_frequencies
+    assert np.abs(2 * np.pi * modes.frequencies_hz / still - 1.0).max() > 0.01
+
+
+def test_gyroscopic_modes_at_standstill_are_the_modes(blade):
+    modes = gyroscopic_modes(blade, 0.0, 4)
+    assert modes.frequencies_hz == pytest.approx(solve_modes(blade.standing, 4).frequencies_hz, rel=1e-7)
+    assert np.abs(modes.shapes.imag).max() < 1e-5 * np.abs(modes.shapes).max()
+
+
+def test_modal_command_at_a_speed(tmp_path, capsys):
+    """The speed stands above the modes, the modes with the gyroscopic coupling below; all of it in JSON and HDF5."""
+    path = tmp_path / "case.toml"
+    path.write_text(CASE + "[rotation]\naxis = [1, 0, 0]\nspeed = 50.0\ngyroscopic = true\n")
+    assert main(["modal", str(path), "-o", str(tmp_path / "m.h5"), "--json", str(tmp_path / "m.json")]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("at 50 rad/s (477.465 rpm)\n")
+    result = json.loads((tmp_path / "m.json").read_text())
+    first = FLAP[0] * UNIT
+    assert result["speed"] == 50.0
+    assert 2 * np.pi * np.array(result["frequency_hz"]) == pytest.approx(np.sqrt(first**2 - 50.0**2), rel=5e-3)
+    found = result["gyroscopic"]
+    assert 2 * np.pi * np.array(found["frequency_hz"]) == pytest.approx([first - 50.0, first + 50.0], rel=5e-3)
+    assert found["whirl"] == pytest.approx([1.0, -1.0], abs=1e-3)
+    values, attributes = load(tmp_path / "m.h5", "modes")
+    assert attributes["speed"] == 50.0
+    assert values["gyroscopic_shape_real"].shape == values["shape"].shape
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("[rotation]\naxis = [1, 0, 0]\nspeed = 1000.0\n", "speed: at 1000 rad/s the structure is unstable"),
+        (
+            "[rotation]\naxis = [1, 0, 0]\ngyroscopic = true\n[modes]\nmin_frequency = 5.0\nmax_frequency = 50.0\n",
+            "modes.min_frequency: modes with the gyroscopic coupling are the lowest; leave it out",
+        ),
+        (
+            "[rotation]\naxis = [1, 0, 0]\nrpm = 10.0\n"
+            '[calibration.tune]\nvary = ["material.block"]\nfrequencies = [16.0]\n',
+            "calibration.tune: takes frequencies measured at standstill; leave the speed out",
+        ),
+    ],
+)
+def test_cases_that_are_refused(tmp_path, capsys, table, message):
+    path = tmp_path / "case.toml"
+    text = CASE.replace("[modes]\ncount = 2\n", "") if "[modes]" in table else CASE
+    path.write_text(text + table)
+    assert main(["modal", str(path)]) == 2
+    printed = capsys.readouterr().err
+    assert message in printed and printed.count("\n") == 1

@@ -19,6 +19,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.correlation import mode_like
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.elasticity import Solid
+from vanedamp.modal.gyroscopic import GyroscopicModes, gyroscopic_modes
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
 from vanedamp.modal.measurements import read_shapes
 from vanedamp.modal.mesh_import import convert
@@ -150,6 +151,7 @@ class ModalAnalysis:
     hot_spot        where it does; None without
     share           of the fatigue strength
     warnings        what to look at: frequencies that hint at wrong units, and why there is no first bending
+    gyroscopic      as many modes with the gyroscopic coupling, if the case wants them
     """
 
     structure: Structure
@@ -164,6 +166,7 @@ class ModalAnalysis:
     share: float
     warnings: tuple[str, ...]
     wall_time_s: float
+    gyroscopic: GyroscopicModes | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the result as plain data."""
@@ -178,6 +181,14 @@ class ModalAnalysis:
             "warnings": list(self.warnings),
             "wall_time_s": self.wall_time_s,
         }
+        if self.structure.case.rotation is not None:
+            data["speed"] = self.structure.case.rotation.omega
+        if self.gyroscopic is not None:
+            data["gyroscopic"] = {
+                "frequency_hz": self.gyroscopic.frequencies_hz.tolist(),
+                "whirl": self.gyroscopic.whirl.tolist(),
+                "residual": self.gyroscopic.residuals.tolist(),
+            }
         if self.amplitude is not None:
             assert self.hot_spot is not None
             data["fatigue"] = {
@@ -208,8 +219,16 @@ class ModalAnalysis:
             "movable_mass": Variable(self.structure.matrices.movable_mass, ("axis",), "kg"),
             **mesh,
         }
+        if self.gyroscopic is not None:
+            complex_modes = self.gyroscopic
+            variables |= {
+                "gyroscopic_frequency": Variable(complex_modes.frequencies_hz, ("mode",), "Hz"),
+                "gyroscopic_shape_real": Variable(complex_modes.shapes.real, ("mode", "dof"), "kg^-0.5"),
+                "gyroscopic_shape_imaginary": Variable(complex_modes.shapes.imag, ("mode", "dof"), "kg^-0.5"),
+                "whirl": Variable(complex_modes.whirl, ("mode",)),
+            }
         result = self.to_json()
-        kept = ("first_bending", "rigid", "cavity", "fatigue")
+        kept = ("first_bending", "rigid", "cavity", "fatigue", "speed")
         attributes = {name: result[name] for name in kept if result.get(name) not in (None, {})}
         attributes |= {"vtk_cell_type": cell_type, "versions": versions()}
         self.modes.save(path, variables, attributes)
@@ -237,10 +256,18 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
         if strengths:
             spot = hot_spot(structure.solid, modes.shapes[bending], strengths, table.hot_spot)
             amplitude = fatigue_amplitude(modes, bending, functional, spot.stress, spot.strength, table.share)
+    gyroscopic = _gyroscopic(structure, len(modes))
     return ModalAnalysis(
         structure, modes, effective_masses(modes, matrices), bending, rigid, cavities, functional, amplitude, spot,
-        table.share, warnings, time.perf_counter() - started,
+        table.share, warnings, time.perf_counter() - started, gyroscopic,
     )  # fmt: skip
+
+
+def _gyroscopic(structure: Structure, count: int) -> GyroscopicModes | None:
+    rotation, rotating = structure.case.rotation, structure.rotating
+    if rotation is None or rotating is None or not rotation.gyroscopic:
+        return None
+    return gyroscopic_modes(rotating, rotation.omega, count)
 
 
 def _cavities(

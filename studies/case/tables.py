@@ -280,6 +280,10 @@ class Case:
             raise ValueError("material: the damping ratios differ; set the one of the modes in [modes] damping_ratio")
         if self.modes.at is not None and self.modes.at not in self.interface:
             raise ValueError(f"modes.at: no interface '{self.modes.at}'; {_known(self.modes.at, self.interface)}")
+        if self.rotation is not None and self.rotation.gyroscopic and self.modes.min_frequency:
+            raise ValueError("modes.min_frequency: modes with the gyroscopic coupling are the lowest; leave it out")
+        if self.rotation is not None and self.rotation.omega and self.calibration and self.calibration.tune:
+            raise ValueError("calibration.tune: takes frequencies measured at standstill; leave the speed out")
 
     @classmethod
     def load(cls, path: str | Path) -> Case:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from typing import Any
@@ -53,6 +54,8 @@ def _print_summary(result: Mapping[str, Any]) -> None:
     """Print modes, effective masses and the rigid model."""
     from vanedamp.studies.commands.support.messages import print_cavities
 
+    if "speed" in result:
+        print(f"at {result['speed']:.6g} rad/s ({result['speed'] * 30 / math.pi:.6g} rpm)")
     print("mode  frequency/Hz   effective mass x, y, z / kg        residual")
     rows = zip(result["frequency_hz"], result["effective_mass"], result["residual"], strict=True)
     for index, (frequency, masses, residual) in enumerate(rows):
@@ -67,6 +70,12 @@ def _print_summary(result: Mapping[str, Any]) -> None:
             f"damping {rigid['damping']:.4g} N s/m"
         )
         print_cavities(result)
+    if "gyroscopic" in result:
+        found = result["gyroscopic"]
+        print("with the gyroscopic coupling, in the rotating frame (whirl 1: with the rotation, -1: against it):")
+        print("mode  frequency/Hz      whirl   residual")
+        for index, row in enumerate(zip(found["frequency_hz"], found["whirl"], found["residual"], strict=True)):
+            print("{:4}  {:12.2f}   {:8.4f}   {:.1e}".format(index + 1, *row))
     if "fatigue" in result:
         fatigue = result["fatigue"]
         print(f"amplitude at {fatigue['share']:.0%} of the fatigue strength: {fatigue['amplitude']:.4g} m")
