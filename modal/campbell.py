@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy import optimize
 
 from vanedamp.files import store
 from vanedamp.files.errors import VanedampError
@@ -24,7 +23,6 @@ _KIND = "campbell"
 _RPM = 30.0 / np.pi  # 1/min in a rad/s
 # frequencies closer than this multiple of their error are one
 _SAME = 10.0
-_ROOT = 1e-13
 
 
 class CampbellError(VanedampError):
@@ -58,11 +56,11 @@ class Campbell:
 
     speeds          (s,) rad/s, ascending: those asked for and those that following the modes took
     asked           (s,) whether a speed was asked for
-    modes           (m,) numbers of the modes, counted from 0: places at the lowest speed; those that are not known there
-                    have the next numbers
+    modes           (m,) numbers of the modes, counted from 0: their places at the lowest speed; those that are not
+                    among the modes computed there have the next numbers
     frequencies_hz  (m, s) of every mode as its shape is followed; nan where it is not among those computed
-    errors          (s,) largest estimated relative error of the frequencies at a speed, of the solution by a Ritz basis;
-                    that of the mesh is not in it
+    errors          (s,) largest estimated relative error of the frequencies at a speed, for not solving the full
+                    structure there; errors of the mesh and of the full solutions are not in it
     solved          (k,) rad/s, speeds at which the full structure was solved
     crossings       with the engine orders, by speed
     approaches      of two modes: veerings and crossings
@@ -151,7 +149,9 @@ class Campbell:
         values, attributes = store.load(path, _KIND)
 
         def rows(prefix: str, names: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-            columns = [[str(v) if d is object else v.item() for v in values[f"{prefix}_{n}"]] for n, (d, _) in names.items()]
+            columns = [
+                [str(v) if d is object else v.item() for v in values[f"{prefix}_{n}"]] for n, (d, _) in names.items()
+            ]
             return (dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True))
 
         return cls(
@@ -189,14 +189,14 @@ def campbell(
     orders      engine orders, above zero, whose crossings are sought from the first to the last speed
     count       modes that are among so many lowest at any speed are followed over all speeds
     gyroscopic  with the gyroscopic coupling: complex modes
-    tolerance   largest estimated relative error of the frequencies from solving the structure at a few speeds only; more
-                are solved until it is met, at the worst at all
+    tolerance   largest estimated relative error of the frequencies for solving the full structure at a few speeds only,
+                which become more until it is met
     report      called with the number of full solutions made, and of those known to be needed
 
     Two modes cross where their frequencies agree to ten tolerances; otherwise they veer. Raises CampbellError,
     modal.rotating.UnstableError for a speed that the structure does not bear, and SolverError.
     """
-    wanted = _checked(rotating, speeds, orders, count, tolerance)
+    wanted = _checked(speeds, orders, count, rotating.standing.free.size, tolerance)
     report = report or (lambda done, total: None)
     report(0, 2)
     with SpeedRange(rotating, float(wanted[0]), float(wanted[-1]), count, gyroscopic) as source:
@@ -204,9 +204,9 @@ def campbell(
             report(len(source.solved), len(source.solved) + 1)
             tracks = Tracks(source, wanted, count, _SAME * tolerance)
             approaches = tracks.approaches()
-            crossings = sorted(_crossings(tracks, orders), key=lambda crossing: (crossing.speed, crossing.mode))
-            found = [point.speed for point in (*approaches, *crossings)]
-            places = np.unique(np.concatenate([tracks.speeds, found]))
+            crossings = _crossings(source, tracks, orders)
+            met = [approach.speed for approach in approaches] + [crossing.speed for crossing in crossings]
+            places = np.unique(np.concatenate([tracks.speeds, met]))
             errors = np.array([source.errors(float(speed)).max() for speed in places])
             worst = float(places[np.argmax(errors)])
             if errors.max() <= tolerance or worst in source.solved:
@@ -231,61 +231,22 @@ def campbell(
         )
 
 
-def _crossings(tracks: Tracks, orders: Sequence[float]) -> Iterator[Crossing]:
-    """Yield the crossings of modes with engine orders, omega = order * speed, as roots of the modes solved again."""
-    speeds = tracks.speeds
-    for mode in (int(number) for number in tracks.kept):
-        frequencies, slopes = tracks.frequencies(mode), tracks.slopes(mode)
-        for order in map(float, orders):
-            above, parting = frequencies - order * speeds, slopes - order
-            if above[0] == 0.0:
-                yield _crossing(mode, order, float(speeds[0]))
-            for interval in np.flatnonzero(np.isfinite(above[:-1]) & np.isfinite(above[1:])):
-                both = slice(interval, interval + 2)
-                for speed in _roots(tracks, mode, order, int(interval), speeds[both], above[both], parting[both]):
-                    yield _crossing(mode, order, speed)
-
-
-def _crossing(mode: int, order: float, speed: float) -> Crossing:
-    return Crossing(mode, order, speed, order * speed / (2.0 * np.pi))
-
-
-def _roots(
-    tracks: Tracks, mode: int, order: float, interval: int, ends: np.ndarray, above: np.ndarray, parting: np.ndarray
-) -> Iterator[float]:
-    """Yield the speeds of an interval at which a mode has the frequency of an engine order, without its low end.
-
-    ends: of the interval; above, parting: what the mode lies above the order there, and the slope of that.
-    """
-
-    def value(speed: float) -> float:
-        return tracks.at(mode, interval, speed)[0] - order * speed
-
-    def slope(speed: float) -> float:
-        return tracks.at(mode, interval, speed)[1] - order
-
-    low, high = map(float, ends)
-    edges = [low, high]
-    side = np.sign(above[0])
-    if side * parting[0] < 0.0 < side * parting[1]:
-        # towards the line and away from it: the nearest place may lie on the other side
-        edges.insert(1, _root(slope, low, high))
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
-        first, last = value(start), value(stop)
-        if first != 0.0 and first * last <= 0.0:
-            yield _root(value, start, stop)
-
-
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    if function(low) * function(high) > 0.0:
-        return low if abs(function(low)) < abs(function(high)) else high
-    return float(optimize.brentq(function, low, high, xtol=_ROOT * high, rtol=_ROOT))
+def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> list[Crossing]:
+    """Return the crossings of the modes of interest with engine orders, by their speed."""
+    low, high = tracks.speeds[[0, -1]]
+    found = [
+        Crossing(tracks.number_at(speed, place), float(order), speed, order * speed / (2.0 * np.pi))
+        for order in orders
+        for place, speed in enumerate(source.meetings(order)[: tracks.count])
+        if low <= speed <= high
+    ]
+    return sorted(found, key=lambda crossing: (crossing.speed, crossing.mode))
 
 
 def _checked(
-    rotating: RotatingMatrices, speeds: Sequence[float] | np.ndarray, orders: Sequence[float], count: int, tolerance: float
+    speeds: Sequence[float] | np.ndarray, orders: Sequence[float], count: int, size: int, tolerance: float
 ) -> np.ndarray:
-    """Return the speeds. Raises CampbellError for arguments that make no diagram."""
+    """Return the speeds. Raises CampbellError for arguments that make no diagram; size: number of free DOFs."""
     values = np.asarray(speeds, dtype=float)
     if values.ndim != 1 or values.size < 2 or not np.all(np.isfinite(values)):
         raise CampbellError("speeds: expected at least two, rad/s")
@@ -294,8 +255,8 @@ def _checked(
     for order in orders:
         if not 0.0 < order < np.inf:
             raise CampbellError(f"orders: expected numbers above zero, not {order:g}")
-    if not 1 <= count <= rotating.standing.free.size:
-        raise CampbellError(f"count: expected 1 to {rotating.standing.free.size} modes (the free DOFs), not {count}")
+    if not 1 <= count <= size:
+        raise CampbellError(f"count: expected 1 to {size} modes (the free DOFs), not {count}")
     if not 0.0 < tolerance < 1.0:
         raise CampbellError(f"tolerance: expected a number between 0 and 1, not {tolerance:g}")
     return values

@@ -72,7 +72,7 @@ def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) 
     space = solve_modes(matrices, max(count, asked)).shapes[:, free].T
     with factorize(stiffness) as factors:
         for _ in range(_ROUNDS):
-            omega, shapes = _within(space, stiffness, coupling, asked)
+            omega, shapes = modes_within(space, stiffness, coupling, asked)
             inertia = mass @ shapes
             forces = stiffness @ shapes
             rest = forces + 1j * omega * (coupling @ shapes) - omega**2 * inertia
@@ -95,8 +95,8 @@ def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) 
     return GyroscopicModes(speed, omega[:count] / (2.0 * np.pi), full[:count], residuals[:count], whirl[:count])
 
 
-def _within(
-    space: np.ndarray, stiffness: sparse.csr_array, coupling: sparse.csr_array, count: int
+def modes_within(
+    space: np.ndarray, stiffness: sparse.csr_array | np.ndarray, coupling: sparse.csr_array | np.ndarray, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest positive frequencies (rad/s) and shapes (n, count), x^H M x = 1, of a mass-orthonormal space.
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy import linalg, optimize
 
 from vanedamp.modal.correlation import Pairing, modal_assurance, pair_modes
-from vanedamp.modal.speed_range import SpeedModes
+from vanedamp.modal.speed_range import SpeedModes, SpeedRange
 
 #: MAC of one mode at neighbouring speeds, at least
 CLEAR_MAC = 0.9
@@ -23,16 +22,6 @@ CLEAR_MAC = 0.9
 LEAST_EXCHANGE = 0.25
 #: speeds closer than this share of the range are no longer divided
 _CLOSEST = 1e-8
-
-
-class Modes(Protocol):
-    """Modes at any speed, in one set of orthonormal coordinates."""
-
-    def modes(self, speed: float) -> SpeedModes:
-        """Return the modes at a speed."""
-
-    def slopes(self, modes: SpeedModes) -> np.ndarray:
-        """Return d omega / d speed of modes."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +57,7 @@ class Tracks:
     notes   where no step was small enough
     """
 
-    def __init__(self, source: Modes, speeds: np.ndarray, count: int, same: float) -> None:
+    def __init__(self, source: SpeedRange, speeds: np.ndarray, count: int, same: float) -> None:
         self.source, self.count, self.same = source, count, same
         self._least = _CLOSEST * float(speeds[-1] - speeds[0])
         self.notes: list[str] = []
@@ -93,19 +82,14 @@ class Tracks:
         """Return the frequencies (s,) of a mode, rad/s; nan where it is not among the modes of the source."""
         return np.array([self._value(j, mode, state.frequencies) for j, state in enumerate(self.states)])
 
-    def at(self, mode: int, interval: int, speed: float) -> tuple[float, float]:
-        """Return frequency (rad/s) and slope of a mode at a speed between two neighbours, by its shapes there."""
-        modes = self.source.modes(speed)
-        alike = np.zeros(modes.frequencies.size)
-        for j in (interval, interval + 1):
-            shape = self.states[j].shapes[:, self.number[j] == mode]
-            alike += modal_assurance(modes.shapes.T, shape.T)[:, 0]
-        place = int(np.argmax(alike))
-        return float(modes.frequencies[place]), float(self.source.slopes(modes)[place])
-
-    def slopes(self, mode: int) -> np.ndarray:
-        """Return d omega / d speed (s,) of a mode."""
-        return np.array([self._value(j, mode, self.source.slopes(state)) for j, state in enumerate(self.states)])
+    def number_at(self, speed: float, place: int) -> int:
+        """Return the mode that is the place-th lowest at a speed of the range, by its shapes at the neighbours."""
+        right = min(max(int(np.searchsorted(self.speeds, speed)), 1), len(self.states) - 1)
+        modes = self._aligned(self.source.modes(speed), self.states[right - 1])
+        alike = np.zeros(1 + max(number.max() for number in self.number))
+        for j in (right - 1, right):
+            alike[self.number[j]] += modal_assurance(modes.shapes[:, place : place + 1].T, self.states[j].shapes.T)[0]
+        return int(np.argmax(alike))
 
     def approaches(self) -> list[Approach]:
         """Return all crossings and veerings of modes next to each other, by their speed."""

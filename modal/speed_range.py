@@ -14,11 +14,12 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.modal.algebra import orthogonal, orthonormal, symmetric_part
-from vanedamp.modal.eigen import Modes, factorize, solve_modes
+from vanedamp.modal.eigen import factorize, solve_modes
+from vanedamp.modal.gyroscopic import gyroscopic_modes, modes_within
 from vanedamp.modal.rotating import RotatingMatrices
 
-# shares of the unit length of a shape: what the basis lacks of it for a field more, and momenta that are round-off
-_LACKING, _NO_MOMENTUM = 1e-10, 1e-8
+# of the unit length of a shape: what the basis lacks of it for a field more
+_LACKING = 1e-10
 
 
 class SpeedModes(NamedTuple):
@@ -36,7 +37,7 @@ class SpeedModes(NamedTuple):
 class SpeedRange:
     """A Ritz basis for the modes over a range of speeds; a context manager, which holds a factorisation.
 
-    rotating    the structure; its stiffness must be positive (semi-)definite up to the greatest speed
+    rotating    the structure, held against every rigid motion
     low, high   ends of the range, rad/s, where the first full solutions are made
     count       modes of interest: the lowest at every speed
     gyroscopic  whether they have the gyroscopic coupling
@@ -58,13 +59,11 @@ class SpeedRange:
         self._forces = [np.empty((self._free.size, 0)) for _ in self._operators]
         self._compliant = [forces.copy() for forces in self._forces]
         self.solved: list[float] = []
-        first = self._solve(high)  # the greatest speed first: it is the one that may be unstable
-        stiffness, centrifugal, mass = self._operators[:3]
-        # a structure with free motions has a regular matrix, too
-        straining = first.angular_frequencies[first.frequencies_hz > 0.0]
-        self._shift = float(straining[0] ** 2) if straining.size else 1.0
+        rotating.at(0.0)  # `meetings` begins there
+        first = self._solve(high)
+        stiffness, centrifugal, _ = self._operators[:3]
         self._middle = 0.5 * (low**2 + high**2)
-        self._factor = factorize(sparse.csr_array(stiffness + self._middle * centrifugal + self._shift * mass))
+        self._factor = factorize(sparse.csr_array(stiffness + self._middle * centrifugal))
         self._join(high, first)
         self.add(low)
 
@@ -96,15 +95,26 @@ class SpeedRange:
         change = 2.0 * speed * self._form(1, modes).real
         if self.gyroscopic:
             change = change + modes.frequencies * self._coupling(modes)
-        inertia = self._inertia(modes, speed)
-        return np.divide(change, inertia, out=np.zeros_like(change), where=inertia > 0.0)
+        return np.asarray(change / self._inertia(modes, speed))
+
+    def meetings(self, order: float) -> np.ndarray:
+        """Return the speeds, rad/s, at which a frequency is that of an engine order, omega = order * W, ascending.
+
+        (K0 + W^2 (K1 + i order G - order^2 M)) x = 0 is linear in the squared speed. Its eigenvalues turn negative one
+        after the other, each once: the i-th speed is that of the i-th lowest mode.
+        """
+        inertia = order**2 * self._small[2] - self._small[1]
+        if self.gyroscopic:
+            inertia = inertia - 1j * order * self._small[3]
+        values = linalg.eigh(0.5 * (inertia + inertia.conj().T), symmetric_part(self._small[0]), eigvals_only=True)
+        return np.asarray(1.0 / np.sqrt(values[values > 0.0][::-1]))
 
     def errors(self, speed: float) -> np.ndarray:
         """Return the estimated relative errors (m,) of the frequencies at a speed.
 
         The error of an eigenvalue is r^T (K - lambda M)^-1 r over the modes that the basis lacks. It is bounded by the
-        residual r in the norm of the inverse of A = K + shift M at the middle of the range, times the largest ratios of
-        that to A at the speed, in the basis, and of A to K - lambda M, at the next Ritz value.
+        residual r in the norm of the inverse of the stiffness in the middle of the range, times the largest ratios of
+        that to K, in the basis, and of K to K - lambda M, at the next Ritz value.
         """
         modes = self.modes(speed)
         if self._basis.shape[1] == self._free.size:
@@ -115,20 +125,23 @@ class SpeedRange:
             parts.append(1j * speed * omega * shapes)
         joined = np.vstack(parts)
         residual = np.abs(np.einsum("im,im->m", joined.conj(), self._gram @ joined))
-        middle, here = (self._stiffness(squared) + self._shift * np.eye(len(shapes)) for squared in (self._middle, speed**2))
+        middle, here = (self._stiffness(squared) for squared in (self._middle, speed**2))
         residual /= linalg.eigh(here, middle, eigvals_only=True, subset_by_index=[0, 0])
         beyond = self._ceilings.get(speed)
-        ratio = 1.0 if beyond is None else (beyond + self._shift) / np.maximum(beyond - omega**2, 1e-3 * beyond)
-        scale = np.maximum(omega, np.sqrt(self._shift))
-        return np.asarray(residual * ratio / (self._inertia(modes, speed) * scale))
+        ratio = 1.0 if beyond is None else beyond / np.maximum(beyond - omega**2, 1e-3 * beyond)
+        return np.asarray(residual * ratio / (self._inertia(modes, speed) * omega))
 
-    def _solve(self, speed: float) -> Modes:
-        return solve_modes(self.rotating.at(speed), self._solved_count)
+    def _solve(self, speed: float) -> np.ndarray:
+        """Return real shapes (k, N) that span the modes of the full structure at a speed."""
+        if not self.gyroscopic:
+            return solve_modes(self.rotating.at(speed), self._solved_count).shapes
+        shapes = gyroscopic_modes(self.rotating, speed, self._solved_count).shapes
+        return np.vstack([shapes.real, shapes.imag])
 
-    def _join(self, speed: float, modes: Modes) -> None:
+    def _join(self, speed: float, shapes: np.ndarray) -> None:
         self.solved.append(speed)
         mass, known = self._operators[2], [self._basis]
-        rest = orthogonal(modes.shapes[:, self._free].T, mass, known)
+        rest = orthogonal(shapes[:, self._free].T, mass, known)
         lacking = np.einsum("ij,ij->j", rest, mass @ rest) > _LACKING**2
         fields = orthonormal(rest[:, lacking], mass, known)
         if not fields.shape[1]:
@@ -144,31 +157,19 @@ class SpeedRange:
         self._ceilings: dict[float, float] = {}
 
     def _ritz(self, speed: float) -> SpeedModes:
-        values, vectors = linalg.eigh(self._stiffness(speed**2))
-        frequencies = np.sqrt(np.maximum(values, 0.0))
+        stiffness = self._stiffness(speed**2)
         if self.gyroscopic:
-            frequencies, vectors = self._turning(speed, frequencies, vectors)
+            size = len(stiffness)
+            frequencies, vectors = modes_within(np.eye(size), stiffness, speed * self._small[3], size)
+        else:
+            values, vectors = linalg.eigh(stiffness)
+            frequencies = np.sqrt(values)
         if len(frequencies) > self._solved_count:
             self._ceilings[speed] = float(frequencies[self._solved_count] ** 2)
         return SpeedModes(speed, frequencies[: self.count], vectors[:, : self.count])
 
     def _stiffness(self, squared_speed: float) -> np.ndarray:
         return symmetric_part(self._small[0] + squared_speed * self._small[1])
-
-    def _turning(self, speed: float, still: np.ndarray, modes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return frequencies and complex shapes with the gyroscopic coupling, from the modes without it.
-
-        omega (s, p) = [[0, S], [S, i W G]] (s, p) with S the root of the stiffness and p = omega x: a Hermitian
-        problem, whose frequencies are real by construction.
-        """
-        coupling = modes.T @ self._small[3] @ modes
-        zero, root = np.zeros_like(coupling), np.diag(still)
-        pencil = np.block([[zero, root], [root, 0.5j * speed * (coupling - coupling.T)]])
-        values, vectors = linalg.eigh(pencil)
-        size = len(still)  # the others are their negatives
-        strains, momenta = vectors[:size, size:], vectors[size:, size:]
-        shapes = np.where(np.linalg.norm(momenta, axis=0) > _NO_MOMENTUM, momenta, strains)
-        return np.maximum(values[size:], 0.0), modes @ (shapes / np.linalg.norm(shapes, axis=0))
 
     def _form(self, place: int, modes: SpeedModes) -> np.ndarray:
         shapes = modes.shapes
