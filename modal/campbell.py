@@ -17,10 +17,9 @@ from vanedamp.files import store
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal.mode_tracking import Approach, Tracks
 from vanedamp.modal.rotating import RotatingMatrices
-from vanedamp.modal.speed_range import SpeedRange
+from vanedamp.modal.speed_range import RPM, SpeedRange
 
 _KIND = "campbell"
-_RPM = 30.0 / np.pi  # 1/min in a rad/s
 # frequencies closer than this multiple of their error are one
 _SAME = 10.0
 
@@ -47,7 +46,7 @@ class Crossing:
     @property
     def rpm(self) -> float:
         """Speed, 1/min."""
-        return self.speed * _RPM
+        return self.speed * RPM
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +90,7 @@ class Campbell:
     @property
     def rpm(self) -> np.ndarray:
         """Speeds (s,), 1/min."""
-        return self.speeds * _RPM
+        return self.speeds * RPM
 
     @property
     def veerings(self) -> tuple[Approach, ...]:
@@ -113,7 +112,7 @@ class Campbell:
             "frequency_hz": self.frequencies_hz.tolist(),
             "orders": list(self.orders),
             "crossings": [asdict(crossing) | {"rpm": crossing.rpm} for crossing in self.crossings],
-            "approaches": [asdict(approach) | {"rpm": approach.speed * _RPM} for approach in self.approaches],
+            "approaches": [asdict(approach) | {"rpm": approach.rpm} for approach in self.approaches],
             "error": self.error,
             "solved": self.solved.tolist(),
             "gyroscopic": self.gyroscopic,

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg, optimize
 
 from vanedamp.modal.correlation import Pairing, modal_assurance, pair_modes
-from vanedamp.modal.speed_range import SpeedModes, SpeedRange
+from vanedamp.modal.speed_range import RPM, SpeedModes, SpeedRange
 
 #: MAC of one mode at neighbouring speeds, at least
 CLEAR_MAC = 0.9
@@ -44,6 +44,11 @@ class Approach:
     frequency_hz: float
     gap_hz: float
     exchange: float
+
+    @property
+    def rpm(self) -> float:
+        """Speed, 1/min."""
+        return self.speed * RPM
 
 
 class Tracks:

@@ -18,6 +18,8 @@ from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.modal.gyroscopic import gyroscopic_modes, modes_within
 from vanedamp.modal.rotating import RotatingMatrices
 
+#: 1/min in a rad/s
+RPM = 30.0 / np.pi
 # of the unit length of a shape: what the basis lacks of it for a field more
 _LACKING = 1e-10
 

@@ -1,4 +1,4 @@
-"""Campbell diagrams: frequencies over speeds, veerings and crossings told apart, engine orders, against closed forms."""
+"""Campbell diagrams: modes over speeds, veerings and crossings told apart, engine orders, against closed forms."""
 
 import numpy as np
 import pytest
