@@ -47,10 +47,9 @@ def _add_orders(figure: go.Figure, diagram: Campbell, top: float) -> None:
             legendgroup="engine orders", showlegend=place == 0, hoverinfo="skip",
             line={"color": _ORDER, "width": 1.1, "dash": "dash"},
         )  # fmt: skip
-        above = end < high
         figure.add_annotation(
             x=end, y=order * end / 60.0, text=f"EO {order:g}", showarrow=False, font={"size": 12, "color": _ORDER},
-            xanchor="center" if above else "left", yanchor="bottom" if above else "middle",
+            xanchor="left", yanchor="middle" if end == high else "top", xshift=3,
         )  # fmt: skip
 
 

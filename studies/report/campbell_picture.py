@@ -33,7 +33,8 @@ def draw_campbell(axes: Axes, diagram: Campbell) -> None:
         if end <= low:
             continue
         axes.plot([low, end], [order * low / 60.0, order * end / 60.0], "--", color=_ORDER, linewidth=0.9)
-        beside: dict[str, Any] = {"xytext": (4, 0), "va": "center"} if end == high else {"xytext": (0, 3), "ha": "center"}
+        right: dict[str, Any] = {"xytext": (4, 0), "va": "center"}
+        beside = right if end == high else {"xytext": (5, -3), "va": "top"}
         axes.annotate(
             f"EO {order:g}", (end, order * end / 60.0), textcoords="offset points", color=_ORDER, fontsize=9, **beside
         )
@@ -49,12 +50,12 @@ def draw_campbell(axes: Axes, diagram: Campbell) -> None:
     if crossings:
         axes.plot(
             [crossing.rpm for crossing in crossings], [crossing.frequency_hz for crossing in crossings], "o",
-            markersize=6, markerfacecolor="white", markeredgecolor=_MARK, label="crossing with an engine order",
+            markersize=6, markerfacecolor="white", markeredgecolor=_MARK, label="crossing",
         )  # fmt: skip
     axes.set(xlim=(low, high), ylim=(0.0, top), xlabel="speed, rpm", ylabel="natural frequency, Hz")
     above = axes.secondary_xaxis("top", functions=(_speed, _rpm))
     above.set_xlabel("rad/s")
-    axes.legend(loc="center left", bbox_to_anchor=(1.05, 0.5), frameon=False)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=4, frameon=False)
     draw_grid(axes)
 
 
