@@ -18,8 +18,8 @@ from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.petsc import Factorization, SolverError
 
 __all__ = [
-    "Factorization", "Modes", "SolverError", "count_below", "factorize", "negative_eigenvalues", "shape_signs",
-    "solve_modes", "static_shape",
+    "Factorization", "Modes", "SolverError", "count_below", "factorize", "shape_signs", "solve_modes",
+    "stable_share", "static_shape",
 ]  # fmt: skip
 
 _KIND = "modes"
@@ -30,6 +30,8 @@ _SPARE = 3
 _GAP = 1e-6
 # more modes than this are found faster slice by slice
 _SLICE = 50
+# of a share of stiffness that is stable
+_SHARE_DIGITS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,13 +133,25 @@ def count_below(matrices: SystemMatrices, frequency_hz: float) -> int:
     return _Pencil(*(m[free][:, free] for m in (matrices.stiffness, matrices.mass))).below(_eigenvalue(frequency_hz))
 
 
-def negative_eigenvalues(matrices: SystemMatrices) -> int:
-    """Return the number of negative eigenvalues of the free stiffness: of directions in which a structure is unstable.
+def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
+    """Return the largest share (0 to 1) of a stiffness (N, N) that leaves the structure stable when it is added.
 
-    The stiffness is regular: that of a structure that is held against every rigid motion.
+    Stable: the free stiffness is positive definite, as it is without the addition. To three digits below 1.
     """
     free = matrices.free
-    return petsc.negative_eigenvalues(matrices.stiffness[free][:, free])
+    given, added = matrices.stiffness[free][:, free], added[free][:, free]
+
+    def unstable(share: float) -> bool:
+        return petsc.negative_eigenvalues(sparse.csr_array(given + share * added)) > 0
+
+    if not unstable(1.0):
+        return 1.0
+    # the energy is linear in the share: past the first unstable one there is no stable one
+    low, high = 0.0, 1.0
+    while high - low > _SHARE_DIGITS * high:
+        middle = 0.5 * (low + high) if low else 0.1 * high
+        low, high = (low, middle) if unstable(middle) else (middle, high)
+    return low
 
 
 def factorize(matrix: sparse.csr_array) -> Factorization:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,10 @@ from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import fenicsx
-from vanedamp.modal.eigen import SolverError, static_shape
+from vanedamp.modal.eigen import SolverError, stable_share, static_shape
 from vanedamp.modal.matrices import Patch, SystemMatrices, unit_direction
-from vanedamp.modal.rotating import RotatingMatrices, cross_matrix, nodal_product
+from vanedamp.modal.rotating import RotatingMatrices, UnstableError, cross_matrix, nodal_product
+from vanedamp.modal.temperature import Temperature, TemperatureError
 
 DEFAULT = "default"
 _COMPONENTS = "xyz"
@@ -28,15 +29,21 @@ class ElasticityError(VanedampError):
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic linear elasticity: young (Pa), poisson (1), density (kg/m^3)."""
+    """Isotropic linear elasticity: young (Pa), poisson (1), density (kg/m^3).
+
+    expansion  1/K, thermal
+    young_at   ((temperature, Pa), ...) in ascending order: the modulus, linear between these; empty: young throughout
+    """
 
     young: float
     poisson: float
     density: float
+    expansion: float = 0.0
+    young_at: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            if not math.isfinite(getattr(self, item.name)):
+            if not np.all(np.isfinite(getattr(self, item.name))):
                 raise ElasticityError(f"{item.name}: expected a finite number, not {getattr(self, item.name)}")
         if self.young <= 0.0:
             raise ElasticityError(f"young: expected a positive modulus in Pa, not {self.young}")
@@ -44,12 +51,28 @@ class Material:
             raise ElasticityError(f"poisson: expected -1 < ratio < 0.5, not {self.poisson}")
         if self.density <= 0.0:
             raise ElasticityError(f"density: expected a positive density in kg/m^3, not {self.density}")
+        temperatures = [temperature for temperature, _ in self.young_at]
+        if any(young <= 0.0 for _, young in self.young_at) or np.any(np.diff(temperatures) <= 0.0):
+            raise ElasticityError("young_at: expected [temperature, modulus in Pa] with ascending temperatures")
 
     @property
     def lame(self) -> tuple[float, float]:
         """Lame's first parameter and the shear modulus, Pa."""
         shear = 0.5 * self.young / (1.0 + self.poisson)
         return 2.0 * shear * self.poisson / (1.0 - 2.0 * self.poisson), shear
+
+    def softening(self, temperatures: np.ndarray) -> np.ndarray:
+        """Return the moduli (n,) at temperatures over `young`. Raises TemperatureError outside `young_at`."""
+        if not self.young_at:
+            return np.ones_like(temperatures)
+        known, moduli = np.array(self.young_at).T
+        low, high = temperatures.min(), temperatures.max()
+        if low < known[0] or high > known[-1]:
+            raise TemperatureError(
+                f"young_at: reaches from {known[0]:g} to {known[-1]:g}, the temperatures from {low:g} to {high:g}; "
+                "give the modulus at those, too"
+            )
+        return np.asarray(np.interp(temperatures, known, moduli)) / self.young
 
 
 @dataclass(frozen=True)
@@ -77,13 +100,14 @@ class ElasticSupport:
 class Solid:
     """An elastic body on a mesh: its forms, and stresses and pictures that need the mesh after assembly.
 
-    materials  volume group -> Material; the key "default" serves every group that is not named
-    degree     of the displacements, 1 to 3; 2 is right for bending
-    elastic    facet group -> ElasticSupport
-    scale      metres a unit of length of the file
+    materials    volume group -> Material; the key "default" serves every group that is not named
+    degree       of the displacements, 1 to 3; 2 is right for bending
+    elastic      facet group -> ElasticSupport
+    scale        metres a unit of length of the file
+    temperature  of the structure: it changes the moduli, and what cannot expand is under stress
 
-    Elements may be curved (of geometric order 2). Raises modal.msh.MeshError for the mesh and ElasticityError for the
-    rest.
+    Elements may be curved (of geometric order 2). Raises modal.msh.MeshError for the mesh, TemperatureError for the
+    temperature and ElasticityError for the rest.
     """
 
     def __init__(
@@ -93,6 +117,7 @@ class Solid:
         degree: int = 2,
         elastic: Mapping[str, ElasticSupport] | None = None,
         scale: float = 1.0,
+        temperature: Temperature | None = None,
     ) -> None:
         if not (math.isfinite(scale) and scale > 0.0):
             raise ElasticityError(f"scale: expected a positive number of metres a unit of length, not {scale}")
@@ -104,9 +129,13 @@ class Solid:
         self.materials = _by_group(materials, self.domain)
         self.elastic = dict(elastic or {})
         self.space = fenicsx.vector_space(self.domain, degree)
+        self.temperature = temperature
+        self._density = fenicsx.cell_constants(self.domain, {name: m.density for name, m in self.materials.items()})
         self._lame = fenicsx.cell_constants(self.domain, {name: m.lame[0] for name, m in self.materials.items()})
         self._shear = fenicsx.cell_constants(self.domain, {name: m.lame[1] for name, m in self.materials.items()})
-        self._density = fenicsx.cell_constants(self.domain, {name: m.density for name, m in self.materials.items()})
+        if temperature is not None:
+            softening = self._field(lambda material, values: material.softening(values))
+            self._lame, self._shear = softening * self._lame, softening * self._shear
 
     def stress(self, displacement: Any) -> Any:
         """Return the UFL stress tensor of a UFL displacement, Pa."""
@@ -117,14 +146,15 @@ class Solid:
         """Return unconstrained matrices, with every group as a patch, and the supports {group: "xyz" or components}.
 
         Groups are of facets, edges or points; the nodes of edges and points have the weight one. Elastic supports are
-        part of the stiffness.
+        part of the stiffness, and so is the geometric stiffness of the stress that a temperature leaves between them.
+        Raises UnstableError for a temperature at which the structure has buckled.
         """
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         patches = {name: self._patch(name) for name in self.domain.groups}
         stiffness = self._material_stiffness(ufl.dx)
         for name in self.elastic:
             stiffness = stiffness + self._support_stiffness(name)
-        return SystemMatrices(
+        unheated = SystemMatrices(
             stiffness=stiffness,
             mass=fenicsx.matrix(self._density * ufl.inner(trial, test) * ufl.dx),
             coordinates=fenicsx.node_coordinates(self.space),
@@ -140,8 +170,10 @@ class Solid:
                 "clamped": dict(clamped),
                 "elastic": {name: asdict(support) for name, support in self.elastic.items()},
                 "versions": fenicsx.versions(),
-            },
+            }
+            | ({} if self.temperature is None else {"temperature": self.temperature.to_json()}),
         )
+        return self._heated(unheated)
 
     def rotating(self, matrices: SystemMatrices, axis: Sequence[float], point: Sequence[float]) -> RotatingMatrices:
         """Return what rotation about an axis through a point (m) makes of the matrices at standstill.
@@ -174,6 +206,7 @@ class Solid:
         """Return the parts of the stiffness, (N, N) N/m each: "material.<volume group>" and "support.<facet group>".
 
         Each is proportional to its Young's modulus or to its support's stiffnesses: the derivatives of model updating.
+        That of thermal stress is none of them.
         """
         parts = {
             f"material.{name}": self._material_stiffness(fenicsx.over_cells(self.domain, cells))
@@ -215,6 +248,37 @@ class Solid:
         if os.path.splitext(path)[1] != ".xdmf":
             raise ElasticityError(f"path: expected a file name ending in .xdmf, not {path}")
         fenicsx.write_fields(self.space, fields, path)
+
+    def _field(self, of: Callable[[Material, np.ndarray], np.ndarray]) -> Any:
+        """Return a function of material and temperature on the mesh, linear in every cell."""
+        assert self.temperature is not None
+        at = self.temperature.at
+        return fenicsx.cell_functions(self.domain, lambda name, places: of(self.materials[name], at(places)))
+
+    def _heated(self, matrices: SystemMatrices) -> SystemMatrices:
+        """Return the matrices with the geometric stiffness of the thermal stress, from the static solution."""
+        if self.temperature is None or not any(material.expansion for material in self.materials.values()):
+            return matrices
+        reference = self.temperature.reference
+        strain = self._field(lambda material, values: material.expansion * (values - reference))
+        pressure = (3.0 * self._lame + 2.0 * self._shear) * strain  # of a body that is held all around
+        load = fenicsx.vector(pressure * ufl.div(ufl.TestFunction(self.space)) * ufl.dx)
+        try:
+            displacement = static_shape(matrices, load)
+        except SolverError:
+            raise ElasticityError(
+                "temperature: the structure is not held against every rigid motion, so that its thermal stress has no "
+                "static solution; hold it in [support] as it can expand, or leave out expansion"
+            ) from None
+        stress = self.stress(fenicsx.field(self.space, displacement)) - pressure * ufl.Identity(3)
+        added = self._geometric_stiffness(stress)
+        share = stable_share(matrices, added)
+        if share < 1.0:
+            raise UnstableError(
+                f"temperature: the structure buckles at {share:.3g} of its thermal stress; give it less, or supports "
+                "that let it expand"
+            )
+        return replace(matrices, stiffness=sparse.csr_array(matrices.stiffness + added))
 
     def _material_stiffness(self, measure: Any) -> sparse.csr_array:
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)

@@ -10,7 +10,8 @@ import contextlib
 import importlib
 import logging
 import os
-from collections.abc import Iterator, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -151,6 +152,18 @@ def cell_constants(domain: Domain, values: Mapping[str, float]) -> Any:
     return function
 
 
+def cell_functions(domain: Domain, values: Callable[[str, np.ndarray], np.ndarray]) -> Any:
+    """Return a function that is linear in every cell, its values (n,) given by volume group and places (n, 3), m."""
+    space = discontinuous_space(domain, 1)
+    function = fem.Function(space)
+    places = node_coordinates(space)
+    dofs = _array(space.dofmap.list).reshape(domain.mesh.topology.index_map(3).size_local, -1)
+    for name, cells in domain.volumes.items():
+        inside = dofs[cells].ravel()
+        function.x.array[inside] = values(name, places[inside])
+    return function
+
+
 def field(space: Any, values: np.ndarray) -> Any:
     """Return a function from the values of its DOFs."""
     function = fem.Function(space)
@@ -184,6 +197,13 @@ def matrix(form: Any) -> sparse.csr_array:
     return result
 
 
+def vector(form: Any) -> np.ndarray:
+    """Assemble a linear UFL form, without boundary conditions."""
+    with _quiet():
+        compiled = fem.form(form)
+    return np.array(fem.assemble_vector(compiled).array)
+
+
 def over_facets(domain: Domain, facets: np.ndarray) -> Any:
     """Return the UFL measure of the integral over boundary facets."""
     return _measure("ds", domain, 2, facets)
@@ -202,9 +222,7 @@ def constant(domain: Domain, values: float | Sequence[float]) -> Any:
 def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
     """Return the integral (n_nodes,), m^2, of every nodal shape function over the facets."""
     along_x = constant(domain, [1.0, 0.0, 0.0])
-    with _quiet():
-        compiled = fem.form(ufl.inner(along_x, ufl.TestFunction(space)) * over_facets(domain, facets))
-    return np.array(fem.assemble_vector(compiled).array.reshape(-1, 3)[:, 0])
+    return vector(ufl.inner(along_x, ufl.TestFunction(space)) * over_facets(domain, facets)).reshape(-1, 3)[:, 0]
 
 
 def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
@@ -359,10 +377,12 @@ def _array(adjacency: Any) -> np.ndarray:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence the log of the form compiler, which writes at INFO to the root logger."""
+    """Silence the form compiler: its log, at INFO of the root logger, and its advice to take fewer points in a cell."""
     before = logging.root.manager.disable
     logging.disable(max(before, logging.INFO))
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Number of integration points", UserWarning)
+            yield
     finally:
         logging.disable(before)

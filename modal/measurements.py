@@ -1,5 +1,7 @@
 """Shapes and frequency responses from and for other programs: CSV, and universal files (UFF 15, 55, 58) by pyuff.
 
+Temperatures come from CSV only.
+
 Universal files are read and written in SI units and in the global frame; pyuff is an optional dependency.
 """
 
@@ -19,6 +21,7 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import Frf, FrfError
+from vanedamp.modal.temperature import Temperature, TemperatureError
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".bunv")
 #: meanings of the two columns of a response in a CSV
@@ -144,6 +147,21 @@ def write_frf(frf: Frf, path: str | os.PathLike[str]) -> None:
     columns = [frf.frequencies_hz, *(part for response in frf.values for part in (response.real, response.imag))]
     names = ["frequency_hz", *(f"{part}_{i}" for i in range(len(frf.values)) for part in ("real", "imag"))]
     write_csv(target, names, np.column_stack(columns).tolist())
+
+
+def read_temperature(path: str | os.PathLike[str], reference: float) -> Temperature:
+    """Read temperatures from a CSV with the columns x, y, z (m) and temperature; a header line may precede them.
+
+    reference: temperature without thermal stress. Raises MeasurementError.
+    """
+    file = _existing(path)
+    rows = _numbers(file)[1]
+    if rows.shape[1] != 4:
+        raise MeasurementError(f"{file}: expected the columns x, y, z (m) and temperature, not {rows.shape[1]}")
+    try:
+        return Temperature(reference, rows[:, 3], rows[:, :3])
+    except TemperatureError as error:
+        raise MeasurementError(f"{file}: {error}") from error
 
 
 def _existing(path: str | os.PathLike[str]) -> Path:

@@ -17,15 +17,12 @@ import numpy as np
 from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.modal.eigen import negative_eigenvalues
+from vanedamp.modal.eigen import stable_share
 from vanedamp.modal.matrices import SystemMatrices
-
-# of the highest stable speed, relative, in a message
-_SPEED_DIGITS = 1e-3
 
 
 class UnstableError(VanedampError):
-    """A structure that leaves its equilibrium, heated or at a speed; the message names the highest stable speed."""
+    """A structure that leaves its equilibrium, heated or at a speed; the message names what it bears."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,29 +49,15 @@ class RotatingMatrices:
         Raises UnstableError where their stiffness is not positive definite. Gyroscopic forces might still hold the
         structure there, but not together with its own damping, however little (Thomson and Tait).
         """
-        found = self._at(speed)
-        if negative_eigenvalues(found):
-            raise UnstableError(self._unstable(speed))
-        return found
-
-    def _at(self, speed: float) -> SystemMatrices:
-        stiffness = self.standing.stiffness + speed**2 * self.centrifugal_stiffness
+        added = speed**2 * self.centrifugal_stiffness
+        share = stable_share(self.standing, added)
+        if share < 1.0:
+            raise UnstableError(
+                f"speed: at {speed:.6g} rad/s the structure is unstable, since the spin softening outweighs its "
+                f"stiffness above {np.sqrt(share) * speed:.4g} rad/s; stay below it"
+            )
         provenance = dict(self.standing.provenance) | {"speed": speed}
-        return replace(self.standing, stiffness=stiffness, provenance=provenance)
-
-    def _unstable(self, speed: float) -> str:
-        """Say why there is no motion about the equilibrium at a speed, and up to which one there is."""
-        if negative_eigenvalues(self.standing):
-            return "the structure buckles at standstill, by the stress of its temperature"
-        # the potential energy is linear in the squared speed: past the first unstable one there is no stable one
-        stable, unstable = 0.0, speed
-        while unstable - stable > _SPEED_DIGITS * unstable:
-            middle = 0.5 * (stable + unstable)
-            stable, unstable = (stable, middle) if negative_eigenvalues(self._at(middle)) else (middle, unstable)
-        return (
-            f"speed: at {speed:.6g} rad/s the structure is unstable: the spin softening outweighs its stiffness above "
-            f"{stable:.4g} rad/s; stay below it"
-        )
+        return replace(self.standing, stiffness=self.standing.stiffness + added, provenance=provenance)
 
 
 def nodal_product(mass: sparse.csr_array, matrix: np.ndarray) -> sparse.csr_array:

@@ -2,17 +2,23 @@
 
 import json
 
+import gmsh
 import numpy as np
 import pytest
-from scipy import sparse
+import skfem
+from scipy import linalg, sparse
+from scipy.sparse.linalg import spsolve
+from skfem.helpers import dot
+from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from vanedamp.files.store import load
 from vanedamp.files.toml_input import InputError
 from vanedamp.meshes.benchmarks import Block, build
-from vanedamp.modal.eigen import solve_modes
+from vanedamp.modal.eigen import solve_modes, static_shape
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
 from vanedamp.modal.gyroscopic import gyroscopic_modes
 from vanedamp.modal.matrices import MatricesError, SystemMatrices
+from vanedamp.modal.msh import session
 from vanedamp.modal.rotating import RotatingMatrices, UnstableError, cross_matrix
 from vanedamp.studies.case.stages import assemble
 from vanedamp.studies.case.tables import Case
@@ -199,6 +205,9 @@ def test_modal_command_at_a_speed(tmp_path, capsys):
     values, attributes = load(tmp_path / "m.h5", "modes")
     assert attributes["speed"] == 50.0
     assert values["gyroscopic_shape_real"].shape == values["shape"].shape
+    assert main(["report", str(tmp_path / "m.h5"), "-o", str(tmp_path / "report.html")]) == 0
+    page = (tmp_path / "report.html").read_text()
+    assert "at 50 rad/s without the gyroscopic coupling" in page and "whirl: 1 with the rotation" in page
 
 
 @pytest.mark.parametrize(
@@ -212,7 +221,7 @@ def test_modal_command_at_a_speed(tmp_path, capsys):
         (
             "[rotation]\naxis = [1, 0, 0]\nrpm = 10.0\n"
             '[calibration.tune]\nvary = ["material.block"]\nfrequencies = [16.0]\n',
-            "calibration.tune: takes frequencies measured at standstill; leave the speed out",
+            "calibration.tune: takes frequencies measured at standstill and without [temperature]; leave them out",
         ),
     ],
 )
@@ -223,3 +232,109 @@ def test_cases_that_are_refused(tmp_path, capsys, table, message):
     assert main(["modal", str(path)]) == 2
     printed = capsys.readouterr().err
     assert message in printed and printed.count("\n") == 1
+
+
+def centrifugal_stress(solid, rotating):
+    """Places (k, 3) and stresses xx, yy, zz, xy, yz, zx (6, k) at unit speed."""
+    return solid.stress_points(), solid.stress_components(static_shape(rotating.standing, rotating.load))
+
+
+def test_stress_of_a_rotating_rod(beam, blade):
+    """rho W^2 (L^2 - x^2) / 2 along the rod (Timoshenko and Goodier 1970), and nothing else of its size."""
+    places, stress = centrifugal_stress(beam, blade)
+    inside = (places[:, 0] > 0.02 * LENGTH) & (places[:, 0] < 0.95 * LENGTH)
+    expected = 0.5 * DENSITY * (LENGTH**2 - places[inside, 0] ** 2)
+    assert np.abs(stress[0, inside] / expected - 1.0).max() < 0.01
+    assert np.abs(stress[1:, inside]).max() < 1e-3 * expected.max()
+
+
+def write_disc(path, radius, thickness, size):
+    """A quarter of a disc about z with the groups `along_x` and `along_y`, its cuts, and `bottom`; curved elements."""
+    with session("disc"):
+        gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, thickness, radius, angle=0.5 * np.pi)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [1], name="disc")
+        for _, tag in gmsh.model.getEntities(2):
+            middle = np.abs(gmsh.model.occ.getCenterOfMass(2, tag)) < 1e-9
+            for name, flat in zip(("along_y", "along_x", "bottom"), middle, strict=True):
+                if flat:
+                    gmsh.model.addPhysicalGroup(2, [tag], name=name)
+        for option in ("Mesh.MeshSizeMin", "Mesh.MeshSizeMax"):
+            gmsh.option.setNumber(option, size)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.write(str(path))
+    return path
+
+
+def test_stress_of_a_rotating_disc(tmp_path):
+    """Radial and hoop stress of a thin solid disc with a free rim (Timoshenko and Goodier 1970, section 32)."""
+    radius, poisson = 0.2, 0.3
+    mesh = write_disc(tmp_path / "disc.msh", radius, 0.02 * radius, radius / 10)
+    solid = Solid(mesh, {"default": Material(YOUNG, poisson, DENSITY)})
+    held = {"along_y": "x", "along_x": "y", "bottom": "z"}
+    places, stress = centrifugal_stress(solid, solid.rotating(solid.assemble(held, 0.0), [0, 0, 1], [0, 0, 0]))
+    r = np.hypot(places[:, 0], places[:, 1])
+    inside = (r > 0.1 * radius) & (r < 0.9 * radius)
+    r, (c, s) = r[inside], places[inside, :2].T / r[inside]
+    xx, yy, _, xy, _, _ = stress[:, inside]
+    radial, hoop = c**2 * xx + s**2 * yy + 2 * c * s * xy, s**2 * xx + c**2 * yy - 2 * c * s * xy
+    centre = (3 + poisson) / 8 * DENSITY * radius**2
+    assert radial == pytest.approx(centre * (1 - (r / radius) ** 2), abs=0.01 * centre)
+    assert hoop == pytest.approx(centre * (1 - (1 + 3 * poisson) / (3 + poisson) * (r / radius) ** 2), rel=0.01)
+
+
+def test_squared_frequencies_over_the_squared_speed(blade):
+    """Their slope is phi^T K1 phi (first-order perturbation; Lancaster 1964, Numer. Math. 6)."""
+    speed = 3.0 * UNIT
+    modes = solve_modes(blade.at(speed), 4)
+    slopes = np.einsum("ij,ij->i", modes.shapes, (blade.centrifugal_stiffness @ modes.shapes.T).T)
+    squares = [solve_modes(blade.at(np.sqrt(s) * speed), 4).angular_frequencies ** 2 for s in (0.99, 1.01)]
+    # curvature over the step leaves 1e-4 of its square, round-off less
+    assert slopes == pytest.approx((squares[1] - squares[0]) / (0.02 * speed**2), rel=1e-3)
+    assert np.all(slopes[[1, 3]] - slopes[[0, 2]] == pytest.approx(1.0, rel=1e-2))  # flap and lag differ by W^2
+
+
+def frequencies_by_scikit_fem(solid, material, axis, point, speed, count):
+    """Angular frequencies of a solid of straight tetrahedra, held at x = 0: all of it at the speed, from its mesh."""
+    cells, _, points = solid.vtk_mesh()
+    corners, numbers = np.unique(cells.reshape(-1, 11)[:, 1:5], return_inverse=True)
+    mesh = skfem.MeshTet(points[corners].T.copy(), numbers.reshape(-1, 4).T.copy())
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTetP2()), intorder=4)
+    lame, shear = lame_parameters(material.young, material.poisson)
+    across = np.eye(3) - np.outer(axis, axis) / np.dot(axis, axis)
+    force = skfem.LinearForm(
+        lambda v, w: (
+            material.density * speed**2 * dot(np.einsum("ij,j...->i...", across, w.x - point[:, None, None]), v)
+        )
+    )
+    elastic = skfem.asm(linear_elasticity(lame, shear), basis).tocsr()
+    free = np.setdiff1d(np.arange(basis.N), basis.get_dofs(lambda x: np.isclose(x[0], 0.0)).all())
+    displacement = np.zeros(basis.N)
+    displacement[free] = spsolve(elastic[free][:, free].tocsc(), skfem.asm(force, basis)[free])
+    gradient = basis.interpolate(displacement).grad
+    strain = 0.5 * (gradient + np.swapaxes(gradient, 0, 1))
+    stress = 2.0 * shear * strain + lame * np.einsum("kk...,ij->ij...", strain, np.eye(3))
+    geometric = skfem.BilinearForm(
+        lambda u, v, w: (
+            np.einsum("jk...,ij...,ik...->...", stress, u.grad, v.grad)
+            - material.density * speed**2 * dot(np.einsum("ij,j...->i...", across, u), v)
+        )
+    )
+    mass = skfem.BilinearForm(lambda u, v, w: material.density * dot(u, v))
+    stiffness, inertia = (
+        matrix[free][:, free].toarray() for matrix in (elastic + skfem.asm(geometric, basis), skfem.asm(mass, basis))
+    )
+    return np.sqrt(linalg.eigh(stiffness, inertia, eigvals_only=True, subset_by_index=[0, count - 1]))
+
+
+def test_frequencies_at_speeds_equal_scikit_fem(tmp_path):
+    """K0 + W^2 K1 against matrices that another code makes at each speed, about a skew axis beside the structure."""
+    material, axis, point = Material(YOUNG, 0.3, DENSITY), np.array([1.0, 2.0, 1.0]), np.array([-0.05, 0.01, 0.0])
+    block = Block(0.1, 0.03, 0.02, divisions=(3, 1, 1))
+    solid = Solid(build(block, tmp_path / "block.msh"), {"default": material})
+    rotating = solid.rotating(solid.assemble({"root": "xyz"}, 0.0), axis, point)
+    for speed in (2000.0, 6000.0, 12000.0):
+        expected = frequencies_by_scikit_fem(solid, material, axis, point, speed, 4)
+        assert solve_modes(rotating.at(speed), 4).angular_frequencies == pytest.approx(expected, rel=1e-7)
+    assert expected[0] > 1.1 * solve_modes(rotating.standing, 1).angular_frequencies[0]

@@ -172,7 +172,8 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
             else:
                 own = material.get(group, case.material.get("default"))
                 assert own is not None
-                material[group] = replace(own, young=factor * own.young)
+                young_at = tuple((temperature, factor * young) for temperature, young in own.young_at)
+                material[group] = replace(own, young=factor * own.young, young_at=young_at)
     return replace(case, material=material, support=replace(case.support, elastic=elastic))
 
 

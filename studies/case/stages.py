@@ -69,7 +69,8 @@ def assemble(case: Case) -> Structure:
     label = case.response_label  # an open choice is refused before the work
     with _mesh(case) as path:
         scale = case.mesh.scale if isinstance(case.mesh, MeshFile) else 1.0
-        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports, scale)
+        heat = None if case.temperature is None else case.temperature.temperature
+        solid = Solid(path, case.materials, case.mesh.degree, case.elastic_supports, scale, heat)
         domain = solid.domain
         case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
         matrices = solid.assemble(case.support.clamped, case.damping_ratio)

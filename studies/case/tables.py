@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import field, fields
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
@@ -29,6 +31,7 @@ from vanedamp.modal.units import absurdity
 from vanedamp.studies.case.calibration_tables import CalibrationTable
 from vanedamp.studies.case.campbell_tables import CampbellTable
 from vanedamp.studies.case.rotation_tables import RotationTable
+from vanedamp.studies.case.temperature_tables import TemperatureTable
 
 if TYPE_CHECKING:
     from vanedamp.modal.elasticity import ElasticSupport, Material
@@ -38,6 +41,10 @@ DEMO_CASE = Path(__file__).with_name("demo_case.toml")
 
 Ratio = Annotated[Real, Field(ge=0, lt=1)]
 Degree = Annotated[Whole, Field(ge=1, le=3)]
+# 1/K: no solid expands more
+_EXPANSION = 1e-3
+# by which `young` and `young_at` may differ at the reference temperature, relative
+_SAME_MODULUS = 1e-3
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -84,7 +91,12 @@ class BlockMesh:
 
 
 #: keys that name a file of measurements
-_FILES = (("modes", "shape"), ("calibration", "damping", "frf"), ("calibration", "tune", "shapes"))
+_FILES = (
+    ("modes", "shape"),
+    ("calibration", "damping", "frf"),
+    ("calibration", "tune", "shapes"),
+    ("temperature", "file"),
+)
 
 #: the records of the generators' parameters
 GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
@@ -119,20 +131,27 @@ Mesh = Annotated[
 @dataclass(frozen=True, config=STRICT)
 class MaterialTable:
     """Isotropic material of a volume group: young (Pa), poisson, density (kg/m^3), damping_ratio of every mode,
-    fatigue_strength (Pa)."""
+    fatigue_strength (Pa), expansion (1/K); young_at: [[temperature, modulus], ...], linear between them."""
 
     young: Positive
     poisson: Annotated[Real, Field(gt=-1, lt=0.5)]
     density: Positive
     damping_ratio: Ratio | None = None
     fatigue_strength: Positive | None = None
+    expansion: Annotated[Real, Field(gt=-_EXPANSION, lt=_EXPANSION)] = 0.0
+    young_at: tuple[tuple[Real, Positive], ...] = ()
+
+    def __post_init__(self) -> None:
+        temperatures = [temperature for temperature, _ in self.young_at]
+        if len(temperatures) == 1 or any(b <= a for a, b in pairwise(temperatures)):
+            raise ValueError("young_at: expected [[temperature, modulus], ...], at least two, temperatures ascending")
 
     @property
     def elastic(self) -> Material:
         """Return it as the finite elements take it."""
         from vanedamp.modal.elasticity import Material  # dolfinx is slow to load, and a bad file wants a quick answer
 
-        return Material(self.young, self.poisson, self.density)
+        return Material(self.young, self.poisson, self.density, self.expansion, self.young_at)
 
 
 def _components(clamped: Any) -> Any:
@@ -275,6 +294,7 @@ class Case:
     calibration: CalibrationTable | None = None
     rotation: RotationTable | None = None
     campbell: CampbellTable | None = None
+    temperature: TemperatureTable | None = None
 
     def __post_init__(self) -> None:
         given = {table.damping_ratio for table in self.material.values()} - {None}
@@ -286,8 +306,13 @@ class Case:
             raise ValueError("campbell: needs a table [rotation] with the axis of the speeds, such as axis = [1, 0, 0]")
         if self.rotation is not None and self.rotation.gyroscopic and self.modes.min_frequency:
             raise ValueError("modes.min_frequency: modes with the gyroscopic coupling are the lowest; leave it out")
-        if self.rotation is not None and self.rotation.omega and self.calibration and self.calibration.tune:
-            raise ValueError("calibration.tune: takes frequencies measured at standstill; leave the speed out")
+        stressed = self.temperature is not None or (self.rotation is not None and self.rotation.omega)
+        if stressed and self.calibration is not None and self.calibration.tune is not None:
+            raise ValueError(
+                "calibration.tune: takes frequencies measured at standstill and without [temperature]; leave them out"
+            )
+        if self.temperature is not None:
+            _check_materials(self.material, self.temperature.reference)
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
@@ -311,7 +336,8 @@ class Case:
         mesh = self.mesh.file if isinstance(self.mesh, MeshFile) else None
         damping = self.calibration.damping.frf if self.calibration and self.calibration.damping else None
         tune = self.calibration.tune.shapes if self.calibration and self.calibration.tune else None
-        return [file for file in (mesh, self.modes.shape, damping, tune) if file is not None]
+        heat = self.temperature.file if self.temperature else None
+        return [file for file in (mesh, self.modes.shape, damping, tune, heat) if file is not None]
 
     @property
     def damping_ratio(self) -> float:
@@ -386,6 +412,25 @@ class Case:
         for group in self.material:
             if group != "default":
                 _check_group(f"material.{group}", group, {"volume": [*volumes, "default"]})
+
+
+def _check_materials(materials: Mapping[str, MaterialTable], reference: float) -> None:
+    """Raise ValueError for materials that no temperature changes, and for two moduli at the reference temperature."""
+    if not any(table.expansion or table.young_at for table in materials.values()):
+        raise ValueError("temperature: changes nothing; give a material its expansion (1/K) or young_at")
+    for group, table in materials.items():
+        if not table.young_at:
+            continue
+        (low, _), *_, (high, _) = table.young_at
+        if not low <= reference <= high:
+            raise ValueError(
+                f"material.{group}.young_at: holds from {low:g} to {high:g}, without the reference {reference:g}"
+            )
+        given = float(np.interp(reference, *np.transpose(table.young_at)))
+        if abs(given / table.young - 1.0) > _SAME_MODULUS:
+            raise ValueError(
+                f"material.{group}.young: is the modulus at the reference temperature, {given:.6g} Pa by young_at"
+            )
 
 
 def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) -> None:

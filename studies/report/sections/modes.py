@@ -60,4 +60,6 @@ def _analysis(file: str, record: tuple[dict[str, Any], dict[str, Any]], page: Pa
         "rigid": json.loads(attributes["rigid"]) if "rigid" in attributes else None,
         "cavities": json.loads(attributes.get("cavity", "{}")),
         "fatigue": json.loads(attributes["fatigue"]) if "fatigue" in attributes else None,
+        "speed": float(attributes["speed"]) if "speed" in attributes else None,
+        "whirls": list(zip(values.get("gyroscopic_frequency", ()), values.get("whirl", ()), strict=True)),
     }
