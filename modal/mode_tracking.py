@@ -182,12 +182,14 @@ class Tracks:
 
     def _approach(self, interval: int, place: int, met: SpeedModes) -> Approach:
         """Return the approach of the place-th and the next mode in an interval of the speeds."""
-        first, second = (int(number) for number in self.number[interval][place : place + 2])
         low, high = (float(omega) / (2.0 * np.pi) for omega in met.frequencies[place : place + 2])
-        crossing = self.number[interval + 1][place] == second and self.number[interval + 1][place + 1] == first
-        gap, exchange = (0.0, 0.0) if crossing else (high - low, self._exchange(first, second, interval))
-        kind = "crossing" if crossing else "veering"
-        return Approach(kind, first, second, met.speed, 0.5 * (low + high), gap, exchange)
+        first, second = self.number[interval][place : place + 2].tolist()
+        if [second, first] == self.number[interval + 1][place : place + 2].tolist():
+            return Approach("crossing", first, second, met.speed, 0.5 * (low + high), 0.0, 0.0)
+        # a third mode may cross one of them on the way
+        first, second = (self.number_at(met.speed, at) for at in (place, place + 1))
+        exchange = self._exchange(first, second, interval)
+        return Approach("veering", first, second, met.speed, 0.5 * (low + high), high - low, exchange)
 
     def _exchange(self, first: int, second: int, interval: int) -> float:
         """Return the largest MAC of the first mode after an interval with the second one before it.
@@ -204,7 +206,7 @@ class Tracks:
                 (first, range(interval + 1, interval + 1 + after)),
             )
         ]
-        return float(modal_assurance(*shapes).max())
+        return float(modal_assurance(*shapes).max(initial=0.0))
 
     def _aligned(self, modes: SpeedModes, reference: SpeedModes) -> SpeedModes:
         """Return modes whose multiple ones are turned, within their span, to shapes like those of a reference."""

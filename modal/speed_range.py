@@ -61,7 +61,8 @@ class SpeedRange:
         self._forces = [np.empty((self._free.size, 0)) for _ in self._operators]
         self._compliant = [forces.copy() for forces in self._forces]
         self.solved: list[float] = []
-        rotating.at(0.0)  # `meetings` begins there
+        if low > 0.0:
+            rotating.at(0.0)  # it is stable there as well, where `meetings` begins
         first = self._solve(high)
         stiffness, centrifugal, _ = self._operators[:3]
         self._middle = 0.5 * (low**2 + high**2)

@@ -206,6 +206,53 @@ def test_closest_approach_of_two_modes_among_many(shaken_truss):
             assert veering.gap_hz == pytest.approx(least.fun, rel=1e-6)
 
 
+def family(random, size=6):
+    """Stiffness, its change with the squared speed, and gyroscopic coupling of modes that veer from each other."""
+    first, second, coupling = random.standard_normal((3, size, size))
+    stiffness = first @ first.T + np.diag(random.uniform(1.0, 10.0, size))
+    return stiffness, 0.02 * second @ second.T, 0.2 * (coupling - coupling.T)
+
+
+def family_spectrum(matrices, speed, gyroscopic):
+    """All angular frequencies, by the first-order system."""
+    stiffness, change, coupling = matrices
+    zero = np.zeros_like(stiffness)
+    turning = -speed * gyroscopic * coupling
+    rates = linalg.eigvals(np.block([[zero, np.eye(len(zero))], [-stiffness - speed**2 * change, turning]]))
+    return np.sort(rates.imag)[len(zero) :]
+
+
+@pytest.mark.parametrize("gyroscopic", [False, True])
+@pytest.mark.parametrize("seed", [3, 11, 27, 42])
+def test_families_without_coupling(seed, gyroscopic):
+    """Modes cross those of the other family and veer from their own: none leaves its family, all orders are met."""
+    random = np.random.default_rng(seed)
+    families, turn = [family(random), family(random)], linalg.qr(random.standard_normal((12, 12)))[0]
+    stiffness, change, coupling = (turn @ linalg.block_diag(*pair) @ turn.T for pair in zip(*families, strict=True))
+    standing = vd.SystemMatrices(0.5 * (stiffness + stiffness.T), np.eye(12), random.normal(size=(4, 3)), [], {}, 0.0)
+    structure = rotating(standing, 0.5 * (change + change.T), coupling)
+    diagram = campbell(structure, np.linspace(0.0, 20.0, 9), [0.1, 0.3, 1.0], count=5, gyroscopic=gyroscopic)
+    assert not diagram.warnings and {approach.kind for approach in diagram.approaches} == {"crossing", "veering"}
+
+    def distances(omega, speed):
+        """Of a frequency from those of either family, relative."""
+        return [np.abs(family_spectrum(each, speed, gyroscopic) / omega - 1.0).min() for each in families]
+
+    for curve in PI2 * diagram.frequencies_hz:
+        known = np.flatnonzero(np.isfinite(curve))
+        away = np.array([distances(curve[j], diagram.speeds[j]) for j in known])
+        assert away.max(axis=0).min() < 1e-7
+    for approach in diagram.approaches:
+        middle, half = PI2 * approach.frequency_hz, 0.5 * PI2 * approach.gap_hz
+        away = np.array([distances(middle + side * half, approach.speed) for side in (-1, 1)])
+        both = away.max(axis=0) < 1e-6
+        assert both.all() if approach.kind == "crossing" else both.any()
+    last = np.sort(np.concatenate([family_spectrum(each, 20.0, gyroscopic) for each in families]))
+    for order in diagram.orders:
+        met = sum(crossing.order == order for crossing in diagram.crossings)
+        assert met == min(5, np.count_nonzero(last < order * 20.0))
+
+
 def test_record(tmp_path):
     diagram = campbell(coupled(10.0), COARSE, [1, 2], count=2)
     diagram.save(tmp_path / "campbell.h5")

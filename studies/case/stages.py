@@ -349,6 +349,9 @@ def campbell_diagram(structure: Structure, report: Callable[[int, int], None] | 
     """
     table, rotation, rotating = structure.case.campbell, structure.case.rotation, structure.rotating
     assert table is not None and rotation is not None and rotating is not None
+    most = rotating.standing.free.size
+    if table.modes > most:
+        raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
     diagram = campbell(rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report)
     return replace(diagram, provenance={"matrices": dict(diagram.provenance), "versions": versions()})
 
