@@ -223,7 +223,7 @@ def family_spectrum(matrices, speed, gyroscopic):
 
 
 @pytest.mark.parametrize("gyroscopic", [False, True])
-@pytest.mark.parametrize("seed", [3, 11, 27, 42])
+@pytest.mark.parametrize("seed", [3, 9, 27, 42])
 def test_families_without_coupling(seed, gyroscopic):
     """Modes cross those of the other family and veer from their own: none leaves its family, all orders are met."""
     random = np.random.default_rng(seed)
