@@ -146,8 +146,9 @@ def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
 
     if not unstable(1.0):
         return 1.0
-    # the energy is linear in the share: past the first unstable one there is no stable one
-    low, high = 0.0, 1.0
+    # the energy is linear in the share: past the first unstable one, such as that of a single DOF, none is stable
+    softer = added.diagonal() < 0.0
+    low, high = 0.0, float(np.min(-given.diagonal()[softer] / added.diagonal()[softer], initial=1.0))
     while high - low > _SHARE_DIGITS * high:
         middle = 0.5 * (low + high) if low else 0.1 * high
         low, high = (low, middle) if unstable(middle) else (middle, high)

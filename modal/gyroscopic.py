@@ -6,11 +6,14 @@ Motions Re(x exp(i omega t)) in the frame that turns with the structure solve th
 
 With K and M positive definite all omega are real (Meirovitch 1974, AIAA J. 12), and as many positive ones lie below a
 frequency as Q has negative eigenvalues there: where one of these vanishes it falls, by x^H K x / omega + omega x^H M x.
+Since |x^H G x| <= 2 x^H M x, Q(omega) lies between K - (omega^2 -+ 2 omega W) M, so that the modes without the coupling
+count it wherever they leave a gap of some 2 W.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
@@ -58,81 +61,101 @@ class GyroscopicModes:
 def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) -> GyroscopicModes:
     """Return the lowest `count` modes at a speed (rad/s), with the gyroscopic coupling.
 
-    A space that begins with the modes without it grows by corrections K^-1 Q x, until all residuals are small; Q's
-    inertia above the last mode proves that none is missed. Raises SolverError for a count that the structure does not
-    have, no convergence, or a missed mode, and UnstableError at a speed without stable equilibrium.
+    A space that begins with the modes without it grows by corrections K^-1 Q x, until all residuals are small. That
+    none is missed is proved by the count of those modes or, where they lie too close, by Q's inertia. Raises
+    SolverError for a count that the structure does not have, no convergence, or a missed mode, and UnstableError at a
+    speed without stable equilibrium.
     """
     matrices = rotating.at(speed)
     free = matrices.free
     stiffness, mass, gyroscopic = (
         matrix[free][:, free] for matrix in (matrices.stiffness, matrices.mass, rotating.gyroscopic)
     )
-    coupling = speed * gyroscopic
-    asked = min(count + _SPARE, free.size)
-    space = solve_modes(matrices, max(count, asked)).shapes[:, free].T
+    pencil = _Pencil(stiffness, mass, sparse.csr_array(speed * gyroscopic))
+    still = solve_modes(matrices, max(count, min(count + _SPARE, free.size)))
+    omega, shapes, residuals = _converged(pencil, still.shapes[:, free].T)
+    if count < omega.size:
+        ceiling, below = _known_count(still.angular_frequencies, speed, count) or _count(pencil, omega, count)
+        found = np.count_nonzero(omega < ceiling)
+        if found != below:
+            where = f"{ceiling / (2.0 * np.pi):.6g} Hz at {speed:.6g} rad/s"
+            raise SolverError(f"{found} of {below} modes found below {where}; ask for a few more or fewer")
+    shapes = shapes[:, :count]
+    # the phase at which x^T M x is real and positive
+    shapes = np.exp(-0.5j * np.angle(np.einsum("ij,ij->j", shapes, mass @ shapes))) * shapes
+    signs = shape_signs(shapes.real.T, (mass @ shapes.real).T @ matrices.movable_translations()[free])
+    full = np.zeros((count, matrices.size), dtype=complex)
+    full[:, free] = (signs * shapes).T
+    whirl = 0.5 * np.einsum("ij,ij->j", shapes.conj(), gyroscopic @ shapes).imag
+    return GyroscopicModes(speed, omega[:count] / (2.0 * np.pi), full, residuals[:count], whirl)
+
+
+class _Pencil(NamedTuple):
+    """K, M and W G of the free DOFs."""
+
+    stiffness: sparse.csr_array
+    mass: sparse.csr_array
+    coupling: sparse.csr_array
+
+
+def _converged(pencil: _Pencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return as many modes as a mass-orthonormal space (n, m) has: frequencies, shapes (n, m) and residuals."""
+    stiffness, mass, coupling = pencil
+    count = space.shape[1]
     with factorize(stiffness) as factors:
         for _ in range(_ROUNDS):
-            omega, shapes = modes_within(space, stiffness, coupling, asked)
-            inertia = mass @ shapes
+            omega, shapes = _within(pencil, space, count)
             forces = stiffness @ shapes
-            rest = forces + 1j * omega * (coupling @ shapes) - omega**2 * inertia
-            corrections = factors.solve(np.hstack([rest.real, rest.imag]))
-            works = np.einsum("ij,ij->j", np.hstack([rest.real, rest.imag]), corrections).reshape(2, -1).sum(axis=0)
+            rest = forces + 1j * omega * (coupling @ shapes) - omega**2 * (mass @ shapes)
+            parts = np.hstack([rest.real, rest.imag])
+            corrections = factors.solve(parts)
+            works = np.einsum("ij,ij->j", parts, corrections).reshape(2, -1).sum(axis=0)
             residuals = np.sqrt(works / np.einsum("ij,ij->j", shapes.conj(), forces).real)
             late = np.tile(residuals > _TOLERANCE, 2)
             if not late.any():
-                break
+                return omega, shapes, residuals
             space = np.hstack([space, orthonormal(corrections[:, late], mass, [space])])
-        else:
-            raise SolverError(f"modes at {speed:.6g} rad/s keep residuals of {residuals.max():.1e}")
-    _check_complete(stiffness, mass, coupling, omega, count)
-    # the phase at which x^T M x is real and positive
-    shapes = np.exp(-0.5j * np.angle(np.einsum("ij,ij->j", shapes, inertia))) * shapes
-    signs = shape_signs(shapes.real.T, (mass @ shapes.real).T @ matrices.movable_translations()[free])
-    full = np.zeros((asked, matrices.size), dtype=complex)
-    full[:, free] = (signs * shapes).T
-    whirl = 0.5 * np.einsum("ij,ij->j", shapes.conj(), gyroscopic @ shapes).imag
-    return GyroscopicModes(speed, omega[:count] / (2.0 * np.pi), full[:count], residuals[:count], whirl[:count])
+    raise SolverError(f"modes with the gyroscopic coupling keep residuals of {residuals.max():.1e}")
 
 
-def modes_within(
-    space: np.ndarray, stiffness: sparse.csr_array | np.ndarray, coupling: sparse.csr_array | np.ndarray, count: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest positive frequencies (rad/s) and shapes (n, count), x^H M x = 1, of a mass-orthonormal space.
+def _within(pencil: _Pencil, space: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest frequencies (rad/s) and shapes (n, count), x^H M x = 1, within a mass-orthonormal space."""
+    small = (space.T @ (matrix @ space) for matrix in (pencil.stiffness, pencil.coupling))
+    omega, shapes = dense_modes(*small)
+    return omega[:count], space @ shapes[:, :count]
 
-    In its own modes, of frequencies kappa, velocities v and scaled displacements y = kappa x obey the skew system
-    v' + W G v + kappa y = 0, y' = kappa v.
+
+def dense_modes(stiffness: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return all positive frequencies (m,), rad/s, ascending, and complex shapes (m, m) of length one, of unit masses.
+
+    stiffness, coupling: (m, m), K and W G. In the modes of K, of frequencies kappa, velocities v and scaled
+    displacements y = kappa x obey the skew system v' + W G v + kappa y = 0, y' = kappa v.
     """
-    squares, turn = linalg.eigh(symmetric_part(space.T @ (stiffness @ space)))
-    kappa, basis = np.sqrt(squares), space @ turn
-    coupled = basis.T @ (coupling @ basis)
+    squares, turn = linalg.eigh(symmetric_part(stiffness))
+    kappa, coupled = np.sqrt(squares), turn.T @ coupling @ turn
     skew = np.block([[0.5 * (coupled - coupled.T), np.diag(kappa)], [-np.diag(kappa), np.zeros_like(coupled)]])
     omega, vectors = linalg.eigh(1j * skew)
-    positive = slice(len(kappa), len(kappa) + count)
-    shapes = vectors[len(kappa) :, positive] / kappa[:, None]
-    return omega[positive], basis @ (shapes / np.linalg.norm(shapes, axis=0))
+    size = len(kappa)
+    shapes = vectors[size:, size:] / kappa[:, None]
+    return omega[size:], turn @ (shapes / np.linalg.norm(shapes, axis=0))
 
 
-def _check_complete(
-    stiffness: sparse.csr_array, mass: sparse.csr_array, coupling: sparse.csr_array, omega: np.ndarray, count: int
-) -> None:
-    """Raise SolverError unless the inertia of Q in a gap above the last mode counts all that lie below."""
-    if omega.size == count:  # all that the structure has
-        return
+def _known_count(still: np.ndarray, speed: float, count: int) -> tuple[float, int] | None:
+    """Return a frequency (rad/s) above `count` modes and how many lie below it, if the modes without coupling tell."""
+    last = np.arange(count, len(still))
+    lower = np.hypot(still[last - 1], speed) + speed
+    upper = np.hypot(still[last], speed) - speed
+    widest = int(np.argmax(upper - lower))
+    if not upper[widest] > lower[widest]:
+        return None
+    return 0.5 * float(lower[widest] + upper[widest]), int(last[widest])
+
+
+def _count(pencil: _Pencil, omega: np.ndarray, count: int) -> tuple[float, int]:
+    """Return the same from the inertia of Q, in the widest gap of the frequencies found."""
     last = count + int(np.argmax(np.diff(omega[count - 1 :])))
-    ceiling = 0.5 * (omega[last - 1] + omega[last])
-    real, imaginary = stiffness - ceiling**2 * mass, ceiling * coupling
+    ceiling = 0.5 * float(omega[last - 1] + omega[last])
+    real, imaginary = pencil.stiffness - ceiling**2 * pencil.mass, ceiling * pencil.coupling
+    whole = sparse.csr_array(sparse.bmat([[real, -imaginary], [imaginary, real]], format="csr"))
     # the real form of a Hermitian matrix has each of its eigenvalues twice
-    found = petsc.negative_eigenvalues(
-        sparse.csr_array(sparse.bmat([[real, -imaginary], [imaginary, real]], format="csr"))
-    )
-    if found != 2 * last:
-        raise SolverError(
-            f"{last} of {found // 2} modes found below {ceiling / (2.0 * np.pi):.6g} Hz; ask for a few more or fewer"
-        )
-
-
-def _in_phase(shapes: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-    """Return complex shapes at the phase at which x^T M x is real and positive: the real part is the largest then."""
-    squares = np.einsum("ij,ij->i", shapes, inertia)
-    return np.exp(-0.5j * np.angle(squares))[:, None] * shapes
+    return ceiling, petsc.negative_eigenvalues(whole) // 2

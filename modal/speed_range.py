@@ -14,14 +14,16 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.modal.algebra import orthogonal, orthonormal, symmetric_part
-from vanedamp.modal.eigen import factorize, solve_modes
-from vanedamp.modal.gyroscopic import gyroscopic_modes, modes_within
+from vanedamp.modal.eigen import Modes, factorize, solve_modes
+from vanedamp.modal.gyroscopic import GyroscopicModes, dense_modes, gyroscopic_modes
 from vanedamp.modal.rotating import RotatingMatrices
 
 #: 1/min in a rad/s
 RPM = 30.0 / np.pi
 # of the unit length of a shape: what the basis lacks of it for a field more
 _LACKING = 1e-10
+# of the highest square that was solved for: the least distance of a mode from it
+_NEAREST = 1e-3
 
 
 class SpeedModes(NamedTuple):
@@ -61,6 +63,7 @@ class SpeedRange:
         self._forces = [np.empty((self._free.size, 0)) for _ in self._operators]
         self._compliant = [forces.copy() for forces in self._forces]
         self.solved: list[float] = []
+        self._highest: list[float] = []
         if low > 0.0:
             rotating.at(0.0)  # it is stable there as well, where `meetings` begins
         first = self._solve(high)
@@ -115,9 +118,11 @@ class SpeedRange:
     def errors(self, speed: float) -> np.ndarray:
         """Return the estimated relative errors (m,) of the frequencies at a speed.
 
-        The error of an eigenvalue is r^T (K - lambda M)^-1 r over the modes that the basis lacks. It is bounded by the
-        residual r in the norm of the inverse of the stiffness in the middle of the range, times the largest ratios of
-        that to K, in the basis, and of K to K - lambda M, at the next Ritz value.
+        The error of an eigenvalue is r^T (K - lambda M)^-1 r over what the basis lacks. That is bounded by the residual
+        r in the norm of the inverse of the stiffness in the middle of the range, times the largest ratios of that
+        stiffness to K, in the basis, and of K to K - lambda M: what the basis lacks lies above the highest modes solved
+        for at the neighbours and, its Rayleigh quotients being linear in the squared speed, above the line between
+        these. So no mode below that line is missed, either.
         """
         modes = self.modes(speed)
         if self._basis.shape[1] == self._free.size:
@@ -130,19 +135,21 @@ class SpeedRange:
         residual = np.abs(np.einsum("im,im->m", joined.conj(), self._gram @ joined))
         middle, here = (self._stiffness(squared) for squared in (self._middle, speed**2))
         residual /= linalg.eigh(here, middle, eigvals_only=True, subset_by_index=[0, 0])
-        beyond = self._ceilings.get(speed)
-        ratio = 1.0 if beyond is None else beyond / np.maximum(beyond - omega**2, 1e-3 * beyond)
+        solved = np.argsort(self.solved)
+        beyond = np.interp(speed**2, np.square(self.solved)[solved], np.array(self._highest)[solved])
+        ratio = beyond / np.maximum(beyond - omega**2, _NEAREST * beyond)
         return np.asarray(residual * ratio / (self._inertia(modes, speed) * omega))
 
-    def _solve(self, speed: float) -> np.ndarray:
-        """Return real shapes (k, N) that span the modes of the full structure at a speed."""
-        if not self.gyroscopic:
-            return solve_modes(self.rotating.at(speed), self._solved_count).shapes
-        shapes = gyroscopic_modes(self.rotating, speed, self._solved_count).shapes
-        return np.vstack([shapes.real, shapes.imag])
+    def _solve(self, speed: float) -> Modes | GyroscopicModes:
+        """Return the modes of the full structure at a speed."""
+        if self.gyroscopic:
+            return gyroscopic_modes(self.rotating, speed, self._solved_count)
+        return solve_modes(self.rotating.at(speed), self._solved_count)
 
-    def _join(self, speed: float, shapes: np.ndarray) -> None:
+    def _join(self, speed: float, modes: Modes | GyroscopicModes) -> None:
         self.solved.append(speed)
+        self._highest.append(float(2.0 * np.pi * modes.frequencies_hz[-1]) ** 2)
+        shapes = np.vstack([modes.shapes.real, modes.shapes.imag]) if self.gyroscopic else modes.shapes
         mass, known = self._operators[2], [self._basis]
         rest = orthogonal(shapes[:, self._free].T, mass, known)
         lacking = np.einsum("ij,ij->j", rest, mass @ rest) > _LACKING**2
@@ -157,18 +164,14 @@ class SpeedRange:
         self._small = [self._basis.T @ forces for forces in self._forces]
         self._gram = np.hstack(self._forces).T @ np.hstack(self._compliant)
         self._known: dict[float, SpeedModes] = {}
-        self._ceilings: dict[float, float] = {}
 
     def _ritz(self, speed: float) -> SpeedModes:
         stiffness = self._stiffness(speed**2)
         if self.gyroscopic:
-            size = len(stiffness)
-            frequencies, vectors = modes_within(np.eye(size), stiffness, speed * self._small[3], size)
+            frequencies, vectors = dense_modes(stiffness, speed * self._small[3])
         else:
             values, vectors = linalg.eigh(stiffness)
             frequencies = np.sqrt(values)
-        if len(frequencies) > self._solved_count:
-            self._ceilings[speed] = float(frequencies[self._solved_count] ** 2)
         return SpeedModes(speed, frequencies[: self.count], vectors[:, : self.count])
 
     def _stiffness(self, squared_speed: float) -> np.ndarray:

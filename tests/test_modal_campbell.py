@@ -166,7 +166,7 @@ def test_few_solutions_stand_for_all(shaken_truss, gyroscopic):
 
 @pytest.mark.parametrize("gyroscopic", [False, True])
 def test_error_estimate_bounds_the_error(shaken_truss, gyroscopic):
-    """With the ends of the range solved only, at four speeds: within a factor of 30, and no less than half."""
+    """With the ends of the range solved only, at four speeds: at most ten times the error, which is no round-off."""
     with SpeedRange(shaken_truss, 0.0, 8.0, 3, gyroscopic) as source:
         for speed in (2.0, 4.0, 6.0, 7.0):
             if gyroscopic:
@@ -175,8 +175,8 @@ def test_error_estimate_bounds_the_error(shaken_truss, gyroscopic):
                 exact = vd.solve_modes(shaken_truss.at(speed), 3).angular_frequencies
             error = source.modes(speed).frequencies[:3] / exact - 1.0
             estimate = source.errors(speed)[:3]
-            assert np.all(error > 1e-12)  # something to estimate
-            assert np.all(estimate >= 0.5 * error) and np.all(estimate <= 30.0 * error)
+            assert np.all(error > 1e-5)
+            assert np.all(estimate >= error) and np.all(estimate <= 10.0 * error)
 
 
 def test_slopes_are_derivatives(shaken_truss):

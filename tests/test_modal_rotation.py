@@ -14,7 +14,8 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 from vanedamp.files.store import load
 from vanedamp.files.toml_input import InputError
 from vanedamp.meshes.benchmarks import Block, build
-from vanedamp.modal.eigen import solve_modes, static_shape
+from vanedamp.modal import gyroscopic
+from vanedamp.modal.eigen import SolverError, solve_modes, static_shape
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
 from vanedamp.modal.gyroscopic import gyroscopic_modes
 from vanedamp.modal.matrices import MatricesError, SystemMatrices
@@ -180,6 +181,18 @@ def test_gyroscopic_modes_against_the_dense_problem(tmp_path):
     assert np.einsum("ij,jk,ik->i", shapes.conj(), mass, shapes) == pytest.approx(1.0, rel=1e-9)
     still = solve_modes(rotating.at(speed), 5).angular_frequencies
     assert np.abs(2 * np.pi * modes.frequencies_hz / still - 1.0).max() > 0.01
+
+
+def test_missed_modes_are_counted(beam, monkeypatch):
+    """A result without the lowest mode does not pass, whichever way the modes are counted."""
+    rotating = beam.rotating(beam.assemble({"root": "xyz"}, 0.0), [1, 0, 0], [0.0, 0.0, 0.5 * SIDE])
+    complete = gyroscopic._converged
+    assert gyroscopic_modes(foucault(3.0, 100.0, 160.0), 90.0, 1).frequencies_hz > 0.0
+    monkeypatch.setattr(gyroscopic, "_converged", lambda *given: tuple(np.delete(a, 0, -1) for a in complete(*given)))
+    # the beam's first modes leave a gap of more than 2 W, those of the mass do not
+    for structure, speed, count in ((rotating, 0.1 * FLAP[0] * UNIT, 2), (foucault(3.0, 100.0, 160.0), 90.0, 1)):
+        with pytest.raises(SolverError, match=r"modes found below .* Hz at"):
+            gyroscopic_modes(structure, speed, count)
 
 
 def test_gyroscopic_modes_at_standstill_are_the_modes(blade):
