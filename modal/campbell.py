@@ -64,7 +64,7 @@ class Campbell:
     crossings       with the engine orders, by speed
     approaches      of two modes: veerings and crossings
     gyroscopic      whether the modes have the gyroscopic coupling
-    warnings        where modes could not be followed
+    warnings        where modes could not be followed, or are not among those computed
     """
 
     speeds: np.ndarray
@@ -186,7 +186,8 @@ def campbell(
 
     speeds      rad/s, ascending, at least two
     orders      engine orders, above zero, whose crossings are sought from the first to the last speed
-    count       modes that are among so many lowest at any speed are followed over all speeds
+    count       modes that are among so many lowest at any speed are followed, as far as they are among half as many
+                more
     gyroscopic  with the gyroscopic coupling: complex modes
     tolerance   largest estimated relative error of the frequencies for solving the full structure at a few speeds only,
                 which become more until it is met
@@ -214,11 +215,19 @@ def campbell(
         warnings = list(tracks.notes)
         if errors.max() > tolerance:
             warnings.append(f"frequencies are estimated to be wrong by up to {errors.max():.2g} of their value")
+        frequencies = np.array([tracks.frequencies(mode) for mode in tracks.kept]) / (2.0 * np.pi)
+        for mode, curve in zip(tracks.kept, frequencies, strict=True):
+            known = tracks.speeds[np.isfinite(curve)]
+            if known.size < curve.size:
+                warnings.append(
+                    f"mode {mode + 1} is among the modes computed only from {known[0] * RPM:.6g} to "
+                    f"{known[-1] * RPM:.6g} rpm; ask for more modes to see the rest of it"
+                )
         return Campbell(
             speeds=tracks.speeds,
             asked=np.isin(tracks.speeds, wanted),
             modes=tracks.kept,
-            frequencies_hz=np.array([tracks.frequencies(mode) for mode in tracks.kept]) / (2.0 * np.pi),
+            frequencies_hz=frequencies,
             errors=errors[np.isin(places, tracks.speeds)],
             solved=np.sort(source.solved),
             orders=tuple(float(order) for order in orders),
@@ -231,15 +240,16 @@ def campbell(
 
 
 def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> list[Crossing]:
-    """Return the crossings of the modes of interest with engine orders, by their speed."""
+    """Return the crossings of the modes that are kept with engine orders, by their speed."""
     low, high = tracks.speeds[[0, -1]]
     found = [
         Crossing(tracks.number_at(speed, place), float(order), speed, order * speed / (2.0 * np.pi))
         for order in orders
-        for place, speed in enumerate(source.meetings(order)[: tracks.count])
+        for place, speed in enumerate(source.meetings(order).tolist()[: source.count])
         if low <= speed <= high
     ]
-    return sorted(found, key=lambda crossing: (crossing.speed, crossing.mode))
+    kept = [crossing for crossing in found if crossing.mode in tracks.kept]
+    return sorted(kept, key=lambda crossing: (crossing.speed, crossing.mode))
 
 
 def _checked(

@@ -54,7 +54,7 @@ class Approach:
 class Tracks:
     """Modes followed over a range of speeds.
 
-    source  the modes at any speed; count: of those lowest at a speed that are followed without a break
+    source  the modes at any speed; count: modes that are among so many lowest somewhere are kept
     same    relative distance of frequencies that are one frequency: shapes of one frequency are any mixture of them
 
     speeds  rad/s, those given and those put in between; number[j][i]: the mode that is the i-th lowest at speeds[j],
@@ -97,14 +97,19 @@ class Tracks:
         return int(np.argmax(alike))
 
     def approaches(self) -> list[Approach]:
-        """Return all crossings and veerings of modes next to each other, by their speed."""
+        """Return all crossings and veerings of the modes that are kept, by their speed."""
         found = []
         for interval, (left, right) in enumerate(itertools.pairwise(self.states)):
-            for place in range(min(self.count, left.frequencies.size - 1)):
+            for place in range(left.frequencies.size - 1):
                 met = self._closest(place, left, right)
                 if met is not None:
                     found.append(self._approach(interval, place, met))
-        kept = [approach for approach in found if approach.kind == "crossing" or approach.exchange >= LEAST_EXCHANGE]
+        kept = [
+            approach
+            for approach in found
+            if (approach.kind == "crossing" or approach.exchange >= LEAST_EXCHANGE)
+            and np.isin([approach.first, approach.second], self.kept).any()
+        ]
         return sorted(kept, key=lambda approach: approach.speed)
 
     def _value(self, j: int, mode: int, values: np.ndarray) -> float:
@@ -135,8 +140,9 @@ class Tracks:
 
     def _between(self, left: SpeedModes, right: SpeedModes, pairs: Pairing) -> float | None:
         """Return a speed that has to come between two; None where the pairs are clear."""
-        lowest = np.arange(min(self.count, left.frequencies.size))
-        clear = np.isin(lowest, pairs.first).all() and np.isin(lowest, pairs.second).all()
+        # the highest may be crossed by one that is not computed
+        known = np.arange(left.frequencies.size - (not self.source.whole))
+        clear = np.isin(known, pairs.first).all() and np.isin(known, pairs.second).all()
         moved = pairs.first != pairs.second
         if clear and not moved.any():
             return None

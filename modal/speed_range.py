@@ -81,6 +81,11 @@ class SpeedRange:
     ) -> None:
         self._factor.destroy()
 
+    @property
+    def whole(self) -> bool:
+        """Whether the modes are all that the structure has."""
+        return self.count == self._free.size
+
     def add(self, speed: float) -> None:
         """Solve the full structure at a speed and join its modes to the basis."""
         self._join(speed, self._solve(speed))
