@@ -202,9 +202,9 @@ def _detuned(curves: Curves, scenes: Scenes) -> Claim:
     }
     return claim(
         "The track need not be exact.",
-        f"{swept[0]:.0f} to {swept[-1]:.0f} Hz; tops by the error of its radius (resonance without walls, Hz): "
+        f"{swept[0]:.0f} to {swept[-1]:.0f} Hz; tops by the error of its radius (resonance near, without walls, Hz): "
         + ", ".join(
-            f"{o:+.0%}: {t:.3f} ({f'{f:.0f}' if f < 2 * swept[-1] else 'none'})"
+            f"{o:+.0%}: {t:.3f} ({f'{f:.0f}' if swept[0] / 2 < f < 2 * swept[-1] else 'none'})"
             for o, t, f in zip(off, tops, expected, strict=True)
         ),
         verdict(worst[5] < _SUPPRESSED, worst[2] < _SUPPRESSED or worst[5] < 0.5),
