@@ -55,7 +55,7 @@ def test_scenes_go_along_an_engine_order(name):
 
 
 def test_frequencies_of_a_curve_are_those_of_the_excitation():
-    (curve,) = along(scenes("rotating_body")["order_12"], [2300.0, 2412.0], 120, 60)
+    (curve,) = along(scenes("rotating_body")["order_12"], [2300.0, 2412.0])
     np.testing.assert_allclose(curve.frequency, [2300.0, 2412.0], rtol=1e-12)
 
 
@@ -144,7 +144,7 @@ def test_there_is_no_resonance_for_a_track_little_below_its_order():
 
 @pytest.mark.parametrize("name", BOTH)
 def test_claims_of_quick_studies(name, tmp_path):
-    found = study(name, Session(STRUCTURE, tmp_path, effort=Effort(points=7, periods=120, transient=60)))
+    found = study(name, Session(STRUCTURE, tmp_path, effort=Effort(points=5, periods=1200, transient=700)))
     assert (tmp_path / f"{name}.png").stat().st_size > 10_000
     assert json.loads((tmp_path / f"{name}.claims.json").read_text())["study"] == name
     for claim in found.claims:
