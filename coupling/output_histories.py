@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
 
 from vanedamp.coupling.methods.registry import run_with_response
 from vanedamp.coupling.model_order.choices import choose
@@ -41,12 +40,12 @@ def histories(scene: Scene, outputs: Sequence[str], samples_per_period: int = 10
     structure = scene.structure
     if not isinstance(structure, Rom):
         raise InputError('structure.model: outputs are those of a reduced model; take model = "rom"')
-    model = reduced_model(structure)
+    model = reduced_model(structure, scene.speed)
     unknown = [name for name in outputs if name not in model.outputs]
     if unknown or model.output_rows is None:
         known = ", ".join(model.outputs) or "none"
         raise InputError(f"outputs: no output {(unknown or ['?'])[0]!r} in {structure.file}; it has {known}")
-    shapes = eigh(model.stiffness, model.mass)[1]
+    shapes = model.natural[1]
     scale = float(np.abs(assemble(scene).of_structure.response).max())
     values, times, status = [], np.zeros(0), Status.OK
     for name in outputs:

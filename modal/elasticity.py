@@ -61,6 +61,10 @@ class Material:
         shear = 0.5 * self.young / (1.0 + self.poisson)
         return 2.0 * shear * self.poisson / (1.0 - 2.0 * self.poisson), shear
 
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self) | {"young_at": [list(entry) for entry in self.young_at]}
+
     def softening(self, temperatures: np.ndarray) -> np.ndarray:
         """Return the moduli (n,) at temperatures over `young`. Raises TemperatureError outside `young_at`."""
         if not self.young_at:
@@ -166,7 +170,7 @@ class Solid:
                 "mesh_sha256": self.domain.sha256,
                 "scale": self.scale,
                 "degree": self.degree,
-                "materials": {name: asdict(material) for name, material in self.materials.items()},
+                "materials": {name: material.to_json() for name, material in self.materials.items()},
                 "clamped": dict(clamped),
                 "elastic": {name: asdict(support) for name, support in self.elastic.items()},
                 "versions": fenicsx.versions(),

@@ -98,6 +98,19 @@ def frf_errors(
     return _errors(model.receptance(frequencies_hz), richer, frequencies_hz, labels, forces)
 
 
+def worst_rungs(ladders: Sequence[Sequence[Rung]]) -> list[Rung]:
+    """Return the largest errors of several ladders by their numbers of modes, of those that all of them have."""
+    by_modes = [{rung.modes: rung for rung in ladder} for ladder in ladders]
+    return [
+        Rung(
+            modes, max(rung.size for rung in rungs), max(rung.receptance for rung in rungs),
+            max(rung.collision for rung in rungs), max(rung.above for rung in rungs), any(r.attached for r in rungs),
+        )
+        for modes in by_modes[0]
+        if len(rungs := [ladder[modes] for ladder in by_modes if modes in ladder]) == len(ladders)
+    ]  # fmt: skip
+
+
 def rigid_errors(
     richer: ReducedModel,
     frequencies_hz: Sequence[float] | np.ndarray,

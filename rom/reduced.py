@@ -374,6 +374,10 @@ def _check_interface(model: ReducedModel) -> None:
         raise ReducedModelError(f"fixed_interface_modes: expected 0 to {model.size}, not {model.fixed_interface_modes}")
     if not 0 <= model.free_modes <= model.size or (model.free_modes and model.fixed_interface_modes):
         raise ReducedModelError(f"free_modes: expected 0 to {model.size} and no fixed-interface modes beside them")
+    if model.centrifugal_stiffness is not None and (model.free_modes or residual is not None):
+        raise ReducedModelError(
+            "centrifugal_stiffness: free_modes and residual_flexibility hold at one speed only; leave them out"
+        )
     if sum(model.blocks) + model.modes > model.size:
         raise ReducedModelError(f"blocks: {model.blocks} and {model.modes} modes exceed the {model.size} coordinates")
     if np.any(model.selection[:, model.size - model.fixed_interface_modes :]):

@@ -14,6 +14,9 @@ from vanedamp.rom.dense_modes import check_elastic, count_rigid_motions, spectru
 from vanedamp.rom.krylov import krylov
 from vanedamp.rom.reduced import ReducedModel
 
+# natural modes, and what the structure does beyond them, are those of one stiffness
+_AT_ONE_SPEED: dict[str, Any] = {"centrifugal_stiffness": None, "greatest_speed": 0.0}
+
 
 def truncated(model: ReducedModel, modes: int, blocks: int | None = None) -> ReducedModel:
     """Return the model with only its first `modes` modes and its first `blocks` blocks of quasi-static coordinates.
@@ -77,22 +80,24 @@ def massless(model: ReducedModel, modes: int) -> ReducedModel:
 
     where G is the interface's flexibility that the modes lack. Monjaraz-Tec, Gross and Krack (2022), Computers and
     Structures 259: contact on it is quasi-static and needs no impact law. `boundary_form` has the singular mass.
-    Raises ReducedModelError for fewer modes than the structure has rigid motions.
+    Of a model that rotates it is that at standstill: take the model at its speed first. Raises ReducedModelError for
+    fewer modes than the structure has rigid motions.
     """
     squares, shapes = spectrum(model.mass, model.stiffness)
     if not 0 < modes <= model.size:
         raise ReducedModelError(f"modes: expected 1 to {model.size} (the modes of this model), not {modes}")
     check_elastic(model.rigid_modes, modes)
     static = shapes[:, modes:] / squares[modes:] @ (model.selection @ shapes[:, modes:]).T
-    kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": ()}
+    kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (), **_AT_ONE_SPEED}
     return model.projected(shapes[:, :modes], **kept, **residual_fields(model, static))
 
 
 def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
     """Return a model's own lowest `modes` natural modes after residual attachment modes, with their mass (Rubin 1975).
 
-    As many more coordinates as the interface has independent ones; its flexibility stays exact. Raises
-    ReducedModelError for all of the modes, or fewer than the structure has rigid motions.
+    As many more coordinates as the interface has independent ones; its flexibility stays exact. Of a model that rotates
+    it is that at standstill: take the model at its speed first. Raises ReducedModelError for all of the modes, or
+    fewer than the structure has rigid motions.
     """
     squares, shapes = spectrum(model.mass, model.stiffness)
     if not 0 < modes < model.size:
@@ -101,7 +106,7 @@ def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
     dropped = shapes[:, modes:]
     static = (model.selection @ dropped).T / squares[modes:, None]
     block = orthonormal(static, np.eye(len(static)))
-    kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (block.shape[1],)}
+    kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (block.shape[1],), **_AT_ONE_SPEED}
     return model.projected(np.hstack([dropped @ block, shapes[:, :modes]]), **kept)
 
 

@@ -13,8 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.sweep.grid import FREQUENCY
-
 #: a damped response within this share of the undamped one has not been touched by the bodies
 UNTOUCHED = 0.01
 
@@ -37,7 +35,8 @@ class Headline:
     attached_mass_fraction       at the damped peak
     onset                        first place where the bodies change the mean by more than 1 %
     peak_at_edge, undamped_at_edge, fixed_at_edge   whether a top lies at an edge of the frequencies: no resonance's
-    spacing, half_power_width    Hz, widest step beside the tops that are resonances, and width of the undamped one
+    spacing, half_power_width    Hz, or units of a speed along an engine order: widest step beside the tops that are
+                                 resonances, and width of the undamped one
     points, points_left_out      of the curve, and how many of them are not ok
     """
 
@@ -74,7 +73,11 @@ class Headline:
 
     @property
     def remarks(self) -> list[str]:
-        """Reasons that keep the ratio from being that of two resonance peaks."""
+        """Reasons that keep the ratio from being that of two resonance peaks, along the frequency."""
+        return self.remarks_in("Hz")
+
+    def remarks_in(self, units: str) -> list[str]:
+        """Return these reasons; units: of the axis."""
         remarks = []
         if self.undamped_at_edge:
             remarks.append("no undamped resonance lies within the range")
@@ -82,13 +85,14 @@ class Headline:
             remarks.append("the damped peak lies at an edge of the range, and may be higher beyond it")
         if self.too_coarse:
             remarks.append(
-                f"points {self.spacing:.3g} Hz apart are too coarse for a resonance {self.half_power_width:.3g} Hz wide"
+                f"points {self.spacing:.3g} {units} apart are too coarse for a resonance {self.half_power_width:.3g} "
+                f"{units} wide"
             )
         if self.points_left_out:
             remarks.append(f"{self.points_left_out} of {self.points} points are left out, which are not ok")
         return remarks
 
-    def sentence(self, axis: str, units: str, low: Any, high: Any) -> str:
+    def sentence(self, axis: str, units: str, low: Any, high: Any, along_frequency: bool) -> str:
         """Return the headline for people; low, high: the range along the axis."""
         unit = "" if units == "1" else f" {units}"
         if not math.isfinite(self.damped_peak):
@@ -98,7 +102,7 @@ class Headline:
             unbounded = self.undamped_peak == math.inf
             compared = "the undamped one has no bound" if unbounded else "there is no undamped one to compare with"
             text = f"damped peak (mean) {self.damped_peak:.4g} m, at {at}; {compared}"
-        elif self.undamped_at_edge or axis != FREQUENCY:
+        elif self.undamped_at_edge or not along_frequency:
             text = (
                 f"highest damped mean {self.peak_ratio:.3f} of the highest undamped amplitude {self.undamped_peak:.4g} "
                 f"m from {format_value(low)} to {format_value(high)}{unit}, at {at}"
@@ -107,7 +111,7 @@ class Headline:
             text = (
                 f"damped peak (mean) {self.peak_ratio:.3f} of the undamped maximum {self.undamped_peak:.4g} m, at {at}"
             )
-        return "; ".join([text, *self.remarks])
+        return "; ".join([text, *self.remarks_in(units)])
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -170,7 +174,8 @@ def _linear_top(name: str, x: np.ndarray, curve: np.ndarray, peaks: Mapping[str,
     if f"{name}_peak" not in peaks:
         return _top(x, np.nan_to_num(curve), along_frequency)
     height, at = float(peaks[f"{name}_peak"]), float(peaks[f"{name}_peak_frequency"])
-    return _Top(height, at, at in (x[0], x[-1]))
+    # a speed comes from the frequency of its engine order
+    return _Top(height, at, bool(np.isclose(at, (x[0], x[-1]), rtol=1e-12, atol=0.0).any()))
 
 
 def _top(x: np.ndarray, curve: np.ndarray, along_frequency: bool) -> _Top:

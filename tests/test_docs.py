@@ -15,6 +15,7 @@ import tomli_w
 from tests.tools.input_files import CLUSTER, SCENE, changed
 from tests.tools.processes import RANKS, ROOT, environment
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.rom.reduced import ReducedModel
@@ -126,7 +127,8 @@ def test_files_are_read(example, tmp_path):
     elif {"structure", "excitation", "sweep", "continuation"} & tables.keys():
         scene = Scene.load(path)
         axes, points = scene.sweep_points()
-        assert scene.replace(next(points)).excitation.frequency == axes["excitation.frequency"][0]
+        drive = next(path for path in ("excitation.frequency", "rotation.rpm") if path in axes)
+        assert number_at(scene.replace(next(points)).to_dict(), drive) == axes[drive][0]
     else:
         case = Case.load(path)
         assert tables.get("interface", case.interface).keys() <= case.interface.keys()

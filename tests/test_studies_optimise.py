@@ -35,6 +35,17 @@ def study(folder, change=lambda data: None, quick=True):
     return path
 
 
+def along_order(data):
+    """The example's structure on a disc: its frequency rises with the speed, and an engine order meets it."""
+    data["structure"]["centrifugal_stiffness"] = 0.2
+    data["rotation"] = {"rpm": 24_000.0}
+    del data["excitation"]["frequency"]
+    data["excitation"]["engine_order"] = 6.0
+    del data["optimise"]["band"]
+    data["optimise"]["rpm"] = {"start": 24_300.0, "stop": 24_900.0, "num": 5}
+    data["optimise"]["map"] = {"mass_ratio": 2, "gap_ratio": 2}
+
+
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     folder = tmp_path_factory.mktemp("optimise")
@@ -125,7 +136,7 @@ def test_the_search_finds_a_known_optimum(tmp_path, monkeypatch):
             (d.mass_ratio - 0.02) ** 2 * 1e3 + (d.gap_ratio - 0.7) ** 2 + 0.1 * (d.bodies - 2) ** 2 + 0.1
             for d in designs
         ]
-        shape = (len(designs), len(sample), len(self.study.table.frequencies))
+        shape = (len(designs), len(sample), len(self.study.frequencies))
         self.scenes += np.prod(shape)
         return np.broadcast_to(np.reshape(values, (-1, 1, 1)), shape), np.ones(shape)
 
@@ -239,6 +250,19 @@ def test_command(tmp_path, capsys, monkeypatch):
         (lambda data: data["damper"][0].update(stiffness=1e5), "the search is for sliders"),
         (lambda data: data["structure"].update(damping_ratio=0.0), "an undamped resonance has no amplitude"),
         (lambda data: data["optimise"].update(evaluations=2), "optimise.evaluations: should be greater"),
+        (lambda data: data["optimise"].update(rpm=[6000.0]), "give one of band (Hz) and, for an engine order, speeds"),
+        (
+            lambda data: data["optimise"].update(rpm=[6000.0]) or data["optimise"].pop("band"),
+            "optimise.rpm: a frequency follows the speed by excitation.engine_order only",
+        ),
+        (
+            lambda data: along_order(data) or data["optimise"].update(band=[2400.0]) or data["optimise"].pop("rpm"),
+            "optimise.band: the frequency follows the speed by excitation.engine_order; give speeds or rpm",
+        ),
+        (
+            lambda data: along_order(data) or data["optimise"].update(rpm=[300.0, 200.0]),
+            "rpm: expected speeds that rise, not 200 rpm after 300 rpm",
+        ),
     ],
 )  # fmt: skip
 def test_bad_studies(change, told, tmp_path, capfd, monkeypatch):
@@ -250,6 +274,24 @@ def test_bad_studies(change, told, tmp_path, capfd, monkeypatch):
     error = capfd.readouterr().err
     assert "optimise.toml: " in error and told in error and error.count("\n") == 1
     assert not (tmp_path / "o.h5").exists()
+
+
+def test_the_best_damper_along_an_engine_order(tmp_path):
+    """Amplitudes are those of runs at the speeds; X is that of the crossing with the engine order."""
+    case = Study.load(study(tmp_path, along_order))
+    structure = case.scene.structure
+    crossing = np.sqrt(structure.stiffness / (structure.mass * 36.0 - 0.2))
+    assert case.resonance.frequency == pytest.approx(6.0 * crossing / (2 * np.pi), rel=1e-5)
+    assert case.amplitude == pytest.approx(3e-5) and case.reference == pytest.approx(3e-5, rel=1e-5)
+    assert case.frequencies == pytest.approx(np.linspace(2430.0, 2490.0, 5))
+    record = optimise(case)
+    assert record.trouble == 0 and 0.0 < record.nominal.amplitude < 0.9
+    design, base = record.nominal.design, case.with_bodies(record.nominal.design.bodies)
+    point = case.point(design, dict.fromkeys(deviations(case)[0], 0.0), 2460.0)
+    alone = simulate(base.replace(point))
+    assert alone.frequency == pytest.approx(2460.0)
+    assert record.nominal_response[2] == pytest.approx(alone.amplitude_mean / record.reference, rel=1e-9)
+    assert record.headlines["nominal"]["undamped_peak_at"] == pytest.approx(case.resonance.frequency, rel=1e-5)
 
 
 def test_bodies_are_spread_over_the_cavities(tmp_path):

@@ -12,7 +12,7 @@ from vanedamp.coupling.methods import Method, exact
 from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
 from vanedamp.coupling.response.records import Records, new_records
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart import restart_from, restart_state
+from vanedamp.coupling.response.restart import at_speed_of, marked_with_speed, restart_from, restart_state
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
@@ -38,7 +38,8 @@ def respond(
 def final_state(scene: Scene, run: Run) -> RestartState | None:
     """Return the state that a run of a scene has come to; None within a period, or if the method keeps none."""
     last, system = run.final(), run.outcome().system
-    return restart_state(system, physical_scale(scene, system), last) if isinstance(last, InitialMotion) else last
+    state = restart_state(system, physical_scale(scene, system), last) if isinstance(last, InitialMotion) else last
+    return None if state is None else marked_with_speed(scene, state)
 
 
 def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:
@@ -71,6 +72,7 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     check_waveform(scene, scene.solver.method)
     system = assemble(scene)
     scale = physical_scale(scene, system)
+    start = None if start is None else at_speed_of(scene, start)
     records = new_records(system, scene.time.simulated, samples_per_period)
     if scene.planar:
         return _begin_planar(scene, system, method, records, events, start)

@@ -30,6 +30,7 @@ from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.bodies import Cavity
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.structures import Prescribed
+from vanedamp.coupling.system.body_loads import greatest_pull
 from vanedamp.coupling.system.transient import left_over
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -206,7 +207,7 @@ def _begin(scene: Scene, index: int, state: RestartState, periods: int, earlier:
     share, lift = _TILTS[index], _LIFT
     if abs(share) == _SMALL:
         play = min(cavity.play for cavity in scene.cavity if cavity.play is not None)
-        fallen = scene.gravity.acceleration / 2 * (_FALL / scene.frequency * (index + 1) / len(_TILTS)) ** 2
+        fallen = greatest_pull(scene) / 2 * (_FALL / scene.frequency * (index + 1) / len(_TILTS)) ** 2
         lift = min(max(fallen / play, _BARELY), _LIFT)
     blocks = _watched(_changed(scene, {"shape": "block"}), periods)
     run = run_of(blocks, start=_tilted(scene, state, share, lift))

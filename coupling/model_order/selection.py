@@ -3,7 +3,7 @@
 `modes = "auto"` takes the fewest natural modes whose estimated error stays within the tolerance (rom.error_estimate):
 of the receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus
 that of the pulse of a collision, in the measure in which the bodies can change the response at all. The whole model of
-the file is the measure.
+the file is the measure; of scenes at several speeds of rotation at the lowest, the middle and the highest of these.
 
 A boundary without mass yields under its contact force by the flexibility G that the modes lack, u = Phi eta + G f,
 while it touches and not otherwise. For one contact at a time this is a spring 1/G between body and modes, which is what
@@ -25,13 +25,14 @@ from vanedamp.coupling.model_order.collision_sensitivity import sensitivity
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.reduced_model_file import reduced_model
+from vanedamp.coupling.system.body_loads import load_warnings
+from vanedamp.coupling.system.reduced_model_file import greatest_speed, reduced_model
 from vanedamp.coupling.system.resonance import excitation_force
 from vanedamp.coupling.system.transient import timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.contact_pulse import Collision, pulse
 from vanedamp.rom.dense_modes import spectrum
-from vanedamp.rom.error_estimate import Choice, choose, frequency_grid, natural_ladder, rigid_errors
+from vanedamp.rom.error_estimate import Choice, Rung, choose, frequency_grid, natural_ladder, rigid_errors, worst_rungs
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
 
@@ -46,6 +47,8 @@ _CAUTION = 5.0
 _RESONANCES, _SEEN, _PLACES = 4, 0.03, (0.0, 0.5, 1.0)
 #: scenes of a sweep that are tried, of those that differ in more than their frequency
 _SCENES = 4
+#: speeds of rotation that are tried, of those that the scenes have
+_SPEEDS = 3
 #: safety factor: collisions interact through residual vibration
 _SAFETY = 1.5
 _NEWTON = "; of the forced response only: Newton's impacts have no limit as modes grow, compliant contacts have"
@@ -113,7 +116,7 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
         return Selected(timed(scene), _warning(_shared(scene, structure)))
     structure = replace(structure, modes=choice.chosen.modes, natural=True, attached=choice.chosen.attached)
     scene = replace(scene, structure=structure)
-    contacts = _collisions(scene, reduced_model(structure))
+    contacts = _collisions(scene, reduced_model(structure, scene.speed))
     stiffness = min((collision.stiffness for collision in contacts), default=None)
     estimate = choice.to_json() | {"stiffness": stiffness}
     warning = _warning(_shared(scene, structure))
@@ -127,16 +130,34 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
-    """Return the warnings of a scene without open choices: of its method, and of impact laws on several modes."""
+    """Return the warnings of a scene without open choices: of its method, impact laws on several modes, and loads."""
     rubs = any(damper.shape != "slider" and damper.friction > 0.0 for damper in scene.damper)
     warning = getattr(METHODS.part(scene.solver.method), "RUBBING_WARNING", None) if rubs else None
-    return (*([] if warning is None else [f"solver.method: {warning}"]), *_of_impact_laws(scene))
+    return (
+        *([] if warning is None else [f"solver.method: {warning}"]),
+        *_of_rotation(scene),
+        *_of_impact_laws(scene),
+        *load_warnings(scene),
+    )
+
+
+def _of_rotation(scene: Scene) -> tuple[str, ...]:
+    """Return a warning of a model that is for speeds in a scene that names none."""
+    if scene.rotation is not None or not isinstance(scene.structure, Rom):
+        return ()
+    greatest = greatest_speed(scene.structure)
+    if greatest == 0.0:
+        return ()
+    return (
+        f"rotation: missing, so that the structure stands still; its model is for speeds up to {greatest:.6g} rad/s, "
+        "and speed = 0 says that standstill is meant",
+    )
 
 
 def _of_impact_laws(scene: Scene) -> tuple[str, ...]:
     if not (isinstance(scene.structure, Rom) and scene.contact.rigid and (scene.damper or scene.stop)):
         return ()
-    size = reduced_model(scene.structure).size
+    size = reduced_model(scene.structure, scene.speed).size
     if size == 1:
         return ()
     return (
@@ -151,7 +172,7 @@ def _shared(scene: Scene, structure: Rom) -> float:
     law = scene.contact
     if not law.takes_residual_flexibility:
         return 0.0
-    model = reduced_model(structure)
+    model = reduced_model(structure, scene.speed)
     residual = model.residual_flexibility
     if residual is None:
         return 0.0
@@ -188,13 +209,42 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     first = scenes[0]
     structure, at = first.structure, first.excitation.at
     assert isinstance(structure, Rom) and at is not None
-    model = reduced_model(replace(structure, modes=None))
     labels = list(dict.fromkeys([at, *(label for scene in scenes for label in _surfaces(scene))]))
-    for label in labels:
-        if label not in model.interface:
-            raise InputError(f"structure: no interface label '{label}'; it has {', '.join(model.interface)}")
     driven = [scene.frequency * order for scene in scenes for order in scene.excitation.shares]
-    frequencies = frequency_grid(model, min(driven), max(driven))
+    speeds = sorted({scene.speed for scene in scenes})
+    found = []
+    for place in np.unique(np.linspace(0, len(speeds) - 1, _SPEEDS).astype(int)):
+        model = reduced_model(replace(structure, modes=None), speeds[place])
+        for label in labels:
+            if label not in model.interface:
+                raise InputError(f"structure: no interface label '{label}'; it has {', '.join(model.interface)}")
+        own = [scene for scene in scenes if scene.speed == speeds[place]]
+        found.append(_ladders(own, model, frequency_grid(model, min(driven), max(driven)), at, labels))
+    rigid = max(ladders.rigid for ladders in found)
+    choices = [
+        choose(worst_rungs([ladders.rungs[attached] for ladders in found]), structure.tolerance, rigid)
+        for attached in (False, True)
+    ]
+    # the first of equals: natural modes without attachment modes
+    choice = min(choices, key=lambda item: (not item.met, item.chosen.size))
+    if not choice.met:
+        raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
+    if any(scene.contact.rigid for scene in scenes):
+        choice = replace(choice, sentence=choice.sentence + _NEWTON)
+    return choice
+
+
+class _Ladders(NamedTuple):
+    """Errors of models at one speed: of the rigid one, and of those of natural modes, without and with attachments."""
+
+    rigid: float
+    rungs: tuple[list[Rung], list[Rung]]
+
+
+def _ladders(
+    scenes: Sequence[Scene], model: ReducedModel, frequencies: np.ndarray, at: str, labels: list[str]
+) -> _Ladders:
+    """Return the errors of models of fewer modes for scenes at the speed of a whole model."""
 
     def collisions(smaller: ReducedModel) -> list[Collision]:
         if any(scene.contact.needs_residual_flexibility for scene in scenes) and not _yields(smaller):
@@ -203,19 +253,14 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
 
     share = min(1.0, _IMPACTS * max(_influence(scene, model, frequencies) for scene in scenes))
     share = _SAFETY * min(share, _CAUTION * _sensitivity(scenes, model, frequencies))
-    rigid = float(rigid_errors(model, frequencies, at, labels, [at]).max())
-    choices = []
-    for attached in (False, True):
-        rungs = natural_ladder(model, frequencies, labels, [at], collisions, attached)
-        rungs = [replace(rung, collision=share * rung.collision) for rung in rungs]
-        choices.append(choose(rungs, structure.tolerance, rigid))
-    # the first of equals: natural modes without attachment modes
-    choice = min(choices, key=lambda item: (not item.met, item.chosen.size))
-    if not choice.met:
-        raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
-    if any(scene.contact.rigid for scene in scenes):
-        choice = replace(choice, sentence=choice.sentence + _NEWTON)
-    return choice
+    loose, attached = (
+        [
+            replace(rung, collision=share * rung.collision)
+            for rung in natural_ladder(model, frequencies, labels, [at], collisions, attached)
+        ]
+        for attached in (False, True)
+    )
+    return _Ladders(float(rigid_errors(model, frequencies, at, labels, [at]).max()), (loose, attached))
 
 
 def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
@@ -257,7 +302,7 @@ def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.n
 
 def _but_for_frequency(scene: Scene) -> tuple[Any, ...]:
     """Return what distinguishes scenes of one model, other than their frequency."""
-    drive = replace(scene.excitation, frequency=1.0)
+    drive = replace(scene.excitation, frequency=1.0, engine_order=None)
     return (drive, scene.cavity, scene.damper, scene.friction_damper, scene.gravity, scene.contact)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,14 +20,16 @@ from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.orbits.passage import PeriodMap
 from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.coupling.scene.paths import number_at
+from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
-_FREQUENCY = "excitation.frequency"
 #: tables whose numbers are none of the motion's equations
 _NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "initial")
 
@@ -38,7 +41,7 @@ def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
     run, or a parameter that is no number of it; an orbit that is not found is a status of the result.
     """
     search = _Search(scene)
-    state = search.start() if start is None else search.map.state_of(start)
+    state = search.start() if start is None else search.map.state_of(at_speed_of(search.first, start))
     return replace(newton.find_orbit(search.map, state), parameter=search.low)
 
 
@@ -95,7 +98,7 @@ class _Search:
         path, self.to = self.table.parameter, self.table.to
         if path.split(".")[0] in _NO_PARAMETERS:
             raise InputError(
-                f"orbit.parameter: {path} is no number of the motion's equations; take one such as {_FREQUENCY}"
+                f"orbit.parameter: {path} is no number of the motion's equations; take one such as {FREQUENCY}"
             )
         try:
             given = number_at(scene.to_dict(), path)
@@ -105,9 +108,15 @@ class _Search:
         if self.to == self.low:
             raise InputError(f"orbit.to: {self.to:g} is where the branch begins; give another value")
         base = replace(scene, sweep={}, orbit=None)
-        if path == _FREQUENCY and self.to is not None and scene.excitation.resonance_near is None:
+        if path in SPEEDS and isinstance(scene.structure, Rom):
+            raise InputError(
+                f"orbit.parameter: {path} turns a reduced model's modes, in which states are compared along a branch; "
+                'sweep it with continuation.direction = "up" or "down", or take a rigid structure'
+            )
+        hertz = hertz_of(path, scene.excitation.engine_order)
+        if math.isfinite(hertz) and self.to is not None and scene.excitation.resonance_near is None:
             # the level is that of one resonance along the branch, as in a sweep
-            near = (min(self.low, self.to), max(self.low, self.to))
+            near = (hertz * min(self.low, self.to), hertz * max(self.low, self.to))
             base = replace(base, excitation=replace(base.excitation, resonance_near=near))
         ends = [_at(base, path, value) for value in (self.low, self.to) if value is not None]
         if leaves_open(base):

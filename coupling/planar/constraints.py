@@ -17,7 +17,8 @@ from vanedamp.coupling.scene.bodies import Cavity, Damper
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import base_acceleration, physical_scale
-from vanedamp.coupling.system.constraints import surface_labels
+from vanedamp.coupling.system.body_loads import body_loads, centres
+from vanedamp.coupling.system.cavities import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, interface_row
 from vanedamp.coupling.system.restitution import law_address
 from vanedamp.coupling.system.system import System
@@ -160,17 +161,15 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     load = np.zeros((len(flat.frequency), size), complex)
     load[:, :n] = flat.load[:, :n]
     floor, turn, rise = np.zeros((3, len(bodies), size))
-    centre = _centres(bodies, owner)
+    centre, loads = centres(scene), body_loads(scene, basis)
     for body in bodies:
         k, x = body.number, body.x
         mass[x], weight[x], load[:, x] = body.damper.mass, flat.weight[n + k], flat.load[:, n + k]
         ground = cavities[owner[k]][FLOOR]
         floor[k, :n], turn[k, :n], rise[k, :n] = ground.along, ground.turn, ground.motion(float(centre[k]), 0.0)[1]
         if body.damper.shape != "slider":
-            label = surface_labels(scene, owner[k])[2]
-            normal = basis.across(label)
-            _, across = scene.gravity.components(basis.directions[label], normal)
-            mass[x + 1], weight[x + 1] = body.damper.mass, -body.damper.mass * across
+            normal = basis.across(surface_labels(scene, owner[k])[2])
+            mass[x + 1], weight[x + 1] = body.damper.mass, -body.damper.mass * float(loads.across[k])
             if normal is not None:
                 load[:, x + 1] = -body.damper.mass * (base @ normal)
             mass[x + 2] = body.damper.moment_of_inertia
@@ -212,11 +211,13 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
     stiffness[:n, :n], damping[:n, :n] = np.diag(flat.stiffness[:n]), flat.damping[:n, :n]
     for body in bodies:
-        if body.damper.stiffness or body.damper.dashpot:
+        spring = (body.damper.stiffness or 0.0) + float(loads.track[body.number])
+        if spring or body.damper.dashpot:
             own = -floor[body.number]
             own[body.x] = 1.0
-            stiffness += (body.damper.stiffness or 0.0) * np.outer(own, own)
+            stiffness += spring * np.outer(own, own)
             damping += (body.damper.dashpot or 0.0) * np.outer(own, own)
+        stiffness[body.x, body.x] -= loads.gradient[body.number]
     response = np.zeros(size)
     response[:n] = flat.response[:n]
     pushed = np.abs(weight) * flat.period + (np.abs(load) / np.maximum(flat.frequency, flat.omega)[:, None]).sum(axis=0)
@@ -256,18 +257,6 @@ def on_structure(system: PlanarSystem) -> PlanarSystem:
     J = system.J.copy()
     J[-len(system.tangential) :] += system.elongation
     return system._replace(J=J, delassus=(J / system.mass) @ J.T)
-
-
-def _centres(bodies: list[_Body], owner: list[int]) -> np.ndarray:
-    """Return where the centres of the bodies (b,) stand in their cavities, m from the middle, side by side."""
-    centre = np.zeros(len(bodies))
-    for index in set(owner):
-        row = [body for body in bodies if owner[body.number] == index]
-        end = -sum(body.a for body in row)
-        for body in row:
-            centre[body.number] = end + body.a
-            end = centre[body.number] + body.a
-    return centre
 
 
 def _neglected(body: _Body, cavity: Cavity) -> float:

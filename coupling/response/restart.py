@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import numpy as np
 
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import InitialMotion, row_motion
+from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -42,11 +45,37 @@ def restart_from(system: System, scale: float, start: RestartState) -> InitialMo
     return InitialMotion(p, rate, *row_motion(system, slip, start.slip_velocity, p, rate, elongation))
 
 
+def marked_with_speed(scene: Scene, state: RestartState) -> RestartState:
+    """Return a state that a scene has left with the speed of its modes, if these depend on one."""
+    if not isinstance(scene.structure, Rom) or scene.rotation is None:
+        return state
+    return replace(state, speed=frozen([scene.speed]))
+
+
+def at_speed_of(scene: Scene, start: RestartState) -> RestartState:
+    """Return a state in the modes of the scene's own speed, as structure and bodies are where they were.
+
+    A state of another number of modes stays as it is (`check_size` refuses it). Raises InputError for a speed that the
+    model does not have.
+    """
+    structure = scene.structure
+    if not (start.speed.size and isinstance(structure, Rom)) or start.speed[0] == scene.speed:
+        return start
+    transfer = modal_transfer(structure, float(start.speed[0]), scene.speed)
+    if transfer.shape[1] != len(start.displacement):
+        return start
+    return replace(
+        start, displacement=frozen(transfer @ start.displacement), velocity=frozen(transfer @ start.velocity),
+        speed=frozen([scene.speed]),
+    )  # fmt: skip
+
+
 def check_size(system: System, start: RestartState, planar: bool = False) -> None:
     """Raise InputError for a state of a scene of another size; planar: whether its bodies move in the plane."""
     b, friction = system.bodies, system.friction_rows
     sizes = (system.modes, system.modes, b, b, friction - b, len(system.J) - friction, *4 * (b if planar else 0,))
-    found = tuple(len(array) for array in astuple(start))
+    *lengths, _ = (len(array) for array in astuple(start))
+    found = tuple(lengths)
     if found[:6] != sizes[:6]:
         raise InputError(
             f"continuation: a state of {found[0]} modes, {found[2]} bodies and {found[4]} friction dampers does not "

@@ -27,6 +27,7 @@ class RestartState:
     lift, lift_velocity: (b,) m and m/s across the cavity, of the bodies' centres above the floor, counted from where
     they lie flat on it; tilt, tilt_rate: (b,) rad and rad/s relative to the cavity; 0 for sliders, and empty without
     bodies that move in the plane
+    speed: (1,) rad/s, speed of rotation whose modes those of the structure are; empty: they are those of the scene
     """
 
     displacement: np.ndarray
@@ -39,6 +40,7 @@ class RestartState:
     lift_velocity: np.ndarray = field(default_factory=_none)
     tilt: np.ndarray = field(default_factory=_none)
     tilt_rate: np.ndarray = field(default_factory=_none)
+    speed: np.ndarray = field(default_factory=_none)
 
     def to_list(self) -> list[list[float]]:
         """Return plain data, exact: Python writes the shortest text of a double that reads as the same."""

@@ -23,6 +23,9 @@ class Cavity:
 
     On a reduced model left, right, floor and ceiling name interface labels. normal_motion, rotation: motion across and
     rotation (rad/m) per unit of the floor's motion along the cavity, where the structure has no coordinates for them.
+    radius: m, from the axis of rotation to the body's centre at mid-travel, with centrifugal_deg (0: the centrifugal
+    load presses the bodies on the floor, 90: it pulls them along the cavity to its left wall) for a structure without a
+    geometry; the cavity lies in the plane of rotation.
     """
 
     name: Annotated[str, AfterValidator(_addressable)]
@@ -34,6 +37,8 @@ class Cavity:
     play: Positive | None = None
     normal_motion: Real = 0.0
     rotation: Real = 0.0
+    radius: Positive | None = None
+    centrifugal_deg: Real = 0.0
 
     def labels(self) -> tuple[str | None, str | None, str | None]:
         """Return the labels of left wall, right wall and floor; a single one serves all three."""
@@ -49,7 +54,7 @@ class Damper:
     plane of the cavity; "auto": a block, run as a slider where that changes the mean amplitude by at most `tolerance`
     (relative, 0.05 unless given). inertia: kg m^2 about the centre, that of the homogeneous body unless given. lift:
     height of its lowest point above the floor, m; tilt: rad. stiffness, dashpot: of a spring between body and floor,
-    along it.
+    along it. track_radius: m, of the path of its centre on a concave floor, whose middle is that of the free travel.
     """
 
     cavity: str
@@ -70,6 +75,7 @@ class Damper:
     tilt_rate: Real = 0.0
     stiffness: Positive | None = None
     dashpot: NonNegative | None = None
+    track_radius: Positive | None = None
     tolerance: Annotated[Real, Field(gt=0, lt=1)] | None = None
 
     def __post_init__(self) -> None:
@@ -84,13 +90,22 @@ class Damper:
                     raise ValueError(f'{key}: a slider only moves along its cavity; take shape = "block" or "disc"')
         elif self.normal_load is not None:
             raise ValueError(f'normal_load: a body of shape = "{self.shape}" is pressed by its contacts; leave it out')
+        if self.track_radius is not None and self.normal_load is not None:
+            raise ValueError(
+                "normal_load: on a track the load across the cavity brings the body back as well; leave it out"
+            )
         if self.tolerance is not None and self.shape != "auto":
             raise ValueError(f'tolerance: of shape = "auto", which chooses; leave it out of shape = "{self.shape}"')
 
     @property
     def planar(self) -> bool:
-        """Whether the body needs the plane: it has an extent, or a spring of its own."""
-        return self.shape != "slider" or self.stiffness is not None or self.dashpot is not None
+        """Whether the body needs the plane: it has an extent, or a spring or a track of its own."""
+        return self.shape != "slider" or self.sprung
+
+    @property
+    def sprung(self) -> bool:
+        """Whether a spring, a dashpot or a concave track binds the body to its cavity."""
+        return (self.stiffness, self.dashpot, self.track_radius) != (None, None, None)
 
     @property
     def half_extent(self) -> tuple[float, float]:

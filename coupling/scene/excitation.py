@@ -39,7 +39,8 @@ class Excitation:
     (Scene.frequency).
     resonance_amplitude is the displacement to which the force brings a resonance of the structure without bodies: of a
     model with several, the one that responds most within `resonance_near`, a frequency or [lowest, highest] (Hz);
-    default: the excitation's frequency, or the range over which it is swept.
+    default: the excitation's frequency, or the range over which it is swept. With an engine order and a range it is the
+    one that the order's line meets, at the speed where it does.
     `at` is the interface label of force and response on a reduced model; the base moves in its direction.
     harmonic: sines whose sum excites, at multiples of the frequency; that of order 1 has amplitude 1 and phase 0 unless
     it is among them. resonance_amplitude speaks of a sine of order 1 and amplitude 1.
@@ -89,6 +90,12 @@ class Excitation:
         return self.waveform if self.waveform is not None and self.waveform.shares is None else None
 
 
+def pulled(field: np.ndarray, cavity: np.ndarray, normal: np.ndarray | None) -> tuple[float, float]:
+    """Return the parts of a field (3,) along a cavity and across it, as of Gravity.components."""
+    across = np.linalg.norm(np.cross(field, cavity)) if normal is None else -field @ normal
+    return float(field @ cavity), float(across)
+
+
 @dataclass(frozen=True, config=STRICT)
 class Gravity:
     """Gravity, by its angle to all cavities, or by its `direction` in space (of any length), which a reduced model's
@@ -117,8 +124,7 @@ class Gravity:
             along, across = -math.sin(angle), math.cos(angle)
         else:
             down = np.array(self.direction) / np.linalg.norm(self.direction)
-            along = float(down @ cavity)
-            across = float(np.linalg.norm(np.cross(down, cavity)) if normal is None else -down @ normal)
+            along, across = pulled(down, cavity, normal)
         if abs(across) < 1e-15:  # upright is upright
             across = 0.0
         return self.acceleration * along, self.acceleration * across

@@ -16,6 +16,7 @@ _UNITS = {
     "base_acceleration": "m/s^2", "acceleration": "m/s^2", "resonance_amplitude": "m", "displacement_amplitude": "m",
     "position": "m", "displacement": "m", "velocity": "m/s", "normal_load": "N", "normal_force": "N",
     "orientation_deg": "degree", "phase": "degree",
+    "speed": "rad/s", "rpm": "rpm",
 }  # fmt: skip
 
 

@@ -8,6 +8,30 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, NonNegative
 
+#: axis of the excitation's frequency; axes of the speed of rotation, and what one of their units is, rad/s
+FREQUENCY = "excitation.frequency"
+SPEEDS = {"rotation.speed": 1.0, "rotation.rpm": 2 * math.pi / 60}
+
+
+def hertz_of(path: str, order: float | None) -> float:
+    """Return the excitation's frequency, Hz, of a unit of a scene's number, such as a speed of an engine order.
+
+    nan of a number that the frequency does not depend on.
+    """
+    if path == FREQUENCY:
+        return 1.0
+    return math.nan if order is None or path not in SPEEDS else frequency_of(order, SPEEDS[path])
+
+
+def frequency_of(order: float, speed: float) -> float:
+    """Return the frequency, Hz, of an engine order at a speed, rad/s."""
+    return order * speed / (2 * math.pi)
+
+
+def speed_of(order: float, frequency: float) -> float:
+    """Return the speed, rad/s, at which an engine order has a frequency, Hz."""
+    return 2 * math.pi * frequency / order
+
 
 @dataclass(frozen=True, config=STRICT)
 class Rotation:

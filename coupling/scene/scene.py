@@ -20,7 +20,7 @@ from vanedamp.coupling.scene.contact_laws.registry import Contact
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
-from vanedamp.coupling.scene.rotation import Rotation
+from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
 from vanedamp.files.toml_input import (
@@ -136,6 +136,7 @@ class Scene:
             self._check_plane()
         if self.excitation.engine_order is not None and not self.speed:
             raise ValueError("excitation.engine_order: its frequency follows the speed; give [rotation] a speed or rpm")
+        self._check_rotation()
         self._check_structure()
 
     @property
@@ -147,7 +148,7 @@ class Scene:
     def frequency(self) -> float:
         """Frequency of the excitation, Hz: its own, or that of its engine order."""
         if self.excitation.engine_order is not None:
-            return self.excitation.engine_order * self.speed / (2 * math.pi)
+            return frequency_of(self.excitation.engine_order, self.speed)
         assert self.excitation.frequency is not None
         return self.excitation.frequency
 
@@ -179,10 +180,10 @@ class Scene:
                 '"auto" beside it; say which body each is'
             )
         for index, damper in enumerate(self.damper):
-            if "auto" in shapes and (damper.stiffness is not None or damper.dashpot is not None):
+            if "auto" in shapes and damper.sprung:
                 raise ValueError(
-                    f'damper[{index}].stiffness, dashpot: beside shape = "auto" bodies have no springs; say which body '
-                    "each is"
+                    f'damper[{index}].stiffness, dashpot, track_radius: beside shape = "auto" bodies have no springs; '
+                    "say which body each is"
                 )
         if "auto" in shapes and not self.contact.rigid:
             raise ValueError(
@@ -198,13 +199,43 @@ class Scene:
 
     def _check_load(self, index: int, damper: Damper) -> None:
         extended = damper.shape != "slider"  # has a ceiling to fall on
-        if extended or damper.normal_load is not None or damper.friction == 0 or self.gravity.direction is not None:
+        if extended or damper.normal_load is not None or damper.friction == 0:
             return
-        if math.cos(math.radians(self.gravity.orientation_deg)) < -1e-12 and self.gravity.acceleration > 0:
+        if self.speed:
+            number = [cavity.name for cavity in self.cavity].index(damper.cavity)
+            angle = self.cavity[number].centrifugal_deg
+            if math.cos(math.radians(angle)) < -1e-12:
+                raise ValueError(
+                    f"damper[{index}]: the centrifugal load lifts the body off the floor at "
+                    f"cavity[{number}].centrifugal_deg = {angle:g}; give normal_load or turn it to -90..90"
+                )
+        elif (
+            self.gravity.direction is None
+            and math.cos(math.radians(self.gravity.orientation_deg)) < -1e-12
+            and self.gravity.acceleration > 0
+        ):
             raise ValueError(
                 f"damper[{index}]: gravity lifts the body off the floor at gravity.orientation_deg = "
                 f"{self.gravity.orientation_deg:g}; give normal_load or turn it to -90..90"
             )
+
+    def _check_rotation(self) -> None:
+        """Raise ValueError where the place of a cavity in rotation is missing, or given twice."""
+        for index, cavity in enumerate(self.cavity):
+            if isinstance(self.structure, Rom):
+                for key in ("radius", "centrifugal_deg"):
+                    if getattr(cavity, key):
+                        raise ValueError(
+                            f"cavity[{index}].{key}: a reduced model has the places and directions of its cavities; "
+                            "leave it out"
+                        )
+                continue
+            loads = [damper.normal_load for damper in self.damper if damper.cavity == cavity.name]
+            if self.speed and cavity.radius is None and (None in loads or (loads and cavity.centrifugal_deg)):
+                raise ValueError(
+                    f"cavity[{index}].radius: missing; [rotation] turns its bodies: give the distance from the axis to "
+                    "the body's centre, m"
+                )
 
     def _check_row(self, cavity: Cavity) -> None:
         row = [(index, damper.position) for index, damper in enumerate(self.damper) if damper.cavity == cavity.name]
@@ -301,10 +332,12 @@ class Scene:
             isinstance(self.structure, Prescribed)
             or any(value is not None for value in given)
             or self.initial != Initial()
-            or any(damper.velocity for damper in self.damper)
+            or any(damper.velocity or (damper.sprung and damper.position) for damper in self.damper)
+            or (bool(self.speed) and any(cavity.centrifugal_deg for cavity in self.cavity))
+            or (bool(self.speed) and isinstance(self.structure, Rom))
             or self.gravity.orientation_deg != 0.0
             or self.gravity.direction is not None
-            or not swept.isdisjoint({"structure", "excitation", "initial", "damper", "gravity"})
+            or not swept.isdisjoint({"structure", "excitation", "initial", "damper", "gravity", "rotation"})
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -14,12 +14,13 @@ from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
 from vanedamp.coupling.model_order.choices import NOTHING, Choices, Chosen, choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.scene.paths import assign, axis_values
+from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.modal_basis import structure_basis
 from vanedamp.files.toml_input import InputError, nearest, validate
 
-FREQUENCY = "excitation.frequency"
 _DIRECTION, _ALONG = "continuation.direction", "continuation.along"
 #: values that cannot change from one run to the next: their states would not fit
 _FIXED = ("structure.model", "structure.file", "structure.modes", "structure.natural", "structure.tolerance")
@@ -146,6 +147,7 @@ def grid(scene: Scene) -> Grid:
     along = _along(scene, axes) if linked else None
     base = _with_range(points.base, axes)
     points = Points(base)
+    _check_speeds(points, axes)
     choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if undecided else NOTHING
     start = with_choices(first, choices)
     assemble(start.scene)
@@ -155,10 +157,35 @@ def grid(scene: Scene) -> Grid:
 
 def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
     """Return the scene whose level is that of one resonance for all of the swept frequencies."""
-    swept = axes.get(FREQUENCY)
-    if swept is None or not _ordered(swept) or scene.excitation.resonance_near is not None:
+    swept, hertz = resonance_axis(scene, axes)
+    if swept is None or not _ordered(axes[swept]) or scene.excitation.resonance_near is not None:
         return scene
-    return replace(scene, excitation=replace(scene.excitation, resonance_near=(float(min(swept)), float(max(swept)))))
+    near = (float(min(axes[swept])) * hertz, float(max(axes[swept])) * hertz)
+    return replace(scene, excitation=replace(scene.excitation, resonance_near=near))
+
+
+def resonance_axis(scene: Scene, axes: Iterable[str]) -> tuple[str | None, float]:
+    """Return the axis along which a sweep meets resonances, and the frequency of a unit of it, Hz.
+
+    That of the frequency, or of the speed along an engine order; None without.
+    """
+    paths = list(axes)
+    order = None if "excitation.engine_order" in paths else scene.excitation.engine_order
+    for path in (FREQUENCY, *SPEEDS):
+        if path in paths and math.isfinite(hertz := hertz_of(path, order)):
+            return path, hertz
+    return None, math.nan
+
+
+def _check_speeds(points: Points, axes: Mapping[str, Sequence[Any]]) -> None:
+    """Raise InputError for a speed at which the structure of the first point is unstable, or beyond its model's."""
+    for path in SPEEDS:
+        if path in axes and _ordered(axes[path]):
+            fastest = points.raw({each: values[0] for each, values in axes.items()} | {path: max(axes[path])})
+            structure = fastest.structure
+            if isinstance(structure, Rom) and structure.modes == "auto":
+                structure = replace(structure, modes=None)
+            structure_basis(structure, fastest.speed)
 
 
 def _telling(axes: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
@@ -183,9 +210,10 @@ def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:
     along = scene.continuation.along
     if along is None:
         numeric = [path for path, values in axes.items() if _ordered(values)]
-        if FREQUENCY not in axes and len(numeric) != 1:
+        usual = [path for path in (FREQUENCY, *SPEEDS) if path in axes]
+        if not usual and len(numeric) != 1:
             raise InputError(f"continuation.along: name the axis of the sweep, one of {', '.join(numeric) or 'none'}")
-        along = FREQUENCY if FREQUENCY in axes else numeric[0]
+        along = (usual or numeric)[0]
     if along not in axes:
         raise InputError(f"continuation.along: the sweep has no axis '{along}'; {nearest(along, list(axes))}")
     if not _ordered(axes[along]):

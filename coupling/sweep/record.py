@@ -12,7 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.scene.paths import unit_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sweep.grid import FREQUENCY
+from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.store import Variable, frozen, load, save
 from vanedamp.files.toml_input import validate
@@ -42,7 +42,8 @@ class Sweep:
                           of sliders
     peaks                 by the names of PEAKS: tops of `undamped` and `fixed` from the lowest to the highest
                           frequency, between the points as well, their frequencies, and the half-power width of the
-                          undamped one, over the axes other than the frequency; empty for a sweep at one frequency
+                          undamped one, over the axes other than the frequency, or the speed along an engine order;
+                          empty for a sweep at one frequency
     provenance            versions and further data of the caller (JSON-able)
 
     A point of the grid is the same whoever ran it, and whenever: no time is taken.
@@ -103,7 +104,8 @@ class Sweep:
             variables[name] = Variable(getattr(self, name), dims, unit)
         for name, values in self.in_plane.items():
             variables[name] = Variable(values, (*dims, "damper"), IN_PLANE[name])
-        others = tuple(_dimension(axis) for axis in self.axes if axis != FREQUENCY)
+        swept = resonance_axis(self.scene, self.axes)[0]
+        others = tuple(_dimension(axis) for axis in self.axes if axis != swept)
         variables |= {name: Variable(values, others, PEAKS[name]) for name, values in self.peaks.items()}
         attributes = {
             "axes": list(self.axes),

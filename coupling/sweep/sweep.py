@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
-from vanedamp.coupling.sweep.grid import FREQUENCY, Grid, PointList, Points
+from vanedamp.coupling.sweep.grid import Grid, PointList, Points, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.coupling.sweep.schedule import _run
 from vanedamp.coupling.sweep.worker import COLUMNS, IN_PLANE, LOSSES, MEASURES, TEXTS, SweepTable, width_of
-from vanedamp.coupling.system.linear_response import LinearPeak, linear_responses
+from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, validate
 
@@ -91,15 +92,16 @@ def _result(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Swe
 
 def _peaks(grid: Grid) -> dict[str, np.ndarray]:
     """Return the tops of the linear curves over the swept frequencies; nan where there is none."""
-    others = {path: values for path, values in grid.axes.items() if path != FREQUENCY}
-    if len(set(grid.axes.get(FREQUENCY, ()))) < 2:
+    swept = resonance_axis(grid.base, grid.axes)[0]
+    if swept is None or len(set(grid.axes[swept])) < 2:
         return {}
-    low, high = min(grid.axes[FREQUENCY]), max(grid.axes[FREQUENCY])
+    others = {path: values for path, values in grid.axes.items() if path != swept}
+    low, high = min(grid.axes[swept]), max(grid.axes[swept])
     points, found = Points(grid.base, grid.choices), []
     for values in itertools.product(*others.values()):
         try:
-            scene = points.scene({**dict(zip(others, values, strict=True)), FREQUENCY: low})
-            found.append(tops(*(response.peak(low, high) for response in linear_responses(scene))))
+            scene = points.scene({**dict(zip(others, values, strict=True)), swept: low})
+            found.append(tops(*linear_peaks(scene, low * SPEEDS.get(swept, 1.0), high * SPEEDS.get(swept, 1.0))))
         except InputError:  # the points' status, or a waveform
             found.append(dict.fromkeys(PEAKS, np.nan))
     shape = tuple(len(values) for values in others.values())

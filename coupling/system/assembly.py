@@ -11,6 +11,7 @@ import numpy as np
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.scene.waveform import Waveform
+from vanedamp.coupling.system.body_loads import body_loads
 from vanedamp.coupling.system.cavities import check_directions
 from vanedamp.coupling.system.constraints import constraints_of
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
@@ -58,8 +59,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     on_structure, on_bodies = made.J[:, :n], made.J[:, n:]
     mass = np.array([damper.mass for damper in scene.damper])
     along = np.reshape([basis.directions[label] for label in made.floors], (-1, 3))
-    gravity = np.reshape([scene.gravity.components(direction) for direction in along], (-1, 2))[:, 0]
-    accelerated = base @ along.T
+    accelerated, loads = base @ along.T, body_loads(scene, basis)
     bodies = len(mass)
     damping = np.zeros((n + bodies, n + bodies))
     damping[:n, :n] = basis.damping
@@ -67,8 +67,9 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         modes=n, bodies=bodies, friction_rows=made.friction_rows, mass=np.concatenate([np.ones(n), mass]),
         stiffness=np.concatenate([basis.stiffness, np.zeros(bodies)]), damping=damping,
         proportional=bool(np.count_nonzero(basis.damping - np.diag(np.diag(basis.damping))) == 0),
-        load=np.hstack([force, -mass * accelerated]) + 0j,
-        weight=np.concatenate([np.zeros(n), mass * gravity]), alike=bool(np.all(accelerated == accelerated[:, :1])),
+        load=np.hstack([force, loads.gradient * table - mass * accelerated]) + 0j,
+        weight=np.concatenate([np.zeros(n), mass * loads.along]),
+        alike=bool(np.all(accelerated == accelerated[:, :1])),
         response=np.concatenate([response, np.zeros(bodies)]), table=table.ravel(), frequency=frequency,
         omega=omega, period=2 * np.pi / omega, floor=made.floor, J=made.J, rest=made.rest,
         delassus=on_structure @ on_structure.T + (on_bodies / mass) @ on_bodies.T, limit=made.limit,

@@ -24,6 +24,14 @@ _PARALLEL, _ALONG = 5.0, 45.0
 Vectors = Mapping[str, np.ndarray]
 
 
+def surface_labels(scene: Scene, index: int) -> tuple[str, str, str]:
+    """Return the interface labels of left wall, right wall and floor of a cavity."""
+    if not isinstance(scene.structure, Rom):
+        return ("structure",) * 3
+    left, right, floor = scene.cavity[index].labels()
+    return str(left), str(right), str(floor)
+
+
 def check_directions(scene: Scene, basis: ModalBasis) -> None:
     """Raise InputError where a reduced model lacks a direction that the scene needs, or where directions do not fit."""
     if not isinstance(scene.structure, Rom):

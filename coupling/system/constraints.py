@@ -18,7 +18,8 @@ import numpy as np
 
 from vanedamp.coupling.scene.contact_laws.law import Element
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.body_loads import body_loads
+from vanedamp.coupling.system.cavities import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
 
 #: coefficients of friction below this are none
@@ -79,7 +80,7 @@ def constraints_of(scene: Scene, basis: ModalBasis, at: str) -> Constraints:
     n, bodies = len(basis.stiffness), len(owner)
     floor = np.reshape([cavities[index].floor for index in owner], (bodies, n))
     floors = [cavities[index].labels[2] for index in owner]
-    friction = [*_slips(scene, basis, floor, floors), *_friction_dampers(scene, basis, at)]
+    friction = [*_slips(scene, floor, body_loads(scene, basis).across), *_friction_dampers(scene, basis, at)]
     rows = [*friction, *_gaps(scene, cavities, owner), *_stops(scene, basis)]
     structure = np.reshape([row.structure for row in rows], (len(rows), n))
     left, right = (np.array([getattr(row, side) for row in rows], np.int64) for side in ("left", "right"))
@@ -123,20 +124,11 @@ def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> _Surfaces:
     return _Surfaces(labels, left, right, floor, yields)
 
 
-def surface_labels(scene: Scene, index: int) -> tuple[str, str, str]:
-    """Return the interface labels of left wall, right wall and floor of a cavity."""
-    if not isinstance(scene.structure, Rom):
-        return ("structure",) * 3
-    left, right, floor = scene.cavity[index].labels()
-    return str(left), str(right), str(floor)
-
-
-def _slips(scene: Scene, basis: ModalBasis, floor: np.ndarray, floors: list[str]) -> list[_Row]:
-    """Return a row for the slip of each body on its floor."""
+def _slips(scene: Scene, floor: np.ndarray, across: np.ndarray) -> list[_Row]:
+    """Return a row for the slip of each body on its floor. across: (b,) acceleration that presses it on, m/s^2."""
     rows = []
     for i, damper in enumerate(scene.damper):
-        _, across = scene.gravity.components(basis.directions[floors[i]])
-        normal = damper.mass * across if damper.normal_load is None else damper.normal_load
+        normal = damper.mass * float(across[i]) if damper.normal_load is None else damper.normal_load
         rows.append(_Row(-floor[i], right=i, limit=_coefficient(damper.friction) * max(normal, 0.0)))
     return rows
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
+from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.engine_order import Natural, crossings
 from vanedamp.coupling.system.resonance import receptance_of
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
@@ -20,6 +24,8 @@ from vanedamp.files.toml_input import InputError
 _EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
 #: local maxima that are refined; the others are lower
 _REFINED = 3
+#: half-power widths beside a crossing of an engine order that hold the top of its resonance
+_WIDTHS = 3.0
 
 
 class LinearPeak(NamedTuple):
@@ -64,7 +70,7 @@ class LinearResponse:
 
     def peak(self, low: float, high: float) -> LinearPeak:
         """Return the largest amplitude from low to high, Hz, to round-off; at an end where no resonance is higher."""
-        natural, widths = self._resonances()
+        natural, widths = self.resonances()
         inside = (natural >= low) & (natural <= high)
         for frequency in natural[inside & (widths == 0.0)]:
             return LinearPeak(float(frequency), math.inf, 0.0)
@@ -89,12 +95,86 @@ class LinearResponse:
             found = max(found, (-float(refined.fun), float(refined.x)))
         return found
 
-    def _resonances(self) -> tuple[np.ndarray, np.ndarray]:
+    def resonances(self) -> tuple[np.ndarray, np.ndarray]:
         """Return frequencies at which a harmonic meets a natural one, and half-power widths there (e n,), Hz."""
         squares, shapes = eigh(np.diag(self.stiffness), self.mass) if len(self.mass) else (np.zeros(0), self.mass)
         widths = np.einsum("ik,ij,jk->k", shapes, self.damping, shapes) / (2 * np.pi)
         natural = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
         return np.divide.outer(natural, self.order).ravel(), np.divide.outer(widths, self.order).ravel()
+
+
+def linear_amplitudes(scene: Scene, frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the amplitudes (f,) of `linear_responses`, m, at frequencies (f,), Hz, of the scene's engine order if any.
+
+    Raises InputError as that does.
+    """
+    order = scene.excitation.engine_order
+    if order is None:
+        free, glued = (response.amplitude(frequencies) for response in linear_responses(scene))
+        return free, glued
+    curves = []
+    for frequency in frequencies:
+        turning = replace(scene, rotation=Rotation(speed=speed_of(order, frequency)))
+        curves.append([response.amplitude(np.array([frequency]))[0] for response in linear_responses(turning)])
+    free, glued = np.transpose(curves)
+    return free, glued
+
+
+def linear_peaks(scene: Scene, low: float, high: float) -> tuple[LinearPeak, LinearPeak]:
+    """Return the peaks of `linear_responses` from low to high: Hz, or rad/s along the scene's engine order.
+
+    Raises InputError as that does.
+    """
+    order = scene.excitation.engine_order
+    if order is None:
+        free, glued = (response.peak(low, high) for response in linear_responses(scene))
+        return free, glued
+
+    @cache
+    def at(speed: float) -> tuple[LinearResponse, LinearResponse]:
+        return linear_responses(replace(scene, rotation=Rotation(speed=speed)))
+
+    return peak_along(lambda x: at(x)[0], order, low, high), peak_along(lambda x: at(x)[1], order, low, high)
+
+
+def peak_along(response: Callable[[float], LinearResponse], order: float, low: float, high: float) -> LinearPeak:
+    """Return the largest amplitude of a linear response along an engine order from low to high, rad/s.
+
+    response: at a speed, rad/s. Frequency and half-power width of the peak are those along the line, Hz; it lies at an
+    end where no resonance in the range is higher.
+    """
+
+    def amplitude(speed: float) -> float:
+        return float(response(speed).amplitude(np.array([frequency_of(order, speed)]))[0])
+
+    def natural(speed: float) -> np.ndarray:
+        return np.sort(response(speed).resonances()[0])
+
+    best = max((amplitude(speed), speed, 0.0) for speed in (low, high))
+    for speed, width in _resonances(response, natural, order, low, high):
+        if width == 0.0:
+            return LinearPeak(frequency_of(order, speed), math.inf, 0.0)
+        around = speed_of(order, _WIDTHS * width)
+        bounds = (max(low, speed - around), min(high, speed + around))
+        top = minimize_scalar(lambda x: -amplitude(x), bounds=bounds, method="bounded", options={"xatol": 1e-9 * speed})
+        best = max(best, (-float(top.fun), float(top.x), width))
+    height, speed, width = best
+    return LinearPeak(frequency_of(order, speed), height, width)
+
+
+def _resonances(
+    response: Callable[[float], LinearResponse], natural: Natural, order: float, low: float, high: float
+) -> Iterator[tuple[float, float]]:
+    """Yield the crossings of an engine order, rad/s, and the half-power widths along it, Hz."""
+    for speed in crossings(natural, order, low, high):
+        frequencies, widths = response(speed).resonances()
+        line = frequency_of(order, speed)
+        nearest = int(np.argmin(np.abs(frequencies - line)))
+        step = 1e-4 * speed * (1.0 if speed + 1e-4 * speed <= high else -1.0)
+        mode = int(np.argmin(np.abs(natural(speed) - line)))
+        # a natural frequency that rises with the line stays near it for longer
+        rise = (natural(speed + step)[mode] - natural(speed)[mode]) / frequency_of(order, step)
+        yield speed, float(widths[nearest] / max(abs(1.0 - rise), 1e-3))
 
 
 def _peak(waves: np.ndarray, order: np.ndarray) -> np.ndarray:

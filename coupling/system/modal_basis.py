@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
-from vanedamp.coupling.system.reduced_model_file import file_stamp, reduced_model
+from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom, Structure
+from vanedamp.coupling.system.reduced_model_file import file_stamp, restricted
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.dense_modes import rounding
@@ -27,7 +27,9 @@ class ModalBasis:
     stiffness: (n,) squared undamped angular frequencies; damping: (n, n); base: (n, 3) load of an acceleration of the
     base. By interface label, in one order: functionals (n,), directions (3,) and normals (3,) (zeros: unknown), and
     positions (3,), m, where they are known. rotations: labels of angles. residual: (k, k) m/N, flexibility of the
-    interface that the modes lack; None: nothing.
+    interface that the modes lack; None: nothing. rotation_axis, rotation_point: (3,) unit vector, and m, the axis that
+    the structure can rotate about; None: not known. in_file, inertia: (N, n) shapes in the
+    coordinates of a model's file, and its mass matrix times these; None where shapes do not change with the speed.
     """
 
     stiffness: np.ndarray
@@ -39,6 +41,10 @@ class ModalBasis:
     positions: dict[str, np.ndarray] = field(default_factory=dict)
     rotations: frozenset[str] = frozenset()
     residual: np.ndarray | None = None
+    rotation_axis: np.ndarray | None = None
+    rotation_point: np.ndarray | None = None
+    in_file: np.ndarray | None = None
+    inertia: np.ndarray | None = None
 
     def across(self, label: str) -> np.ndarray | None:
         """Return the direction (3,) of the motion across beside that of an interface label; None where unknown."""
@@ -75,28 +81,48 @@ def interface_row(basis: ModalBasis, label: str, key: str) -> np.ndarray:
 
 
 def basis_of(scene: Scene) -> ModalBasis:
-    """Return the modes of a scene's structure. Raises InputError for an unusable model."""
-    structure = scene.structure
+    """Return the modes of a scene's structure at its speed. Raises InputError for an unusable model."""
+    return structure_basis(scene.structure, scene.speed)
+
+
+def structure_basis(structure: Structure, speed: float) -> ModalBasis:
+    """Return the modes of a structure at a speed of rotation, rad/s. Raises InputError for an unusable model."""
     if isinstance(structure, Rigid):
-        root, stiffness = np.sqrt(structure.mass), structure.stiffness_at(scene.speed)
+        root, stiffness = np.sqrt(structure.mass), structure.stiffness_at(speed)
         if not stiffness > 0.0:
             raise InputError(
-                f"rotation: at {scene.speed:.6g} rad/s the stiffness of the structure is {stiffness:.4g} N/m: it is "
+                f"rotation: at {speed:.6g} rad/s the stiffness of the structure is {stiffness:.4g} N/m: it is "
                 f"unstable from {np.sqrt(-structure.stiffness / structure.centrifugal_stiffness):.6g} rad/s on"
             )
         return ModalBasis(
-            frozen([stiffness / structure.mass]), frozen([[structure.viscous_at(scene.speed) / structure.mass]]),
+            frozen([stiffness / structure.mass]), frozen([[structure.viscous_at(speed) / structure.mass]]),
             frozen([root * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {},
         )  # fmt: skip
     if isinstance(structure, Prescribed):
         none = np.zeros(0)
         return ModalBasis(none, np.zeros((0, 0)), np.zeros((0, 3)), {"structure": none}, {"structure": _AXIS}, {})
-    return _rom_basis(structure, scene.speed, file_stamp(structure.file))
+    return _rom_basis(structure, speed, file_stamp(structure.file))
 
 
-@lru_cache(maxsize=8)
+# a basis is small, and a sweep over speeds comes back to each of them
+@lru_cache(maxsize=256)
 def _rom_basis(structure: Rom, speed: float, _stamp: int) -> ModalBasis:
-    return modal_basis(reduced_model(structure, speed))
+    found = restricted(structure, speed)
+    basis, shapes = modal_basis(found.model), found.model.natural[1]
+    if found.in_file is None or found.inertia is None:
+        return basis
+    return replace(basis, in_file=frozen(found.in_file @ shapes), inertia=frozen(found.inertia @ shapes))
+
+
+def modal_transfer(structure: Rom, before: float, after: float) -> np.ndarray:
+    """Return the modal coordinates (n, n) at a speed of rotation, rad/s, of each mode at another speed before.
+
+    Phi'^T M Phi: the structure stays where it is if the modes at both speeds span the same motions; else, as natural
+    modes of a smaller number, it goes to the nearest motion that they have (in kinetic energy).
+    """
+    one, other = structure_basis(structure, before).in_file, structure_basis(structure, after).inertia
+    assert one is not None and other is not None  # a model that does not rotate has no other speed
+    return other.T @ one
 
 
 def modal_basis(model: ReducedModel) -> ModalBasis:
@@ -131,5 +157,6 @@ def modal_basis(model: ReducedModel) -> ModalBasis:
     arms = np.zeros(len(model.interface)) if model.arms is None else model.arms
     rotations = frozenset(label for label, arm in zip(model.interface, arms, strict=True) if arm > 0.0)
     return ModalBasis(
-        frozen(squares), frozen(damping), base, rows, directions, normals, places, rotations, model.residual_flexibility
+        frozen(squares), frozen(damping), base, rows, directions, normals, places, rotations,
+        model.residual_flexibility, model.rotation_axis, model.rotation_point,
     )  # fmt: skip

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
@@ -18,29 +22,72 @@ def file_stamp(file: str) -> int:
     return path.stat().st_mtime_ns if path.is_file() else 0
 
 
-def reduced_model(structure: Rom, speed: float = 0.0) -> ReducedModel:
+class Restricted(NamedTuple):
+    """A reduced model at a speed with a scene's number of modes.
+
+    in_file: (N, n) its coordinates in those q of the model's file, which are in_file @ its own; inertia: (N, n) the
+    mass matrix of the file times in_file, kg. None for a model that does not rotate, whose coordinates never change.
+    """
+
+    model: ReducedModel
+    in_file: np.ndarray | None = None
+    inertia: np.ndarray | None = None
+
+
+def reduced_model(structure: Rom, speed: float) -> ReducedModel:
     """Return the reduced model of a structure at a speed of rotation (rad/s), with its number of modes.
 
     Raises InputError for an open choice, and for a speed that the model does not have.
     """
+    return restricted(structure, speed).model
+
+
+def restricted(structure: Rom, speed: float) -> Restricted:
+    """Return the same with its coordinates in those of the file."""
     if structure.modes == "auto":
         raise InputError('structure.modes: "auto" is still open; model_order.selection.select_model_order chooses')
-    return _restricted(
-        structure.file, file_stamp(structure.file), speed, structure.modes, structure.natural, structure.attached
-    )
+    return _restricted(structure, speed, file_stamp(structure.file))
+
+
+def greatest_speed(structure: Rom) -> float:
+    """Return the speed of rotation, rad/s, up to which the model of a file holds; 0 for one that does not rotate."""
+    return _loaded(structure.file, file_stamp(structure.file)).greatest_speed
 
 
 @lru_cache(maxsize=8)
-def _restricted(file: str, stamp: int, speed: float, modes: int | None, natural: bool, attached: bool) -> ReducedModel:
+def _restricted(structure: Rom, speed: float, stamp: int) -> Restricted:
+    whole = _loaded(structure.file, stamp)
     try:
-        model = _loaded(file, stamp).at_speed(speed)
+        model = whole.at_speed(speed)
     except ReducedModelError as error:
-        raise InputError(f"rotation: {file}: {error}") from None
+        raise InputError(f"rotation: {structure.file}: {error}") from None
+    if whole.greatest_speed == 0.0:
+        return Restricted(_cut(model, structure))
+    # outputs are functionals of the coordinates, which follow these through every change: so do the coordinates
+    own, rows = tuple(f"q{index}" for index in range(whole.size)), np.eye(whole.size)
+    given = len(model.outputs)
+    if model.output_rows is not None:
+        rows = np.vstack([model.output_rows, rows])
+    marked = _cut(replace(model, outputs=(*model.outputs, *own), output_rows=rows, output_residual=None), structure)
+    assert marked.output_rows is not None
+    in_file = marked.output_rows[given:]
+    kept: dict[str, Any] = {
+        "outputs": model.outputs,
+        "output_rows": marked.output_rows[:given] if given else None,
+        "output_residual": None if marked.output_residual is None or not given else marked.output_residual[:given],
+    }
+    return Restricted(replace(marked, **kept), in_file, whole.mass @ in_file)
+
+
+def _cut(model: ReducedModel, structure: Rom) -> ReducedModel:
+    """Return a model at its speed with the structure's number of modes."""
+    modes = structure.modes
     if modes is None:
         return model
-    if attached:
+    assert isinstance(modes, int)
+    if structure.attached:
         return with_attachment_modes(model, modes)
-    return massless(model, modes) if natural else truncated(model, modes)
+    return massless(model, modes) if structure.natural else truncated(model, modes)
 
 
 @lru_cache(maxsize=8)

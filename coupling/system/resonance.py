@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Prescribed
-from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
+from vanedamp.coupling.scene.structures import Prescribed, Rom, Structure
+from vanedamp.coupling.system.engine_order import crossings
+from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row, structure_basis
+from vanedamp.coupling.system.reduced_model_file import file_stamp
 from vanedamp.files.toml_input import InputError
 
 
@@ -36,8 +40,10 @@ class Resonance(NamedTuple):
 def chosen_resonance(scene: Scene) -> Resonance:
     """Return the resonance that `resonance_amplitude` means: of the mode that responds most within `resonance_near`.
 
+    With an engine order and a range it is that of the highest response along the order, at the speed where it is met.
     Raises InputError for a structure without damping.
     """
+    scene = _at_resonance(scene)
     basis = basis_of(scene)
     return _chosen(scene, basis, interface_row(basis, forced_label(scene), "excitation.at"))
 
@@ -55,14 +61,48 @@ def force_amplitude(scene: Scene, basis: ModalBasis, response: np.ndarray) -> fl
     excitation = scene.excitation
     if excitation.resonance_amplitude is None:
         return excitation.force or 0.0
+    if (meant := _at_resonance(scene)) is not scene:
+        return excitation.resonance_amplitude / chosen_resonance(meant).flexibility
     return excitation.resonance_amplitude / _chosen(scene, basis, response).flexibility
 
 
-def _chosen(scene: Scene, basis: ModalBasis, response: np.ndarray) -> Resonance:
+def _at_resonance(scene: Scene) -> Scene:
+    """Return a scene at the speed at which its engine order is in resonance, where that is sought over a range."""
+    order, (low, high) = scene.excitation.engine_order, scene.resonance_range
+    if order is None or low == high:
+        return scene
+    structure = scene.structure
+    stamp = file_stamp(structure.file) if isinstance(structure, Rom) else 0
+    speed = _resonant_speed(structure, forced_label(scene), order, speed_of(order, low), speed_of(order, high), stamp)
+    near = replace(scene.excitation, resonance_near=frequency_of(order, speed))
+    return replace(scene, rotation=Rotation(speed=speed), excitation=near)
+
+
+@lru_cache(maxsize=64)
+def _resonant_speed(structure: Structure, at: str, order: float, low: float, high: float, _stamp: int) -> float:
+    """Return the speed, rad/s, of the highest response along an engine order, without bodies: once for a sweep."""
+
+    def response(speed: float) -> float:
+        basis, omega = structure_basis(structure, speed), np.array([order * speed])
+        _check_damped(basis)
+        row = interface_row(basis, at, "excitation.at")
+        return float(np.abs(receptance_of(basis.stiffness, basis.damping, np.eye(len(row)), row, omega)[0]))
+
+    def natural(speed: float) -> np.ndarray:
+        return np.sqrt(structure_basis(structure, speed).stiffness) / (2 * np.pi)
+
+    return max([low, high, *crossings(natural, order, low, high)], key=response)
+
+
+def _check_damped(basis: ModalBasis) -> None:
     if np.any(np.diag(basis.damping) <= 0):
         raise InputError(
             "excitation.resonance_amplitude: an undamped resonance has no amplitude; give damping or force"
         )
+
+
+def _chosen(scene: Scene, basis: ModalBasis, response: np.ndarray) -> Resonance:
+    _check_damped(basis)
     # each mode at the frequency of the range that is nearest to its own
     low, high = (2 * np.pi * frequency for frequency in scene.resonance_range)
     omega = np.clip(np.sqrt(basis.stiffness), low, high)

@@ -40,7 +40,7 @@ class System(NamedTuple):
     damping: np.ndarray  # (N, N)
     proportional: bool  # whether damping couples no two modes
     load: np.ndarray  # (e, N) complex amplitudes of the loads of all harmonics, N
-    weight: np.ndarray  # (N,) gravity along each body's cavity, N
+    weight: np.ndarray  # (N,) gravity and centrifugal load along each body's cavity, N
     alike: bool  # whether the base accelerates all bodies alike: their cavities have one angle to its motion
     response: np.ndarray  # (N,) functional of the response
     table: np.ndarray  # (e,) complex displacements of a base whose motion is the response (prescribed), m

@@ -17,6 +17,8 @@ from the same factors (Craig and Hale 1988, J. Guidance 11(6), block-Krylov comp
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackError
@@ -34,6 +36,18 @@ _ROUND_TRIP = 1e-2
 _OWN_SHARE = 1e-10
 # lowest eigenvalue of the mass of fields of unit norm that a factorisation stands
 _SMALLEST = 1e-14
+
+
+class Basis(NamedTuple):
+    """A basis of the motions that supports and rigid patches leave to a structure.
+
+    constraint: (n, k) constraint modes of the interface coordinates, then c characteristic ones; blocks: (n, m) each,
+    of quasi-static modes; fixed: (n, f) fixed-interface modes by frequency, mass-normalised.
+    """
+
+    constraint: np.ndarray
+    blocks: list[np.ndarray]
+    fixed: np.ndarray
 
 
 def reduce(
@@ -57,6 +71,20 @@ def reduce(
 
     Raises ReductionError for more modes than the structure has, and when it can move with its interface held.
     """
+    basis = basis_of(matrices, interface, modes, factorize, int(quasi_static), characteristic)
+    origin = {"basis": "craig-bampton", "modes": modes, "quasi_static": int(quasi_static)}
+    return reduced_model(matrices, interface, basis, origin, keep_recovery)
+
+
+def basis_of(
+    matrices: SystemMatrices,
+    interface: Interface,
+    modes: int,
+    factorize: Factorize = superlu,
+    quasi_static: int = 0,
+    characteristic: int = 6,
+) -> Basis:
+    """Return the basis of `reduce`, with arguments and errors of that, from one factorisation."""
     stiffness, mass, vectors = interface.restrict(matrices)
     boundary, labels = _boundary(interface, vectors)
     held = _Held(stiffness, boundary, factorize)
@@ -64,18 +92,25 @@ def reduce(
     if interface.full.size:
         constraint = constraint @ _characteristic(constraint, stiffness, mass, labels, characteristic)
     fixed = _fixed_interface_modes(held, stiffness, mass, modes)
-    blocks = _quasi_static_blocks(held, mass, constraint, fixed, int(quasi_static))
-    basis = np.hstack([constraint, *blocks, fixed])
+    return Basis(constraint, _quasi_static_blocks(held, mass, constraint, fixed, quasi_static), fixed)
+
+
+def reduced_model(
+    matrices: SystemMatrices, interface: Interface, parts: Basis, origin: dict[str, Any], keep_recovery: bool = False
+) -> ReducedModel:
+    """Return the model that a basis makes of a structure; origin: entries of its provenance."""
+    stiffness, mass, _ = interface.restrict(matrices)
+    basis = np.hstack([parts.constraint, *parts.blocks, parts.fixed])
     return project(
         matrices, interface,
         mass=symmetric_part(basis.T @ (mass @ basis)),
         stiffness=symmetric_part(basis.T @ (stiffness @ basis)),
         basis=basis,
         selection=np.eye(len(interface.labels), basis.shape[1]),
-        blocks=blocks,
-        origin={"basis": "craig-bampton", "modes": modes, "quasi_static": int(quasi_static)},
+        blocks=parts.blocks,
+        origin=origin,
         keep_recovery=keep_recovery,
-        fixed_interface_modes=modes,
+        fixed_interface_modes=parts.fixed.shape[1],
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +31,8 @@ from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, 
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.stress import HotSpot, hot_spot
 from vanedamp.modal.units import doubts
-from vanedamp.rom.basis_ladder import basis_ladder, basis_model, rich_model
-from vanedamp.rom.error_estimate import LadderError, choose, frequency_grid, rigid_errors
+from vanedamp.rom.basis_ladder import BLOCKS, basis_ladder, basis_model, rich_model
+from vanedamp.rom.error_estimate import LadderError, choose, frequency_grid, rigid_errors, worst_rungs
 from vanedamp.rom.interface import (
     Interface,
     InterfaceCoordinate,
@@ -42,6 +43,7 @@ from vanedamp.rom.interface import (
 )
 from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.rotation import SpeedBases, reduce_rotating
 from vanedamp.studies.case.calibration_tables import CalibrationTable
 from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 
@@ -359,14 +361,15 @@ def campbell_diagram(structure: Structure, report: Callable[[int, int], None] | 
 def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:
     """Return the model with stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
 
-    A hot spot is where a natural mode of the model has its largest von Mises stress, or the largest one away from the
-    spots before it; the first `modes` modes have `spots` each. Needs a model with its recovery.
+    A hot spot is where a natural mode of the model at the case's speed has its largest von Mises stress, or the largest
+    one away from the spots before it; the first `modes` modes have `spots` each. Needs a model with its recovery.
     """
     assert model.recovery is not None
     solid = structure.solid
     places = solid.stress_points()
     apart = 0.02 * np.ptp(places, axis=0).max()
-    shapes = linalg.eigh(model.stiffness, model.mass)[1][:, :modes]
+    at_speed = model if structure.case.rotation is None else model.at_speed(structure.case.rotation.omega)
+    shapes = linalg.eigh(at_speed.stiffness, at_speed.mass)[1][:, :modes]
     picked: list[int] = []
     for shape in shapes.T:
         stress = np.array(solid.von_mises(model.recovery @ shape))
@@ -400,26 +403,60 @@ def reduction(
 
     The estimate of its error is in the model's provenance. It covers receptances of the whole interface up to
     max_frequency, by default 1.5 times the first natural frequency. Craig-Bampton models have a block of quasi-static
-    modes. Raises LadderError when no model of up to _MOST modes meets the tolerance.
+    modes. A structure that rotates is reduced for all speeds up to the greatest of its case, and the number of modes
+    suits standstill and that speed. Raises LadderError when no model of up to _MOST modes meets the tolerance, and
+    InputError for a structure that rotates with another basis, or up to no speed.
     """
+    rotating, greatest = structure.rotating, _greatest_speed(structure, basis)
     coordinates = interface(structure.case, structure.matrices)
     at = structure.case.response_label or coordinates.labels[0]
     most = min(_MOST, structure.matrices.free.size // 4)
     asked = min(_START, most) if modes is None else modes
     while True:
-        rich = rich_model(structure.matrices, coordinates, basis, asked, factorize, keep_recovery=keep_recovery)
-        frequencies = _of_interest(rich, max_frequency)
-        rigid = float(rigid_errors(rich, frequencies, at).max())
-        ladder = basis_ladder(rich, basis, frequencies)
+        if rotating is None:
+            bases = None
+            rich = [rich_model(structure.matrices, coordinates, basis, asked, factorize, keep_recovery=keep_recovery)]
+        else:
+            bases = SpeedBases(rotating, coordinates, asked, factorize, 1 + BLOCKS)
+            rich = [bases.model_at(speed) for speed in (0.0, greatest)]
+        grids = [_of_interest(model, max_frequency) for model in rich]
+        rigid = max(float(rigid_errors(model, grid, at).max()) for model, grid in zip(rich, grids, strict=True))
+        ladder = worst_rungs([basis_ladder(model, basis, grid) for model, grid in zip(rich, grids, strict=True)])
         choice = choose(ladder if modes is None else ladder[-1:], tolerance, rigid)
         if modes is not None or choice.met:
             break
         if asked == most:
             raise LadderError(f"tolerance: {choice.sentence}; raise it, or lower the highest frequency")
         asked = min(2 * asked, most)
-    estimate = choice.to_json() | {"frequencies_hz": [float(frequencies[0]), float(frequencies[-1])]}
-    model = basis_model(rich, basis, choice.chosen.modes)
+    covered = [min(float(grid[0]) for grid in grids), max(float(grid[-1]) for grid in grids)]
+    estimate = choice.to_json() | {"frequencies_hz": covered}
+    if bases is None:
+        model = basis_model(rich[0], basis, choice.chosen.modes)
+    else:
+        of_interest = partial(_of_interest, max_frequency=max_frequency)
+        model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, keep_recovery)
     return replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
+
+
+def _greatest_speed(structure: Structure, basis: str) -> float:
+    """Return the greatest speed, rad/s, that a reduced model of the structure is for; 0 if it does not rotate.
+
+    Raises InputError for none, or a basis that does not hold over speeds, and UnstableError beyond the stable ones.
+    """
+    table, rotating = structure.case.rotation, structure.rotating
+    if table is None or rotating is None:
+        return 0.0
+    if basis != "craig-bampton":
+        raise InputError(
+            f"basis: {basis} is that of one speed; of a case with [rotation] take craig-bampton, from which a scene "
+            "takes natural modes at its own speed by structure.natural = true"
+        )
+    if table.greatest == 0.0:
+        raise InputError(
+            "rotation: a reduced model is for speeds up to a greatest one; give max_speed (rad/s), max_rpm or a speed"
+        )
+    rotating.at(table.greatest)
+    return table.greatest
 
 
 def _of_interest(model: ReducedModel, max_frequency: float | None) -> np.ndarray:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from typing import TYPE_CHECKING
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, count, hertz, ratio
+
+if TYPE_CHECKING:
+    from vanedamp.rom.reduced import ReducedModel
 
 ORDER = 50
 SUMMARY = "reduced model at the case's interface"
@@ -67,7 +71,7 @@ def run(arguments: Namespace) -> None:
         model = replace(
             with_hot_spots(structure, model, spots), recovery=None, residual_recovery=None, coordinates=None
         )
-    estimate = model.provenance["estimate"]
+    estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
     if arguments.output:
         model.save(arguments.output)
     result = {
@@ -80,13 +84,26 @@ def run(arguments: Namespace) -> None:
         "warnings": list(unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes]))),
         "wall_time_s": time.perf_counter() - started,
     }
+    fastest = model.at_speed(model.greatest_speed)
+    if rotation is not None:
+        result["rotation"] = rotation | {"frequency_hz": fastest.natural_frequencies_hz.tolist()}
+        if case.rotation is not None and case.rotation.gyroscopic:
+            result["warnings"].append("rotation.gyroscopic: the reduced model leaves the gyroscopic coupling out")
     write_result(arguments.json, result)
     print_warnings(arguments.input, result["warnings"])
     if arguments.json != "-":
         kind = "natural" if model.free_modes else "fixed-interface"
         print(f"{model.size} coordinates, {model.modes} of them {kind} modes; interface: {', '.join(model.interface)}")
         print(f"{estimate['sentence']}, up to {estimate['frequencies_hz'][1]:.4g} Hz")
-        print("frequencies, Hz: " + ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8]))
+        if rotation is not None:
+            print(rotation["sentence"])
+        print("frequencies, Hz: " + _listed(model))
+        if rotation is not None:
+            print(f"at {model.greatest_speed:.6g} rad/s: " + _listed(fastest))
+
+
+def _listed(model: ReducedModel) -> str:
+    return ", ".join(f"{frequency:.6g}" for frequency in model.natural_frequencies_hz[:8])
 
 
 def _modes(text: str) -> int | None:

@@ -18,12 +18,12 @@ import numpy as np
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
-from vanedamp.coupling.sweep.sweep import run_list, tops
+from vanedamp.coupling.sweep.sweep import run_list
 from vanedamp.coupling.sweep.worker import COLUMNS
 from vanedamp.files.store import finite, frozen
 from vanedamp.studies.headline import Headline, headline
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
-from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.optimisation.study import Design, Optimise, Study
 
 #: generations of a search, at least
 _GENERATIONS = 5
@@ -63,7 +63,7 @@ def optimise(
     }
     took = time.perf_counter() - started
     return Optimisation(
-        study={"optimise": _plain(asdict(table)), "scene": study.scene.to_dict()},
+        study={"optimise": _given(table), "scene": study.scene.to_dict()},
         mass=study.mass,
         amplitude=study.amplitude,
         reference=study.reference,
@@ -76,7 +76,7 @@ def optimise(
         history_design=frozen([design for design, _, _ in trial.history]),
         history_amplitude=frozen([amplitude for _, amplitude, _ in trial.history]),
         history_robust=frozen([robust for _, _, robust in trial.history]),
-        frequency=frozen(table.frequencies),
+        frequency=study.frequencies,
         undamped=frozen(responses["nominal"][1]),
         nominal_response=frozen(responses["nominal"][0]),
         robust_response=frozen(responses["robust"][0]),
@@ -116,7 +116,7 @@ class _Trial:
         table = study.table
         self._variables = [n for n in Design._fields if len(set(getattr(table.variables, n))) > 1]
         designs = table.evaluations * (1 + len(sample) * (len(sample) > 1)) + table.map.mass_ratio * table.map.gap_ratio
-        self._expected = len(table.frequencies) * designs
+        self._expected = len(study.frequencies) * designs
 
     def nominal(self, designs: Sequence[Design]) -> np.ndarray:
         """Return the amplitudes (d,) of designs as they are."""
@@ -140,13 +140,10 @@ class _Trial:
 
     def headline(self, design: Design, damped: np.ndarray) -> Headline:
         """Return the headline of a design's amplitudes (f,) over the reference."""
-        frequencies, known = self.study.table.frequencies, self.study.reference * damped
-        undamped, fixed = self.study.linear(design, self.sample[0])
-        band = float(frequencies[0]), float(frequencies[-1])
+        known, linear = self.study.reference * damped, self.study.linear(design, self.sample[0])
         return headline(
-            frequencies, known, known, np.full(len(known), np.nan), undamped.amplitude(frequencies),
-            fixed.amplitude(frequencies), tops(undamped.peak(*band), fixed.peak(*band)), along_frequency=True,
-        )  # fmt: skip
+            self.study.frequencies, known, known, np.full(len(known), np.nan), *linear, along_frequency=True
+        )
 
     def search(self, judge: Callable[[Sequence[Design]], np.ndarray], first: np.ndarray | None) -> Design:
         """Return the best design by differential evolution, from a first generation or from a Latin hypercube."""
@@ -198,14 +195,14 @@ class _Trial:
         nan with the bodies where a run is not ok, and without them where it is no scene.
         """
         table = self.study.table
-        shape = (len(designs), len(sample), len(table.frequencies))
+        shape = (len(designs), len(sample), len(self.study.frequencies))
         damped, undamped = np.zeros(shape), np.zeros(shape)
         levels = self.study.reference * np.array([1 + deviation["excitation"] for deviation in sample])[:, None]
         for count in sorted({design.bodies for design in designs}):
             places = [place for place, design in enumerate(designs) if design.bodies == count]
             points = [
                 self.study.point(designs[place], deviation, float(frequency))
-                for place in places for deviation in sample for frequency in table.frequencies
+                for place in places for deviation in sample for frequency in self.study.frequencies
             ]  # fmt: skip
             finished = run_list(self.study.with_bodies(count), points, self._executor, self._tell)
             self.scenes += len(points)
@@ -222,6 +219,11 @@ class _Trial:
         """Show progress: the runs done of the list at hand."""
         if self._progress is not None:
             self._progress(self.scenes + done, max(self._expected, self.scenes + done))
+
+
+def _given(table: Optimise) -> dict[str, Any]:
+    """Return a study's table as plain data, without what it leaves out."""
+    return {key: _plain(value) for key, value in asdict(table).items() if value is not None}
 
 
 def _plain(data: Any) -> Any:

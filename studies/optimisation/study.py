@@ -14,15 +14,20 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.bodies import Damper
 from vanedamp.coupling.scene.paths import Range, axis_values
+from vanedamp.coupling.scene.rotation import Rotation, hertz_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom
 from vanedamp.coupling.sweep.grid import Points
+from vanedamp.coupling.sweep.sweep import tops
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.linear_response import LinearResponse, linear_responses
+from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_peaks
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
+from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml, validate
 
 _MOST_FREQUENCIES = 10_000
+#: what the points of a band are, and their unit
+_UNITS = {"band": ("frequencies", "Hz"), "speeds": ("speeds", "rad/s"), "rpm": ("speeds", "rpm")}
 
 
 def _bounds(value: Any) -> Any:
@@ -30,6 +35,7 @@ def _bounds(value: Any) -> Any:
     return [value, value] if isinstance(value, int | float) else value
 
 
+_Values = Range | Annotated[tuple[Positive, ...], Field(min_length=1)]
 Bounds = Annotated[tuple[Positive, Positive], BeforeValidator(_bounds)]
 Counts = Annotated[
     tuple[Annotated[Whole, Field(ge=1, le=32)], Annotated[Whole, Field(ge=1, le=32)]], BeforeValidator(_bounds)
@@ -77,12 +83,14 @@ class Map:
 class Optimise:
     """The objective, and how it is minimised.
 
-    band: excitation frequencies, Hz; measure: of a run; over_band, over_tolerances: what counts of a band's and of the
-    tolerances' values; samples: of the tolerances, by Latin hypercube; evaluations: designs that each of the two
-    searches may try.
+    band: excitation frequencies, Hz; speeds, rad/s, or rpm in place of it: speeds of an engine order; measure: of a
+    run; over_band, over_tolerances: what counts of a band's and of the tolerances' values; samples: of the tolerances,
+    by Latin hypercube; evaluations: designs that each of the two searches may try.
     """
 
-    band: Range | Annotated[tuple[Positive, ...], Field(min_length=1)]
+    band: _Values | None = None
+    speeds: _Values | None = None
+    rpm: _Values | None = None
     variables: Variables = field(default_factory=Variables)
     tolerances: Tolerances = field(default_factory=Tolerances)
     map: Map = field(default_factory=Map)
@@ -94,23 +102,50 @@ class Optimise:
     seed: Annotated[Whole, Field(ge=0)] = 1
 
     def __post_init__(self) -> None:
+        if sum(getattr(self, name) is not None for name in _UNITS) != 1:
+            raise ValueError("give one of band (Hz) and, for an engine order, speeds (rad/s) and rpm")
+        key, (what, unit) = self.key, _UNITS[self.key]
         if self.count > _MOST_FREQUENCIES:
-            raise ValueError(f"band: {self.count} frequencies; at most {_MOST_FREQUENCIES}")
-        if self.frequencies.min() <= 0.0:
-            raise ValueError(f"band: expected positive frequencies, not {self.frequencies.min():g} Hz")
-        for before, after in itertools.pairwise(self.frequencies.tolist()):
+            raise ValueError(f"{key}: {self.count} {what}; at most {_MOST_FREQUENCIES}")
+        if self.values.min() <= 0.0:
+            raise ValueError(f"{key}: expected positive {what}, not {self.values.min():g} {unit}")
+        for before, after in itertools.pairwise(self.values.tolist()):
             if after <= before:
-                raise ValueError(f"band: expected frequencies that rise, not {after:g} Hz after {before:g} Hz")
+                raise ValueError(f"{key}: expected {what} that rise, not {after:g} {unit} after {before:g} {unit}")
+
+    @property
+    def key(self) -> str:
+        """Which of band, speeds and rpm is given."""
+        return next(name for name in _UNITS if getattr(self, name) is not None)
 
     @property
     def count(self) -> int:
-        """Number of frequencies."""
-        return self.band.num if isinstance(self.band, Range) else len(self.band)
+        """Number of points of the band."""
+        given = getattr(self, self.key)
+        return given.num if isinstance(given, Range) else len(given)
 
     @property
-    def frequencies(self) -> np.ndarray:
-        """Excitation frequencies, Hz."""
-        return np.array(axis_values(self.band), float)
+    def values(self) -> np.ndarray:
+        """Points of the band, in the unit of its key."""
+        return np.array(axis_values(getattr(self, self.key)), float)
+
+    def frequencies(self, order: float | None) -> np.ndarray:
+        """Return the excitation frequencies, Hz, with an engine order if there is one.
+
+        Raises InputError for frequencies of an engine order, and for speeds without one.
+        """
+        if self.key == "band":
+            if order is not None:
+                raise InputError(
+                    "optimise.band: the frequency follows the speed by excitation.engine_order; give speeds or rpm"
+                )
+            return self.values
+        if order is None:
+            raise InputError(
+                f"optimise.{self.key}: a frequency follows the speed by excitation.engine_order only; name that in "
+                "place of excitation.frequency, or give a band in Hz"
+            )
+        return hertz_of("rotation.rpm" if self.key == "rpm" else "rotation.speed", order) * self.values
 
 
 class Design(NamedTuple):
@@ -126,9 +161,18 @@ class _File:
     optimise: Optimise
 
 
+class LinearCurves(NamedTuple):
+    """Amplitudes (f,), m, at the points of a band without bodies and with glued ones, and their tops by PEAKS."""
+
+    undamped: np.ndarray
+    fixed: np.ndarray
+    peaks: dict[str, float]
+
+
 class Study(NamedTuple):
     """A scene, its [optimise] table, and what designs are measured in.
 
+    frequencies: (f,) Hz, of the band.
     resonance: whose modal mass (kg) mass ratios refer to; amplitude: its undamped amplitude X (m), to which gap ratios
     refer; reference: the undamped amplitude in the band (m), its maximum or its mean as `over_band` says, to which
     damped amplitudes refer.
@@ -136,6 +180,7 @@ class Study(NamedTuple):
 
     scene: Scene
     table: Optimise
+    frequencies: np.ndarray
     resonance: Resonance
     amplitude: float
     reference: float
@@ -151,22 +196,33 @@ class Study(NamedTuple):
         data = read_toml(path)
         if "optimise" not in data:
             raise InputError(f"{path}: optimise: missing; say what is best in an [optimise] table (docs/sweeps.md)")
-        table = validate(_File, {"optimise": data.pop("optimise")}, str(path)).optimise
-        band = table.frequencies.tolist()
+        given = data.pop("optimise")
+        if isinstance(given, dict) and not set(_UNITS) & set(given):
+            raise InputError(
+                f"{path}: optimise.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
+            )
+        table = validate(_File, {"optimise": given}, str(path)).optimise
         scene = Scene.of(data, path)
-        if scene.excitation.resonance_near is None:
-            scene = replace(scene, excitation=replace(scene.excitation, resonance_near=(band[0], band[-1])))
+        worst = table.over_band == "worst"
         try:
+            band = table.frequencies(scene.excitation.engine_order)
+            if scene.excitation.resonance_near is None:
+                near = float(band[0]), float(band[-1])
+                scene = replace(scene, excitation=replace(scene.excitation, resonance_near=near))
+            scene = _at(scene, float(band[0]))
             _check(scene)
             force, resonance = excitation_force(scene), chosen_resonance(scene)
-            undamped = linear_responses(scene)[0]
+            if worst:
+                reference = linear_peaks(scene, *_ends(scene, band))[0].amplitude
+            else:
+                reference = float(linear_amplitudes(scene, band)[0].mean())
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         if force == 0.0:
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
-        worst = table.over_band == "worst"
-        reference = undamped.peak(band[0], band[-1]).amplitude if worst else undamped.amplitude(band).mean()
-        study = cls(replace(scene, sweep={}), table, resonance, force * resonance.flexibility, float(reference))
+        study = cls(
+            replace(scene, sweep={}), table, frozen(band), resonance, force * resonance.flexibility, float(reference)
+        )
         try:
             study._check_corners()
         except InputError as error:
@@ -180,7 +236,7 @@ class Study(NamedTuple):
         for side in (-1.0, 1.0):
             deviation = {name: side * width for name, width in widths.items()}
             scene = Points(self.with_bodies(design.bodies)).scene(
-                self.point(design, deviation, float(self.table.frequencies[0]))
+                self.point(design, deviation, float(self.frequencies[0]))
             )
             assemble(scene)
 
@@ -194,10 +250,12 @@ class Study(NamedTuple):
         )
         return replace(self.scene, damper=bodies)
 
-    def linear(self, design: Design, deviation: Mapping[str, float]) -> tuple[LinearResponse, LinearResponse]:
-        """Return the linear responses without bodies, and with those of a design glued to their floors."""
-        point = self.point(design, deviation, float(self.table.frequencies[0]))
-        return linear_responses(Points(self.with_bodies(design.bodies)).scene(point))
+    def linear(self, design: Design, deviation: Mapping[str, float]) -> LinearCurves:
+        """Return the linear curves without bodies, and with those of a design glued to their floors."""
+        point = self.point(design, deviation, float(self.frequencies[0]))
+        scene = Points(self.with_bodies(design.bodies)).scene(point)
+        ends = _ends(scene, self.frequencies)
+        return LinearCurves(*linear_amplitudes(scene, self.frequencies), tops(*linear_peaks(scene, *ends)))
 
     def point(self, design: Design, deviation: Mapping[str, float], frequency: float) -> dict[str, Any]:
         """Return what a design, off by a deviation of the tolerances, changes in the scene with its bodies."""
@@ -211,15 +269,32 @@ class Study(NamedTuple):
             f"damper.{index}.position": gap * ((cavities[:index].count(name) + 1) / (cavities.count(name) + 1) - 0.5)
             for index, name in enumerate(cavities)
         }
-        return places | {
-            "excitation.frequency": frequency,
-            f"excitation.{key}": level * (1 + deviation["excitation"]),
-            "cavity.gap": gap,
-            "damper.mass": design.mass_ratio * self.mass / design.bodies * (1 + deviation["mass"]),
-            "damper.restitution": float(np.clip(first.restitution + deviation["restitution"], 0.0, 1.0)),
-            "damper.friction": max(first.friction + deviation["friction"], 0.0),
-            "gravity.orientation_deg": scene.gravity.orientation_deg + deviation["orientation_deg"],
-        }
+        order = scene.excitation.engine_order
+        drive = {"excitation.frequency": frequency} if order is None else {"rotation.speed": speed_of(order, frequency)}
+        return (
+            places
+            | drive
+            | {
+                f"excitation.{key}": level * (1 + deviation["excitation"]),
+                "cavity.gap": gap,
+                "damper.mass": design.mass_ratio * self.mass / design.bodies * (1 + deviation["mass"]),
+                "damper.restitution": float(np.clip(first.restitution + deviation["restitution"], 0.0, 1.0)),
+                "damper.friction": max(first.friction + deviation["friction"], 0.0),
+                "gravity.orientation_deg": scene.gravity.orientation_deg + deviation["orientation_deg"],
+            }
+        )
+
+
+def _at(scene: Scene, frequency: float) -> Scene:
+    """Return the scene at a frequency, Hz, of its engine order; one without an engine order as it is."""
+    order = scene.excitation.engine_order
+    return scene if order is None else replace(scene, rotation=Rotation(speed=speed_of(order, frequency)))
+
+
+def _ends(scene: Scene, band: np.ndarray) -> tuple[float, float]:
+    """Return the ends of a band of frequencies (f,), Hz, as `linear_peaks` takes them."""
+    low, high, order = float(band[0]), float(band[-1]), scene.excitation.engine_order
+    return (low, high) if order is None else (speed_of(order, low), speed_of(order, high))
 
 
 def _check(scene: Scene) -> None:
@@ -230,7 +305,9 @@ def _check(scene: Scene) -> None:
     if not scene.damper:
         raise InputError("damper: missing; the first one says what the bodies are like")
     if any(damper.planar for damper in scene.damper):
-        raise InputError("damper: the search is for sliders without springs; leave shape, stiffness and dashpot out")
+        raise InputError(
+            "damper: the search is for sliders without springs; leave shape, stiffness, dashpot and track_radius out"
+        )
     if scene.excitation.base_acceleration:
         raise InputError(
             "excitation.base_acceleration: name force or resonance_amplitude, the level that is to be damped"

@@ -24,9 +24,9 @@ import tomli_w
 from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
 
+from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rigid, Rom
-from vanedamp.coupling.sweep.grid import FREQUENCY
 from vanedamp.coupling.system.reduced_model_file import reduced_model
 from vanedamp.files.store import load, replacing
 from vanedamp.files.toml_input import STRICT, InputError, Positive, Whole, read_toml, validate
@@ -184,12 +184,13 @@ def linear_peaks(scene: Scene) -> list[float]:
     structure = scene.structure
     if isinstance(structure, Rom):
         floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
-        model = _whole(structure)
+        model = _whole(structure, scene.speed)
         fixed = model.with_masses((floors[damper.cavity], damper.mass) for damper in scene.damper)
         return sorted({float(item.natural_frequencies_hz[0]) for item in (fixed, model)})
     assert isinstance(structure, Rigid)
     masses = {structure.mass, structure.mass + sum(damper.mass for damper in scene.damper)}
-    return sorted(math.sqrt(structure.stiffness / mass) / (2 * math.pi) for mass in masses)
+    stiffness = structure.stiffness_at(scene.speed)
+    return sorted(math.sqrt(stiffness / mass) / (2 * math.pi) for mass in masses)
 
 
 def write_scene(scene: Scene, path: Path) -> None:
@@ -201,14 +202,14 @@ def write_scene(scene: Scene, path: Path) -> None:
         temporary.write_text(tomli_w.dumps(data), encoding="utf-8")
 
 
-def _whole(structure: Rom) -> ReducedModel:
-    """Return the reduced model with all that its file holds."""
-    return reduced_model(replace(structure, modes=None))
+def _whole(structure: Rom, speed: float) -> ReducedModel:
+    """Return the reduced model at a speed (rad/s) with all that its file holds."""
+    return reduced_model(replace(structure, modes=None), speed)
 
 
 def _damping_ratio(scene: Scene) -> float:
     if isinstance(scene.structure, Rom):
-        return float(np.max(_whole(scene.structure).damping_ratio or 0.0)) or 1e-3
+        return float(np.max(_whole(scene.structure, scene.speed).damping_ratio or 0.0)) or 1e-3
     return getattr(scene.structure, "damping_ratio", None) or 1e-3
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import plotly.graph_objects as go
 
+from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.files.store import csv_text
 
 COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#7e22ce", "#0e7490", "#a16207", "#be185d", "#475569")
@@ -59,8 +61,11 @@ def dressed(figure: go.Figure, height: int) -> go.Figure:
     return figure
 
 
-def axis_title(path: str, units: str) -> str:
-    """Return the title of an axis of a sweep."""
+def axis_title(path: str, units: str, hertz: float = math.nan) -> str:
+    """Return the title of an axis of a sweep; hertz: frequency of a unit of a speed along an engine order, Hz."""
     if path == "excitation.frequency":
         return "excitation frequency, Hz"
+    if path in SPEEDS:
+        known = f" (along the engine order {hertz:.5g} Hz a {units})" if math.isfinite(hertz) else ""
+        return f"speed of rotation, {units}{known}"
     return f"{path}, {units}".removesuffix(", 1")

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
-from vanedamp.coupling.sweep.grid import FREQUENCY
-from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.grid import resonance_axis
+from vanedamp.coupling.sweep.record import PEAKS, Sweep
 from vanedamp.files.store import frozen
 from vanedamp.studies.headline import Headline, format_value, headline, reference_of
 
@@ -28,6 +30,7 @@ class ForcedResponse:
     in_plane           by the names of coupling.sweep.worker.IN_PLANE, (n, bodies), nan for sliders; empty without
                        bodies in the plane
     headline           figures and sentence of the curve
+    hertz              frequency of a unit of the axis, Hz: of a speed along an engine order, 1 of a frequency; nan else
     source             the file it comes from
     """
 
@@ -45,12 +48,13 @@ class ForcedResponse:
     energy_share: np.ndarray
     in_plane: Mapping[str, np.ndarray]
     headline: Headline
+    hertz: float = math.nan
     source: str = ""
 
     @property
     def sentence(self) -> str:
         """The headline for people."""
-        sentence = self.headline.sentence(self.axis, self.units, self.x[0], self.x[-1])
+        sentence = self.headline.sentence(self.axis, self.units, self.x[0], self.x[-1], math.isfinite(self.hertz))
         return f"{self.name}: {sentence}"
 
     def to_json(self) -> dict[str, Any]:
@@ -71,11 +75,13 @@ def model_name(scene: Scene) -> str:
 def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedResponse]:
     """Return one forced response for every combination of the other axes.
 
-    They run along the excitation frequency if the sweep has it, or else along its longest axis of numbers.
+    They run along the excitation frequency if the sweep has it, or else along the speed of rotation, or its longest
+    axis of numbers.
     """
     paths = list(sweep.axes)
     lengths = [len(values) * (values.dtype.kind in "if") for values in sweep.axes.values()]
-    along = paths.index(FREQUENCY) if FREQUENCY in paths else int(np.argmax(lengths))
+    usual = [paths.index(path) for path in (FREQUENCY, *SPEEDS) if path in paths]
+    along = usual[0] if usual else int(np.argmax(lengths))
     order = np.argsort(sweep.axes[paths[along]], kind="stable")
     others = [sweep.axes[path] for index, path in enumerate(paths) if index != along]
     labels = [path for index, path in enumerate(paths) if index != along]
@@ -100,7 +106,8 @@ def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> For
     cut: dict[str, Any] = {key: frozen(np.where(ok, values[point], np.nan)) for key, values in damped.items()}
     x = sweep.axes[axis][point[list(sweep.axes).index(axis)]]
     undamped, fixed = frozen(sweep.amplitude_undamped[point]), frozen(sweep.amplitude_fixed[point])
-    tops = peaks_of(sweep, point) if axis == FREQUENCY else {}
+    swept, hertz = resonance_axis(sweep.scene, sweep.axes)
+    tops = peaks_of(sweep, point) if axis == swept else {}
     return ForcedResponse(
         name=name,
         axis=axis,
@@ -115,18 +122,24 @@ def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> For
         },
         headline=headline(
             x, cut["damped_mean"], cut["damped_max"], cut["attached_mass_fraction"], undamped, fixed, tops,
-            axis == FREQUENCY,
+            axis == swept,
         ),
+        hertz=hertz if axis == swept else math.nan,
         **cut,
     )  # fmt: skip
 
 
 def peaks_of(sweep: Sweep, point: tuple[Any, ...]) -> dict[str, Any]:
-    """Return the tops of the linear curves of a part of a sweep, by the names of coupling.sweep.sweep.PEAKS."""
-    if not sweep.peaks:
+    """Return the tops of the linear curves of a part of a sweep, by the names of coupling.sweep.sweep.PEAKS.
+
+    Places and widths are those on the axis of the sweep, in its unit.
+    """
+    swept, hertz = resonance_axis(sweep.scene, sweep.axes)
+    if not sweep.peaks or swept is None:
         return {}
-    along = list(sweep.axes).index(FREQUENCY)
-    return {name: values[point[:along] + point[along + 1 :]] for name, values in sweep.peaks.items()}
+    along = list(sweep.axes).index(swept)
+    units = {name: 1.0 if unit == "m" else hertz for name, unit in PEAKS.items()}
+    return {name: values[point[:along] + point[along + 1 :]] / units[name] for name, values in sweep.peaks.items()}
 
 
 def for_people(units: str) -> tuple[float, str]:

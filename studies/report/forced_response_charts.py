@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -122,9 +123,11 @@ def _cycle(responses: Sequence[ForcedResponse]) -> list[str]:
 
 
 def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int) -> go.Figure:
+    orders = {response.hertz for response in responses}
+    hertz = orders.pop() if len(orders) == 1 else math.nan
     figure.update_xaxes(hoverformat=".6g")
     for axis in figure.select_xaxes():
         if axis.showticklabels is not False:  # of panels above each other, the lowest carries the title
-            axis.update(title_text=axis_title(responses[0].axis, responses[0].units))
+            axis.update(title_text=axis_title(responses[0].axis, responses[0].units, hertz))
     figure.update_layout(hovermode="x unified")
     return dressed(figure, height)

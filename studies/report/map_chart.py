@@ -10,7 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from vanedamp.coupling.sweep.grid import FREQUENCY
+from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import is_start
 from vanedamp.studies.headline import reference_of

@@ -36,5 +36,8 @@ def _reduction(file: str, model: ReducedModel) -> dict[str, Any]:
         ],
         "modes": model.modes,
         "frequencies": model.natural_frequencies_hz,
+        "greatest_speed": model.greatest_speed,
+        "fastest": model.at_speed(model.greatest_speed).natural_frequencies_hz,
+        "rotation": model.provenance.get("rotation", {}).get("sentence"),
         "damping_ratio": model.damping_ratio,
     }
