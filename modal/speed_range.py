@@ -46,6 +46,8 @@ class SpeedRange:
     count       modes of interest: the lowest at every speed
     gyroscopic  whether they have the gyroscopic coupling
 
+    solved      rad/s, speeds with full solutions so far
+
     Raises modal.rotating.UnstableError for a structure that is unstable at the greatest speed, and SolverError.
     """
 
@@ -66,12 +68,12 @@ class SpeedRange:
         self._highest: list[float] = []
         if low > 0.0:
             rotating.at(0.0)  # it is stable there as well, where `meetings` begins
-        first = self._solve(high)
+        ends = {speed: self._solve(speed) for speed in (high, low)}  # the one that may be unstable first
         stiffness, centrifugal, _ = self._operators[:3]
         self._middle = 0.5 * (low**2 + high**2)
         self._factor = factorize(sparse.csr_array(stiffness + self._middle * centrifugal))
-        self._join(high, first)
-        self.add(low)
+        for speed, modes in ends.items():
+            self._join(speed, modes)
 
     def __enter__(self) -> SpeedRange:
         return self
