@@ -2,8 +2,8 @@
 
 Duffy, Bagley and Mehmed (2000), a NASA memorandum, and US 6,827,551, in words of our own, and what a designer would ask
 beside: other blades, starts, errors of the track, other orders. Order-tuned absorbers: Den Hartog (1956), Mechanical
-Vibrations, section 6.7. Amplitudes are relative to the undamped maximum X; frequencies are
-the excitation's, which follow the speed.
+Vibrations, section 6.7. Amplitudes are relative to the undamped maximum X; frequencies are the excitation's, which
+follow the speed.
 """
 
 from __future__ import annotations
