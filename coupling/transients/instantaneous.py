@@ -20,8 +20,8 @@ from vanedamp.coupling.transients.ring_down_segments import Segment
 _LOOKS = 16
 #: share of the speed before that counts as rest, and by which that speed is forgotten from one period to the next
 _STILL, _FORGOTTEN = 1e-12, 0.01
-#: a swing below this share of both its neighbours is a rebound within a half cycle, no half cycle
-_REBOUND = 0.1
+#: share of the swings before and after below which a swing is a rebound within a half cycle; the most in a row
+_REBOUND, _MOST_REBOUNDS = 0.1, 100
 
 
 class TurningPoint(NamedTuple):
@@ -88,20 +88,25 @@ def _point(segment: Segment, start: float, t: float) -> TurningPoint:
 
 
 def without_rebounds(points: list[TurningPoint]) -> list[TurningPoint]:
-    """Return the turning points that bound half cycles: rebounds of an impact within a half cycle are left out.
+    """Return the turning points that bound half cycles: rebounds of impacts within a half cycle are left out.
 
-    A rebound is a swing smaller than a tenth of both its neighbours; the outer extremes stay.
+    Rebounds are swings that are all smaller than a tenth of both the swing before and that after them. At the end of a
+    half cycle its outermost turning point stays, on its way none.
     """
     kept: list[TurningPoint] = []
     for point in points:
         kept.append(point)
-        while len(kept) > 3 and _rebounds(*(each.coordinate for each in kept[-4:])):
-            del kept[-3:-1]
+        swing = np.abs(np.diff([each.coordinate for each in kept[-_MOST_REBOUNDS:]]))
+        large = np.flatnonzero(swing[:-1] >= _REBOUND * swing[-1:])
+        first = int(large[-1]) + 1 if len(large) else len(swing)
+        rebounds = swing[first:-1]
+        if not len(rebounds) or rebounds.max() >= _REBOUND * swing[first - 1]:
+            continue
+        begun = len(kept) - 2 - len(rebounds)  # the turning point before the first rebound
+        outer = max if kept[begun].coordinate > kept[begun - 1].coordinate else min
+        stays = [outer(kept[begun:-1], key=lambda each: each.coordinate)] if len(rebounds) % 2 == 0 else []
+        kept[begun:-1] = stays
     return kept
-
-
-def _rebounds(a: float, b: float, c: float, d: float) -> bool:
-    return abs(c - b) < _REBOUND * min(abs(b - a), abs(d - c))
 
 
 class HalfCycles(NamedTuple):
@@ -168,34 +173,29 @@ def damping_ratio(decrement: np.ndarray) -> np.ndarray:
 
 
 class Bins(NamedTuple):
-    """Values by amplitude, in bins of equal ratio. Arrays (b,); nan where a bin has too few values.
+    """Values by amplitude. Arrays (b,); nan where a bin has too few values.
 
-    low, high: edges; count: of the values; mean, with the half width of its 95 % confidence interval, from every
-    `stride`-th value so that their windows do not overlap; median.
+    low, high: edges of the amplitude; number: of the values; mean, with the half width of its 95 % confidence interval,
+    from every `stride`-th value so that their windows do not overlap; median.
     """
 
     low: np.ndarray
     high: np.ndarray
-    count: np.ndarray
+    number: np.ndarray
     mean: np.ndarray
     confidence: np.ndarray
     median: np.ndarray
 
 
-def bins(amplitude: np.ndarray, values: np.ndarray, count: int, stride: int = 1) -> Bins:
-    """Return `count` bins over the amplitudes (k,) of values (k,), nan left out. Empty without amplitudes."""
-    known = np.isfinite(values) & (amplitude > 0.0)
-    if not known.any() or not count:
-        return Bins(*np.zeros((6, 0)))
-    edges = np.geomspace(amplitude[known].min(), amplitude[known].max(), count + 1)
-    place = np.clip(np.searchsorted(edges, amplitude, side="right") - 1, 0, count - 1)
+def bins(amplitude: np.ndarray, values: np.ndarray, edges: np.ndarray, stride: int = 1) -> Bins:
+    """Return bins over the amplitudes (k,) of values (k,), nan left out. edges: (b + 1,), the outer ones open."""
+    place = np.searchsorted(edges[1:-1], amplitude, side="right")
     rows = []
-    for k in range(count):
-        own = values[known & (place == k)]
+    for k in range(len(edges) - 1):
+        own = values[(place == k) & np.isfinite(values)]
         apart = own[::stride]
         spread = np.nan
         if len(apart) > 1:
             spread = student.ppf(0.975, len(apart) - 1) * apart.std(ddof=1) / np.sqrt(len(apart))
         rows.append([len(own), own.mean() if len(own) else np.nan, spread, np.median(own) if len(own) else np.nan])
-    found = np.array(rows).T
-    return Bins(edges[:-1], edges[1:], *found)
+    return Bins(edges[:-1], edges[1:], *np.reshape(rows, (-1, 4)).T)

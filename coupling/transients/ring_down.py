@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -17,7 +16,7 @@ from vanedamp.coupling.model_order.choices import Chosen, choose
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.evaluation import evaluate
-from vanedamp.coupling.response.records import ENERGIES, STORED, VISCOUS
+from vanedamp.coupling.response.records import STORED, VISCOUS
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.ring_down import RingDownTable
@@ -27,7 +26,7 @@ from vanedamp.coupling.system.linear_response import glued_mass
 from vanedamp.coupling.system.modal_basis import forced_label
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.instantaneous import TurningPoint, TurningPoints, without_rebounds
-from vanedamp.coupling.transients.ring_down_record import LinearMode, RingDown
+from vanedamp.coupling.transients.ring_down_record import PARTS, LinearMode, RingDown
 from vanedamp.coupling.transients.ring_down_segments import Walk
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
 from vanedamp.files.store import frozen
@@ -49,14 +48,14 @@ def ring_down(
     """
     began, table = time.perf_counter(), table_of(scene)
     chosen = choose(scene)
-    periods = table.periods or math.ceil((table.duration or 0.0) * scene.frequency)
-    free = free_scene(chosen.scene, periods)
+    free = free_scene(chosen.scene, table)
+    periods = free.time.simulated
     drive = _drive(chosen, periods, progress) if table.start == "steady" else None
     start = blown_or_pulled(chosen.scene, table) if drive is None else drive.final
     system = assemble(free)
     mode = _followed(chosen.scene, system, table, start)
     record = RingDown(
-        scene=replace(chosen.scene, sweep={}, orbit=None), status=Status.OK, linear=_linear(system, mode),
+        scene=scene, status=Status.OK, linear=_linear(system, mode),
         duration=periods * system.period, time=frozen(()), displacement=frozen(()), energy=frozen(()),
         structure_energy=frozen(()), impacts=frozen((), int), rest_time=None, energies={}, energy_residual=0.0,
         drive=None if drive is None else _of_drive(drive), wall_time_s=0.0, estimate=chosen.estimate,
@@ -66,7 +65,9 @@ def ring_down(
         record = replace(record, status=drive.status)
     if start is not None:
         before = 0 if drive is None else drive.periods
-        record = _rung_down(record, free, system, start, lambda done: progress and progress(before + done, before + periods))
+        record = _rung_down(
+            record, free, system, start, lambda done: progress and progress(before + done, before + periods)
+        )
     return replace(record, wall_time_s=time.perf_counter() - began)
 
 
@@ -138,12 +139,12 @@ def _rung_down(
     moments, coordinate, energy, structure = np.array(points or np.zeros((0, len(TurningPoint._fields)))).T
     hit = np.array([event.time for event in response.event_list if event.kind == "impact"])
     ledger = outcome.records.ledger[: outcome.periods + 1]
-    lost = {name: float(ledger[-1, k]) for k, name in enumerate(ENERGIES) if VISCOUS <= k < STORED}
+    parts = ledger[0, STORED], *ledger[-1, VISCOUS:STORED], ledger[-1, STORED]
     return replace(
         record, status=response.status if record.status is Status.OK else record.status, time=frozen(moments),
         displacement=frozen(system.response[mode] * coordinate), energy=frozen(energy),
         structure_energy=frozen(structure), impacts=frozen(np.diff(np.searchsorted(hit, moments)), int),
         rest_time=None if turning.rest is None else turning.rest.time,
-        energies={"initial": float(ledger[0, STORED])} | lost | {"left": float(ledger[-1, STORED])},
+        energies=dict(zip(PARTS, map(float, parts), strict=True)),
         energy_residual=response.energy_residual,
     )  # fmt: skip

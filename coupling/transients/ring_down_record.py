@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import xarray
 
 KIND = "ring_down"
+#: energies of a ring-down: at its start, what it loses, and at its end
+PARTS = ("initial", "viscous", "friction", "impact", "contact", "left")
 
 
 @dataclass(frozen=True)
@@ -93,13 +95,16 @@ class RingDown:
 
     @cached_property
     def bins(self) -> dict[str, Bins]:
-        """Means by amplitude (m): of the frequency (Hz), and of the damping ratio by both estimates."""
-        count, half, whole = self.table.bins, self.half_cycles, self.cycles
+        """Means over `table.bins` bins of amplitude (m), of equal ratio: of frequency (Hz) and both damping ratios."""
+        half, whole = self.half_cycles, self.cycles
+        edges = np.zeros(0)
+        if self.table.bins and len(half.time):
+            edges = np.geomspace(half.amplitude.min(), half.amplitude.max(), self.table.bins + 1)
         stride = 2 * self.table.cycles
         return {
-            "frequency": bins(half.amplitude, half.frequency, count),
-            "damping_ratio": bins(whole.amplitude, whole.damping_ratio, count, stride),
-            "damping_ratio_energy": bins(whole.amplitude, whole.damping_ratio_energy, count, stride),
+            "frequency": bins(half.amplitude, half.frequency, edges),
+            "damping_ratio": bins(whole.amplitude, whole.damping_ratio, edges, stride),
+            "damping_ratio_energy": bins(whole.amplitude, whole.damping_ratio_energy, edges, stride),
         }
 
     def to_json(self) -> dict[str, Any]:
@@ -149,7 +154,7 @@ class RingDown:
         }
         if self.table.bins:
             for name, each in self.bins.items():
-                units = {"low": "m", "high": "m", "count": "1"}
+                units = {"low": "m", "high": "m", "number": "1"}
                 for part, values in zip(each._fields, each, strict=True):
                     unit = units.get(part, "Hz" if name == "frequency" else "1")
                     found[f"{name}_{part}"] = Variable(values, ("bin",), unit)
@@ -175,15 +180,17 @@ class RingDown:
         arrays = {name: frozen(values[name]) for name in ("time", "displacement", "energy", "structure_energy")}
         data = {name: json.loads(attributes[name]) for name in ("linear", "energies", "scene", "provenance")}
         open_ = {name: json.loads(attributes[name]) for name in ("drive", "estimate", "advice") if name in attributes}
+        energies = data["energies"]
         return cls(
             scene=validate(Scene, data["scene"], str(path)), status=Status(attributes["status"]),
             linear=LinearMode(**data["linear"]), duration=float(attributes["duration"]),
             impacts=frozen(values["impacts"], int),
             rest_time=float(attributes["rest_time"]) if "rest_time" in attributes else None,
-            energies=data["energies"], energy_residual=float(attributes["energy_residual"]),
-            drive=open_.get("drive"), wall_time_s=float(attributes["wall_time_s"]), estimate=open_.get("estimate"),
-            advice=open_.get("advice"), warnings=tuple(json.loads(attributes["warnings"])),
-            provenance=data["provenance"], **arrays,
+            # a file has them in the order of their names
+            energies={name: energies[name] for name in PARTS if name in energies},
+            energy_residual=float(attributes["energy_residual"]), drive=open_.get("drive"),
+            wall_time_s=float(attributes["wall_time_s"]), estimate=open_.get("estimate"), advice=open_.get("advice"),
+            warnings=tuple(json.loads(attributes["warnings"])), provenance=data["provenance"], **arrays,
         )  # fmt: skip
 
     def to_xarray(self) -> xarray.Dataset:

@@ -1,7 +1,7 @@
 """The free motion between events in closed form, segment by segment as the engine decides them.
 
-The engine is walked from event to event. What it has set up for a segment, the modes of the subsystem with their complex
-amplitudes, is the motion until the next event: it is evaluated here at any time, without samples and interpolation.
+The engine is walked from event to event. What it has set up for a segment, the modes of the subsystem with their
+complex amplitudes, is the motion until the next event: it is evaluated at any time, without samples and interpolation.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +27,9 @@ def table_of(scene: Scene) -> RingDownTable:
     """Return the [ring_down] table of a scene that can ring down. Raises InputError for others."""
     table = scene.ring_down
     if table is None:
-        raise InputError('ring_down: missing; say in a table [ring_down] how the motion begins, such as start = "steady"')
+        raise InputError(
+            'ring_down: missing; say in a table [ring_down] how the motion begins, such as start = "steady"'
+        )
     if isinstance(scene.structure, Prescribed):
         raise InputError('ring_down: a prescribed motion does not ring down; take structure.model = "rigid" or "rom"')
     if scene.solver.method != "exact":
@@ -44,8 +47,9 @@ def table_of(scene: Scene) -> RingDownTable:
     return table
 
 
-def free_scene(scene: Scene, periods: int) -> Scene:
-    """Return a scene without its excitation, whose frequency stays the unit of time."""
+def free_scene(scene: Scene, table: RingDownTable) -> Scene:
+    """Return a scene without its excitation, whose frequency stays the unit of time, over the free motion."""
+    periods = table.periods or math.ceil((table.duration or 0.0) * scene.frequency)
     return replace(
         scene, excitation=Excitation(frequency=scene.frequency, at=scene.excitation.at),
         time=Time(periods=periods, transient=0), sweep={}, orbit=None,
