@@ -42,7 +42,7 @@ class TurningPoints:
 
     def __init__(self) -> None:
         self.found: list[TurningPoint] = []
-        self._sign, self._speed = 0.0, 0.0
+        self._sign, self._speed, self._energy = 0.0, 0.0, 0.0
         #: where the speed has vanished, while it is open whether the coordinate goes on
         self._stop: TurningPoint | None = None
 
@@ -53,6 +53,12 @@ class TurningPoints:
 
     def add(self, segment: Segment, start: float, duration: float) -> None:
         """Follow a segment that begins at a time `start` and takes `duration`, s."""
+        if segment.fastest == 0.0:
+            now = segment.energy(0.0)
+            if now.kinetic > _STILL**2 * max(now.structure, self._energy):
+                # other modes move, and this one has become so small beside them that the engine leaves it out
+                self._sign, self._stop = 0.0, None
+                return
         looks = max(int(np.ceil(duration * segment.fastest * _LOOKS / (2 * np.pi))), 2)
         times = np.linspace(0.0, duration, looks + 1)
         for first in range(0, looks, _LOOKS):
@@ -62,6 +68,7 @@ class TurningPoints:
         """Follow the sign of the speed from one of the times (k,) within a segment to the next."""
         speeds = segment.speed(times)
         largest = float(np.abs(speeds).max())
+        self._energy = self._energy or segment.energy(0.0).structure
         if largest > _STILL * self._speed:
             self._speed = max(largest, _FORGOTTEN * self._speed)
         signs = np.where(np.abs(speeds) <= _STILL * self._speed, 0.0, np.sign(speeds))
@@ -84,7 +91,8 @@ def _root(segment: Segment, before: float, after: float) -> float:
 
 
 def _point(segment: Segment, start: float, t: float) -> TurningPoint:
-    return TurningPoint(float(start + t), segment.coordinate(t), *segment.energy(t))
+    energy = segment.energy(t)
+    return TurningPoint(float(start + t), segment.coordinate(t), energy.total, energy.structure)
 
 
 def without_rebounds(points: list[TurningPoint]) -> list[TurningPoint]:

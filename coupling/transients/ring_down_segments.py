@@ -18,10 +18,11 @@ from vanedamp.coupling.response.response import Status
 
 
 class Energy(NamedTuple):
-    """Energies at a time, J: of structure, bodies and springs together, and of the structure's modes."""
+    """Energies at a time, J: of structure, bodies and springs together; of the structure's modes, and kinetic of it."""
 
     total: float
     structure: float
+    kinetic: float
 
 
 class Segment:
@@ -100,7 +101,8 @@ class SliderSegment(Segment):
         bodies = system.of_bodies
         moving = 0.5 * float(bodies.mass @ speed**2) - float(bodies.weight @ (slip + system.floor @ p))
         step = p - self._p
-        return Energy(structure + moving + self._springs(np.r_[step, moved + system.floor @ step]), structure)
+        springs = self._springs(np.r_[step, moved + system.floor @ step])
+        return Energy(structure + moving + springs, structure, 0.5 * float(rate @ rate))
 
     def _springs(self, step: np.ndarray) -> float:
         """Return the energy of the springs after a motion (N,) of the coordinates, J."""
@@ -140,7 +142,7 @@ class PlanarSegment(Segment):
         pressed = np.isfinite(system.spring[:u]) & (self._state[:u] < OPEN)
         gap = (system.rest[:u] + system.J[:u] @ q)[pressed]
         total += 0.5 * float(system.spring[:u][pressed] @ gap**2 + system.tangential @ (system.elongation @ q) ** 2)
-        return Energy(total, structure)
+        return Energy(total, structure, 0.5 * float(v[:modes] @ v[:modes]))
 
 
 class Walk:
