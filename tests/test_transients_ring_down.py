@@ -256,8 +256,8 @@ def test_damping_of_a_body_is_that_of_the_forced_response_and_of_the_closed_form
     """
     one, quarter = deviation(1e-3), deviation(2.5e-4)
     assert one.max() < 0.008 and one[:, 1].max() < 0.004  # measured: 0.0051 by decrement, 0.0023 by energy
-    # a quarter of the mass, a quarter of the deviation: but for second order, and for the window of 11 cycles
-    assert one / quarter == pytest.approx(np.full((4, 2), 4.0), rel=0.2)
+    # a quarter of the mass, a quarter of the deviation, but for terms of second order and the window of 11 cycles
+    assert one / quarter == pytest.approx(np.full((4, 2), 4.0), rel=0.25)  # measured: 3.32 to 3.75
     for amplitude in (0.5, 0.3):
         theta = (1 + math.sqrt((1 + RHO**2) * amplitude**2 - RHO**2)) / (1 + RHO**2)
         attached = 8 * theta * (theta - 1) / (math.pi * amplitude) ** 2

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
+from scipy.ndimage import median_filter
 
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.studies.report.charts import COLOURS, dressed
@@ -16,6 +17,8 @@ from vanedamp.studies.report.charts import COLOURS, dressed
 _DARK, _PALE, _LINE = "#0f172a", "#94a3b8", "#334155"
 #: points of a curve that are drawn; the table has them all
 _MOST_POINTS = 4000
+#: half cycles whose median the axis of frequencies must hold
+_NEIGHBOURS = 7
 
 HEADER = [
     "time_s", "amplitude_m", "frequency_Hz", "impacts", "damping_time_s", "damping_amplitude_m", "damping_ratio",
@@ -71,10 +74,18 @@ def ring_down_figure(record: RingDown) -> go.Figure:
     figure.update_yaxes(title_text="turning points, µm", row=1, col=1)
     for col in (1, 2):
         figure.update_xaxes(title_text="amplitude, µm", type="log", exponentformat="power", row=2, col=col)
-    figure.update_yaxes(title_text="frequency, Hz", tickformat=".6~g", row=2, col=1)
+    figure.update_yaxes(title_text="frequency, Hz", tickformat=".6~g", range=_range(record), row=2, col=1)
     figure.update_yaxes(title_text="damping ratio", type="log", exponentformat="power", row=2, col=2)
     legend = {"orientation": "h", "y": 1.02, "yanchor": "bottom"}
     return dressed(figure, height=760).update_layout(legend=legend, margin_t=70)
+
+
+def _range(record: RingDown) -> list[float]:
+    """Return the frequencies that are shown at first: single half cycles of chaotic motion lie beyond."""
+    middle = median_filter(record.half_cycles.frequency, _NEIGHBOURS, mode="nearest")
+    low, high = (float(end([*middle, record.linear.frequency, record.linear.fixed_frequency])) for end in (min, max))
+    margin = 0.05 * (high - low) or 1e-3 * high
+    return [low - margin, high + margin]
 
 
 def _few(count: int) -> slice:
