@@ -28,7 +28,7 @@ from vanedamp.files.toml_input import InputError
 
 _FREQUENCY = "excitation.frequency"
 #: tables whose numbers are none of the motion's equations
-_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "initial")
+_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "ring_down", "initial")
 
 
 def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:

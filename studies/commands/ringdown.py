@@ -11,7 +11,7 @@ from vanedamp.studies.terminal import progress
 if TYPE_CHECKING:
     from vanedamp.coupling.transients.ring_down_record import RingDown
 
-ORDER = 87
+ORDER = 88
 SUMMARY = "ring-down or hammer blow as the scene's [ring_down] table says: frequency and damping over the amplitude"
 #: rows of the table that is printed
 _ROWS = 10
