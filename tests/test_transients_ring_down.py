@@ -13,8 +13,8 @@ from tests.test_studies_report import charts
 from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.transients.instantaneous import TurningPoint, bins, cycles, without_rebounds
-from vanedamp.coupling.transients.ring_down_segments import Walk
+from vanedamp.coupling.transients.instantaneous import TurningPoint, TurningPoints, bins, cycles, without_rebounds
+from vanedamp.coupling.transients.ring_down_segments import Energy, Segment, Walk
 from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import ReducedModel
@@ -296,6 +296,27 @@ def test_rebounds_are_no_half_cycles(coordinates, expected):
     assert [point.coordinate for point in without_rebounds(points)] == expected
 
 
+class Jolted(Segment):
+    """A segment of x'' = -x from a place and a speed, as an impact leaves them."""
+
+    def __init__(self, place, speed):
+        self.wave, self.rate = np.array([place - 1j * speed]), np.array([1j])
+        self.powers = np.array([place, speed, 0.0])
+
+    def energy(self, t):
+        return Energy(1.0, 1.0, 1.0)
+
+
+def test_two_impacts_at_one_instant_turn_the_motion_once_or_not_at_all():
+    found = TurningPoints()
+    found.add(Jolted(0.5, 1.0), 0.0, 0.1)
+    found.add(Jolted(0.6, -1.0), 0.1, 0.0)
+    found.add(Jolted(0.6, 0.5), 0.1, 0.1)  # turned back at once
+    assert not found.found
+    found.add(Jolted(0.65, -0.5), 0.2, 0.1)
+    assert [point.time for point in found.found] == [0.2] and found.rest is None
+
+
 def test_a_beat_keeps_its_half_cycles():
     beat = [TurningPoint(float(k), (-1.0) ** k * (1.02 + math.cos(0.3 * k)), 0.0, 0.0) for k in range(80)]
     assert without_rebounds(beat) == beat
@@ -400,6 +421,11 @@ def test_the_command_and_its_report(tmp_path, monkeypatch, capsys):
         ({"ring_down": blow(), "initial": {"velocity": 1.0}}, "initial: the structure is at rest before"),
         ({"ring_down": pull(2e-3), "stop": [{"side": "right", "gap": 1e-3, "restitution": 0.5}]}, "beyond a stop"),
         ({"ring_down": blow(), "solver": {"method": "moreau"}}, 'ring_down: is for solver.method "exact"'),
+        (
+            {"ring_down": blow(), "cavity": [CAVITY | {"play": 1e-4}],
+             "damper": [BODY | {"shape": "auto", "length": 0.01, "height": 0.01}]},
+            'damper.shape: "auto" compares steady motions',
+        ),
         ({}, "ring_down: missing"),
     ],
 )  # fmt: skip
@@ -416,6 +442,9 @@ def _without_none(table):
 def test_labels_that_are_unknown_or_do_not_move_and_a_prescribed_motion(tmp_path, capsys):
     with pytest.raises(InputError, match=r"ring_down.at: no interface label 'top'; it has tip, fourth"):
         vd.ring_down(chain(tmp_path, ring_down=blow(at="top")))
+    open_ = chain(tmp_path, ring_down=blow()).replace({"structure.modes": "auto"})
+    with pytest.raises(InputError, match=r'structure.modes: "auto" chooses them for a steady excitation'):
+        vd.ring_down(open_)
     two = ReducedModel.from_matrices(
         np.eye(2), np.diag([1e4, 2e4]), {"a": [1.0, 0.0], "b": [0.0, 1.0]}, damping_ratio=0.01
     )

@@ -79,10 +79,17 @@ class TurningPoints:
             if self._sign == -signs[k]:
                 # between two segments an impact has turned it
                 turn = _root(segment, times[k - 1], times[k]) if k and self._stop is None else times[k]
-                self.found.append(self._stop or _point(segment, start, turn))
+                self._turn(self._stop or _point(segment, start, turn))
             elif not self._sign and self._stop is not None:
                 self.found.append(self._stop)  # released at rest
             self._sign, self._stop = float(signs[k]), None
+
+    def _turn(self, point: TurningPoint) -> None:
+        """Keep a turning point; one that turns back at the instant of the last leaves none of both."""
+        if self.found and point.time <= self.found[-1].time:
+            self.found.pop()
+        else:
+            self.found.append(point)
 
 
 def _root(segment: Segment, before: float, after: float) -> float:

@@ -38,13 +38,25 @@ def table_of(scene: Scene) -> RingDownTable:
         raise InputError(f"ring_down: {reason}")
     if table.at is not None and not isinstance(scene.structure, Rom):
         raise InputError("ring_down.at: a structure of one mode has no interface labels; leave it out")
+    if table.start != "steady":
+        _check_at_rest(scene, table)
+    return table
+
+
+def _check_at_rest(scene: Scene, table: RingDownTable) -> None:
+    """Raise InputError where a blow or a pull moves nothing, or leaves open what only a steady motion decides."""
     if table.start == "impulse" and not table.impulse:
         raise InputError("ring_down.impulse: nothing moves; give an impulse that is not 0 (N s)")
     if table.start == "displacement" and not (table.displacement or scene.initial != Initial()):
         raise InputError("ring_down.displacement: nothing moves; give a displacement that is not 0 (m), or [initial]")
     if (table.impulse or table.displacement) and scene.initial != Initial():
         raise InputError(f"initial: the structure is at rest before ring_down.{table.start}; remove the table")
-    return table
+    if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+        raise InputError(
+            'structure.modes: "auto" chooses them for a steady excitation; a blow or a pull moves all: give a number'
+        )
+    if any(damper.shape == "auto" for damper in scene.damper):
+        raise InputError('damper.shape: "auto" compares steady motions; after a blow or a pull say which body each is')
 
 
 def free_scene(scene: Scene, table: RingDownTable) -> Scene:
