@@ -376,6 +376,21 @@ def test_a_ring_down_counts_impacts_and_reports_its_progress():
     assert np.array_equal(by_time.displacement, found.displacement)
 
 
+def test_turning_points_bound_the_motion_of_a_run():
+    """Samples of the same run, 2000 a period: none lies beyond a turning point, and one comes close to it."""
+    data = hit()
+    found = vd.ring_down(data)
+    free = free_scene(data, table_of(data))
+    run = vd.simulate(free, samples_per_period=2000, start=blown_or_pulled(data, table_of(data)))
+    step = run.time[1]
+    for k in range(1, len(found.time) - 1):
+        inside = (run.time > found.time[k - 1]) & (run.time < found.time[k + 1])
+        side = np.sign(found.displacement[k] - found.displacement[k - 1])
+        farthest = (side * run.displacement[inside]).max()
+        speed = 100 * np.abs(found.displacement[k - 1 : k + 2]).max()
+        assert -1e-14 < side * found.displacement[k] - farthest < speed * step
+
+
 def test_a_drive_that_is_not_steady_says_so():
     data = oscillator(
         1e-3, force=1.0, time={"periods": 20, "transient": 10}, ring_down={"start": "steady", "periods": 5}
@@ -403,6 +418,20 @@ def test_the_command_and_its_report(tmp_path, monkeypatch, capsys):
     (traces,) = charts(page).values()
     names = [trace.get("name") for trace in traces]
     assert {"by decrement", "by energy", "mode without bodies", "mode bodies glued"} <= set(names)
+
+
+def test_the_report_of_a_motion_with_few_turning_points_or_none(tmp_path):
+    still = oscillator(0.02, friction_damper=[{"normal_force": 10.0, "friction": 0.1}], ring_down=pull(5e-5, bins=3))
+    short = oscillator(0.02, ring_down=blow(periods=1, bins=3))
+    stopped = hit(**{"solver.max_events": 1})
+    for name, data in {"still": still, "short": short, "stopped": stopped}.items():
+        found = vd.ring_down(data)
+        found.save(tmp_path / f"{name}.h5")
+        again = vd.RingDown.load(tmp_path / f"{name}.h5")
+        assert json.dumps(again.to_json()) == json.dumps(found.to_json())
+        assert len(found.time) < 4
+    write_report(collect([tmp_path]), tmp_path / "report.html")
+    assert (tmp_path / "report.html").read_text().count("<h2>Ring-down</h2>") == 3
 
 
 @pytest.mark.parametrize(
