@@ -408,8 +408,8 @@ def test_the_command_and_its_report(tmp_path, monkeypatch, capsys):
     assert main(["ringdown", "scene.toml", "-o", "rung.h5", "--json", "rung.json"]) == 0
     assert "mode 0: 15.9155 Hz, damping ratio 0.002; bodies glued: 15.5319 Hz" in capsys.readouterr().out
     result = json.loads((tmp_path / "rung.json").read_text())
-    assert result["status"] == "ok" and result["half_cycles"].keys() >= {"amplitude_m", "frequency_Hz"}
-    assert result["cycles"].keys() >= {"amplitude_m", "damping_ratio", "damping_ratio_energy", "energy_loss_J"}
+    assert result["status"] == "ok" and result["half_cycles"].keys() >= {"amplitude_m", "frequency_hz"}
+    assert result["cycles"].keys() >= {"amplitude_m", "damping_ratio", "damping_ratio_energy", "energy_loss_j"}
     assert len(result["bins"]["damping_ratio"]["amplitude_low_m"]) == 4
     assert vd.RingDown.load("rung.h5").provenance["versions"]
     write_report(collect([tmp_path / "rung.h5"]), tmp_path / "report.html")

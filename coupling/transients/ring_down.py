@@ -82,7 +82,7 @@ def _drive(chosen: Chosen, periods: int, progress: Callable[[int, int], None] | 
 
 def _of_drive(drive: Response) -> dict[str, Any]:
     return {
-        "status": drive.status.value, "frequency": drive.frequency, "amplitude_mean": drive.amplitude_mean,
+        "status": drive.status.value, "frequency_hz": drive.frequency, "amplitude_mean_m": drive.amplitude_mean,
         "classification": drive.classification,
     }  # fmt: skip
 

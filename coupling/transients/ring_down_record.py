@@ -54,7 +54,7 @@ class RingDown:
     rest_time           s, at which the mode comes to rest; None if it moves to the end
     energies            J over the free motion: initial, viscous, friction, impact, contact and left
     energy_residual     imbalance of the ledger, relative to its largest term
-    drive               figures of the steady response before: status, amplitude_mean (m), frequency (Hz); None without
+    drive               of the steady response before: status, frequency_hz, amplitude_mean_m, classification; or None
     estimate, advice, warnings, as in Response; provenance: versions and further data of the caller (JSON-able)
     """
 
@@ -108,26 +108,28 @@ class RingDown:
         }
 
     def to_json(self) -> dict[str, Any]:
-        """Return the result as plain data; units stand in the names of the lists."""
+        """Return the result as plain data, with units in the names."""
         half, whole = self.half_cycles, self.cycles
+        hertz = {"frequency": "frequency_hz", "fixed_frequency": "fixed_frequency_hz"}
+        linear = {hertz.get(name, name): value for name, value in asdict(self.linear).items()}
         data: dict[str, Any] = {
-            "status": self.status.value, "linear": asdict(self.linear), "duration": self.duration,
-            "rest_time": self.rest_time, "energies": self.energies, "energy_residual": self.energy_residual,
+            "status": self.status.value, "linear": linear, "duration_s": self.duration, "rest_time_s": self.rest_time,
+            "energies_j": self.energies, "energy_residual": self.energy_residual,
             "drive": self.drive, "wall_time_s": self.wall_time_s, "warnings": list(self.warnings),
             "turning_points": {
                 "time_s": self.time.tolist(), "displacement_m": self.displacement.tolist(),
-                "energy_J": self.energy.tolist(),
+                "energy_j": self.energy.tolist(),
             },
             "half_cycles": {
                 "time_s": half.time.tolist(), "amplitude_m": half.amplitude.tolist(),
-                "frequency_Hz": half.frequency.tolist(), "impacts": self.impacts.tolist(),
+                "frequency_hz": half.frequency.tolist(), "impacts": self.impacts.tolist(),
             },
             "cycles": {
                 "time_s": whole.time.tolist(), "amplitude_m": whole.amplitude.tolist(),
                 "damping_ratio": whole.damping_ratio.tolist(),
-                "damping_ratio_energy": whole.damping_ratio_energy.tolist(), "energy_loss_J": whole.loss.tolist(),
+                "damping_ratio_energy": whole.damping_ratio_energy.tolist(), "energy_loss_j": whole.loss.tolist(),
             },
-            "bins": {name: _of_bins(found) for name, found in self.bins.items()} if self.table.bins else None,
+            "bins": {hertz.get(name, name): _of_bins(found) for name, found in self.bins.items()} if self.table.bins else None,
         }  # fmt: skip
         for name in ("estimate", "advice"):
             if (value := getattr(self, name)) is not None:

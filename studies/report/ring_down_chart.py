@@ -21,8 +21,8 @@ _MOST_POINTS = 4000
 _NEIGHBOURS = 7
 
 HEADER = [
-    "time_s", "amplitude_m", "frequency_Hz", "impacts", "damping_time_s", "damping_amplitude_m", "damping_ratio",
-    "damping_ratio_energy", "energy_loss_J",
+    "time_s", "amplitude_m", "frequency_hz", "impacts", "damping_time_s", "damping_amplitude_m", "damping_ratio",
+    "damping_ratio_energy", "energy_loss_j",
 ]  # fmt: skip
 
 
