@@ -129,8 +129,9 @@ class RingDown:
                 "damping_ratio": whole.damping_ratio.tolist(),
                 "damping_ratio_energy": whole.damping_ratio_energy.tolist(), "energy_loss_j": whole.loss.tolist(),
             },
-            "bins": {hertz.get(name, name): _of_bins(found) for name, found in self.bins.items()} if self.table.bins else None,
         }  # fmt: skip
+        if self.table.bins:
+            data["bins"] = {hertz.get(name, name): _of_bins(found) for name, found in self.bins.items()}
         for name in ("estimate", "advice"):
             if (value := getattr(self, name)) is not None:
                 data[name] = value
