@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from vanedamp.coupling.sweep.record import Sweep
     from vanedamp.coupling.sweep.steady_states import steady_states
     from vanedamp.coupling.sweep.sweep import sweep
+    from vanedamp.coupling.transients.ring_down import ring_down
+    from vanedamp.coupling.transients.ring_down_record import RingDown
     from vanedamp.files.errors import VanedampError
     from vanedamp.files.toml_input import InputError
     from vanedamp.modal.eigen import Modes, solve_modes
@@ -32,9 +34,9 @@ if TYPE_CHECKING:
     from vanedamp.studies.case.tables import Case
 
 __all__ = [
-    "Branches", "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "Scene", "Status",
-    "Sweep", "SystemMatrices", "VanedampError", "find_orbit", "orbits", "reduce", "rigid_model", "simulate",
-    "solve_modes", "steady_states", "sweep",
+    "Branches", "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "RingDown",
+    "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "find_orbit", "orbits", "reduce", "rigid_model",
+    "ring_down", "simulate", "solve_modes", "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -47,6 +49,7 @@ _HOMES = {
     "ReducedModel": "rom.reduced",
     "Response": "coupling.response.response",
     "RigidModel": "modal.rigid_model",
+    "RingDown": "coupling.transients.ring_down_record",
     "Scene": "coupling.scene.scene",
     "Status": "coupling.response.response",
     "Sweep": "coupling.sweep.sweep",
@@ -56,6 +59,7 @@ _HOMES = {
     "orbits": "coupling.orbits.orbits",
     "reduce": "rom.reduction",
     "rigid_model": "modal.rigid_model",
+    "ring_down": "coupling.transients.ring_down",
     "simulate": "coupling.engine",
     "solve_modes": "modal.eigen",
     "steady_states": "coupling.sweep.steady_states",

@@ -17,15 +17,21 @@ from vanedamp.studies.commands.support.outputs import Outputs
 
 def load_scene(path: str, outputs: Outputs) -> Scene:
     """Load a scene that moves and whose files are there; none of them may be an output. Raises InputError."""
-    scene = Scene.load(path)
-    outputs.keep(scene.files)
-    if isinstance(scene.structure, Rom) and not Path(scene.structure.file).is_file():
-        raise InputError(f"structure.file: no such file {scene.structure.file}; `vanedamp reduce` writes one")
+    scene = load_any_scene(path, outputs)
     if not scene.moved:
         raise InputError(
             "excitation: nothing moves the structure; give force, base_acceleration or resonance_amplitude, or an "
             "[initial] state"
         )
+    return scene
+
+
+def load_any_scene(path: str, outputs: Outputs) -> Scene:
+    """Load a scene whose files are there, whether or not something moves it; as load_scene."""
+    scene = Scene.load(path)
+    outputs.keep(scene.files)
+    if isinstance(scene.structure, Rom) and not Path(scene.structure.file).is_file():
+        raise InputError(f"structure.file: no such file {scene.structure.file}; `vanedamp reduce` writes one")
     return scene
 
 
