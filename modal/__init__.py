@@ -2,7 +2,7 @@
 
 In the order of the pipeline: `mesh_import` (on `abaqus`, `nastran`, `frames`) and `msh` read meshes; `elasticity` (on
 `fenicsx`) assembles `matrices`, which `matrix_files` exchanges; `eigen` (on `petsc`, `parallel`, `algebra`) solves;
-`rotating` and `gyroscopic` are for structures that turn; `multiple`, `participation` and `stress` describe them,
-`units` checks them; `measurements`, `frf` (on `rational_fit`) and `correlation` are for tests, `model_updating` fits
-the model to them; `rigid_model` and `base_excitation` come last.
+`rotating`, `gyroscopic` and `campbell` (on `speed_range`, `mode_tracking`) are for structures that turn; `multiple`,
+`participation` and `stress` describe modes, `units` checks them; `measurements`, `frf` (on `rational_fit`) and
+`correlation` are for tests, `model_updating` fits the model to them; `rigid_model` and `base_excitation` come last.
 """

@@ -119,19 +119,25 @@ def _converged(pencil: _Pencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _within(pencil: _Pencil, space: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest positive frequencies (rad/s) and shapes (n, count), x^H M x = 1, of a mass-orthonormal space.
+    """Return the lowest frequencies (rad/s) and shapes (n, count), x^H M x = 1, within a mass-orthonormal space."""
+    small = (space.T @ (matrix @ space) for matrix in (pencil.stiffness, pencil.coupling))
+    omega, shapes = dense_modes(*small)
+    return omega[:count], space @ shapes[:, :count]
 
-    In its own modes, of frequencies kappa, velocities v and scaled displacements y = kappa x obey the skew system
-    v' + W G v + kappa y = 0, y' = kappa v.
+
+def dense_modes(stiffness: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return all positive frequencies (m,), rad/s, ascending, and complex shapes (m, m) of length one, of unit masses.
+
+    stiffness, coupling: (m, m), K and W G. In the modes of K, of frequencies kappa, velocities v and scaled
+    displacements y = kappa x obey the skew system v' + W G v + kappa y = 0, y' = kappa v.
     """
-    squares, turn = linalg.eigh(symmetric_part(space.T @ (pencil.stiffness @ space)))
-    kappa, basis = np.sqrt(squares), space @ turn
-    coupled = basis.T @ (pencil.coupling @ basis)
+    squares, turn = linalg.eigh(symmetric_part(stiffness))
+    kappa, coupled = np.sqrt(squares), turn.T @ coupling @ turn
     skew = np.block([[0.5 * (coupled - coupled.T), np.diag(kappa)], [-np.diag(kappa), np.zeros_like(coupled)]])
     omega, vectors = linalg.eigh(1j * skew)
-    positive = slice(len(kappa), len(kappa) + count)
-    shapes = vectors[len(kappa) :, positive] / kappa[:, None]
-    return omega[positive], basis @ (shapes / np.linalg.norm(shapes, axis=0))
+    size = len(kappa)
+    shapes = vectors[size:, size:] / kappa[:, None]
+    return omega[size:], turn @ (shapes / np.linalg.norm(shapes, axis=0))
 
 
 def _known_count(still: np.ndarray, speed: float, count: int) -> tuple[float, int] | None:

@@ -74,7 +74,7 @@ def turning_model(tmp_path):
     model = ReducedModel.from_matrices(
         np.eye(6) + 0.1 * factor @ factor.T, 1e3 * (factor @ factor.T + np.eye(6)), rows, damping_ratio=0.01,
         centrifugal_stiffness=added @ added.T, rotation_axis=[0.0, 0.0, 1.0], rotation_point=[0.0, 0.0, 0.0],
-        greatest_speed=100.0, directions=dict.fromkeys(rows, [0.0, 0.0, 1.0]), positions=np.full((3, 3), 0.01),
+        greatest_speed=100.0, directions={row: [0.0, 0.0, 1.0] for row in rows}, positions=np.full((3, 3), 0.01),
     )  # fmt: skip
     model.save(tmp_path / "turning.h5")
     return model, str(tmp_path / "turning.h5")

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from vanedamp.coupling.transients.ring_down_record import RingDown
     from vanedamp.files.errors import VanedampError
     from vanedamp.files.toml_input import InputError
+    from vanedamp.modal.campbell import Campbell, campbell
     from vanedamp.modal.eigen import Modes, solve_modes
     from vanedamp.modal.matrices import SystemMatrices
     from vanedamp.modal.rigid_model import RigidModel, rigid_model
@@ -34,14 +35,15 @@ if TYPE_CHECKING:
     from vanedamp.studies.case.tables import Case
 
 __all__ = [
-    "Branches", "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "RingDown",
-    "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "find_orbit", "orbits", "reduce", "rigid_model",
-    "ring_down", "simulate", "solve_modes", "steady_states", "sweep",
+    "Branches", "Campbell", "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel",
+    "RingDown", "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "campbell", "find_orbit", "orbits",
+    "reduce", "rigid_model", "ring_down", "simulate", "solve_modes", "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
 _HOMES = {
     "Branches": "coupling.orbits.branch",
+    "Campbell": "modal.campbell",
     "Case": "studies.case.tables",
     "InputError": "files.toml_input",
     "Interface": "rom.interface",
@@ -55,6 +57,7 @@ _HOMES = {
     "Sweep": "coupling.sweep.sweep",
     "SystemMatrices": "modal.matrices",
     "VanedampError": "files.errors",
+    "campbell": "modal.campbell",
     "find_orbit": "coupling.orbits.orbits",
     "orbits": "coupling.orbits.orbits",
     "reduce": "rom.reduction",

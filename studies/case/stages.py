@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from scipy import linalg
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError
+from vanedamp.modal.campbell import Campbell, campbell
 from vanedamp.modal.correlation import mode_like
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
 from vanedamp.modal.elasticity import Solid
@@ -340,6 +341,21 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
     materials = {name: (table.young, table.density) for name, table in structure.case.material.items()}
     remarks = doubts(materials, float(np.ptp(matrices.coordinates, axis=0).max()), matrices.total_mass, first_hz)
     return tuple(f"units: {remark}" for remark in remarks)
+
+
+def campbell_diagram(structure: Structure, report: Callable[[int, int], None] | None = None) -> Campbell:
+    """Return the Campbell diagram that the case's tables [campbell] and [rotation] ask for.
+
+    report: called with the number of full solutions made, and of those known to be needed. Raises the errors of
+    `modal.campbell.campbell`.
+    """
+    table, rotation, rotating = structure.case.campbell, structure.case.rotation, structure.rotating
+    assert table is not None and rotation is not None and rotating is not None
+    most = rotating.standing.free.size
+    if table.modes > most:
+        raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
+    diagram = campbell(rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report)
+    return replace(diagram, provenance={"matrices": dict(diagram.provenance), "versions": versions()})
 
 
 def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, modes: int = 1) -> ReducedModel:

@@ -29,6 +29,7 @@ from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.modal.units import absurdity
 from vanedamp.studies.case.calibration_tables import CalibrationTable
+from vanedamp.studies.case.campbell_tables import CampbellTable
 from vanedamp.studies.case.rotation_tables import RotationTable
 from vanedamp.studies.case.temperature_tables import TemperatureTable
 
@@ -292,6 +293,7 @@ class Case:
     interface: dict[str, InterfaceTable] = field(default_factory=dict)
     calibration: CalibrationTable | None = None
     rotation: RotationTable | None = None
+    campbell: CampbellTable | None = None
     temperature: TemperatureTable | None = None
 
     def __post_init__(self) -> None:
@@ -300,6 +302,8 @@ class Case:
             raise ValueError("material: the damping ratios differ; set the one of the modes in [modes] damping_ratio")
         if self.modes.at is not None and self.modes.at not in self.interface:
             raise ValueError(f"modes.at: no interface '{self.modes.at}'; {_known(self.modes.at, self.interface)}")
+        if self.campbell is not None and self.rotation is None:
+            raise ValueError("campbell: needs a table [rotation] with the axis of the speeds, such as axis = [1, 0, 0]")
         if self.rotation is not None and self.rotation.gyroscopic and self.modes.min_frequency:
             raise ValueError("modes.min_frequency: modes with the gyroscopic coupling are the lowest; leave it out")
         stressed = self.temperature is not None or (self.rotation is not None and self.rotation.omega)

@@ -1,0 +1,271 @@
+"""Campbell diagram: natural frequencies of a rotating structure over its speed, and where engine orders meet them.
+
+All in the frame that turns with the structure, where an excitation at rest has the frequencies k * speed / (2 pi).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files import store
+from vanedamp.files.errors import VanedampError
+from vanedamp.modal.mode_tracking import Approach, Tracks
+from vanedamp.modal.rotating import RotatingMatrices
+from vanedamp.modal.speed_range import RPM, SpeedRange
+
+_KIND = "campbell"
+# frequencies closer than this multiple of their error are one
+_SAME = 10.0
+
+
+class CampbellError(VanedampError):
+    """Speeds, orders or a number of modes of which there is no diagram; the message names the argument."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A natural frequency met by an engine order.
+
+    mode          counted from 0
+    order         periods a revolution
+    speed         rad/s
+    frequency_hz  of both
+    """
+
+    mode: int
+    order: float
+    speed: float
+    frequency_hz: float
+
+    @property
+    def rpm(self) -> float:
+        """Speed, 1/min."""
+        return self.speed * RPM
+
+
+@dataclass(frozen=True, eq=False)
+class Campbell:
+    """Natural frequencies over the speed.
+
+    speeds          (s,) rad/s, ascending: those asked for and those that following the modes took
+    asked           (s,) whether a speed was asked for
+    modes           (m,) numbers of the modes, counted from 0: their places at the lowest speed; those that are not
+                    among the modes computed there have the next numbers
+    frequencies_hz  (m, s) of every mode as its shape is followed; nan where it is not among those computed
+    errors          (s,) largest estimated relative error of the frequencies at a speed, for not solving the full
+                    structure there; errors of the mesh and of the full solutions are not in it
+    solved          (k,) rad/s, speeds at which the full structure was solved
+    crossings       with the engine orders, by speed
+    approaches      of two modes: veerings and crossings
+    gyroscopic      whether the modes have the gyroscopic coupling
+    warnings        where modes could not be followed, or are not among those computed
+    """
+
+    speeds: np.ndarray
+    asked: np.ndarray
+    modes: np.ndarray
+    frequencies_hz: np.ndarray
+    errors: np.ndarray
+    solved: np.ndarray
+    orders: tuple[float, ...]
+    crossings: tuple[Crossing, ...]
+    approaches: tuple[Approach, ...]
+    gyroscopic: bool = False
+    warnings: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, dtype in (("asked", bool), ("modes", np.int64)):
+            object.__setattr__(self, name, store.frozen(getattr(self, name), dtype))
+        for name in ("speeds", "frequencies_hz", "errors", "solved"):
+            object.__setattr__(self, name, store.frozen(getattr(self, name)))
+        object.__setattr__(self, "provenance", dict(self.provenance))
+
+    @property
+    def rpm(self) -> np.ndarray:
+        """Speeds (s,), 1/min."""
+        return self.speeds * RPM
+
+    @property
+    def veerings(self) -> tuple[Approach, ...]:
+        """The approaches at which two modes exchange their shapes."""
+        return tuple(approach for approach in self.approaches if approach.kind == "veering")
+
+    @property
+    def error(self) -> float:
+        """Largest estimated relative error of a frequency."""
+        return float(self.errors.max())
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the result as plain data."""
+        return {
+            "speed": self.speeds.tolist(),
+            "rpm": self.rpm.tolist(),
+            "asked": self.asked.tolist(),
+            "mode": self.modes.tolist(),
+            "frequency_hz": self.frequencies_hz.tolist(),
+            "orders": list(self.orders),
+            "crossings": [asdict(crossing) | {"rpm": crossing.rpm} for crossing in self.crossings],
+            "approaches": [asdict(approach) | {"rpm": approach.rpm} for approach in self.approaches],
+            "error": self.error,
+            "solved": self.solved.tolist(),
+            "gyroscopic": self.gyroscopic,
+            "warnings": list(self.warnings),
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an HDF5 record."""
+        variables = {
+            "speed": store.Variable(self.speeds, ("speed",), "rad/s"),
+            "asked": store.Variable(self.asked.astype(np.int8), ("speed",)),
+            "mode": store.Variable(self.modes, ("mode",)),
+            "frequency": store.Variable(self.frequencies_hz, ("mode", "speed"), "Hz"),
+            "error": store.Variable(self.errors, ("speed",)),
+            "solved_speed": store.Variable(self.solved, ("solution",), "rad/s"),
+            "engine_order": store.Variable(np.array(self.orders, dtype=float), ("engine_order",)),
+        }
+        for prefix, dimension, rows, names in (
+            ("crossing", "crossing", self.crossings, _CROSSING),
+            ("approach", "approach", self.approaches, _APPROACH),
+        ):
+            for name, (dtype, units) in names.items():
+                values = np.array([getattr(row, name) for row in rows], dtype=dtype)
+                variables[f"{prefix}_{name}"] = store.Variable(values, (dimension,), units)
+        attributes = {
+            "gyroscopic": self.gyroscopic, "warnings": json.dumps(self.warnings), "provenance": dict(self.provenance)
+        }  # fmt: skip
+        store.save(path, _KIND, variables, attributes)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Campbell:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        values, attributes = store.load(path, _KIND)
+
+        def rows(prefix: str, names: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+            columns = [
+                [str(v) if d is object else v.item() for v in values[f"{prefix}_{n}"]] for n, (d, _) in names.items()
+            ]
+            return (dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True))
+
+        return cls(
+            values["speed"], values["asked"], values["mode"], values["frequency"], values["error"],
+            values["solved_speed"], tuple(values["engine_order"].tolist()),
+            tuple(Crossing(**row) for row in rows("crossing", _CROSSING)),
+            tuple(Approach(**row) for row in rows("approach", _APPROACH)),
+            bool(attributes["gyroscopic"]), tuple(json.loads(attributes["warnings"])),
+            json.loads(attributes["provenance"]),
+        )  # fmt: skip
+
+
+#: columns of the tables by their fields: type and unit
+_CROSSING: dict[str, tuple[Any, str]] = {
+    "mode": (np.int64, "1"), "order": (float, "1"), "speed": (float, "rad/s"), "frequency_hz": (float, "Hz"),
+}  # fmt: skip
+_APPROACH: dict[str, tuple[Any, str]] = {
+    "kind": (object, "1"), "first": (np.int64, "1"), "second": (np.int64, "1"), "speed": (float, "rad/s"),
+    "frequency_hz": (float, "Hz"), "gap_hz": (float, "Hz"), "exchange": (float, "1"),
+}  # fmt: skip
+
+
+def campbell(
+    rotating: RotatingMatrices,
+    speeds: Sequence[float] | np.ndarray,
+    orders: Sequence[float] = (),
+    count: int = 6,
+    gyroscopic: bool = False,
+    tolerance: float = 1e-8,
+    report: Callable[[int, int], None] | None = None,
+) -> Campbell:
+    """Return the lowest natural frequencies over speeds, followed by their shapes, and their crossings.
+
+    speeds      rad/s, ascending, at least two
+    orders      engine orders, above zero, whose crossings are sought from the first to the last speed
+    count       modes that are among so many lowest at any speed are followed, as far as they are among half as many
+                more
+    gyroscopic  with the gyroscopic coupling: complex modes
+    tolerance   largest estimated relative error of the frequencies for solving the full structure at a few speeds only,
+                which become more until it is met
+    report      called with the number of full solutions made, and of those known to be needed
+
+    Two modes cross where their frequencies agree to ten tolerances; otherwise they veer. Raises CampbellError,
+    modal.rotating.UnstableError for a speed that the structure does not bear, and SolverError.
+    """
+    wanted = _checked(speeds, orders, count, rotating.standing.free.size, tolerance)
+    report = report or (lambda done, total: None)
+    report(0, 2)
+    with SpeedRange(rotating, float(wanted[0]), float(wanted[-1]), count, gyroscopic) as source:
+        while True:
+            report(len(source.solved), len(source.solved) + 1)
+            tracks = Tracks(source, wanted, count, _SAME * tolerance)
+            approaches = tracks.approaches()
+            crossings = _crossings(source, tracks, orders)
+            met = [approach.speed for approach in approaches] + [crossing.speed for crossing in crossings]
+            places = np.unique(np.concatenate([tracks.speeds, met]))
+            errors = np.array([source.errors(float(speed)).max() for speed in places])
+            worst = float(places[np.argmax(errors)])
+            if errors.max() <= tolerance or worst in source.solved:
+                break
+            source.add(worst)
+        warnings = list(tracks.notes)
+        if errors.max() > tolerance:
+            warnings.append(f"frequencies are estimated to be wrong by up to {errors.max():.2g} of their value")
+        frequencies = np.array([tracks.frequencies(mode) for mode in tracks.kept]) / (2.0 * np.pi)
+        for mode, curve in zip(tracks.kept, frequencies, strict=True):
+            known = tracks.speeds[np.isfinite(curve)]
+            if known.size < curve.size:
+                warnings.append(
+                    f"mode {mode + 1} is among the modes computed only from {known[0] * RPM:.6g} to "
+                    f"{known[-1] * RPM:.6g} rpm; ask for more modes to see the rest of it"
+                )
+        return Campbell(
+            speeds=tracks.speeds,
+            asked=np.isin(tracks.speeds, wanted),
+            modes=tracks.kept,
+            frequencies_hz=frequencies,
+            errors=errors[np.isin(places, tracks.speeds)],
+            solved=np.sort(source.solved),
+            orders=tuple(float(order) for order in orders),
+            crossings=tuple(crossings),
+            approaches=tuple(approaches),
+            gyroscopic=gyroscopic,
+            warnings=tuple(warnings),
+            provenance=rotating.standing.provenance,
+        )
+
+
+def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> list[Crossing]:
+    """Return the crossings of the modes that are kept with engine orders, by their speed."""
+    low, high = tracks.speeds[[0, -1]]
+    found = [
+        Crossing(tracks.number_at(speed, place), float(order), speed, order * speed / (2.0 * np.pi))
+        for order in orders
+        for place, speed in enumerate(source.meetings(order).tolist()[: source.count])
+        if low <= speed <= high
+    ]
+    kept = [crossing for crossing in found if crossing.mode in tracks.kept]
+    return sorted(kept, key=lambda crossing: (crossing.speed, crossing.mode))
+
+
+def _checked(
+    speeds: Sequence[float] | np.ndarray, orders: Sequence[float], count: int, size: int, tolerance: float
+) -> np.ndarray:
+    """Return the speeds. Raises CampbellError for arguments that make no diagram; size: number of free DOFs."""
+    values = np.asarray(speeds, dtype=float)
+    if values.ndim != 1 or values.size < 2 or not np.all(np.isfinite(values)):
+        raise CampbellError("speeds: expected at least two, rad/s")
+    if values[0] < 0.0 or np.any(np.diff(values) <= 0.0):
+        raise CampbellError("speeds: expected them ascending from zero or more, each once")
+    for order in orders:
+        if not 0.0 < order < np.inf:
+            raise CampbellError(f"orders: expected numbers above zero, not {order:g}")
+    if not 1 <= count <= size:
+        raise CampbellError(f"count: expected 1 to {size} modes (the free DOFs), not {count}")
+    if not 0.0 < tolerance < 1.0:
+        raise CampbellError(f"tolerance: expected a number between 0 and 1, not {tolerance:g}")
+    return values

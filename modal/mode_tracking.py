@@ -1,0 +1,233 @@
+"""Which mode is which from speed to speed: by the MAC of neighbours, and speeds put in where that is ambiguous.
+
+Two modes whose frequencies approach each other either cross, each keeping its shape, or veer: they turn away from each
+other and exchange their shapes on the way (Leissa 1974; Perkins and Mote 1986, J. Sound Vib. 106). Between coarse
+speeds both look the same. So the closest approach itself is sought, as the root of the difference of the slopes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg, optimize
+
+from vanedamp.modal.correlation import Pairing, modal_assurance, pair_modes
+from vanedamp.modal.speed_range import RPM, SpeedModes, SpeedRange
+
+#: MAC of one mode at neighbouring speeds, at least
+CLEAR_MAC = 0.9
+#: least share of its shape that a mode takes over from another one for a veering
+LEAST_EXCHANGE = 0.25
+#: speeds closer than this share of the range are no longer divided
+_CLOSEST = 1e-8
+
+
+@dataclass(frozen=True)
+class Approach:
+    """The closest approach of two tracked modes.
+
+    kind             "veering" or "crossing"
+    first, second    modes: of lower and higher frequency before it
+    speed            rad/s
+    frequency_hz     middle of the two
+    gap_hz           their distance; zero at a crossing
+    exchange         MAC of the first one after a veering with the second one before it, the largest over the range: 1
+                     for a full exchange of shapes
+    """
+
+    kind: str
+    first: int
+    second: int
+    speed: float
+    frequency_hz: float
+    gap_hz: float
+    exchange: float
+
+    @property
+    def rpm(self) -> float:
+        """Speed, 1/min."""
+        return self.speed * RPM
+
+
+class Tracks:
+    """Modes followed over a range of speeds.
+
+    source  the modes at any speed; count: modes that are among so many lowest somewhere are kept
+    same    relative distance of frequencies that are one frequency: shapes of one frequency are any mixture of them
+
+    speeds  rad/s, those given and those put in between; number[j][i]: the mode that is the i-th lowest at speeds[j],
+            counted from 0 as they stand at the lowest speed, further ones as they appear
+    notes   where no step was small enough
+    """
+
+    def __init__(self, source: SpeedRange, speeds: np.ndarray, count: int, same: float) -> None:
+        self.source, self.count, self.same = source, count, same
+        self._least = _CLOSEST * float(speeds[-1] - speeds[0])
+        self.notes: list[str] = []
+        first = source.modes(float(speeds[0]))
+        # its multiple modes stand as they part
+        self.states = [self._aligned(first, source.modes(float(speeds[0]) + 100.0 * self._least))]
+        self.number = [np.arange(first.frequencies.size)]
+        for speed in speeds[1:]:
+            self._reach(float(speed))
+
+    @property
+    def speeds(self) -> np.ndarray:
+        """(s,) rad/s."""
+        return np.array([state.speed for state in self.states])
+
+    @property
+    def kept(self) -> np.ndarray:
+        """The modes that are among the `count` lowest somewhere, ascending."""
+        return np.unique([number[: self.count] for number in self.number])
+
+    def frequencies(self, mode: int) -> np.ndarray:
+        """Return the frequencies (s,) of a mode, rad/s; nan where it is not among the modes of the source."""
+        return np.array([self._value(j, mode, state.frequencies) for j, state in enumerate(self.states)])
+
+    def number_at(self, speed: float, place: int) -> int:
+        """Return the mode that is the place-th lowest at a speed of the range, by its shapes at the neighbours."""
+        right = min(max(int(np.searchsorted(self.speeds, speed)), 1), len(self.states) - 1)
+        modes = self._aligned(self.source.modes(speed), self.states[right - 1])
+        alike = np.zeros(1 + max(number.max() for number in self.number))
+        for j in (right - 1, right):
+            alike[self.number[j]] += modal_assurance(modes.shapes[:, place : place + 1].T, self.states[j].shapes.T)[0]
+        return int(np.argmax(alike))
+
+    def approaches(self) -> list[Approach]:
+        """Return all crossings and veerings of the modes that are kept, by their speed."""
+        found = []
+        for interval, (left, right) in enumerate(itertools.pairwise(self.states)):
+            for place in range(left.frequencies.size - 1):
+                met = self._closest(place, left, right)
+                if met is not None:
+                    found.append(self._approach(interval, place, met))
+        kept = [
+            approach
+            for approach in found
+            if (approach.kind == "crossing" or approach.exchange >= LEAST_EXCHANGE)
+            and np.isin([approach.first, approach.second], self.kept).any()
+        ]
+        return sorted(kept, key=lambda approach: approach.speed)
+
+    def _value(self, j: int, mode: int, values: np.ndarray) -> float:
+        places = np.flatnonzero(self.number[j] == mode)
+        return float(values[places[0]]) if places.size else np.nan
+
+    def _reach(self, speed: float) -> None:
+        """Go on from the last state to a speed, over speeds between them as far as the shapes need."""
+        ahead = [speed]
+        while ahead:
+            left = self.states[-1]
+            right = self._aligned(self.source.modes(ahead[-1]), left)
+            pairs = pair_modes(modal_assurance(left.shapes.T, right.shapes.T), CLEAR_MAC)
+            between = self._between(left, right, pairs)
+            if between is not None:
+                ahead.append(between)
+                continue
+            ahead.pop()
+            self._append(right, pairs)
+
+    def _append(self, right: SpeedModes, pairs: Pairing) -> None:
+        number = np.full(right.frequencies.size, -1)
+        number[pairs.second] = self.number[-1][pairs.first]
+        unknown = np.flatnonzero(number < 0)
+        number[unknown] = 1 + max(known.max() for known in self.number) + np.arange(unknown.size)
+        self.states.append(right)
+        self.number.append(number)
+
+    def _between(self, left: SpeedModes, right: SpeedModes, pairs: Pairing) -> float | None:
+        """Return a speed that has to come between two; None where the pairs are clear."""
+        # the highest may be crossed by one that is not computed
+        known = np.arange(left.frequencies.size - (not self.source.whole))
+        clear = np.isin(known, pairs.first).all() and np.isin(known, pairs.second).all()
+        moved = pairs.first != pairs.second
+        if clear and not moved.any():
+            return None
+        low, high = left.speed, right.speed
+        if high - low < self._least:
+            if not clear:
+                self.notes.append(f"modes cannot be followed over {high:.9g} rad/s: their shapes jump there")
+            return None
+        swapped = {(int(a), int(b)) for a, b in zip(pairs.first[moved], pairs.second[moved], strict=True)}
+        for place in sorted({min(pair) for pair in swapped}):
+            met = self._closest(place, left, right) if (place, place + 1) in swapped else None
+            if met is not None and low < met.speed < high and not self._one(met, place):
+                return met.speed  # a veering so narrow that the shapes seem to go straight on
+            if met is not None and (place + 1, place) in swapped:
+                swapped -= {(place, place + 1), (place + 1, place)}
+        return None if clear and not swapped else 0.5 * (low + high)
+
+    def _closest(self, place: int, left: SpeedModes, right: SpeedModes) -> SpeedModes | None:
+        """Return the modes where the place-th and the next frequency are closest between two speeds.
+
+        None where they do not come closer there, or are one frequency all along.
+        """
+        if right.frequencies.size <= place + 1 or (self._one(left, place) and self._one(right, place)):
+            return None
+
+        def parting(speed: float, known: SpeedModes | None = None) -> float:
+            slopes = self.source.slopes(self.source.modes(speed) if known is None else known)
+            return float(slopes[place + 1] - slopes[place])
+
+        if not (parting(left.speed, left) < 0.0 <= parting(right.speed, right)):
+            return None
+        low, high = left.speed, right.speed
+        if parting(low) < 0.0 <= parting(high):  # at one frequency, the shapes may be mixed otherwise than in the state
+            low = optimize.brentq(parting, low, high, xtol=1e-14 * high, rtol=1e-14)
+        elif self._one(right, place):
+            low = high
+        return self.source.modes(low)
+
+    def _one(self, modes: SpeedModes, place: int) -> bool:
+        """Say whether the place-th and the next frequency are one."""
+        low, high = modes.frequencies[place : place + 2]
+        return bool(high - low <= self.same * high)
+
+    def _approach(self, interval: int, place: int, met: SpeedModes) -> Approach:
+        """Return the approach of the place-th and the next mode in an interval of the speeds."""
+        low, high = (float(omega) / (2.0 * np.pi) for omega in met.frequencies[place : place + 2])
+        first, second = self.number[interval][place : place + 2].tolist()
+        if [second, first] == self.number[interval + 1][place : place + 2].tolist():
+            return Approach("crossing", first, second, met.speed, 0.5 * (low + high), 0.0, 0.0)
+        # a third mode may cross one of them on the way
+        first, second = (self.number_at(met.speed, at) for at in (place, place + 1))
+        exchange = self._exchange(first, second, interval)
+        return Approach("veering", first, second, met.speed, 0.5 * (low + high), high - low, exchange)
+
+    def _exchange(self, first: int, second: int, interval: int) -> float:
+        """Return the largest MAC of the first mode after an interval with the second one before it.
+
+        As far as the two part on either side: beyond, they may approach each other once more.
+        """
+        gap = np.abs(self.frequencies(second) - self.frequencies(first))
+        before = _rising(gap[interval::-1])
+        after = _rising(gap[interval + 1 :])
+        shapes = [
+            np.vstack([self.states[j].shapes[:, self.number[j] == mode].T for j in states])
+            for mode, states in (
+                (second, range(interval, interval - before, -1)),
+                (first, range(interval + 1, interval + 1 + after)),
+            )
+        ]
+        return float(modal_assurance(*shapes).max(initial=0.0))
+
+    def _aligned(self, modes: SpeedModes, reference: SpeedModes) -> SpeedModes:
+        """Return modes whose multiple ones are turned, within their span, to shapes like those of a reference."""
+        shapes = modes.shapes.copy()
+        apart = np.flatnonzero(np.diff(modes.frequencies) > self.same * modes.frequencies[1:]) + 1
+        for group in np.split(np.arange(modes.frequencies.size), apart):
+            if group.size > 1:
+                overlap = shapes[:, group].conj().T @ reference.shapes
+                nearest = np.sort(np.argsort(-np.linalg.norm(overlap, axis=0))[: group.size])
+                turn, _ = linalg.polar(overlap[:, nearest])  # the nearest rotation (Procrustes)
+                shapes[:, group] = shapes[:, group] @ turn
+        return modes._replace(shapes=shapes)
+
+
+def _rising(values: np.ndarray) -> int:
+    """Return the number of values up to the first that is less than the one before it, or nan."""
+    falls = np.flatnonzero(~(np.diff(values) >= 0.0))
+    return int(falls[0]) + 1 if falls.size else len(values)

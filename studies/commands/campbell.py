@@ -1,0 +1,93 @@
+"""`vanedamp campbell`: natural frequencies over the speed of rotation, and their crossings with engine orders."""
+
+from __future__ import annotations
+
+import time
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
+from vanedamp.studies.terminal import progress
+
+if TYPE_CHECKING:
+    from vanedamp.modal.campbell import Campbell
+
+ORDER = 25
+SUMMARY = "natural frequencies over the speed of rotation, and where engine orders meet them"
+#: columns of modes beside each other, and speeds below each other
+_MOST_COLUMNS, _MOST_ROWS = 12, 25
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a case, the result files and one for a picture."""
+    add_input(parser, "CASE.toml")
+    add_output(parser, "CAMPBELL.h5")
+    add_json(parser)
+    parser.add_argument("--picture", metavar="FILE.png", help="the diagram as a picture")
+
+
+def run(arguments: Namespace) -> None:
+    """Compute the diagram."""
+    from vanedamp.files.toml_input import InputError
+    from vanedamp.studies.case.tables import Case
+    from vanedamp.studies.commands.support.messages import print_warnings, write_result
+    from vanedamp.studies.commands.support.outputs import check_outputs
+
+    outputs = check_outputs(arguments, picture=(".png",))
+    case = Case.load(arguments.input)
+    outputs.keep(case.files)
+    if case.campbell is None:
+        raise InputError(
+            f"{arguments.input}: campbell: missing; give its speeds and engine orders, such as "
+            "rpm = {start = 0, stop = 6000, num = 31} and engine_orders = [1, 2, 3]"
+        )
+    from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
+
+    started = time.perf_counter()
+    structure = assemble(case)
+    with progress("campbell") as report:
+        diagram = campbell_diagram(structure, report)
+    if arguments.output:
+        diagram.save(arguments.output)
+    if arguments.picture:
+        from vanedamp.studies.report.campbell_picture import campbell_picture
+
+        campbell_picture(diagram, Path(arguments.picture))
+    seconds = time.perf_counter() - started
+    warnings = [*diagram.warnings, *unit_doubts(structure)]
+    write_result(arguments.json, diagram.to_json() | {"warnings": warnings, "wall_time_s": seconds})
+    print_warnings(arguments.input, warnings)
+    if arguments.json != "-":
+        _print_summary(diagram)
+        print(
+            f"{len(diagram.solved)} solutions of the full structure in {seconds:.1f} s, their modes the basis for all "
+            f"speeds: estimated error {diagram.error:.1e} of the frequencies"
+        )
+
+
+def _print_summary(diagram: Campbell) -> None:
+    """Print modes over speeds, crossings with engine orders, and veerings."""
+    shown = diagram.modes[:_MOST_COLUMNS]
+    kind = ", with gyroscopic coupling" if diagram.gyroscopic else ""
+    print(f"natural frequencies in Hz over the speed{kind}")
+    print("       rpm     rad/s" + "".join(f"    mode {mode + 1:2}" for mode in shown))
+    rows = diagram.asked.nonzero()[0]
+    for row in rows[:: -(-len(rows) // _MOST_ROWS)]:
+        values = "".join(f"  {frequency:9.2f}" for frequency in diagram.frequencies_hz[: len(shown), row])
+        print(f"{diagram.rpm[row]:10.1f}{diagram.speeds[row]:10.2f}{values}")
+    if diagram.orders:
+        print("crossings with engine orders\n  mode  order         rpm       rad/s          Hz")
+    for crossing in diagram.crossings:
+        print(
+            f"{crossing.mode + 1:6}{crossing.order:7g}{crossing.rpm:12.3f}{crossing.speed:12.4f}"
+            f"{crossing.frequency_hz:12.4f}"
+        )
+    if diagram.orders and not diagram.crossings:
+        print("  none")
+    for veering in diagram.veerings:
+        print(
+            f"veering: modes {veering.first + 1} and {veering.second + 1} at {veering.rpm:.1f} rpm "
+            f"({veering.speed:.2f} rad/s), {veering.frequency_hz:.2f} Hz, {veering.gap_hz:.3g} Hz apart; they exchange "
+            f"{veering.exchange:.0%} of their shapes"
+        )
