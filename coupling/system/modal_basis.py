@@ -10,8 +10,8 @@ import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom, Structure
-from vanedamp.coupling.system.reduced_model_file import file_stamp, restricted
-from vanedamp.files.store import frozen
+from vanedamp.coupling.system.reduced_model_file import restricted
+from vanedamp.files.store import file_stamp, frozen
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.dense_modes import rounding
 from vanedamp.rom.reduced import NORMAL, ReducedModel
