@@ -11,7 +11,8 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.load_pattern import Load, pattern_loads, repeated
-from vanedamp.coupling.scene.waveform import AnyWaveform, Waveform
+from vanedamp.coupling.scene.waveform import Waveform
+from vanedamp.coupling.scene.waveforms.registry import AnyWaveform
 from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, Real, Whole
 
@@ -49,7 +50,8 @@ class Excitation:
     at, order, force, phase_deg. load_factor: times all of them (1); relative with resonance_amplitude, which finds it.
     harmonic: sines whose sum excites, at multiples of the frequency; that of order 1 has amplitude 1 and phase 0 unless
     it is among them. resonance_amplitude speaks of a sine of order 1 and amplitude 1.
-    waveform: another signal over the period in place of the sines, by a class of other code (scene.waveform).
+    waveform: another signal over the period in place of the sines (scene.waveform); one with a duration of its own
+    needs no frequency.
     """
 
     frequency: Positive | None = None
@@ -67,8 +69,7 @@ class Excitation:
     load_factor: NonNegative | None = None
 
     def __post_init__(self) -> None:
-        if (self.frequency is None) == (self.engine_order is None):
-            raise ValueError("give one of frequency (Hz) and engine_order (periods a revolution)")
+        self._check_period()
         given = [self.force, self.base_acceleration, self.resonance_amplitude]
         if sum(value is not None for value in given) > 1:
             raise ValueError("give at most one of force, base_acceleration and resonance_amplitude")
@@ -82,6 +83,14 @@ class Excitation:
                 raise ValueError(f"harmonic[{index}].order: {order} is given twice; orders must differ")
         if self.waveform is not None and self.harmonic:
             raise ValueError("give one of harmonic and waveform")
+
+    def _check_period(self) -> None:
+        """Raise ValueError unless one thing says how long the period is."""
+        if self.waveform is not None and self.waveform.timed:
+            if self.engine_order is not None:
+                raise ValueError(f'engine_order: the period is that of shape = "{self.waveform.shape}"; leave it out')
+        elif (self.frequency is None) == (self.engine_order is None):
+            raise ValueError("give one of frequency (Hz) and engine_order (periods a revolution)")
 
     def _check_loads(self) -> None:
         """Raise ValueError for loads beside what they replace, and for keys that belong to something left out."""

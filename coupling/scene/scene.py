@@ -66,6 +66,8 @@ class Time:
         return self.simulated * 2 // 3 if self.transient is None else self.transient
 
 
+#: share by which a frequency may be off that of a waveform with its own duration
+_SAME_PERIOD = 1e-4
 #: where a scene names files, relative to its own
 _FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "waveform", "file"))
 
@@ -150,7 +152,16 @@ class Scene:
 
     @property
     def frequency(self) -> float:
-        """Frequency of the excitation, Hz: its own, or that of its engine order."""
+        """Frequency of the excitation, Hz: its own, that of its engine order, or of its waveform. Raises InputError."""
+        signal = self.excitation.waveform
+        if signal is not None and signal.timed:
+            given = self.excitation.frequency
+            if given is not None and not abs(given * signal.duration - 1.0) <= _SAME_PERIOD:
+                raise InputError(
+                    f'excitation.frequency: shape "{signal.shape}" lasts {signal.duration:.6g} s, a period of '
+                    f"{1 / signal.duration:.6g} Hz, not {given:.6g}; leave the frequency out"
+                )
+            return 1.0 / signal.duration
         if self.excitation.engine_order is not None:
             return frequency_of(self.excitation.engine_order, self.speed)
         assert self.excitation.frequency is not None

@@ -95,9 +95,14 @@ def base_acceleration(scene: Scene, basis: ModalBasis) -> np.ndarray:
 
 def loads_of(scene: Scene, signal: Waveform) -> Loads:
     """Return the loads of the scene's excitation with a signal in place of its sine."""
-    sine = assemble(replace(scene, excitation=replace(scene.excitation, waveform=None)))
-    level = -sine.load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
+    level = -assemble(with_sine(scene)).load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
     return lambda angle: np.outer(signal.sampled(angle), level)
+
+
+def with_sine(scene: Scene) -> Scene:
+    """Return the scene with a sine in place of its waveform."""
+    plain = replace(scene.excitation, waveform=None, frequency=scene.frequency, engine_order=None)
+    return replace(scene, excitation=plain)
 
 
 def initial_motion(scene: Scene, system: System) -> InitialMotion:
