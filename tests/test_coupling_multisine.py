@@ -13,6 +13,7 @@ from vanedamp.coupling.scene.waveforms.multisine import Multisine
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.reduced import ReducedModel
 
 #: 41 sines about a mode of 100 Hz
 FREQUENCY, ORDERS, OWN, RATIO, FORCE = 2.5, [20, 60], 2 * math.pi * 100.0, 0.02, 3.0
@@ -182,3 +183,18 @@ def test_wrong_tables(waveform, message):
     with pytest.raises(InputError, match=f"^scene: excitation.waveform{message}") as refused:
         scene(waveform)
     assert "\n" not in str(refused.value)
+
+
+def test_no_attached_mass_without_order_one(tmp_path):
+    """It is measured by that order; and the number of modes is chosen by runs with it."""
+    assert simulate(scene(periods=1, **BODY)).attached_mass_fraction is None
+    assert simulate(scene({"orders": [1, 60]}, periods=1, **BODY)).attached_mass_fraction is not None
+    model = ReducedModel.from_matrices(np.eye(2), np.diag([1e4, 1e6]), {"tip": [1.0, 0.5]}, damping_ratio=0.01)
+    model.save(tmp_path / "rom.h5")
+    structure = {"model": "rom", "file": str(tmp_path / "rom.h5"), "modes": "auto"}
+    noise = {"shape": "multisine", "orders": ORDERS}
+    excitation = {"frequency": FREQUENCY, "force": 1.0, "at": "tip", "waveform": noise}
+    with pytest.raises(
+        InputError, match=r'^structure.modes: "auto" tries the bodies at resonances that sines of order'
+    ):
+        simulate(scene(structure=structure, excitation=excitation))

@@ -79,7 +79,8 @@ def select_model_orders(scenes: Sequence[Scene]) -> list[Selected]:
 def choices_of(scenes: Iterable[Scene]) -> Choices:
     """Return the number of modes that suits all scenes with one model and tolerance, for each of these.
 
-    Raises InputError for a scene with stops, whose impacts the estimate does not know, or with a waveform.
+    Raises InputError for a scene with stops, whose impacts the estimate does not know, and for one whose sines it
+    cannot try.
     """
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
@@ -93,8 +94,20 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
                     'structure.modes: "auto" weighs errors at the frequencies of sines, and a waveform has no highest '
                     "one; give a number of modes"
                 )
+            if not _has_first_order(scene):
+                raise InputError(
+                    'structure.modes: "auto" tries the bodies at resonances that sines of order 1 meet, and this '
+                    "excitation has none; give a number of modes"
+                )
             groups.setdefault(_group(scene), []).append(scene)
     return {key: _choice(members) for key, members in groups.items()}
+
+
+def _has_first_order(scene: Scene) -> bool:
+    excitation = scene.excitation
+    if excitation.distributed:
+        return any(load.order == 1 and load.force for load in excitation.loads.values())
+    return excitation.waveform is None or bool(excitation.shares[1])
 
 
 def needs_selection(scene: Scene) -> bool:
