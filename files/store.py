@@ -104,6 +104,12 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
+def file_stamp(path: str | os.PathLike[str]) -> int:
+    """Return a number that distinguishes a file from a later one of that name."""
+    file = Path(path)
+    return file.stat().st_mtime_ns if file.is_file() else 0
+
+
 def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
     """Write a table: one line of names, then the rows."""
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:

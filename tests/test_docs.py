@@ -179,6 +179,15 @@ def test_program_of_the_readme(tmp_path):
     assert len(reductions) == 3 and max(reductions) < 1.0
 
 
+def test_program_of_noise(tmp_path):
+    """It prints the figures of the text and draws the picture of the page."""
+    (tmp_path / "noise.toml").write_text((ROOT / "docs" / "examples" / "noise.toml").read_text())
+    text = "import matplotlib\n\nmatplotlib.use('Agg')\n" + program("service_loads.md", "multisine.png")
+    rigid, loose = re.findall(r": ([\d.]+) µm rms", run(text, tmp_path))
+    assert (float(rigid), float(loose)) == pytest.approx((17.2, 5.5), abs=0.3)
+    assert (tmp_path / "multisine.png").stat().st_size > 0
+
+
 def test_program_of_mpi_ranks(tmp_path):
     pytest.importorskip("mpi4py", reason="needs mpi4py")
     (tmp_path / "scene.toml").write_text(SCENE)

@@ -208,7 +208,8 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
     eigenvalue, shape, project = _one_of_each_pair(*modes)
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
     felt = np.abs(np.vstack([functional, system.of_structure.response]))
-    _check_split(system, felt.max(axis=0), law, sprung, shape, project)
+    carried = np.abs(carrier).max(axis=0, initial=0.0)
+    _check_split(system, np.maximum(felt.max(axis=0), carried), law, sprung, shape, project)
     flexibility = lift / real.frequency**2
     _check_rest(system, felt, flexibility @ loads)
     m = len(eigenvalue) + e
@@ -258,8 +259,8 @@ def _check_split(
 ) -> None:
     """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
 
-    Each coordinate counts by its share in the rows and the response (felt (n,)), its rate by its own frequency or
-    that of the excitation.
+    Each coordinate counts by its share in the rows, the response and the motion of carried bodies (felt (n,)), its rate
+    by its own frequency or that of the excitation.
     """
     n, b = system.modes, system.bodies
     size = np.r_[1 / np.maximum(felt, _UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]

@@ -26,6 +26,8 @@ from vanedamp.coupling.system.transient import outlasted
 _CHUNK = 100
 #: share of the energy there is that counts as flow in any case
 _CARRIED = 1e-3
+#: share of the largest order's load below which that of order 1 is none
+_NO_SHARE = 1e-9
 #: columns of the log of bodies in the plane
 LOG_WIDTH = 8
 #: statuses of runs that came to their end
@@ -169,7 +171,11 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         ),
         energy=evaluated,
         energy_residual=balance,
-        attached_mass_fraction=_attached(system, section, records.momentum[window].sum(), harmonic, first, span),
+        attached_mass_fraction=(
+            None
+            if _without_first_order(scene, system)
+            else _attached(system, section, records.momentum[window].sum(), harmonic, first, span)
+        ),
         wall_time_s=time.perf_counter() - started,
         periods=done,
         transient=first,
@@ -246,6 +252,14 @@ def _state_scale(system: System, section: np.ndarray) -> np.ndarray:
     slips = np.maximum(largest[3 : 3 + b], largest[3 + b :] / system.omega)
     momentum = system.of_bodies.mass.sum() * system.omega * max(x, slips.max(initial=0.0))
     return np.array([x, system.omega * x, momentum, *slips, *(system.omega * slips)]) + np.finfo(float).tiny
+
+
+def _without_first_order(scene: Scene, system: System) -> bool:
+    """Whether a waveform or loads have sines of higher orders only, by which no attached mass is measured."""
+    if scene.excitation.waveform is None and not scene.excitation.distributed:
+        return False
+    sizes = np.abs(np.column_stack([system.load, system.table])).max(axis=1)
+    return bool(sizes[0] <= _NO_SHARE * sizes.max())
 
 
 def _attached(

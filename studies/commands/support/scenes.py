@@ -20,8 +20,8 @@ def load_scene(path: str, outputs: Outputs) -> Scene:
     scene = load_any_scene(path, outputs)
     if not scene.moved:
         raise InputError(
-            "excitation: nothing moves the structure; give force, base_acceleration or resonance_amplitude, or an "
-            "[initial] state"
+            "excitation: nothing moves the structure; give force, base_acceleration, resonance_amplitude or load, or "
+            "an [initial] state"
         )
     return scene
 
@@ -57,10 +57,13 @@ def print_resonance(source: str, scene: Scene) -> dict[str, Any]:
         scene = replace(scene, structure=replace(scene.structure, modes=None))
     resonance = chosen_resonance(scene)
     force = level / resonance.flexibility
+    loads = scene.excitation.distributed
     if resonance.modes > 1:
         print_note(
             source,
             f"excitation.resonance_amplitude: of the resonance at {resonance.frequency:.6g} Hz (mode "
-            f"{resonance.mode + 1}), force {force:.4g} N; resonance_near names another",
+            f"{resonance.mode + 1}), {f'loads times {force:.4g}' if loads else f'force {force:.4g} N'}; resonance_near "
+            "names another",
         )
-    return {"resonance": {"frequency": resonance.frequency, "mode": resonance.mode, "force": force}}
+    key = "load_factor" if loads else "force"
+    return {"resonance": {"frequency": resonance.frequency, "mode": resonance.mode, key: force}}
