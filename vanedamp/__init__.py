@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from vanedamp.coupling.sweep.record import Sweep
     from vanedamp.coupling.sweep.steady_states import steady_states
     from vanedamp.coupling.sweep.sweep import sweep
+    from vanedamp.coupling.transients.ramp import ramp
+    from vanedamp.coupling.transients.ramp_record import Ramp
     from vanedamp.files.errors import VanedampError
     from vanedamp.files.toml_input import InputError
     from vanedamp.modal.eigen import Modes, solve_modes
@@ -32,9 +34,9 @@ if TYPE_CHECKING:
     from vanedamp.studies.case.tables import Case
 
 __all__ = [
-    "Branches", "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel", "Scene", "Status",
-    "Sweep", "SystemMatrices", "VanedampError", "find_orbit", "orbits", "reduce", "rigid_model", "simulate",
-    "solve_modes", "steady_states", "sweep",
+    "Branches", "Case", "InputError", "Interface", "Modes", "Ramp", "ReducedModel", "Response", "RigidModel", "Scene",
+    "Status", "Sweep", "SystemMatrices", "VanedampError", "find_orbit", "orbits", "ramp", "reduce", "rigid_model",
+    "simulate", "solve_modes", "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -44,6 +46,7 @@ _HOMES = {
     "InputError": "files.toml_input",
     "Interface": "rom.interface",
     "Modes": "modal.eigen",
+    "Ramp": "coupling.transients.ramp_record",
     "ReducedModel": "rom.reduced",
     "Response": "coupling.response.response",
     "RigidModel": "modal.rigid_model",
@@ -54,6 +57,7 @@ _HOMES = {
     "VanedampError": "files.errors",
     "find_orbit": "coupling.orbits.orbits",
     "orbits": "coupling.orbits.orbits",
+    "ramp": "coupling.transients.ramp",
     "reduce": "rom.reduction",
     "rigid_model": "modal.rigid_model",
     "simulate": "coupling.engine",

@@ -235,7 +235,8 @@ def _subsystem(system: System, closed: np.ndarray) -> Subsystem:
     return Subsystem(
         rigid=rigid, sprung=sprung, carrier=carrier, held=cluster < 0, free=(cluster >= 0) & ~springs.anchored,
         cluster=springs.cluster, functional=functional, law=law, kept=kept, real=real,
-        modes=complex_modes(real.frequency, real.damping), lift=lift, drop=drop, loads=loads, static=flexibility @ loads,
+        modes=complex_modes(real.frequency, real.damping), lift=lift, drop=drop, loads=loads,
+        static=flexibility @ loads,
     )  # fmt: skip
 
 

@@ -1,0 +1,235 @@
+"""Run-up and run-down: the excitation's frequency, or the speed of rotation, changes at the start of every period.
+
+Within a period both are constant (transients.ramp_course), so that the exact engine stays exact. Phase and force are
+continuous, and the motion goes on as it is: a period begins with the state that the one before has left
+(response.restart). Where the speed changes the stiffness, it changes the energy stored in it: work of the rotation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.exact.subsystem_assembly import Subsystem
+from vanedamp.coupling.methods.registry import final_state
+from vanedamp.coupling.model_order.choices import choices_of, leaves_open, with_choices
+from vanedamp.coupling.model_order.selection import warnings_of
+from vanedamp.coupling.response.evaluation import Outcome, Run, exchanged_energy, residual
+from vanedamp.coupling.response.records import EXCITATION, STORED, VISCOUS, new_records
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import at_speed_of, restart_from
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.ramp import Ramp as Table
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
+from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.system import System
+from vanedamp.coupling.transients.ramp_course import Course, courses, ramped, scene_at, table_of
+from vanedamp.coupling.transients.ramp_record import WORKS, Ramp, RampRun
+from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import InputError
+
+#: share of the gap, and of its product with the angular frequency, below which a body counts as at rest
+_AT_REST = 1e-9
+#: points of the linear curves over a speed
+_SPEEDS = 201
+
+
+def ramp(
+    scene: Scene, progress: Callable[[int, int], None] | None = None, provenance: Mapping[str, Any] | None = None
+) -> Ramp:
+    """Run a scene up or down, or both, at all rates of its [ramp] table.
+
+    progress: called with the number of periods done and of those to do, of all runs.
+    Raises InputError for a scene without the table, or one that cannot be run so; numerical trouble is a status of the
+    run.
+    """
+    table, base, planned = table_of(scene), ramped(scene), courses(scene)
+    choices = None
+    if leaves_open(base):
+        choices = choices_of([scene_at(base, table, value) for value in (table.from_, table.to)])
+    total, before = sum(len(course.time) for course in planned), 0
+    runs: list[RampRun] = []
+    notes: list[str] = []
+    for course in planned:
+        first, start = scene_at(base, table, float(course.value[0])), None
+        if choices is not None:
+            chosen = with_choices(first, choices)
+            first, start = chosen.scene, chosen.start
+        if not runs:
+            notes += warnings_of(first)
+        if table.start == "steady":
+            start, warnings = _steady(first, start)
+            notes += warnings
+        run = _Run(first, table, course, start)
+        for done in run:
+            if progress is not None:
+                progress(before + done, total)
+        before += len(course.time)
+        runs.append(run.result())
+    curves, tops = _stationary(first, table)
+    return Ramp(scene, tuple(runs), curves, tops, tuple(dict.fromkeys(notes)), dict(provenance or {}))
+
+
+def _steady(scene: Scene, start: RestartState | None) -> tuple[RestartState, list[str]]:
+    """Return the end of a run of the scene, and what is to be said about it. Raises InputError if it ends early."""
+    response = simulate(scene, start=start)
+    if response.final is None:
+        raise InputError(
+            f'ramp.start: the run at {scene.frequency:.6g} Hz ends early ({response.status}); take start = "rest"'
+        )
+    ended = f"ramp.start: the run at {scene.frequency:.6g} Hz before the ramp is {response.status}; give more periods"
+    return response.final, [] if response.status is Status.OK else [ended]
+
+
+def at_frequency(system: System, frequency: float) -> System:
+    """Return a system at another frequency of the excitation, Hz, which leaves the amplitudes of the loads."""
+    omega = 2 * np.pi * frequency
+    return system._replace(omega=omega, period=2 * np.pi / omega, frequency=omega * system.order)
+
+
+class _Run(Iterator[int]):
+    """A run, an iterator over the number of periods done: it ends with the last one, or within one (`status`)."""
+
+    def __init__(self, scene: Scene, table: Table, course: Course, start: RestartState | None) -> None:
+        self.scene, self.table, self.course, self.state = scene, table, course, start
+        self.over_speed = table.quantity != "frequency"
+        self.system, self.known = assemble(scene), dict[bytes, Subsystem]()
+        self.status, self.done, self.events, self.tilted, self.open_ledger = Status.OK, 0, 0, False, np.inf
+        p, b = len(course.time), self.system.bodies
+        travel = {cavity.name: cavity.gap for cavity in scene.cavity}
+        self.travel = np.array([travel[damper.cavity] for damper in scene.damper])
+        self.amplitude, self.impacts, self.collided = np.zeros((3, p))
+        self.stuck = np.zeros((p, b), bool)
+        self.section, self.parts = np.zeros((p + 1, 2)), np.zeros((p + 1, 1 + b))
+        # the ledger without the work of the rotation, which is counted apart
+        self.ledger, self.stored, self.rotation = np.zeros((p + 1, STORED + 1)), 0.0, 0.0
+
+    def __next__(self) -> int:
+        """Run the next period. Return the number of those done."""
+        if self.done == len(self.course.time) or self.status is not Status.OK:
+            raise StopIteration
+        run = self._begin(self.done)
+        self.status = run.advance_to(1)
+        if self.status is Status.OK:
+            self._record(self.done, run.outcome())
+            self.state = final_state(self.scene, run)
+            self.done += 1
+        return self.done
+
+    def _begin(self, k: int) -> Run:
+        """Return a run of period k that begins with the motion so far."""
+        state = self.state
+        if self.over_speed:
+            self.scene = scene_at(self.scene, self.table, float(self.course.value[k]))
+            system = assemble(self.scene)
+            if not _alike(system, self.system):
+                self.known = {}
+            self.system = system
+            state = None if state is None else at_speed_of(self.scene, state)
+        else:
+            self.system = at_frequency(self.system, float(self.course.frequency[k]))
+        scene, system, solver = self.scene, self.system, self.scene.solver
+        records, left = new_records(system, 1, 0), solver.max_events - self.events
+        if scene.planar:
+            from vanedamp.coupling.planar.planar_run import begin_run
+
+            return begin_run(scene, system, records, True, left, getattr(solver, "linearisation", 0.01), state)
+        if state is None:
+            motion = initial_motion(scene, system)
+        else:
+            motion = restart_from(system, physical_scale(scene, system), state)
+        return EngineRun(system, motion, records, True, left, self.known)
+
+    def _record(self, k: int, outcome: Outcome) -> None:
+        records, b = outcome.records, self.system.bodies
+        (begun, ended), section = records.ledger, records.section
+        if k == 0:
+            self.section[0], self.parts[0], self.ledger[0] = section[0, :2], records.parts[0], begun
+        elif self.over_speed:
+            # impacts at the very start of the period come after the change of the speed
+            self.rotation += begun[STORED] + begun[VISCOUS:STORED].sum() - begun[EXCITATION] - self.stored
+        self.stored = ended[STORED]
+        self.section[k + 1], self.parts[k + 1] = section[1, :2], records.parts[1]
+        self.ledger[k + 1] = ended
+        self.ledger[k + 1, :STORED] += self.ledger[k, :STORED] if k else 0.0
+        self.ledger[k + 1, STORED] -= self.rotation
+        self.amplitude[k], self.impacts[k], self.collided[k] = records.peak[0], records.impacts[0], records.collided[0]
+        slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
+        same = np.abs(section[1, 3 : 3 + b] - section[0, 3 : 3 + b]) <= _AT_REST * self.travel
+        self.stuck[k] = slow.all(axis=0) & same & ~_named(outcome)
+        self.events, self.open_ledger = self.events + outcome.events, outcome.open_ledger
+        if outcome.plane is not None:
+            neglected = outcome.plane.neglected * outcome.plane.tilt[0] ** 2  # nan for sliders
+            self.tilted = self.tilted or bool(np.any(neglected > outcome.plane.bound))
+
+    def result(self) -> RampRun:
+        """Return the record of the periods done."""
+        p, course, status = self.done, self.course, self.status
+        exchanged = exchanged_energy(self.system, self.collided)
+        balance = residual(self.ledger[: p + 1], self.parts[: p + 1], exchanged)
+        if status is Status.OK and not balance <= self.open_ledger:
+            status = Status.ENERGY
+        elif status is Status.OK and self.tilted:
+            status = Status.TILTED
+        change = self.ledger[p] - self.ledger[0]
+        works = *change[:STORED], self.rotation, change[STORED] + self.rotation
+        return RampRun(
+            rate=course.rate, status=status.value, time=course.time[:p], frequency=course.frequency[:p],
+            speed=course.speed[:p], amplitude=frozen(self.amplitude[:p]), impacts=frozen(self.impacts[:p]),
+            stuck=frozen(self.stuck[:p], bool), displacement=frozen(self.section[: p + 1, 0]),
+            velocity=frozen(self.section[: p + 1, 1]),
+            energy={name: float(value) for name, value in zip(WORKS, works, strict=True)}, energy_residual=balance,
+        )  # fmt: skip
+
+
+def _alike(system: System, other: System) -> bool:
+    """Whether two systems have the same subsystems (exact.subsystem_assembly.Subsystem)."""
+    names = ("stiffness", "damping", "mass", "floor", "J", "spring", "dashpot")
+    return all(np.array_equal(getattr(system, name), getattr(other, name)) for name in names)
+
+
+def _named(outcome: Outcome) -> np.ndarray:
+    """Return whether an event names a body (b,)."""
+    system, named = outcome.system, np.zeros(outcome.system.bodies, bool)
+    for row in {int(row) for chunk in outcome.log for row in chunk[:, 2]}:
+        if outcome.plane is None:
+            named |= system.of_bodies.J[row] != 0.0
+        elif outcome.plane.places[row][1] not in ("stop", "casing"):
+            named[outcome.plane.places[row][0]] = True
+    return named
+
+
+def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict[str, float]]:
+    """Return the amplitudes of the linear structure in steady state over the ramp, and their tops: see Ramp."""
+    low, high = min(table.from_, table.to), max(table.from_, table.to)
+    if table.quantity == "frequency":
+        responses = linear_responses(scene)
+        frequency = np.unique(np.concatenate([response.grid(low, high) for response in responses]))
+        speed = np.full(len(frequency), scene.speed)
+        heights = [response.amplitude(frequency) for response in responses]
+        peaks = [(peak.amplitude, peak.frequency) for peak in (response.peak(low, high) for response in responses)]
+    else:
+
+        def at(value: float) -> tuple[float, float, float, float]:
+            here = scene_at(scene, table, float(value))
+            undamped, fixed = (float(r.amplitude(np.array([here.frequency]))[0]) for r in linear_responses(here))
+            return here.frequency, here.speed, undamped, fixed
+
+        grid = np.linspace(low, high, _SPEEDS)
+        frequency, speed, *heights = np.array([at(value) for value in grid]).T
+        peaks = []
+        for place, height in enumerate(heights, start=2):
+            top = int(np.argmax(height))
+            bounds = grid[max(top - 1, 0)], grid[min(top + 1, len(grid) - 1)]
+            found = minimize_scalar(lambda value: -at(value)[place], bounds=bounds, method="bounded")  # noqa: B023
+            peaks.append(max((at(value)[place], at(value)[0]) for value in (found.x, grid[top])))
+    curves = dict(zip(("frequency", "speed", "undamped", "fixed"), (frequency, speed, *heights), strict=True))
+    tops = {f"{name}_{of}": value for name, peak in zip(("undamped", "fixed"), peaks, strict=True)
+            for of, value in zip(("peak", "peak_frequency"), peak, strict=True)}  # fmt: skip
+    return {name: frozen(values) for name, values in curves.items()}, tops
