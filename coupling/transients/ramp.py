@@ -213,23 +213,25 @@ def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict
         frequency = np.unique(np.concatenate([response.grid(low, high) for response in responses]))
         speed = np.full(len(frequency), scene.speed)
         heights = [response.amplitude(frequency) for response in responses]
-        peaks = [(peak.amplitude, peak.frequency) for peak in (response.peak(low, high) for response in responses)]
+        undamped, fixed = (response.peak(low, high) for response in responses)
+        peaks = [(undamped.amplitude, undamped.frequency), (fixed.amplitude, fixed.frequency)]
+        tops = {"half_power_width": undamped.width}
     else:
 
-        def at(value: float) -> tuple[float, float, float, float]:
+        def at(value: float) -> tuple[float, ...]:
             here = scene_at(scene, table, float(value))
-            undamped, fixed = (float(r.amplitude(np.array([here.frequency]))[0]) for r in linear_responses(here))
-            return here.frequency, here.speed, undamped, fixed
+            heights = (response.amplitude(np.array([here.frequency]))[0] for response in linear_responses(here))
+            return here.frequency, here.speed, *map(float, heights)
 
         grid = np.linspace(low, high, _SPEEDS)
         frequency, speed, *heights = np.array([at(value) for value in grid]).T
-        peaks = []
-        for place, height in enumerate(heights, start=2):
+        peaks, tops = [], {}
+        for column, height in enumerate(heights, start=2):
             top = int(np.argmax(height))
             bounds = grid[max(top - 1, 0)], grid[min(top + 1, len(grid) - 1)]
-            found = minimize_scalar(lambda value: -at(value)[place], bounds=bounds, method="bounded")  # noqa: B023
-            peaks.append(max((at(value)[place], at(value)[0]) for value in (found.x, grid[top])))
+            found = minimize_scalar(lambda value, column=column: -at(value)[column], bounds=bounds, method="bounded")
+            peaks.append(max((at(value)[column], at(value)[0]) for value in (found.x, grid[top])))
     curves = dict(zip(("frequency", "speed", "undamped", "fixed"), (frequency, speed, *heights), strict=True))
-    tops = {f"{name}_{of}": value for name, peak in zip(("undamped", "fixed"), peaks, strict=True)
-            for of, value in zip(("peak", "peak_frequency"), peak, strict=True)}  # fmt: skip
+    for name, (amplitude, place) in zip(("undamped", "fixed"), peaks, strict=True):
+        tops |= {f"{name}_peak": amplitude, f"{name}_peak_frequency": place}
     return {name: frozen(values) for name, values in curves.items()}, tops

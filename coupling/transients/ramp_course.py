@@ -22,6 +22,8 @@ from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 _FREQUENCY = "frequency"
+#: periods of a run that anyone would wait for: some hours
+_MOST = 10_000_000
 #: rad/s of a unit of the speeds of rotation
 _RADIANS = {"speed": 1.0, "rpm": 2 * math.pi / 60}
 
@@ -67,6 +69,11 @@ def _course(base: Scene, table: Table, begin: float, end: float, rate: float | N
         raise InputError(
             f"ramp.rate: {rate:g} {table.unit} a second passes the range in less than one period of the excitation; "
             "take a lower one"
+        )
+    if periods > _MOST:
+        raise InputError(
+            f"ramp.rate: at {rate:g} {table.unit} a second the range takes {periods:.3g} periods of the excitation; at "
+            f"most {_MOST}: take a higher rate"
         )
     number = np.arange(periods + 1)
     if constant:
