@@ -195,9 +195,9 @@ def _alike(system: System, other: System) -> bool:
 
 
 def _named(outcome: Outcome) -> np.ndarray:
-    """Return whether an event names a body (b,)."""
+    """Return whether an event names a body (b,); states at rest are logged as a run begins, at time zero."""
     system, named = outcome.system, np.zeros(outcome.system.bodies, bool)
-    for row in {int(row) for chunk in outcome.log for row in chunk[:, 2]}:
+    for row in {int(row) for chunk in outcome.log for row in chunk[chunk[:, 0] > 0.0, 2]}:
         if outcome.plane is None:
             named |= system.of_bodies.J[row] != 0.0
         elif outcome.plane.places[row][1] not in ("stop", "casing"):
