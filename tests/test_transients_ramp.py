@@ -180,20 +180,23 @@ def test_peaks_are_those_of_lewis():
 
 
 def test_slow_runs_tend_to_the_stationary_curve():
-    """The amplitude lags, by Lewis' rate q times 2 eta/(1 + eta^2)^(5/2), eta over the half width; its peak by q^2/2."""
+    """The amplitude is off by at most 0.57 times Lewis' rate q, max 2 eta/(1 + eta^2)^(5/2); its peak by q^2/2.
+
+    What the mode's other eigenvalue adds is as much up as it takes away down.
+    """
     apart, missing, q = [], [], []
     data = ONE_MODE | {"structure": {**ONE_MODE["structure"], "damping_ratio": 0.02}}
-    for rate in (2.0, 4.0, 8.0):
-        found = ramp(scene({"from": 92.0, "to": 108.0, "rate": rate, "start": "steady"}, data))
-        (run,) = found.runs
+    for rate in (3.0, 6.0):
+        found = ramp(scene({"from": 92.0, "to": 108.0, "rate": rate, "both": True, "start": "steady"}, data))
+        run, _ = found.runs
         stationary = np.interp(run.frequency, found.curves["frequency"], found.curves["undamped"])
         apart.append(np.abs(run.amplitude - stationary).max() / found.tops["undamped_peak"])
-        missing.append(1 - found.share(run))
+        missing.append(np.mean([1 - found.share(run) for run in found.runs]))
         q.append(found.lewis_rate(run))
     assert found.warnings == ()
-    assert np.log2(np.array(apart[1:]) / apart[:-1]) == pytest.approx(1.0, abs=0.2)
-    assert apart[0] == pytest.approx(0.5725 * q[0], rel=0.2)
-    assert missing == pytest.approx(np.array(q) ** 2 / 2, abs=3e-4)
+    assert apart == pytest.approx(0.5725 * np.array(q), rel=0.2)
+    assert missing == pytest.approx(1 - peak_ratio(np.array(q)), rel=0.01)
+    assert np.log2(missing[1] / missing[0]) == pytest.approx(2.0, abs=0.4)
 
 
 def test_course():
