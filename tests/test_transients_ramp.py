@@ -196,7 +196,6 @@ def test_slow_runs_tend_to_the_stationary_curve():
     assert found.warnings == ()
     assert apart == pytest.approx(0.5725 * np.array(q), rel=0.2)
     assert missing == pytest.approx(1 - peak_ratio(np.array(q)), rel=0.01)
-    assert np.log2(missing[1] / missing[0]) == pytest.approx(2.0, abs=0.4)
 
 
 def test_course():
@@ -319,6 +318,8 @@ def test_run_up_of_a_rotor():
     energy = run.energy
     assert energy["excitation"] + energy["rotation"] == pytest.approx(energy["viscous"] + energy["stored"], rel=1e-8)
     assert run.energy_residual < 1e-10
+    # the frequency leaves that of the structure at a rate that its stiffness slows down
+    assert found.share(run) == pytest.approx(peak_ratio(np.array([found.lewis_rate(run)]))[0], rel=0.02)
     # the resonance 4 speed = sqrt((k + speed^2 c)/m)
     resonance = np.sqrt(1e4 / (16 * MASS - 0.5))
     assert found.tops["undamped_peak_frequency"] == pytest.approx(4 * resonance / (2 * np.pi), rel=1e-3)
@@ -328,7 +329,7 @@ def test_speed_at_a_constant_frequency():
     """The frequency stays, and the structure's own passes it."""
     data = ROTOR | {"excitation": {"frequency": 11.7, "force": FORCE}}
     (run,) = ramp(scene({"quantity": "speed", "from": 0.0, "to": 70.0, "rate": 7.0}, data)).runs
-    assert np.ptp(run.frequency) == 0.0 and run.frequency_rate == 0.0
+    assert np.ptp(run.frequency) == 0.0
     assert run.speed == pytest.approx(7.0 * (run.time + 0.5 / 11.7), rel=1e-12)
     exact = staircase(
         run, np.diag([MASS]), np.diag([2.0]), lambda speed: np.diag([1e4 + 0.5 * speed**2]), np.array([FORCE])

@@ -31,7 +31,7 @@ from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 #: tables whose numbers are none of the motion's equations
-_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "initial")
+_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "initial")
 
 
 def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:

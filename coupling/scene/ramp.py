@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Whole
 
 #: units of the quantities that a ramp changes
-UNITS = {"frequency": "Hz", "speed": "rad/s", "rpm": "1/min"}
+UNITS = {"frequency": "Hz", "speed": "rad/s", "rpm": "rpm"}
 
 
 def _listed(rate: Any) -> Any:
@@ -21,7 +21,7 @@ def _listed(rate: Any) -> Any:
 class Ramp:
     """A change of the excitation frequency or the speed of rotation that is linear in time.
 
-    quantity: "frequency" (Hz), "speed" (rad/s) or "rpm" (1/min), whose frequency follows by excitation.engine_order or
+    quantity: "frequency" (Hz), "speed" (rad/s) or "rpm", whose frequency follows by excitation.engine_order or
     stays; from, to: where it begins and ends, in that unit; rate: its change in a second, one or several, each a run of
     its own, or periods: of the excitation that it takes; both: whether it runs from `to` to `from` as well; start:
     "rest", with the state that the scene begins with, or "steady", with the end of a run of the scene at constant

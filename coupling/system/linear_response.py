@@ -85,7 +85,7 @@ class LinearResponse:
 
     def grid(self, low: float, high: float) -> np.ndarray:
         """Return frequencies (k,), Hz, from low to high between which the amplitude hides no maximum."""
-        natural, widths = self._resonances()
+        natural, widths = self.resonances()
         near = (natural[:, None] + widths[:, None] * _AROUND)[widths > 0.0].ravel()
         return np.unique(np.concatenate([np.linspace(low, high, _EVEN), np.clip(near, low, high)]))
 

@@ -8,6 +8,7 @@ continuous, and the motion goes on as it is: a period begins with the state that
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,8 @@ from vanedamp.files.toml_input import InputError
 _AT_REST = 1e-9
 #: points of the linear curves over a speed
 _SPEEDS = 201
+#: share of the range over which the detuning of a resonance is differentiated
+_STEP = 1e-4
 
 
 def ramp(
@@ -213,9 +216,8 @@ def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict
         frequency = np.unique(np.concatenate([response.grid(low, high) for response in responses]))
         speed = np.full(len(frequency), scene.speed)
         heights = [response.amplitude(frequency) for response in responses]
-        undamped, fixed = (response.peak(low, high) for response in responses)
-        peaks = [(undamped.amplitude, undamped.frequency), (fixed.amplitude, fixed.frequency)]
-        tops = {"half_power_width": undamped.width}
+        found = [response.peak(low, high) for response in responses]
+        peaks = [(peak.frequency, peak.amplitude, peak.frequency) for peak in found]
     else:
 
         def at(value: float) -> tuple[float, ...]:
@@ -223,15 +225,41 @@ def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict
             heights = (response.amplitude(np.array([here.frequency]))[0] for response in linear_responses(here))
             return here.frequency, here.speed, *map(float, heights)
 
+        def negative(value: float, column: int) -> float:
+            return -at(value)[column]
+
         grid = np.linspace(low, high, _SPEEDS)
         frequency, speed, *heights = np.array([at(value) for value in grid]).T
-        peaks, tops = [], {}
+        peaks = []
         for column, height in enumerate(heights, start=2):
             top = int(np.argmax(height))
             bounds = grid[max(top - 1, 0)], grid[min(top + 1, len(grid) - 1)]
-            found = minimize_scalar(lambda value, column=column: -at(value)[column], bounds=bounds, method="bounded")
-            peaks.append(max((at(value)[column], at(value)[0]) for value in (found.x, grid[top])))
+            refined = minimize_scalar(negative, bounds=bounds, args=(column,), method="bounded")
+            place = min((float(refined.x), float(grid[top])), key=partial(negative, column=column))
+            peaks.append((place, at(place)[column], at(place)[0]))
     curves = dict(zip(("frequency", "speed", "undamped", "fixed"), (frequency, speed, *heights), strict=True))
-    for name, (amplitude, place) in zip(("undamped", "fixed"), peaks, strict=True):
-        tops |= {f"{name}_peak": amplitude, f"{name}_peak_frequency": place}
+    width, leaving = _crossing(scene, table, peaks[0][0], low, high)
+    tops = {"half_power_width": width, "detuning_rate": leaving}
+    for name, (_, amplitude, top_frequency) in zip(("undamped", "fixed"), peaks, strict=True):
+        tops |= {f"{name}_peak": amplitude, f"{name}_peak_frequency": top_frequency}
     return {name: frozen(values) for name, values in curves.items()}, tops
+
+
+def _crossing(scene: Scene, table: Table, value: float, low: float, high: float) -> tuple[float, float]:
+    """Return half-power width of the resonance without bodies at a value of the quantity, Hz, and Hz that a unit detunes.
+
+    Zeros where the ramp does not pass the resonance.
+    """
+
+    def detuning(value: float) -> tuple[np.ndarray, np.ndarray]:
+        here = scene_at(scene, table, value)
+        natural, widths = linear_responses(here)[0].resonances()
+        return here.frequency - natural, widths
+
+    apart, widths = detuning(value)
+    mode = int(np.argmin(np.abs(apart)))
+    if detuning(low)[0][mode] * detuning(high)[0][mode] >= 0.0:
+        return 0.0, 0.0
+    ends = (max(value - _STEP * (high - low), low), min(value + _STEP * (high - low), high))
+    before, behind = (float(detuning(end)[0][mode]) for end in ends)
+    return float(widths[mode]), abs(behind - before) / (ends[1] - ends[0])

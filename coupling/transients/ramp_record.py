@@ -75,12 +75,6 @@ class RampRun:
         """Largest amplitude, m; nan for a run that ended in its first period."""
         return float(self.amplitude[self.top]) if len(self.amplitude) else np.nan
 
-    @property
-    def frequency_rate(self) -> float:
-        """Change of the frequency in a second, Hz/s; nan for a run of one period."""
-        middle = self.time + 0.5 / self.frequency
-        return float(np.diff(self.frequency[[0, -1]])[0] / (middle[-1] - middle[0])) if len(middle) > 1 else np.nan
-
     def at_peak(self, name: str) -> float:
         """Return the value of a series in the period with the largest amplitude."""
         return float(getattr(self, name)[self.top]) if len(self.amplitude) else np.nan
@@ -93,8 +87,9 @@ class Ramp:
     runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
     linear structure in steady state without bodies and with every body glued to its cavity; tops: the largest of both
     from end to end and where they are, `undamped_peak` and `fixed_peak` (m), `undamped_peak_frequency` and
-    `fixed_peak_frequency` (Hz), and over a frequency the `half_power_width` of the undamped one (Hz); warnings: to be
-    read before figures are used; provenance: versions and further data of the caller (JSON-able).
+    `fixed_peak_frequency` (Hz); of the resonance without bodies its `half_power_width` (Hz), and `detuning_rate`, by
+    which the frequency leaves it for a unit of the quantity (Hz), both 0 where the ramp does not pass it; warnings: to
+    be read before figures are used; provenance: versions and further data of the caller (JSON-able).
     """
 
     scene: Scene
@@ -118,11 +113,10 @@ class Ramp:
     def lewis_rate(self, run: RampRun) -> float:
         """Return the rate of a run in the measure of transients.lewis.peak_ratio; nan without a resonance or damping.
 
-        For the resonance of the linear structure without bodies, over a frequency: that of a mode with zeta omega = pi
-        times its half-power width.
+        Of a mode with the half-power width 2 zeta f, whose resonance the excitation's frequency leaves at that rate.
         """
-        width = self.tops.get("half_power_width", 0.0)
-        return 2 * abs(run.frequency_rate) / (np.pi * width**2) if width > 0.0 else np.nan
+        width, leaving = self.tops["half_power_width"], self.tops["detuning_rate"]
+        return 2 * abs(run.rate) * leaving / (np.pi * width**2) if width > 0.0 else np.nan
 
     def to_json(self) -> dict[str, Any]:
         """Return peaks, energies and status of each run as plain data (nan where there is none)."""

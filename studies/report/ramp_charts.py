@@ -94,7 +94,7 @@ def peaks_figure(ramp: Ramp) -> go.Figure:
     unit = f"{ramp.table.unit} a second"
     lewis = np.array([ramp.lewis_rate(run) for run in ramp.runs])
     rates = np.array([abs(run.rate) for run in ramp.runs])
-    if np.all(lewis > 0.0):
+    if ramp.tops["half_power_width"] > 0.0:
         drawn = np.geomspace(rates.min() / _BEYOND, rates.max() * _BEYOND, _RATES)
         figure.add_scatter(
             x=drawn, y=peak_ratio(drawn * (lewis[0] / rates[0])), name="one mode without bodies (Lewis)", mode="lines",

@@ -55,6 +55,7 @@ def _ramp(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
         "along": along(ramp),
         "rows": rows,
         "beside": bool(beside),
+        "passed": ramp.tops["half_power_width"] > 0.0,
         "chart": page.chart("ramp", ramp_figure(ramp, named), ramp_header(ramp), ramp_rows(ramp), [file, *beside]),
         "peaks": page.chart("peaks", peaks_figure(ramp), peaks_header(ramp), peaks_rows(ramp), [file]),
     }
