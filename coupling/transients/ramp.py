@@ -134,7 +134,10 @@ class _Run(Iterator[int]):
             if not _alike(system, self.system):
                 self.known = {}
             self.system = system
-            state = None if state is None else at_speed_of(self.scene, state)
+            if self.state is not None:
+                state = at_speed_of(self.scene, self.state)
+                # fewer modes than the model has may not hold the motion: what they lose is no work of the rotation
+                self.rotation -= 0.5 * (_square(state.velocity) - _square(self.state.velocity))
         else:
             self.system = at_frequency(self.system, float(self.course.frequency[k]))
         scene, system, solver = self.scene, self.system, self.scene.solver
@@ -189,6 +192,10 @@ class _Run(Iterator[int]):
             velocity=frozen(self.section[: p + 1, 1]),
             energy={name: float(value) for name, value in zip(WORKS, works, strict=True)}, energy_residual=balance,
         )  # fmt: skip
+
+
+def _square(values: np.ndarray) -> float:
+    return float(values @ values)
 
 
 def _alike(system: System, other: System) -> bool:
@@ -246,10 +253,7 @@ def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict
 
 
 def _crossing(scene: Scene, table: Table, value: float, low: float, high: float) -> tuple[float, float]:
-    """Return half-power width of the resonance without bodies at a value of the quantity, Hz, and Hz that a unit detunes.
-
-    Zeros where the ramp does not pass the resonance.
-    """
+    """Return half-power width and detuning rate of the resonance at a value of the quantity: see Ramp."""
 
     def detuning(value: float) -> tuple[np.ndarray, np.ndarray]:
         here = scene_at(scene, table, value)

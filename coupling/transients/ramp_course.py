@@ -107,6 +107,10 @@ def ramped(scene: Scene) -> Scene:
             "ramp: the velocity of a prescribed motion would jump where its frequency changes; take a structure that "
             "a force moves"
         )
+    if scene.solver.method != "exact":
+        raise InputError(
+            f'solver.method: run-ups are those of the exact engine, not of "{scene.solver.method}"; take "exact"'
+        )
     check_waveform(scene, "exact")
     if table.quantity == _FREQUENCY and excitation.engine_order is None and excitation.frequency is None:
         raise InputError("ramp.quantity: the waveform has a duration of its own, and no frequency that could change")

@@ -90,8 +90,7 @@ def ramp_rows(ramp: Ramp) -> Iterator[list[float]]:
 
 def peaks_figure(ramp: Ramp) -> go.Figure:
     """Draw the peak over the rate, relative to the stationary one without bodies, and Lewis' closed form."""
-    figure, reference = go.Figure(), ramp.tops["undamped_peak"]
-    unit = f"{ramp.table.unit} a second"
+    figure = go.Figure()
     lewis = np.array([ramp.lewis_rate(run) for run in ramp.runs])
     rates = np.array([abs(run.rate) for run in ramp.runs])
     if ramp.tops["half_power_width"] > 0.0:
@@ -104,11 +103,11 @@ def peaks_figure(ramp: Ramp) -> go.Figure:
         runs = [run for run in ramp.runs if run.direction == direction]
         if runs:
             figure.add_scatter(
-                x=[abs(run.rate) for run in runs], y=[run.peak / reference for run in runs], name=direction,
+                x=[abs(run.rate) for run in runs], y=[ramp.share(run) for run in runs], name=direction,
                 mode="markers", marker={"color": colour, "symbol": symbol, "size": 11},
                 hovertemplate="%{x:.4g}: %{y:.4f}",
             )  # fmt: skip
-    figure.update_xaxes(title_text=f"rate, {unit}", type="log")
+    figure.update_xaxes(title_text=f"rate, {ramp.table.unit} a second", type="log")
     figure.update_yaxes(title_text="peak / stationary peak", rangemode="tozero")
     return dressed(figure, height=420)
 
