@@ -414,6 +414,7 @@ PLANAR_SPRINGS = BODY | {
     "contact": {"law": "compliant", "stiffness": 1e7},
 }  # fmt: skip
 TABLE = {"structure": {"model": "prescribed", "displacement_amplitude": 1e-4}, "excitation": {"frequency": 9.0}}
+SOFTENED = ROTOR | {"structure": ROTOR["structure"] | {"centrifugal_stiffness": -1.0}}
 UP = {"from": 90.0, "to": 110.0, "rate": 5.0}
 REFUSED = [
     ({"from": 90.0, "to": 110.0}, {}, "give one of rate (Hz a second) and periods"),
@@ -429,6 +430,7 @@ REFUSED = [
     (UP | {"quantity": "speed"}, {}, "[rotation], which is missing"),
     (UP, ROTOR, 'take "speed" or "rpm"'),
     (UP | {"quantity": "rpm", "from": 0.0}, ROTOR, "at standstill"),
+    (UP | {"quantity": "speed", "to": 400.0}, SOFTENED, "unstable from 100 rad/s on"),
     (
         UP | {"quantity": "rpm"}, ROTOR | {"excitation": {"engine_order": 4.0, "resonance_amplitude": 1e-4}},
         "give excitation.force",

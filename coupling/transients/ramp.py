@@ -18,7 +18,7 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact.event_driven import EngineRun
 from vanedamp.coupling.exact.subsystem_assembly import Subsystem
 from vanedamp.coupling.methods.registry import final_state
-from vanedamp.coupling.model_order.choices import choices_of, leaves_open, with_choices
+from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.evaluation import Outcome, Run, exchanged_energy, residual
 from vanedamp.coupling.response.records import EXCITATION, STORED, VISCOUS, new_records
@@ -53,17 +53,16 @@ def ramp(
     run.
     """
     table, base, planned = table_of(scene), ramped(scene), courses(scene)
-    choices = None
-    if leaves_open(base):
-        choices = choices_of([scene_at(base, table, value) for value in (table.from_, table.to)])
+    ends = [scene_at(base, table, value) for value in (table.from_, table.to)]
+    choices = choices_of(ends) if leaves_open(base) else NOTHING
+    for end in ends:  # before the first run: a speed may be too high
+        assemble(with_choices(end, choices).scene)
     total, before = sum(len(course.time) for course in planned), 0
     runs: list[RampRun] = []
     notes: list[str] = []
     for course in planned:
-        first, start = scene_at(base, table, float(course.value[0])), None
-        if choices is not None:
-            chosen = with_choices(first, choices)
-            first, start = chosen.scene, chosen.start
+        chosen = with_choices(scene_at(base, table, float(course.value[0])), choices)
+        first, start = chosen.scene, chosen.start
         if not runs:
             notes += warnings_of(first)
         if table.start == "steady":
