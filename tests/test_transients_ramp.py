@@ -358,13 +358,35 @@ def test_run_up_of_a_rotor():
 def test_speed_at_a_constant_frequency():
     """The frequency stays, and the structure's own passes it."""
     data = ROTOR | {"excitation": {"frequency": 11.7, "force": FORCE}}
-    (run,) = ramp(scene({"quantity": "speed", "from": 0.0, "to": 70.0, "rate": 7.0}, data)).runs
+    found = ramp(scene({"quantity": "speed", "from": 0.0, "to": 70.0, "rate": 7.0}, data))
+    (run,) = found.runs
     assert np.ptp(run.frequency) == 0.0
     assert run.speed == pytest.approx(7.0 * (run.time + 0.5 / 11.7), rel=1e-12)
     exact = staircase(
         run, np.diag([MASS]), np.diag([2.0]), lambda speed: np.diag([1e4 + 0.5 * speed**2]), np.array([FORCE])
     )
     assert np.abs(run.displacement - exact[:, 0]).max() < 1e-9 * np.abs(exact[:, 0]).max()
+    assert found.tops["undamped_peak"] == pytest.approx(FORCE / (2.0 * 2 * np.pi * 11.7), rel=1e-9)
+    assert found.share(run) == pytest.approx(peak_ratio(np.array([found.lewis_rate(run)]))[0], rel=0.05)
+
+
+def test_a_body_that_is_spun_up_sticks():
+    """Its normal load grows with the squared speed, in steps at which nothing that is stored changes."""
+    data = ROTOR | {
+        "structure": {"model": "rigid", "mass": MASS, "stiffness": 3e4, "damping": 20.0},
+        "excitation": {"frequency": 15.0, "force": 40.0},
+        "cavity": [{"name": "c", "gap": 0.2, "radius": 0.3}],
+        "damper": [{**SLIDER, "friction": 0.5}],
+    }
+    (run,) = ramp(scene({"quantity": "speed", "from": 2.0, "to": 30.0, "rate": 4.0}, data)).runs
+    (stuck,) = run.stuck.T
+    assert run.status == "ok" and run.energy_residual < 1e-10
+    assert not stuck[:20].any() and stuck[-5:].all()
+    assert abs(run.energy["rotation"]) < 1e-10 * run.energy["excitation"]
+    # it slides for the last time where friction still falls short of the floor's acceleration
+    last = int(np.flatnonzero(~stuck)[-1])
+    holds = 0.5 * 0.3 * run.speed[last] ** 2
+    assert holds == pytest.approx(run.amplitude[last] * (2 * np.pi * 15.0) ** 2, rel=0.1)
 
 
 MATRICES = {

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Whole
 
 #: units of the quantities that a ramp changes
@@ -48,3 +49,8 @@ class Ramp:
     def unit(self) -> str:
         """Unit of the quantity."""
         return UNITS[self.quantity]
+
+    @property
+    def path(self) -> str:
+        """Dotted path of the quantity in the scene."""
+        return FREQUENCY if self.quantity == "frequency" else f"rotation.{self.quantity}"

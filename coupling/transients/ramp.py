@@ -8,11 +8,11 @@ continuous, and the motion goes on as it is: a period begins with the state that
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq
 
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact.event_driven import EngineRun
@@ -26,9 +26,16 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import at_speed_of, restart_from
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.ramp import Ramp as Table
+from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
-from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.coupling.system.linear_response import (
+    LinearPeak,
+    LinearResponse,
+    linear_amplitudes,
+    linear_peaks,
+    linear_responses,
+)
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.ramp_course import Course, courses, ramped, scene_at, table_of
 from vanedamp.coupling.transients.ramp_record import WORKS, Ramp, RampRun
@@ -37,8 +44,8 @@ from vanedamp.files.toml_input import InputError
 
 #: share of the gap, and of its product with the angular frequency, below which a body counts as at rest
 _AT_REST = 1e-9
-#: points of the linear curves over a speed
-_SPEEDS = 201
+#: points of the linear curves from end to end, and around their peaks, in half-power widths
+_EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
 #: share of the range over which the detuning of a resonance is differentiated
 _STEP = 1e-4
 
@@ -217,38 +224,52 @@ def _named(outcome: Outcome) -> np.ndarray:
 def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict[str, float]]:
     """Return the amplitudes of the linear structure in steady state over the ramp, and their tops: see Ramp."""
     low, high = min(table.from_, table.to), max(table.from_, table.to)
-    if table.quantity == "frequency":
-        responses = linear_responses(scene)
-        frequency = np.unique(np.concatenate([response.grid(low, high) for response in responses]))
-        speed = np.full(len(frequency), scene.speed)
-        heights = [response.amplitude(frequency) for response in responses]
-        found = [response.peak(low, high) for response in responses]
-        peaks = [(peak.frequency, peak.amplitude, peak.frequency) for peak in found]
+    hertz, unit = hertz_of(table.path, scene.excitation.engine_order), SPEEDS.get(table.path, 1.0)
+    if np.isfinite(hertz):
+        peaks = list(linear_peaks(scene, low * unit, high * unit))
+        near = [peak.frequency + peak.width * _AROUND for peak in peaks]
+        if table.quantity == "frequency":
+            near = [response.grid(low, high) for response in linear_responses(scene)]
+        lines = np.linspace(low, high, _EVEN) * hertz
+        frequency = np.unique(np.clip(np.concatenate([lines, *near]), lines[0], lines[-1]))
+        value, (undamped, fixed) = frequency / hertz, linear_amplitudes(scene, frequency)
+        top = peaks[0].frequency / hertz
     else:
-
-        def at(value: float) -> tuple[float, ...]:
-            here = scene_at(scene, table, float(value))
-            heights = (response.amplitude(np.array([here.frequency]))[0] for response in linear_responses(here))
-            return here.frequency, here.speed, *map(float, heights)
-
-        def negative(value: float, column: int) -> float:
-            return -at(value)[column]
-
-        grid = np.linspace(low, high, _SPEEDS)
-        frequency, speed, *heights = np.array([at(value) for value in grid]).T
-        peaks = []
-        for column, height in enumerate(heights, start=2):
-            top = int(np.argmax(height))
-            bounds = grid[max(top - 1, 0)], grid[min(top + 1, len(grid) - 1)]
-            refined = minimize_scalar(negative, bounds=bounds, args=(column,), method="bounded")
-            place = min((float(refined.x), float(grid[top])), key=partial(negative, column=column))
-            peaks.append((place, at(place)[column], at(place)[0]))
-    curves = dict(zip(("frequency", "speed", "undamped", "fixed"), (frequency, speed, *heights), strict=True))
-    width, leaving = _crossing(scene, table, peaks[0][0], low, high)
+        value, undamped, fixed = _at_one_frequency(scene, table, low, high)
+        peaks = [LinearPeak(scene.frequency, float(heights.max()), 0.0) for heights in (undamped, fixed)]
+        frequency, top = np.full(len(value), scene.frequency), float(value[np.argmax(undamped)])
+    speed = value * unit if table.path in SPEEDS else np.full(len(value), scene.speed)
+    width, leaving = _crossing(scene, table, top, low, high)
     tops = {"half_power_width": width, "detuning_rate": leaving}
-    for name, (_, amplitude, top_frequency) in zip(("undamped", "fixed"), peaks, strict=True):
-        tops |= {f"{name}_peak": amplitude, f"{name}_peak_frequency": top_frequency}
+    for name, peak in zip(("undamped", "fixed"), peaks, strict=True):
+        tops |= {f"{name}_peak": peak.amplitude, f"{name}_peak_frequency": peak.frequency}
+    curves = {"frequency": frequency, "speed": speed, "undamped": undamped, "fixed": fixed}
     return {name: frozen(values) for name, values in curves.items()}, tops
+
+
+def _at_one_frequency(scene: Scene, table: Table, low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return values (k,) of a speed, resonances among them, and amplitudes (k,) without bodies and with them glued."""
+
+    @cache
+    def responses(value: float) -> tuple[LinearResponse, LinearResponse]:
+        return linear_responses(scene_at(scene, table, value))
+
+    def natural(value: float, curve: int) -> np.ndarray:
+        return np.sort(responses(value)[curve].resonances()[0])
+
+    def apart(value: float, curve: int, mode: int) -> float:
+        return float(natural(value, curve)[mode] - scene.frequency)
+
+    values = np.linspace(low, high, _EVEN).tolist()
+    tops = []
+    for curve in range(2):
+        above = np.array([natural(value, curve) > scene.frequency for value in values])
+        for place, mode in np.argwhere(above[:-1] != above[1:]).tolist():
+            tops.append(float(brentq(apart, *values[place : place + 2], args=(curve, mode))))
+    values = sorted({*values, *tops})
+    at = np.array([scene.frequency])
+    undamped, fixed = np.array([[one.amplitude(at)[0] for one in responses(value)] for value in values]).T
+    return np.array(values), undamped, fixed
 
 
 def _crossing(scene: Scene, table: Table, value: float, low: float, high: float) -> tuple[float, float]:

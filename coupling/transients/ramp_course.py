@@ -15,7 +15,7 @@ import numpy as np
 
 from vanedamp.coupling.methods.registry import check_waveform, why_no_restart
 from vanedamp.coupling.scene.ramp import Ramp as Table
-from vanedamp.coupling.scene.rotation import Rotation
+from vanedamp.coupling.scene.rotation import SPEEDS, Rotation, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.files.store import frozen
@@ -24,8 +24,6 @@ from vanedamp.files.toml_input import InputError
 _FREQUENCY = "frequency"
 #: periods of a run that anyone would wait for: some hours
 _MOST = 10_000_000
-#: rad/s of a unit of the speeds of rotation
-_RADIANS = {"speed": 1.0, "rpm": 2 * math.pi / 60}
 
 
 class Course(NamedTuple):
@@ -55,8 +53,8 @@ def courses(scene: Scene) -> list[Course]:
 
 def _course(base: Scene, table: Table, begin: float, end: float, rate: float | None) -> Course:
     """Return the periods from one end of the ramp to the other, as many as fit in; rate: in either direction."""
-    constant = 0.0 if _follows(base, table) else base.frequency
-    share = 0.0 if constant else scene_at(base, table, end).frequency / end
+    share = hertz_of(table.path, base.excitation.engine_order)
+    constant = base.frequency if math.isnan(share) else 0.0
     sign = math.copysign(1.0, end - begin)
     # periods from end to end, times the rate
     way = abs(end - begin) * constant if constant else abs(end**2 - begin**2) / 2 * share
@@ -82,14 +80,9 @@ def _course(base: Scene, table: Table, begin: float, end: float, rate: float | N
         edge = np.sqrt(np.maximum(begin**2 + sign * 2 * rate / share * number, 0.0))
     value = (edge[1:] + edge[:-1]) / 2
     frequency = np.full(periods, constant) if constant else share * value
-    speed = value * _RADIANS[table.quantity] if table.quantity in _RADIANS else np.full(periods, base.speed)
+    speed = value * SPEEDS[table.path] if table.path in SPEEDS else np.full(periods, base.speed)
     time = (edge[:-1] - begin) / (sign * rate)
     return Course(frozen(value), frozen(frequency), frozen(speed), frozen(time), sign * rate)
-
-
-def _follows(scene: Scene, table: Table) -> bool:
-    """Whether the frequency follows the ramp's quantity: it is that, or the engine order of a speed."""
-    return table.quantity == _FREQUENCY or scene.excitation.engine_order is not None
 
 
 def table_of(scene: Scene) -> Table:

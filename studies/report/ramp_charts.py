@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import plotly.graph_objects as go
 
+from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.transients.lewis import peak_ratio
 from vanedamp.coupling.transients.ramp_record import Ramp, RampRun
 from vanedamp.studies.report.charts import COLOURS, dressed
@@ -51,13 +52,11 @@ def ramp_figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]])
             hovertemplate="%{x:.6g}: %{y:.5g} µm",
         )  # fmt: skip
     for name, (value, amplitude) in beside.items():
-        if x == "speed" and ramp.table.quantity == "rpm":
-            value = value * 2 * np.pi / 60
-        elif x == "frequency" and ramp.table.quantity != "frequency":
-            order = ramp.scene.excitation.engine_order or 0.0
-            value = value * order / (60.0 if ramp.table.quantity == "rpm" else 2 * np.pi)
+        unit = (
+            SPEEDS[ramp.table.path] if x == "speed" else hertz_of(ramp.table.path, ramp.scene.excitation.engine_order)
+        )
         figure.add_scatter(
-            x=value, y=1e6 * amplitude, name=f"steady state ({name})", mode="markers",
+            x=value * unit, y=1e6 * amplitude, name=f"steady state ({name})", mode="markers",
             marker={"color": _STATIONARY, "size": 5, "symbol": "circle-open"}, hovertemplate="%{x:.6g}: %{y:.5g} µm",
         )  # fmt: skip
     figure.update_xaxes(title_text=_TITLES[x], hoverformat=".6g")

@@ -23,7 +23,6 @@ from vanedamp.studies.report.sweep_beside import points_beside
 
 ORDER = 17
 KIND = "ramp"
-_PATHS = {"frequency": "excitation.frequency", "speed": "rotation.speed", "rpm": "rotation.rpm"}
 
 
 def load(path: Path) -> Result:
@@ -39,9 +38,8 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 
 
 def _ramp(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
-    table = ramp.table
     beside = {
-        other: points_beside(ramp.scene, _PATHS[table.quantity], result.record)
+        other: points_beside(ramp.scene, ramp.table.path, result.record)
         for other, result in page.results.kinds["sweep"].items()
     }
     beside = {other: points for other, points in beside.items() if len(points[0])}
