@@ -92,7 +92,16 @@ def completed(tables: dict, folder: Path) -> dict:
     """Tables of an example with those that it leaves out."""
     if "matrices" in tables:
         return tables
-    scene = {"structure", "excitation", "sweep", "continuation", "optimise", "orbit", "ring_down"} & tables.keys()
+    scene = {
+        "structure",
+        "excitation",
+        "sweep",
+        "continuation",
+        "optimise",
+        "orbit",
+        "ramp",
+        "ring_down",
+    } & tables.keys()
     base = tomllib.loads(OSCILLATOR if scene else CLUSTER)
     if "structure" in tables:
         ReducedModel.from_matrices(np.eye(2), np.diag([2.26e8, 1e10]), {"tip": [1.0, 0.5]}, damping_ratio=0.01).save(
@@ -124,6 +133,8 @@ def test_files_are_read(example, tmp_path):
         assert Study.load(path).table.variables.bodies == (1, 4)
     elif "orbit" in tables:
         assert Scene.load(path).orbit is not None
+    elif "ramp" in tables:
+        assert Scene.load(path).ramp is not None
     elif "ring_down" in tables:
         assert Scene.load(path).ring_down is not None
     elif {"structure", "excitation", "sweep", "continuation"} & tables.keys():

@@ -30,7 +30,7 @@ from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 #: tables whose numbers are none of the motion's equations
-_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "ring_down", "initial")
+_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring_down", "initial")
 
 
 def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:

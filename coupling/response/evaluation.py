@@ -142,7 +142,9 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     harmonic = 2 / span * records.harmonic[window].sum()
     evaluated = {name: float(value) for name, value in zip(ENERGIES, ledger[-1], strict=True)}
     peaks = records.peak[window]
-    balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(system, records))
+    balance = residual(
+        records.ledger[: done + 1], records.parts[: done + 1], exchanged_energy(system, records.collided)
+    )
     if not balance <= run.open_ledger and status in _USABLE:
         status = Status.ENERGY
     samples = records.samples_per_period
@@ -232,12 +234,12 @@ def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> f
     return 0.0 if flowed == 0.0 else float(abs(imbalance) / flowed)
 
 
-def _exchanged(system: System, records: Records) -> float:
-    """Return the energy that comes and goes within a period, J: in collisions, and lent by the loads."""
+def exchanged_energy(system: System, collided: np.ndarray) -> float:
+    """Return the energy that comes and goes within a period, J: in collisions (periods,), and lent by the loads."""
     rate = np.maximum(system.frequency, system.omega)[:, None]  # the mean of a waveform counts as a slow load
     modes = np.abs(system.of_structure.load) ** 2 / np.maximum(system.of_structure.stiffness, rate**2)
     bodies = np.abs(system.of_bodies.load) ** 2 / (system.of_bodies.mass * rate**2)
-    return float(max(records.collided.max(), (modes.sum() + bodies.sum()) / 2))
+    return float(max(collided.max(), (modes.sum() + bodies.sum()) / 2))
 
 
 def _state_scale(system: System, section: np.ndarray) -> np.ndarray:

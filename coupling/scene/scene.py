@@ -20,6 +20,7 @@ from vanedamp.coupling.scene.contact_laws.registry import Contact
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
+from vanedamp.coupling.scene.ramp import Ramp
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
@@ -122,6 +123,7 @@ class Scene:
     continuation: Continuation = field(default_factory=Continuation)
     sweep: dict[str, Axis] = field(default_factory=dict)
     orbit: Orbit | None = None
+    ramp: Ramp | None = None
     ring_down: RingDownTable | None = None
 
     def __post_init__(self) -> None:

@@ -75,8 +75,7 @@ class LinearResponse:
         inside = (natural >= low) & (natural <= high)
         for frequency in natural[inside & (widths == 0.0)]:
             return LinearPeak(float(frequency), math.inf, 0.0)
-        near = (natural[:, None] + widths[:, None] * _AROUND).ravel()
-        grid = np.unique(np.concatenate([np.linspace(low, high, _EVEN), np.clip(near, low, high)]))
+        grid = self.grid(low, high)
         heights = self.amplitude(grid)
         padded = np.concatenate([[-1.0], heights, [-1.0]])
         tops = np.flatnonzero((heights >= padded[:-2]) & (heights >= padded[2:]))
@@ -84,6 +83,12 @@ class LinearResponse:
         amplitude, frequency = max(self._refined(grid, heights, int(top)) for top in tops)
         width = float(widths[np.argmin(np.abs(natural - frequency))]) if len(natural) else 0.0
         return LinearPeak(frequency, amplitude, width)
+
+    def grid(self, low: float, high: float) -> np.ndarray:
+        """Return frequencies (k,), Hz, from low to high between which the amplitude hides no maximum."""
+        natural, widths = self.resonances()
+        near = (natural[:, None] + widths[:, None] * _AROUND)[widths > 0.0].ravel()
+        return np.unique(np.concatenate([np.linspace(low, high, _EVEN), np.clip(near, low, high)]))
 
     def _refined(self, grid: np.ndarray, heights: np.ndarray, top: int) -> tuple[float, float]:
         """Return height and frequency of the maximum around a point of the grid; that point at an edge."""
