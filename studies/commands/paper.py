@@ -13,7 +13,7 @@ SUMMARY = "the paper's figures as studies, each claim with a verdict"
 def add_arguments(parser: ArgumentParser) -> None:
     """Take the folder, and which studies to run."""
     add_output(parser, "DIR", required=True)
-    parser.add_argument("studies", nargs="*", metavar="STUDY", help="fig9 ... fit (default: all; docs/paper.md)")
+    parser.add_argument("studies", nargs="*", metavar="STUDY", help="fig9, campbell ... (default: all; docs/paper.md)")
     add_workers(parser)
     parser.add_argument("--resume", action="store_true", help="take over what the folder has of the same scenes")
 

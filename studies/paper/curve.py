@@ -37,6 +37,8 @@ class Curve:
 
     largest, mean, confidence  absolute maxima, means of the periods' peaks, half widths of their 95 % confidence
                                intervals (0 where there are too few periods)
+    harmonic                   amplitudes at the excitation's frequency, without the offset by a body that leans on a
+                               wall
     undamped, fixed            linear curves without bodies and with all glued
     attached, impacts          attached mass fraction and impacts per period
     periodic                   whether the response repeats
@@ -47,6 +49,7 @@ class Curve:
     largest: np.ndarray
     mean: np.ndarray
     confidence: np.ndarray
+    harmonic: np.ndarray
     undamped: np.ndarray
     fixed: np.ndarray
     attached: np.ndarray
@@ -92,19 +95,30 @@ class Curve:
 
 
 def curves(sweep: Sweep, name: str) -> list[Curve]:
-    """Return a curve for every combination of the axes before the last, the frequency; without points not ok."""
+    """Return a curve for every combination of the axes before the last, the frequency; without points not ok.
+
+    Along an engine order the last axis is the speed, and the frequency the excitation's.
+    """
     responses = forced_responses(sweep, name)
     count = len(responses[0].x)
-    confidence, classification = (
-        values.reshape(-1, count) for values in (sweep.amplitude_mean_confidence, sweep.classification)
+    confidence, harmonic, classification = (
+        values.reshape(-1, count)
+        for values in (sweep.amplitude_mean_confidence, sweep.amplitude_harmonic, sweep.classification)
     )
     unit = sweep.scene.excitation.resonance_amplitude
     return [
-        _curve(*parts, unit or parts[0].reference) for parts in zip(responses, confidence, classification, strict=True)
+        _curve(*parts, unit or parts[0].reference)
+        for parts in zip(responses, confidence, harmonic, classification, strict=True)
     ]
 
 
-def _curve(response: ForcedResponse, confidence: np.ndarray, classification: np.ndarray, unit: float) -> Curve:
+def _curve(
+    response: ForcedResponse,
+    confidence: np.ndarray,
+    harmonic: np.ndarray,
+    classification: np.ndarray,
+    unit: float,
+) -> Curve:
     done = np.isfinite(response.damped_mean)
 
     def relative(values: np.ndarray) -> np.ndarray:
@@ -112,10 +126,11 @@ def _curve(response: ForcedResponse, confidence: np.ndarray, classification: np.
 
     return Curve(
         name=response.name,
-        frequency=response.x[done],
+        frequency=response.hertz * response.x[done],
         largest=relative(response.damped_max),
         mean=relative(response.damped_mean),
         confidence=relative(confidence),
+        harmonic=relative(harmonic),
         undamped=relative(response.undamped),
         fixed=relative(response.fixed),
         attached=response.attached_mass_fraction[done],

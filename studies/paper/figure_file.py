@@ -2,8 +2,9 @@
 
 The file has a `title`, a `[frequencies]` table (start, stop and number of points), the `[scene]` that all curves share,
 and a `[curve.<name>]` for each curve that differs from it, with the tables that it replaces; a figure of one curve has
-none, and a curve may have `frequencies` of its own. Quantities in quotes are multiples of what the structure is like:
-"0.5 amplitude". A cavity or damper with a `count` stands for that number of equal cavities, or of bodies in a row.
+none, and a curve may have `frequencies` of its own: along an engine order they are those of its speeds. Quantities in
+quotes are multiples of what the structure is like: "0.5 amplitude". A cavity or damper with a `count` stands for that
+number of equal cavities, or of bodies in a row.
 
 A `[bar]` (density in kg/m^3, section in m^2) is a body that fills its cavity but for the gap: a curve that is `longer`
 by a share of its tangential length is heavier by that share, and its gap is less by as much as the bar is longer.
@@ -24,7 +25,7 @@ import tomli_w
 from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
 
-from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.coupling.scene.rotation import FREQUENCY, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rigid, Rom
 from vanedamp.coupling.system.reduced_model_file import reduced_model
@@ -34,6 +35,8 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.report.forced_response import resonance_grid
 
 FOLDER = Path(__file__).with_name("scenes")
+#: axis of a curve along an engine order
+SPEED = "rotation.speed"
 _QUANTITY = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?) ([a-z_]+)")
 
 
@@ -64,12 +67,17 @@ class Structure:
         )
 
     def unit(self, name: str) -> float:
-        """Return a unit: a field's value, `force` at the undamped resonance (N), or `inertia` of the mass there (N)."""
+        """Return a unit: a field's value, `force` at the undamped resonance (N), or `inertia` of the mass there (N).
+
+        `speed` (rad/s) is that at which a revolution takes a period of the rigid model, `impedance` (N s/m) its mass
+        times that.
+        """
+        speed = 2 * math.pi * self.frequency
         values = {
             "mass": self.mass, "stiffness": self.stiffness, "damping_ratio": self.damping_ratio,
             "frequency": self.frequency, "amplitude": self.amplitude,
             "force": 2 * self.damping_ratio * self.stiffness * self.amplitude,
-            "inertia": self.mass * (2 * math.pi * self.frequency) ** 2 * self.amplitude,
+            "inertia": self.mass * speed**2 * self.amplitude, "speed": speed, "impedance": self.mass * speed,
         }  # fmt: skip
         if name not in values:
             raise InputError(f"unknown unit '{name}'; known: {', '.join(values)}")
@@ -170,17 +178,26 @@ def with_length(scene: Scene, bar: Bar, longer: float) -> Scene:
 
 
 def with_frequencies(scene: Scene, frequencies: Frequencies, points: int) -> Scene:
-    """Return the scene with a last axis of frequencies in its [sweep], finer around its linear resonances."""
+    """Return the scene with a last axis of frequencies in its [sweep], finer around its linear resonances.
+
+    Along an engine order it is one of the speeds that have these frequencies.
+    """
     peaks = [peak for peak in linear_peaks(scene) if frequencies.start < peak < frequencies.stop]
     if not peaks:
         grid = np.linspace(frequencies.start, frequencies.stop, points)
     else:
         grid = resonance_grid(frequencies.start, frequencies.stop, peaks, 2 * _damping_ratio(scene), points)
-    return scene.replace({"sweep": {**scene.to_dict()["sweep"], FREQUENCY: grid.tolist()}})
+    path, values = FREQUENCY, grid.tolist()
+    if (order := scene.excitation.engine_order) is not None:
+        path, values = SPEED, [speed_of(order, frequency) for frequency in values]
+    return scene.replace({"sweep": {**scene.to_dict()["sweep"], path: values}})
 
 
 def linear_peaks(scene: Scene) -> list[float]:
-    """Return the first natural frequencies with all bodies fixed and without them, Hz, of any structure."""
+    """Return the first natural frequencies with all bodies fixed and without them, Hz, of any structure.
+
+    Of a rigid one along an engine order those where the order meets them: m (2 pi f)^2 = c + c1 (2 pi f / order)^2.
+    """
     structure = scene.structure
     if isinstance(structure, Rom):
         floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
@@ -188,8 +205,10 @@ def linear_peaks(scene: Scene) -> list[float]:
         fixed = model.with_masses((floors[damper.cavity], damper.mass) for damper in scene.damper)
         return sorted({float(item.natural_frequencies_hz[0]) for item in (fixed, model)})
     assert isinstance(structure, Rigid)
-    masses = {structure.mass, structure.mass + sum(damper.mass for damper in scene.damper)}
-    stiffness = structure.stiffness_at(scene.speed)
+    order, mass, stiffness = scene.excitation.engine_order, structure.mass, structure.stiffness_at(scene.speed)
+    if order is not None:
+        mass, stiffness = mass - structure.centrifugal_stiffness / order**2, structure.stiffness
+    masses = {mass, mass + sum(damper.mass for damper in scene.damper)}
     return sorted(math.sqrt(stiffness / mass) / (2 * math.pi) for mass in masses)
 
 

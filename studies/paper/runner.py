@@ -28,14 +28,27 @@ from vanedamp.files.store import StoreError, digest, finite, load, write_json
 from vanedamp.files.toml_input import InputError, nearest, read_toml, validate
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.paper import claims_blocks, claims_reduced, claims_rigid, claims_systems, plots
+from vanedamp.studies.paper import (
+    blade,
+    claims_blocks,
+    claims_reduced,
+    claims_rigid,
+    claims_rotation,
+    claims_self_tuning,
+    claims_systems,
+    plots,
+    plots_rotation,
+)
 from vanedamp.studies.paper.curve import Curve, curves
 from vanedamp.studies.paper.figure_file import FOLDER, Bar, Effort, PaperFigure, Structure, write_scene
 from vanedamp.studies.report.claims import CLAIMS, Claim, Study
 from vanedamp.studies.terminal import progress
 from vanedamp.studies.workers import workers
 
-NAMES = ("fig9", "fig10", "fig12", "fig13", "fig14", "fig19", "mistuning", "systems", "blocks", "fit")
+NAMES = (
+    "fig9", "fig10", "fig12", "fig13", "fig14", "fig19", "mistuning", "systems", "blocks", "fit",
+    "campbell", "rotating_body", "self_tuning",
+)  # fmt: skip
 #: modes of the reduced model's file: what `modes = "auto"` chooses from
 MODES = 12
 
@@ -107,6 +120,8 @@ def study(name: str, session: Session) -> Study:
     """Run one study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
     if name == "fig13":
         return _history(session)
+    if name == "campbell":
+        return _blade(session)
     figure = PaperFigure.load(name, session.structure, session.effort)
     sweeps = {curve: _swept(figure, curve, session) for curve in figure.scenes}
     read = {curve: curves(sweep, curve.replace("_", " ") or name) for curve, sweep in sweeps.items()}
@@ -189,6 +204,10 @@ def _claims(
         case "fit":
             _, play, friction, _ = figure.scenes["map"].sweep_points()[0].values()
             return claims_blocks.fit(by_name, play, friction, sliders["fig9"][""][1])
+        case "rotating_body":
+            return claims_rotation.rotating_body(by_name, figure.scenes)
+        case "self_tuning":
+            return claims_self_tuning.self_tuning(by_name, figure.scenes)
     return claims_systems.claims(by_name)
 
 
@@ -228,6 +247,10 @@ def _picture(
             _, play, friction, _ = figure.scenes["map"].sweep_points()[0].values()
             tops = claims_blocks.highest_means(by_name["map"], (2, len(play), len(friction)))
             plots.fit_picture(tops, play, friction, sliders["fig9"][""][1], title, path)
+        case "rotating_body":
+            plots_rotation.rotating_body_picture(by_name, figure.scenes, title, path)
+        case "self_tuning":
+            plots_rotation.self_tuning_picture(by_name, figure.scenes, title, path)
         case _:
             plots.responses_picture({name: of[0] for name, of in _named(by_name).items()}, title, path)
 
@@ -259,6 +282,14 @@ def _history(session: Session) -> Study:
     plots.history_picture(response, session.structure.amplitude, title, folder / "fig13.png")
     claims = claims_reduced.fig13(response, runs["rigid"][1], alike)
     return _written(Study("fig13", title, ["fig13_response.h5"], claims), folder)
+
+
+def _blade(session: Session) -> Study:
+    """Run `campbell`: no sweep of scenes, but finite elements over the speed."""
+    found = blade.blade()
+    plots_rotation.campbell_picture(found, blade.TITLE, session.folder / "campbell.png")
+    sources = blade.save(found, session.folder)
+    return _written(Study("campbell", blade.TITLE, sources, claims_rotation.campbell(found)), session.folder)
 
 
 def _written(study: Study, folder: Path) -> Study:
