@@ -6,6 +6,9 @@ that become scipy matrices.
 
 from __future__ import annotations
 
+import vanedamp.modal.stack  # noqa: F401
+
+# isort: split
 import contextlib
 import importlib
 import logging
@@ -13,14 +16,15 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
+import cffi
 import dolfinx
 import dolfinx.fem.petsc
 import dolfinx.io
 import dolfinx.mesh
 import dolfinx.plot
-import gmsh
 import numpy as np
 import petsc4py
 import ufl
@@ -28,7 +32,9 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy import sparse
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import digest
+from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
 from vanedamp.modal.msh import MeshError
 
@@ -38,6 +44,10 @@ except ImportError:  # its name before 0.10
     gmshio = importlib.import_module("dolfinx.io.gmshio")
 
 _UNNAMED = "unnamed"
+
+
+class CompilerError(VanedampError):
+    """A machine on which no form can be compiled; the message says what it lacks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +118,7 @@ def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
         except MeshError as error:
             raise MeshError(f"{file}: {error}") from error
         names = {dimension: msh.groups(dimension) for dimension in (2, 3)}
-        with _quiet():
+        with _compiling():
             # three fields up to 0.9, more after them since
             mesh, cells, facets = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=3)[:3]
     mesh.geometry.x[:] *= scale
@@ -137,7 +147,7 @@ def vector_space(domain: Domain, degree: int) -> Any:
 def discontinuous_space(domain: Domain, degree: int) -> Any:
     """Return the scalar polynomials of a degree in every cell, without continuity."""
     family = "DQ" if domain.mesh.topology.cell_name() == "hexahedron" else "DG"
-    with _quiet():
+    with _compiling():
         create = getattr(fem, "functionspace", None) or fem.FunctionSpace
         return create(domain.mesh, (family, degree))
 
@@ -171,7 +181,7 @@ def group_nodes(space: Any, entities: np.ndarray, dimension: int = 2) -> np.ndar
 
 def matrix(form: Any) -> sparse.csr_array:
     """Assemble a bilinear UFL form, without boundary conditions, to CSR without stored zeros."""
-    with _quiet():
+    with _compiling():
         compiled = fem.form(form)
     assembled = fem.petsc.assemble_matrix(compiled)
     try:
@@ -202,7 +212,7 @@ def constant(domain: Domain, values: float | Sequence[float]) -> Any:
 def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
     """Return the integral (n_nodes,), m^2, of every nodal shape function over the facets."""
     along_x = constant(domain, [1.0, 0.0, 0.0])
-    with _quiet():
+    with _compiling():
         compiled = fem.form(ufl.inner(along_x, ufl.TestFunction(space)) * over_facets(domain, facets))
     return np.array(fem.assemble_vector(compiled).array.reshape(-1, 3)[:, 0])
 
@@ -210,7 +220,7 @@ def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
 def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
     """Return the integral (3,), m^2, of the outward unit normal over boundary facets."""
     axis = constant(domain, [1.0, 0.0, 0.0])
-    with _quiet():
+    with _compiling():
         compiled = fem.form(ufl.inner(axis, ufl.FacetNormal(domain.mesh)) * over_facets(domain, facets))
     found = np.empty(3)
     for i, unit in enumerate(np.eye(3)):
@@ -223,7 +233,7 @@ def evaluate(expression: Any, space: Any) -> Any:
     """Return the function of a space that takes the values of a UFL expression at the space's own points."""
     points = space.element.interpolation_points
     function = fem.Function(space)
-    with _quiet():
+    with _compiling():
         function.interpolate(fem.Expression(expression, points() if callable(points) else points))
     return function
 
@@ -290,7 +300,7 @@ def _measure(kind: str, domain: Domain, dimension: int, entities: np.ndarray) ->
 
 
 def _vectors(mesh: Any, degree: int) -> Any:
-    with _quiet():
+    with _compiling():
         if hasattr(fem, "functionspace"):
             return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
         return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
@@ -358,11 +368,16 @@ def _array(adjacency: Any) -> np.ndarray:
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Silence the log of the form compiler, which writes at INFO to the root logger."""
+def _compiling() -> Iterator[None]:
+    """Silence the log of the form compiler, which writes at INFO to the root logger. Raises CompilerError."""
     before = logging.root.manager.disable
     logging.disable(max(before, logging.INFO))
     try:
         yield
+    except cffi.VerificationError as error:
+        raise CompilerError(
+            f"the finite elements' forms cannot be compiled ({shorten(str(error), 100)}); they need a C compiler and Python's headers: "
+            "apt install gcc libc6-dev python3-dev"
+        ) from None
     finally:
         logging.disable(before)
