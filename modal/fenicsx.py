@@ -376,8 +376,8 @@ def _compiling() -> Iterator[None]:
         yield
     except cffi.VerificationError as error:
         raise CompilerError(
-            f"the finite elements' forms cannot be compiled ({shorten(str(error), 100)}); they need a C compiler and Python's headers: "
-            "apt install gcc libc6-dev python3-dev"
+            f"the finite elements' forms cannot be compiled ({shorten(str(error), 100)}); they need a C compiler and "
+            "Python's headers: apt install gcc libc6-dev python3-dev"
         ) from None
     finally:
         logging.disable(before)
