@@ -17,8 +17,8 @@ _INTERRUPTED = 130
 #: packages of the finite elements, and how to get them
 _SYSTEM = ("dolfinx", "petsc4py", "slepc4py", "ufl", "basix", "ffcx", "mpi4py", "cffi")
 _FINITE_ELEMENTS = (
-    "pip install 'vanedamp[fem]' (Linux on x86-64, Python 3.12 or newer), apt install python3-dolfinx python3-slepc4py, "
-    "or conda's environment.yml (CONTRIBUTING.md)"
+    "pip install 'vanedamp[fem]' (Linux on x86-64, Python 3.12 or newer), apt install python3-dolfinx, or "
+    "conda's environment.yml (CONTRIBUTING.md)"
 )
 #: names of packages that are not those of their modules
 _ON_PYPI = {"vtkmodules": "vtk", "yaml": "pyyaml"}
