@@ -42,7 +42,7 @@ class Structure:
     """The units of a figure's quantities: the rigid model of the first bending, and its excitation.
 
     mass (kg), stiffness (N/m), damping_ratio, frequency (Hz) of the rigid model; amplitude (m) of its undamped
-    resonance; rom: file of the reduced model.
+    resonance; rom: file of the reduced model, if there is one.
     """
 
     mass: float
@@ -50,7 +50,12 @@ class Structure:
     damping_ratio: float
     frequency: float
     amplitude: float
-    rom: Path
+    rom: Path | None = None
+
+    @classmethod
+    def shipped(cls) -> Structure:
+        """Return the rigid model of the shipped cluster, which needs no finite elements."""
+        return cls(**read_toml(FOLDER / "rigid_model.toml"))
 
     @classmethod
     def load(cls, modes: Path, rom: Path) -> Structure:
