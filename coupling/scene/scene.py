@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import tomli_w
 from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter
 from pydantic.dataclasses import dataclass
 
@@ -23,6 +24,8 @@ from vanedamp.coupling.scene.paths import Range, assign, axis_values
 from vanedamp.coupling.scene.rotation import Rotation
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
+from vanedamp.files.display import Displayed
+from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import (
     STRICT,
     InputError,
@@ -96,8 +99,8 @@ class Continuation:
     along: str | None = None
 
 
-@dataclass(frozen=True, config=STRICT)
-class Scene:
+@dataclass(frozen=True, config=STRICT, repr=False)
+class Scene(Displayed):
     """Everything one run needs. Change a scene by making another: `scene.replace({"cavity.c1.gap": 1e-5})`."""
 
     structure: Structure
@@ -278,6 +281,15 @@ class Scene:
             structure["file"] = str(Path(path).parent / structure["file"])
         return validate(cls, data, str(path))
 
+    def save(self, path: str | Path) -> None:
+        """Write the TOML file that `load` reads; a reduced model's file beside it is named relative to it."""
+        data = self.to_dict()
+        if isinstance(self.structure, Rom):
+            file, folder = Path(self.structure.file).resolve(), Path(path).resolve().parent
+            data["structure"]["file"] = str(file.relative_to(folder) if file.is_relative_to(folder) else file)
+        with replacing(path) as temporary:
+            temporary.write_text(tomli_w.dumps(data), encoding="utf-8")
+
     @property
     def files(self) -> list[str]:
         """The reduced models that the scene and its sweep name."""
@@ -327,3 +339,12 @@ class Scene:
         axes = {path: axis_values(values) for path, values in self.sweep.items()}
         points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
         return {path: np.asarray(values) for path, values in axes.items()}, points
+
+
+def loaded(scene: Scene | str | Path) -> Scene:
+    """Return a scene, or the one in a TOML file. Raises InputError for anything else."""
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, str | Path):
+        return Scene.load(scene)
+    raise InputError(f"scene: expected a Scene or its TOML file, not {type(scene).__name__}")

@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import tomli_w
 from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
 
@@ -28,7 +27,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rigid, Rom
 from vanedamp.coupling.sweep.grid import FREQUENCY
 from vanedamp.coupling.system.reduced_model_file import reduced_model
-from vanedamp.files.store import load, replacing
+from vanedamp.files.store import load
 from vanedamp.files.toml_input import STRICT, InputError, Positive, Whole, read_toml, validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.report.forced_response import resonance_grid
@@ -195,15 +194,6 @@ def linear_peaks(scene: Scene) -> list[float]:
     assert isinstance(structure, Rigid)
     masses = {structure.mass, structure.mass + sum(damper.mass for damper in scene.damper)}
     return sorted(math.sqrt(structure.stiffness / mass) / (2 * math.pi) for mass in masses)
-
-
-def write_scene(scene: Scene, path: Path) -> None:
-    """Write a scene as the TOML file of `vanedamp run` and `vanedamp sweep`, a model's file relative to it."""
-    data = scene.to_dict()
-    if isinstance(scene.structure, Rom):
-        data["structure"]["file"] = Path(scene.structure.file).name
-    with replacing(path) as temporary:
-        temporary.write_text(tomli_w.dumps(data), encoding="utf-8")
 
 
 def _whole(structure: Rom) -> ReducedModel:
