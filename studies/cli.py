@@ -24,6 +24,16 @@ _FINITE_ELEMENTS = (
 _ON_PYPI = {"vtkmodules": "vtk", "yaml": "pyyaml"}
 
 
+class _Version(argparse.Action):
+    """Print the version, which takes a while to look up."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from importlib.metadata import version
+
+        print(f"vanedamp {version('vanedamp')}")
+        parser.exit()
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser that refuses a wrong command line in one line."""
 
@@ -108,6 +118,7 @@ def _parser(name: str | None) -> argparse.ArgumentParser:
         prog="vanedamp", description="Vibration damping of vane clusters by loose bodies in cavities: from a mesh to "
         "forced responses with impacts."
     )  # fmt: skip
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
     places = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for other, command in commands.items():
         summary = command.SUMMARY

@@ -108,6 +108,13 @@ class PlanarSamples(NamedTuple):
         return variables
 
 
+#: units of the figures of a response that have one
+UNITS = {
+    "frequency": "Hz", "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m",
+    "amplitude_rms": "m", "amplitude_harmonic": "m", "phase": "rad", "wall_time_s": "s",
+}  # fmt: skip
+
+
 @dataclass(frozen=True, repr=False)
 class Response(Displayed):
     """The response of a structure with loose bodies. Amplitudes and energies are those of the evaluated periods.
