@@ -191,6 +191,16 @@ def save(
         temporary.write_bytes(image.getbuffer())
 
 
+def dataset(variables: Mapping[str, Variable], attributes: Mapping[str, Any]) -> Any:
+    """Return a record as an xarray.Dataset, as its file opens. Raises ModuleNotFoundError without xarray."""
+    import xarray
+
+    made = {
+        name: (tuple(item.dims), np.asarray(item.values), {"units": item.units}) for name, item in variables.items()
+    }
+    return xarray.Dataset(made, attrs=dict(attributes))
+
+
 def clear_leftovers(path: str | os.PathLike[str]) -> None:
     """Remove the temporary files that killed writers of `path` have left beside it."""
     target = destination(path)

@@ -24,7 +24,7 @@ from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import _parser, main
 from vanedamp.studies.demo import EFFORT
 from vanedamp.studies.optimisation.study import Study
-from vanedamp.studies.paper.figure_file import PaperFigure, Structure, write_scene
+from vanedamp.studies.paper.figure_file import PaperFigure, Structure
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 SHELL = ("vanedamp", "mpirun", "cd", "make", ".venv/bin/python", ".venv/bin/pip")
@@ -181,7 +181,7 @@ def test_program_of_the_readme(tmp_path):
     structure = Structure(0.157, 0.157 * (2 * np.pi * 2412.0) ** 2, 0.002, 2412.0, 70e-6, Path("rom.h5"))
     scene = PaperFigure.load("fig10", structure, EFFORT).scenes["single"]
     (tmp_path / "out").mkdir()
-    write_scene(scene, tmp_path / "out" / "fig10_single.toml")
+    scene.save(tmp_path / "out" / "fig10_single.toml")
     status, *printed = run(program("README.md", "simulate"), tmp_path).replace("[", "").replace("]", "").split()
     amplitude, attached, *reductions = map(float, printed)
     response = simulate(scene.replace({"excitation.frequency": 2382.0, "cavity.c1.gap": 2e-5}))

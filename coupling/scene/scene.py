@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import tomli_w
 from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter
 from pydantic.dataclasses import dataclass
 
@@ -25,6 +26,8 @@ from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
+from vanedamp.files.display import Displayed
+from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import (
     STRICT,
     InputError,
@@ -104,8 +107,8 @@ class Continuation:
     along: str | None = None
 
 
-@dataclass(frozen=True, config=STRICT)
-class Scene:
+@dataclass(frozen=True, config=STRICT, repr=False)
+class Scene(Displayed):
     """Everything one run needs. Change a scene by making another: `scene.replace({"cavity.c1.gap": 1e-5})`."""
 
     structure: Structure
@@ -339,13 +342,18 @@ class Scene:
     @classmethod
     def of(cls, data: dict[str, Any], path: str | Path) -> Scene:
         """Return the scene in the tables of a TOML file that lies at `path`."""
-        for place in _FILES:
-            table: Any = data
-            for step in place[:-1]:
-                table = table.get(step) if isinstance(table, dict) else None
-            if isinstance(table, dict) and isinstance(table.get(place[-1]), str):
-                table[place[-1]] = str(Path(path).parent / table[place[-1]])
+        for table, key in _named_files(data):
+            table[key] = str(Path(path).parent / table[key])
         return validate(cls, data, str(path))
+
+    def save(self, path: str | Path) -> None:
+        """Write the TOML file that `load` reads; files beside it, such as a reduced model's, are relative to it."""
+        data, folder = self.to_dict(), Path(path).resolve().parent
+        for table, key in _named_files(data):
+            file = Path(table[key]).resolve()
+            table[key] = str(file.relative_to(folder) if file.is_relative_to(folder) else file)
+        with replacing(path) as temporary:
+            temporary.write_text(tomli_w.dumps(data), encoding="utf-8")
 
     @property
     def files(self) -> list[str]:
@@ -403,3 +411,22 @@ class Scene:
         axes = {path: axis_values(values) for path, values in self.sweep.items()}
         points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
         return {path: np.asarray(values) for path, values in axes.items()}, points
+
+
+def _named_files(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield the tables of a scene that name a file, each with its key."""
+    for place in _FILES:
+        table: Any = data
+        for step in place[:-1]:
+            table = table.get(step) if isinstance(table, dict) else None
+        if isinstance(table, dict) and isinstance(table.get(place[-1]), str):
+            yield table, place[-1]
+
+
+def loaded(scene: Scene | str | Path) -> Scene:
+    """Return a scene, or the one in a TOML file. Raises InputError for anything else."""
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, str | Path):
+        return Scene.load(scene)
+    raise InputError(f"scene: expected a Scene or its TOML file, not {type(scene).__name__}")
