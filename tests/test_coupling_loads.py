@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -159,6 +160,27 @@ def test_the_resonance_that_the_loads_reach(tmp_path):
     assert scale == pytest.approx(1e-3 * own * 2 * RATIO * math.sqrt(1 - RATIO**2) / 2.0, rel=1e-9)
     with pytest.raises(InputError, match=r"^excitation.resonance_amplitude: the loads of order 1 excite no mode that"):
         linear_responses(case.replace({"excitation.load": travelling(2, order=2)}))
+
+
+def test_the_resonance_that_the_loads_meet_along_an_engine_order(tmp_path):
+    """Two nodal diameters of blades that stiffen with the speed: W^2 (4^2 - 0.5) = omega_2^2, at that height there."""
+    _, model = ring(tmp_path)
+    turning = replace(
+        model, centrifugal_stiffness=0.5 * np.eye(BLADES), rotation_axis=np.array([0.0, 0.0, 1.0]),
+        rotation_point=np.zeros(3), greatest_speed=400.0,
+    )  # fmt: skip
+    turning.save(tmp_path / "turning.h5")
+    speed = OWN * math.sqrt((1 + 4 * COUPLING) / (4**2 - 0.5))
+    excitation = {"engine_order": 4.0, "at": "tip0", "load": travelling(2), "resonance_amplitude": 1e-3}
+    case = {
+        "structure": {"model": "rom", "file": str(tmp_path / "turning.h5")}, "excitation": excitation,
+        "rotation": {"speed": speed}, "time": {"periods": 2, "transient": 1},
+        "sweep": {"rotation.speed": [0.6 * speed, speed, 1.3 * speed]},
+    }  # fmt: skip
+    found = sweep(validate(Scene, case, "scene"))
+    # but for terms of the damping's square
+    assert found.peaks["undamped_peak"] == pytest.approx(1e-3, rel=5 * RATIO**2)
+    assert found.peaks["undamped_peak_frequency"] == pytest.approx(4 * speed / (2 * math.pi), rel=5 * RATIO**2)
 
 
 # -- with a body
