@@ -105,8 +105,6 @@ def ramped(scene: Scene) -> Scene:
             f'solver.method: run-ups are those of the exact engine, not of "{scene.solver.method}"; take "exact"'
         )
     check_waveform(scene, "exact")
-    if table.quantity == _FREQUENCY and excitation.engine_order is None and excitation.frequency is None:
-        raise InputError("ramp.quantity: the waveform has a duration of its own, and no frequency that could change")
     if reason := why_no_restart(scene):
         raise InputError(f"ramp: a period begins with the motion that the one before has left, which {reason}")
     if table.quantity == _FREQUENCY:
