@@ -28,7 +28,7 @@ test-all: setup ## the tests with the slow verification tier
 test-arithmetic: setup ## the fast tier under the arithmetic of other processors, with a table (ARGUMENTS="generic TEST ...")
 	PYTHON=$(PYTHON) scripts/test_arithmetic.sh $(ARGUMENTS)
 
-test-versions: ## the finite element tests on Debian 13 and unstable, in root folders of their own (root, debootstrap)
+test-versions: ## the finite element tests on Debian 13 (PyPI's dolfinx and apt's) and unstable, in root folders of their own
 	scripts/test_versions.sh
 
 check: setup ## ruff, mypy, import contracts

@@ -5,23 +5,24 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 from vanedamp.coupling.methods.registry import respond
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.scene import Scene, loaded
 
 
 def simulate(
-    scene: Scene,
+    scene: Scene | str | Path,
     events: bool = False,
     samples_per_period: int = 0,
     start: RestartState | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Response:
-    """Run a scene from time zero over `scene.time.simulated` excitation periods.
+    """Run a scene, or the one in a TOML file, from time zero over `scene.time.simulated` excitation periods.
 
     events: keep the list of events; samples_per_period: keep that many equidistant samples of each period; start: the
     state that another run has left (`Response.final`), in place of the scene's initial one, where the method can;
@@ -29,6 +30,7 @@ def simulate(
     Raises InputError for a scene that the model does not allow; numerical trouble is a status of the response.
     """
     started = time.perf_counter()
+    scene = loaded(scene)
     chosen = choose(scene)
     response = respond(chosen.scene, events, samples_per_period, start or chosen.start, progress)
     took = time.perf_counter() - started

@@ -104,6 +104,12 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
+def file_stamp(path: str | os.PathLike[str]) -> int:
+    """Return a number that distinguishes a file from a later one of that name."""
+    file = Path(path)
+    return file.stat().st_mtime_ns if file.is_file() else 0
+
+
 def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
     """Write a table: one line of names, then the rows."""
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
@@ -183,6 +189,16 @@ def save(
                     file[name].dims[axis].attach_scale(file[dimension])
     with replacing(path) as temporary:
         temporary.write_bytes(image.getbuffer())
+
+
+def dataset(variables: Mapping[str, Variable], attributes: Mapping[str, Any]) -> Any:
+    """Return a record as an xarray.Dataset, as its file opens. Raises ModuleNotFoundError without xarray."""
+    import xarray
+
+    made = {
+        name: (tuple(item.dims), np.asarray(item.values), {"units": item.units}) for name, item in variables.items()
+    }
+    return xarray.Dataset(made, attrs=dict(attributes))
 
 
 def clear_leftovers(path: str | os.PathLike[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import reprlib
 import tomllib
@@ -10,6 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 from vanedamp.files.errors import VanedampError
@@ -79,12 +81,24 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
     """Return `data` as a `record`. Raises InputError naming the source, the key and the remedy."""
     adapter: TypeAdapter[T] = _adapter(record)  # type: ignore[arg-type]
-    try:
+    with contextlib.suppress(ValidationError):
         return adapter.validate_python(dict(data))
+    data = _plain(data)
+    try:
+        return adapter.validate_python(data)
     except ValidationError as error:
         # a misspelt key is missing, too: its own complaint is the one that helps
         found = sorted(error.errors(), key=lambda entry: entry["type"] not in _UNKNOWN)
         raise InputError(f"{source}: {_explain(adapter, found[0], data)}") from None
+
+
+def _plain(data: Any) -> Any:
+    """Return data with Python's own numbers and lists in place of numpy's."""
+    if isinstance(data, Mapping):
+        return {key: _plain(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_plain(value) for value in data]
+    return data.tolist() if isinstance(data, np.ndarray | np.generic) else data
 
 
 @lru_cache(maxsize=32)

@@ -7,9 +7,8 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-import gmsh
-
 from vanedamp.meshes.parameters import ParameterError, check_elements, check_size
+from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
 
 #: ratio of lengths; gmsh merges points nearer than 1e-8 of a model's size

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import gmsh
 import numpy as np
 
 from vanedamp.meshes.parameters import ParameterError
+from vanedamp.modal import gmsh_on_demand as gmsh
 
 if TYPE_CHECKING:
     from vanedamp.meshes.parameters import VaneCluster

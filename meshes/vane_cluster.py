@@ -9,10 +9,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import gmsh
-
 from vanedamp.meshes.cluster_geometry import facets, solids
 from vanedamp.meshes.parameters import ParameterError, VaneCluster
+from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
 
 __all__ = ["SHIPPED", "ParameterError", "VaneCluster", "build"]

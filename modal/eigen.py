@@ -12,6 +12,7 @@ import numpy as np
 from scipy import linalg, sparse
 
 from vanedamp.files import store
+from vanedamp.files.display import Displayed
 from vanedamp.modal import petsc
 from vanedamp.modal.algebra import affine_fields, leading_sign, ritz_values
 from vanedamp.modal.matrices import SystemMatrices
@@ -34,8 +35,8 @@ _SLICE = 50
 _SHARE_DIGITS = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class Modes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Modes(Displayed):
     """Undamped modes K phi = (2 pi f)^2 M phi, lowest first.
 
     frequencies_hz  (m,)

@@ -6,6 +6,9 @@ that become scipy matrices.
 
 from __future__ import annotations
 
+import vanedamp.modal.stack  # noqa: F401
+
+# isort: split
 import contextlib
 import importlib
 import logging
@@ -14,14 +17,15 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
+import cffi
 import dolfinx
 import dolfinx.fem.petsc
 import dolfinx.io
 import dolfinx.mesh
 import dolfinx.plot
-import gmsh
 import numpy as np
 import petsc4py
 import ufl
@@ -29,7 +33,9 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy import sparse
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import digest
+from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
 from vanedamp.modal.msh import MeshError
 
@@ -39,6 +45,10 @@ except ImportError:  # its name before 0.10
     gmshio = importlib.import_module("dolfinx.io.gmshio")
 
 _UNNAMED = "unnamed"
+
+
+class CompilerError(VanedampError):
+    """A machine on which no form can be compiled; the message says what it lacks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +119,7 @@ def read(path: str | os.PathLike[str], scale: float = 1.0) -> Domain:
         except MeshError as error:
             raise MeshError(f"{file}: {error}") from error
         names = {dimension: msh.groups(dimension) for dimension in (2, 3)}
-        with _quiet():
+        with _compiling():
             # three fields up to 0.9, more after them since
             mesh, cells, facets = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=3)[:3]
     mesh.geometry.x[:] *= scale
@@ -138,7 +148,7 @@ def vector_space(domain: Domain, degree: int) -> Any:
 def discontinuous_space(domain: Domain, degree: int) -> Any:
     """Return the scalar polynomials of a degree in every cell, without continuity."""
     family = "DQ" if domain.mesh.topology.cell_name() == "hexahedron" else "DG"
-    with _quiet():
+    with _compiling():
         create = getattr(fem, "functionspace", None) or fem.FunctionSpace
         return create(domain.mesh, (family, degree))
 
@@ -184,7 +194,7 @@ def group_nodes(space: Any, entities: np.ndarray, dimension: int = 2) -> np.ndar
 
 def matrix(form: Any) -> sparse.csr_array:
     """Assemble a bilinear UFL form, without boundary conditions, to CSR without stored zeros."""
-    with _quiet():
+    with _compiling():
         compiled = fem.form(form)
     assembled = fem.petsc.assemble_matrix(compiled)
     try:
@@ -199,7 +209,7 @@ def matrix(form: Any) -> sparse.csr_array:
 
 def vector(form: Any) -> np.ndarray:
     """Assemble a linear UFL form, without boundary conditions."""
-    with _quiet():
+    with _compiling():
         compiled = fem.form(form)
     return np.array(fem.assemble_vector(compiled).array)
 
@@ -228,7 +238,7 @@ def facet_weights(domain: Domain, space: Any, facets: np.ndarray) -> np.ndarray:
 def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
     """Return the integral (3,), m^2, of the outward unit normal over boundary facets."""
     axis = constant(domain, [1.0, 0.0, 0.0])
-    with _quiet():
+    with _compiling():
         compiled = fem.form(ufl.inner(axis, ufl.FacetNormal(domain.mesh)) * over_facets(domain, facets))
     found = np.empty(3)
     for i, unit in enumerate(np.eye(3)):
@@ -241,7 +251,7 @@ def evaluate(expression: Any, space: Any) -> Any:
     """Return the function of a space that takes the values of a UFL expression at the space's own points."""
     points = space.element.interpolation_points
     function = fem.Function(space)
-    with _quiet():
+    with _compiling():
         function.interpolate(fem.Expression(expression, points() if callable(points) else points))
     return function
 
@@ -308,7 +318,7 @@ def _measure(kind: str, domain: Domain, dimension: int, entities: np.ndarray) ->
 
 
 def _vectors(mesh: Any, degree: int) -> Any:
-    with _quiet():
+    with _compiling():
         if hasattr(fem, "functionspace"):
             return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
         return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
@@ -376,13 +386,21 @@ def _array(adjacency: Any) -> np.ndarray:
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Silence the form compiler: its log, at INFO of the root logger, and its advice to take fewer points in a cell."""
+def _compiling() -> Iterator[None]:
+    """Silence the form compiler: its log, at INFO of the root logger, and its advice to take fewer points in a cell.
+
+    Raises CompilerError.
+    """
     before = logging.root.manager.disable
     logging.disable(max(before, logging.INFO))
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Number of integration points", UserWarning)
             yield
+    except cffi.VerificationError as error:
+        raise CompilerError(
+            f"the finite elements' forms cannot be compiled ({shorten(str(error), 100)}); they need a C compiler and "
+            "Python's headers: apt install gcc libc6-dev python3-dev"
+        ) from None
     finally:
         logging.disable(before)

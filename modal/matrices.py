@@ -15,6 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from vanedamp.files import store
+from vanedamp.files.display import Displayed
 from vanedamp.files.errors import VanedampError
 
 _KIND = "system-matrices"
@@ -64,8 +65,8 @@ class Patch:
         return float(self.weights.sum())
 
 
-@dataclass(frozen=True, eq=False)
-class SystemMatrices:
+@dataclass(frozen=True, eq=False, repr=False)
+class SystemMatrices(Displayed):
     """Unconstrained finite element matrices in displacement DOFs, dof = 3 * node + component, N = 3 * n_nodes.
 
     stiffness      (N, N) symmetric CSR, N/m

@@ -8,13 +8,13 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-import gmsh
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import replacing
+from vanedamp.modal import gmsh_on_demand as gmsh
 
 
 class MeshError(VanedampError):

@@ -6,6 +6,9 @@ included, is up to rank 0 only.
 
 from __future__ import annotations
 
+import vanedamp.modal.stack  # noqa: F401
+
+# isort: split
 import contextlib
 import time
 import traceback

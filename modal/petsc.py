@@ -7,6 +7,9 @@ and inertia counts (see `parallel`), on MUMPS; a Factorization stays on its own 
 
 from __future__ import annotations
 
+import vanedamp.modal.stack  # noqa: F401
+
+# isort: split
 import contextlib
 from collections.abc import Callable, Iterator
 from types import TracebackType
@@ -181,11 +184,11 @@ def _nearest(
         return eps
 
     eps = None
-    if direct is None and shift <= 0.0 and parallel.COMM.size == 1:
+    if direct is None and shift <= 0.0 and parallel.COMM.size == 1 and PETSc.Sys.hasExternalPackage("suitesparse"):
         eps = prepared("cholmod")
         try:
             eps.setUp()
-        except PETSc.Error:  # singular, or a PETSc without SuiteSparse
+        except PETSc.Error:  # singular
             eps.reset()
             eps = None
     eps = eps or prepared(direct or "mumps")

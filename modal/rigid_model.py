@@ -25,6 +25,8 @@ class RigidModel:
     damping_ratio             of the mode
     at                        label of the interface coordinate
     frequency_hz              of the undamped mode
+    base_mass                 kg: load there for an acceleration of the base of 1 m/s^2 against its direction, of either
+                              sign; None: not known
     """
 
     mass: float
@@ -33,16 +35,20 @@ class RigidModel:
     damping_ratio: float
     at: str
     frequency_hz: float
+    base_mass: float | None = None
 
     def resonance_force(self, amplitude: float) -> float:
         """Force amplitude, N, that brings the resonance to a displacement amplitude, m: d w_1 X = 2 zeta c X."""
         return 2.0 * self.damping_ratio * self.stiffness * amplitude
 
 
-def rigid_model(modes: Modes, mode: int, functional: np.ndarray, at: str, damping_ratio: float) -> RigidModel:
+def rigid_model(
+    modes: Modes, mode: int, functional: np.ndarray, at: str, damping_ratio: float, inertia: np.ndarray | None = None
+) -> RigidModel:
     """Return the rigid model of a mode at the interface coordinate u = functional^T q, with functional (N,).
 
-    m = phi^T M phi / (w^T phi)^2, c = w_1^2 m, d = 2 zeta w_1 m. Raises CalibrationError when the mode does not move
+    inertia: (N,) M r of the translation r of every node with the base. m = phi^T M phi / (w^T phi)^2, c = w_1^2 m,
+    d = 2 zeta w_1 m, base mass phi^T M r / w^T phi. Raises CalibrationError when the mode does not move
     the interface coordinate, or has no frequency.
     """
     shape, frequency = modes.shapes[mode], modes.angular_frequencies[mode]
@@ -60,6 +66,7 @@ def rigid_model(modes: Modes, mode: int, functional: np.ndarray, at: str, dampin
         damping_ratio=damping_ratio,
         at=at,
         frequency_hz=float(modes.frequencies_hz[mode]),
+        base_mass=None if inertia is None else float(inertia @ shape) / displacement,
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from vanedamp.files import store
+from vanedamp.files.display import Displayed
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal.matrices import Patch, SystemMatrices, patch_average, unit_direction
 from vanedamp.rom.reduced import NORMAL, ROTATION
@@ -165,8 +166,8 @@ def _normal(matrices: SystemMatrices, facets: str | Sequence[str]) -> np.ndarray
     return normal / length if length > _FLAT else np.zeros(3)
 
 
-@dataclass(frozen=True, eq=False)
-class Interface:
+@dataclass(frozen=True, eq=False, repr=False)
+class Interface(Displayed):
     """k interface coordinates on a structure with N DOFs.
 
     coordinates  their definitions, in order

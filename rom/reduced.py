@@ -16,6 +16,7 @@ import numpy as np
 from scipy import linalg
 
 from vanedamp.files import store
+from vanedamp.files.display import Displayed
 from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom.checks import ReducedModelError, check_definite, shaped, symmetric, unit
 from vanedamp.rom.dense_modes import count_rigid_motions, modal_damping, spectrum
@@ -52,8 +53,8 @@ _SYMMETRIC = ("mass", "damping", "stiffness", "residual_flexibility", "centrifug
 _REQUIRED = ("mass", "damping", "stiffness", "selection", "directions", "base_load")
 
 
-@dataclass(frozen=True, eq=False)
-class ReducedModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class ReducedModel(Displayed):
     """M q'' + C q' + K q = f in n generalised coordinates, of which k functionals are the labelled interface.
 
     mass, damping, stiffness  (n, n) symmetric; M positive definite, K positive semidefinite

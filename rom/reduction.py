@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal, get_args
 
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.bases import craig_bampton, free_interface
 from vanedamp.rom.bases.projection import Factorize, ReductionError, superlu
-from vanedamp.rom.interface import Interface
+from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
 
@@ -17,7 +18,7 @@ BASES: tuple[str, ...] = get_args(Basis)
 
 def reduce(
     matrices: SystemMatrices,
-    interface: Interface,
+    interface: Interface | Sequence[InterfaceCoordinate],
     basis: str = "craig-bampton",
     modes: int = 12,
     factorize: Factorize = superlu,
@@ -25,7 +26,7 @@ def reduce(
     quasi_static: int = 0,
     characteristic: int = 6,
 ) -> ReducedModel:
-    """Return the reduced model of a structure at its interface.
+    """Return the reduced model of a structure at its interface, or at a list of interface coordinates.
 
     basis  "craig-bampton"  constraint modes and fixed-interface modes (Craig and Bampton 1968)
            "rubin"          natural modes and residual attachment modes with their mass (Rubin 1975)
@@ -43,6 +44,8 @@ def reduce(
     do.
     """
     check_basis(basis)
+    if not isinstance(interface, Interface):
+        interface = Interface.on_patches(matrices, interface)
     if basis in ("craig-bampton", "massless"):
         fixed = max(2 * modes, modes + 10) if basis == "massless" else modes
         most = interface.motions.shape[1] - len(interface.labels) - interface.full.size

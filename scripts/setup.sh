@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Everything vanedamp needs, on Debian or Ubuntu: system packages (dolfinx has no wheel), a virtual environment on the
-# system's interpreter, which apt's dolfinx belongs to, the pinned packages of requirements.txt and the project itself.
+# Everything vanedamp needs, on Debian or Ubuntu: system packages, a virtual environment on the system's interpreter, the
+# pinned packages of requirements.txt and the project itself. dolfinx is PyPI's wheel where there is one for that
+# interpreter (x86-64, Python 3.12 and newer), otherwise apt's; DOLFINX=wheel or DOLFINX=apt decides.
 # It installs what is missing and nothing else, so it may run before every command.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -10,15 +11,18 @@ venv=.venv
 stamp=$venv/setup-stamp # names what .venv was made from; written last, so that a killed set-up starts over
 
 system_packages=(
-    # h5py stays apt's: PyPI's carries a second HDF5 library, which breaks Debian 12's dolfinx
-    python3-dolfinx python3-slepc4py python3-scipy python3-h5py
-    python3-venv python3-setuptools python3-wheel
-    # without OpenBLAS a factorisation is six times slower
-    libopenblas0-pthread
+    python3-venv
     # dolfinx compiles forms when they are first used
     gcc libc6-dev
     # gmsh and pyvista, which render without a display but not without these
     libglu1-mesa libgl1 libegl1 libxcursor1 libxft2 libxinerama1 libxfixes3 libxrender1 libfontconfig1
+)
+of_wheel=(python3-dev)
+of_apt=(
+    # h5py stays apt's: PyPI's carries a second HDF5 library, which breaks Debian 12's dolfinx
+    python3-dolfinx python3-slepc4py python3-scipy python3-h5py python3-setuptools python3-wheel
+    # without OpenBLAS a factorisation is six times slower
+    libopenblas0-pthread
 )
 
 say() { echo "setup: $*" >&2; }
@@ -57,23 +61,41 @@ require_python() {
         refuse "$python is $($python -V), and 3.11 or newer is needed."
 }
 
-install_system_packages() {
-    local package
-    missing=()
-    for package in "${system_packages[@]}"; do
-        installed "$package" || missing+=("$package")
-    done
-    if [ ${#missing[@]} = 0 ]; then
-        require_python
-        return
-    fi
-    say "installing system packages: ${missing[*]}"
+# Refresh apt's lists, and install an interpreter where there is none.
+prepare_apt() {
+    missing=("$@")
+    say "installing system packages: $*"
     as_root true # ends here when sudo is refused
     quietly dpkg --configure -a || true # finishes what an earlier installation left half done
     apt_get update || say "apt-get update failed; going on with the package lists that are there"
     [ -x $python ] || apt_get install -y --no-install-recommends python3
+}
+
+# Whether dolfinx is PyPI's wheel or apt's.
+choose_dolfinx() {
+    case ${DOLFINX:-} in
+        wheel | apt) dolfinx=$DOLFINX ;;
+        "") dolfinx=apt
+            [ "$(uname -m)" != x86_64 ] || ! $python -c 'import sys; sys.exit(sys.version_info < (3, 12))' ||
+                dolfinx=wheel ;;
+        *) say "DOLFINX: expected wheel or apt, not $DOLFINX"; exit 2 ;;
+    esac
+}
+
+install_system_packages() {
+    local package others
+    missing=()
+    [ -x $python ] || prepare_apt python3
     require_python
-    apt-get --simulate install python3-dolfinx >/dev/null 2>&1 || refuse "apt has no python3-dolfinx to install here."
+    choose_dolfinx
+    declare -n others=of_$dolfinx
+    for package in "${system_packages[@]}" "${others[@]}"; do
+        installed "$package" || missing+=("$package")
+    done
+    [ ${#missing[@]} -gt 0 ] || return 0
+    prepare_apt "${missing[@]}"
+    [ $dolfinx = wheel ] || apt-get --simulate install python3-dolfinx >/dev/null 2>&1 ||
+        refuse "apt has no python3-dolfinx to install here."
     apt_get install -y --no-install-recommends "${missing[@]}"
 }
 
@@ -90,7 +112,7 @@ END
 
 up_to_date() { finished && [ "$(cat $stamp)" = "$wanted" ]; }
 
-wanted=$({ pwd && cat scripts/setup.sh requirements.txt pyproject.toml; } | cksum)
+wanted=$({ pwd && echo "${DOLFINX:-}" && cat scripts/setup.sh requirements.txt pyproject.toml; } | cksum)
 up_to_date && exit 0
 
 command -v apt-get >/dev/null || refuse "there is no apt-get here."
@@ -99,16 +121,22 @@ flock --nonblock 9 || { say "waiting for another set-up to end" && flock 9; }
 up_to_date && exit 0
 
 install_system_packages
-finished || $python -m venv --clear --system-site-packages $venv
+finished || $python -m venv --clear $([ $dolfinx = wheel ] || echo --system-site-packages) $venv
 rm -f $stamp
 say "installing Python packages into $venv"
-# --no-deps: requirements.txt is complete, and dependencies that apt provides under other names stay apt's
-$venv/bin/pip install --quiet --disable-pip-version-check --no-deps -r requirements.txt
-$venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+pip() { $venv/bin/pip install --quiet --disable-pip-version-check "$@"; }
+if [ $dolfinx = wheel ]; then
+    pip --constraint requirements.txt -e ".[fem,exchange,nastran,cluster,peers,dev]"
+else
+    # --no-deps: requirements.txt is complete, and dependencies that apt provides under other names stay apt's
+    pip --no-deps -r requirements.txt
+    pip --no-deps --no-build-isolation -e .
+fi
 echo "$wanted" >$stamp
 $venv/bin/python - >&2 <<'END'
 import platform
 
+import vanedamp.modal.stack  # noqa: F401
 import dolfinx
 import numpy
 from petsc4py import PETSc

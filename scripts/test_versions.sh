@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # The tests of finite elements and reduction on other releases of dolfinx: clean Debian root folders, set up by
-# scripts/setup.sh as on a fresh machine. As root, with debootstrap; some 4 GB a release.
+# scripts/setup.sh as on a fresh machine, with PyPI's wheel of dolfinx or apt's. As root, with debootstrap; some 4 GB each.
 #
-#     scripts/test_versions.sh [trixie] [sid] [TEST ...]      default: both releases, all tests of modal/ and rom/
+#     scripts/test_versions.sh [trixie-wheel] [trixie-apt] [sid-apt] [TEST ...]
 #
+# Default: these three, and all tests of modal/ and rom/.
 # The folders stay in $VERSIONS (/var/tmp/vanedamp-versions), so that a second call takes the tests' time alone. Packages
 # come from where this machine's own come from, or from $MIRROR.
 set -euo pipefail
@@ -45,7 +46,7 @@ inside() {
         mount -t proc proc "$root/proc"
         mount --rbind /dev "$root/dev"
         mount --rbind /sys "$root/sys"
-        exec env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 OMP_NUM_THREADS="${OMP_NUM_THREADS:-}" \
+        exec env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" \
             "${network[@]}" \
             OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 DEBIAN_FRONTEND=noninteractive \
             chroot "$root" "$@"' -- "$root" "$@"
@@ -58,7 +59,7 @@ prepare() {
         rm -rf "$root"
         mkdir -p "$root"
         # the date on an archive's mirror may have passed
-        debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" $mirror >"$root.log" 2>&1 ||
+        debootstrap --variant=minbase --include=ca-certificates "${suite%-*}" "$root" $mirror >"$root.log" 2>&1 ||
             { say "$suite: debootstrap failed, see $root.log"; return 1; }
         echo 'Acquire::Check-Valid-Until "false";' >"$root/etc/apt/apt.conf.d/10archive"
         touch "$root/bootstrapped"
@@ -71,18 +72,18 @@ prepare() {
 run() {
     local suite=$1 root=$home/$1
     prepare "$suite" "$root" || return 1
-    inside "$root" /vanedamp/scripts/setup.sh || { say "$suite: the set-up failed"; return 1; }
+    inside "$root" env DOLFINX="${suite#*-}" /vanedamp/scripts/setup.sh || { say "$suite: the set-up failed"; return 1; }
     inside "$root" bash -c 'cd /vanedamp && exec .venv/bin/python -m pytest -q "$@"' -- "${tests[@]}"
 }
 
 suites=() tests=()
 for word in "$@"; do
     case $word in
-        trixie | sid | forky) suites+=("$word") ;;
+        trixie-wheel | trixie-apt | sid-wheel | sid-apt) suites+=("$word") ;;
         *) tests+=("$word") ;;
     esac
 done
-[ ${#suites[@]} -gt 0 ] || suites=(trixie sid)
+[ ${#suites[@]} -gt 0 ] || suites=(trixie-wheel trixie-apt sid-apt)
 [ ${#tests[@]} -gt 0 ] || tests=(tests/test_modal_*.py tests/test_rom_*.py)
 
 mirror=${MIRROR:-$(archive)}

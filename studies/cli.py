@@ -14,11 +14,24 @@ from vanedamp.studies.interrupts import swallowed_interrupts_again
 
 BAD_INPUT = 2
 _INTERRUPTED = 130
-#: packages that come with the system, and how to get them
-_SYSTEM = ("dolfinx", "petsc4py", "slepc4py", "ufl", "basix", "ffcx", "mpi4py")
-_FINITE_ELEMENTS = "apt install python3-dolfinx, or conda's environment.yml (CONTRIBUTING.md)"
+#: packages of the finite elements, and how to get them
+_SYSTEM = ("dolfinx", "petsc4py", "slepc4py", "ufl", "basix", "ffcx", "mpi4py", "cffi")
+_FINITE_ELEMENTS = (
+    "pip install 'vanedamp[fem]' (Linux on x86-64, Python 3.12 or newer), apt install python3-dolfinx, or "
+    "conda's environment.yml (CONTRIBUTING.md)"
+)
 #: names of packages that are not those of their modules
 _ON_PYPI = {"vtkmodules": "vtk", "yaml": "pyyaml"}
+
+
+class _Version(argparse.Action):
+    """Print the version, which takes a while to look up."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from importlib.metadata import version
+
+        print(f"vanedamp {version('vanedamp')}")
+        parser.exit()
 
 
 class _Parser(argparse.ArgumentParser):
@@ -105,6 +118,7 @@ def _parser(name: str | None) -> argparse.ArgumentParser:
         prog="vanedamp", description="Vibration damping of vane clusters by loose bodies in cavities: from a mesh to "
         "forced responses with impacts."
     )  # fmt: skip
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
     places = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for other, command in commands.items():
         summary = command.SUMMARY

@@ -1,4 +1,4 @@
-"""The demonstration: the shipped mesh through the whole pipeline, leaving every file of it."""
+"""The demonstration: the shipped mesh through the whole pipeline, or its rigid model; every file of it stays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.store import load
-from vanedamp.studies.paper.figure_file import Effort
+from vanedamp.studies.paper.figure_file import Effort, Structure
 from vanedamp.studies.paper.runner import MODES, Session, prepare, print_claims, study
 from vanedamp.studies.report.claims import CLAIMS
 from vanedamp.studies.report.forced_response import forced_responses
@@ -19,6 +19,8 @@ from vanedamp.studies.workers import WorkerPool, available_cores
 
 #: figures of the paper, with fewer frequencies and periods than `vanedamp paper` takes
 FIGURES = ("fig9", "fig10", "fig12")
+#: those that need no reduced model
+RIGID_FIGURES = ("fig9", "fig10")
 EFFORT = Effort(points=61, periods=1500, transient=700)
 _COMMANDS = """\
 The same, step by step:
@@ -31,20 +33,34 @@ The same, step by step:
 All figures of the paper: vanedamp paper -o paper"""
 
 
-def run_demo(folder: Path, workers: int | None = None) -> Path:
-    """Make modes, rigid model, reduction, three figures of the paper and the report. Returns the report's path."""
+_RIGID_COMMANDS = """\
+The same, step by step:
+    cd {folder}
+    vanedamp sweep fig9.toml -o fig9.h5
+    vanedamp report . -o report.html
+With finite elements: vanedamp demo"""
+
+
+def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> Path:
+    """Make modes, rigid model, reduction, three figures of the paper and the report. Returns the report's path.
+
+    rigid: take the shipped rigid model and leave out what needs finite elements.
+    """
     started = time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)
-    results = [folder / "modes.h5", folder / "rom.h5"]
+    results = [] if rigid else [folder / "modes.h5", folder / "rom.h5"]
     with WorkerPool(workers or available_cores()) as pool:
         # compiling the engine takes as long as the finite elements: side by side, and once for all workers
         compiled = pool.submit(warm_up)
-        with _stage("mesh, modes, rigid model, reduced model"):
-            structure = prepare(folder)
+        if rigid:
+            structure = Structure.shipped()
+        else:
+            with _stage("mesh, modes, rigid model, reduced model"):
+                structure = prepare(folder)
         with _stage("engine compiled, or found compiled"):
             compiled.result()
         session = Session(structure, folder, pool, EFFORT)
-        for name in FIGURES:
+        for name in RIGID_FIGURES if rigid else FIGURES:
             begun = time.perf_counter()
             figure = study(name, session)
             print_claims(figure, time.perf_counter() - begun)
@@ -54,8 +70,9 @@ def run_demo(folder: Path, workers: int | None = None) -> Path:
 
     with _stage("report"):
         write_report(collect(results), folder / "report.html")
-        _summary(folder)
-    print(_COMMANDS.format(folder=folder, modes=MODES))
+        if not rigid:
+            _summary(folder)
+    print((_RIGID_COMMANDS if rigid else _COMMANDS).format(folder=folder, modes=MODES))
     print(f"{folder / 'report.html'}: done in {time.perf_counter() - started:.0f} s")
     return folder / "report.html"
 

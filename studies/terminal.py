@@ -1,16 +1,24 @@
-"""Progress bars on a terminal."""
+"""Progress of long work: a bar on a terminal, a line now and then in a log."""
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+#: seconds between two lines in a log
+_PATIENCE = 30.0
 
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a progress bar on standard error with rate and time left, on a terminal only."""
+    """Show progress on standard error, with rate and time left: a bar on a terminal, elsewhere a line every 30 s."""
     from tqdm import tqdm
 
+    if not sys.stderr.isatty():
+        yield _Lines(title)
+        return
     with tqdm(desc=title, disable=None, leave=False) as bar:
 
         def show(done: int, total: int) -> None:
@@ -20,3 +28,22 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
             bar.update(done - bar.n)
 
         yield show
+
+
+class _Lines:
+    """Lines in a log: how much is done, at which rate, and the time left."""
+
+    def __init__(self, title: str) -> None:
+        self.title, self.started, self.said = title, time.monotonic(), time.monotonic()
+        self.before: int | None = None
+
+    def __call__(self, done: int, total: int) -> None:
+        if self.before is None:
+            self.before = done  # what was done before says nothing of the rate
+        now = time.monotonic()
+        if now - self.said < _PATIENCE or done == total:
+            return
+        self.said = now
+        rate = (done - self.before) / (now - self.started)
+        left = f", {rate:.3g} a second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
+        print(f"vanedamp: {self.title}: {done} of {total}{left}", file=sys.stderr, flush=True)

@@ -1,5 +1,8 @@
 """Expensive records and working directories that several test files share."""
 
+import vanedamp.modal.stack  # noqa: F401
+
+# isort: split
 import pytest
 
 

@@ -93,8 +93,8 @@ def driven(monkeypatch):
     """Numbers of driven modes in the subsystems that runs have met."""
     found, fill = [], flow._fill
 
-    def watched(flows, rows, s, closed):
-        fill(flows, rows, s, closed)
+    def watched(flows, system, s, subsystem):
+        fill(flows, system, s, subsystem)
         found.append(int(np.ptp(flows.driven[s])))
 
     monkeypatch.setattr(flow, "_fill", watched)

@@ -7,6 +7,7 @@ import pytest
 
 from vanedamp import InputError, ReducedModel, Scene, Sweep, orbits, simulate, sweep
 from vanedamp.coupling.model_order.choices import with_choices
+from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.structures import Rom
@@ -74,7 +75,7 @@ def turning_model(tmp_path):
     model = ReducedModel.from_matrices(
         np.eye(6) + 0.1 * factor @ factor.T, 1e3 * (factor @ factor.T + np.eye(6)), rows, damping_ratio=0.01,
         centrifugal_stiffness=added @ added.T, rotation_axis=[0.0, 0.0, 1.0], rotation_point=[0.0, 0.0, 0.0],
-        greatest_speed=100.0, directions=dict.fromkeys(rows, [0.0, 0.0, 1.0]), positions=np.full((3, 3), 0.01),
+        greatest_speed=100.0, directions={row: [0.0, 0.0, 1.0] for row in rows}, positions=np.full((3, 3), 0.01),
     )  # fmt: skip
     model.save(tmp_path / "turning.h5")
     return model, str(tmp_path / "turning.h5")
@@ -234,25 +235,59 @@ def test_a_prescribed_structure_may_turn():
     assert simulate(driven).frequency == pytest.approx(20.0, rel=1e-14)
 
 
-def test_a_branch_of_orbits_over_the_speed(turning_model):
+def test_a_branch_of_orbits_over_the_speed():
     """Without contact its amplitude is that of the linear curve along the engine order, at one level."""
-    table = {"parameter": "rotation.speed", "from": 4.6, "to": 5.4, "start": "linear"}
+    table = {"parameter": "rotation.speed", "from": 4.95, "to": 5.15, "start": "linear", "step": 0.1, "max_step": 0.2}
     apart = scene(
         excitation={"engine_order": 4, "resonance_amplitude": 1e-3}, orbit=table,
         cavity=[{"name": "c", "gap": 1.0, "radius": 1.0}],
         damper=[{"cavity": "c", "mass": 1e-9, "friction": 1e9, "restitution": 0.5}],
     )  # fmt: skip
     (branch,) = orbits(apart).branches
-    assert branch.parameter[0] == 4.6 and branch.parameter[-1] == pytest.approx(5.4)
+    assert branch.parameter[0] == 4.95 and branch.parameter[-1] == pytest.approx(5.15)
     k, omega = STIFFNESS + branch.parameter**2 * ADDED, 4 * branch.parameter
     curve = 1 / np.abs(k - MASS * omega**2 + 2j * 0.01 * np.sqrt(k * MASS) * omega)
     crossing = STIFFNESS / (MASS * 4**2 - ADDED)
     force = 1e-3 * 2 * 0.01 * (STIFFNESS + crossing * ADDED)
     assert branch.amplitude_max == pytest.approx(force * curve, rel=1e-3)  # the level errs by the damping's square
-    with pytest.raises(InputError, match=r"^orbit\.parameter: rotation\.speed turns a reduced model's modes"):
-        orbits(
-            reduced_sweep(turning_model[1], [10.0]).replace({"sweep": {}, "orbit": table | {"from": 10.0, "to": 11.0}})
-        )
+
+
+def test_a_branch_of_orbits_over_the_speed_of_a_reduced_model(turning_model):
+    """Its modes turn on the way: without contact the amplitude is that of the linear curve at every speed."""
+    base = reduced_sweep(turning_model[1], [10.0]).replace({"sweep": {}, "cavity.c.gap": 1.0, "damper.mass": 1e-9})
+    base = base.replace({
+        "structure": {"model": "rom", "file": turning_model[1]}, "damper.friction": 1e9,
+        "excitation": {"engine_order": 0.5, "force": 1.0, "at": "tip"},
+    })  # fmt: skip
+    table = {"parameter": "rotation.speed", "from": 20.0, "to": 60.0, "start": "linear", "step": 0.2, "max_step": 1.0}
+    (branch,) = orbits(base.replace({"orbit": table})).branches
+    for speed, amplitude in zip(branch.parameter, branch.amplitude_max, strict=True):
+        turned = base.replace({"rotation.speed": speed})
+        linear = linear_responses(turned)[0].amplitude(np.array([turned.frequency]))[0]
+        assert amplitude == pytest.approx(linear, rel=1e-6)
+    assert branch.parameter[-1] == pytest.approx(60.0)
+
+
+def test_states_of_a_branch_are_those_of_runs_at_its_speeds(turning_model):
+    """A passage with impacts ends where the engine does, and its derivative is that of differences."""
+    base = reduced_sweep(turning_model[1], [10.0]).replace({"sweep": {}, "rotation.speed": 10.0, "cavity.c.gap": 2e-5})
+    walked = period_map(base, "rotation.speed")
+    start = walked.state_of(simulate(base).final)
+    there = walked.at(14.0)
+    assert there.state_of(simulate(base).final) == pytest.approx(start, rel=1e-9, abs=1e-12)
+    short = there.scene.replace({"time": {"periods": 1, "transient": 0}})
+    final = simulate(short, start=there.restart_of(start)).final
+    passage = there(start)
+    assert any(name.startswith("impact") for name in passage.sequence)
+    assert there.state_of(final) == pytest.approx(passage.state, rel=1e-9, abs=1e-9 * np.abs(passage.state).max())
+    # one-mode steps, small beside the motion, keep the sequence of events
+    step = 1e-6 * np.abs(start[:3]).max()
+    differences = [
+        (there(start + step * unit).state - there(start - step * unit).state) / (2 * step)
+        for unit in np.eye(len(start))[:3]
+    ]
+    known = passage.derivative[:, :3]
+    assert np.transpose(differences) == pytest.approx(known, rel=1e-3, abs=1e-3 * np.abs(known).max())
 
 
 def test_speeds_that_mean_nothing_are_refused():

@@ -24,7 +24,7 @@ from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import _parser, main
 from vanedamp.studies.demo import EFFORT
 from vanedamp.studies.optimisation.study import Study
-from vanedamp.studies.paper.figure_file import PaperFigure, Structure, write_scene
+from vanedamp.studies.paper.figure_file import PaperFigure, Structure
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 SHELL = ("vanedamp", "mpirun", "cd", "make", ".venv/bin/python", ".venv/bin/pip")
@@ -92,7 +92,16 @@ def completed(tables: dict, folder: Path) -> dict:
     """Tables of an example with those that it leaves out."""
     if "matrices" in tables:
         return tables
-    scene = {"structure", "excitation", "sweep", "continuation", "optimise", "orbit"} & tables.keys()
+    scene = {
+        "structure",
+        "excitation",
+        "sweep",
+        "continuation",
+        "optimise",
+        "orbit",
+        "ramp",
+        "ring_down",
+    } & tables.keys()
     base = tomllib.loads(OSCILLATOR if scene else CLUSTER)
     if "structure" in tables:
         ReducedModel.from_matrices(np.eye(2), np.diag([2.26e8, 1e10]), {"tip": [1.0, 0.5]}, damping_ratio=0.01).save(
@@ -124,6 +133,10 @@ def test_files_are_read(example, tmp_path):
         assert Study.load(path).table.variables.bodies == (1, 4)
     elif "orbit" in tables:
         assert Scene.load(path).orbit is not None
+    elif "ramp" in tables:
+        assert Scene.load(path).ramp is not None
+    elif "ring_down" in tables:
+        assert Scene.load(path).ring_down is not None
     elif {"structure", "excitation", "sweep", "continuation"} & tables.keys():
         scene = Scene.load(path)
         axes, points = scene.sweep_points()
@@ -168,13 +181,22 @@ def test_program_of_the_readme(tmp_path):
     structure = Structure(0.157, 0.157 * (2 * np.pi * 2412.0) ** 2, 0.002, 2412.0, 70e-6, Path("rom.h5"))
     scene = PaperFigure.load("fig10", structure, EFFORT).scenes["single"]
     (tmp_path / "out").mkdir()
-    write_scene(scene, tmp_path / "out" / "fig10_single.toml")
+    scene.save(tmp_path / "out" / "fig10_single.toml")
     status, *printed = run(program("README.md", "simulate"), tmp_path).replace("[", "").replace("]", "").split()
     amplitude, attached, *reductions = map(float, printed)
     response = simulate(scene.replace({"excitation.frequency": 2382.0, "cavity.c1.gap": 2e-5}))
     assert status == response.status
     assert (amplitude, attached) == pytest.approx((response.amplitude_mean, response.attached_mass_fraction))
     assert len(reductions) == 3 and max(reductions) < 1.0
+
+
+def test_program_of_noise(tmp_path):
+    """It prints the figures of the text and draws the picture of the page."""
+    (tmp_path / "noise.toml").write_text((ROOT / "docs" / "examples" / "noise.toml").read_text())
+    text = "import matplotlib\n\nmatplotlib.use('Agg')\n" + program("service_loads.md", "multisine.png")
+    rigid, loose = re.findall(r": ([\d.]+) µm rms", run(text, tmp_path))
+    assert (float(rigid), float(loose)) == pytest.approx((17.2, 5.5), abs=0.3)
+    assert (tmp_path / "multisine.png").stat().st_size > 0
 
 
 def test_program_of_mpi_ranks(tmp_path):

@@ -103,20 +103,22 @@ def test_a_slider_meets_the_means(tmp_path):
     np.testing.assert_allclose(system.J[:2], flat.J[flat.friction_rows :], atol=1e-14)
 
 
-def test_gravity_and_base_across_an_inclined_cavity(tmp_path):
+@pytest.mark.parametrize("given", [{}, {"base_direction": [0.0, 3.0, 0.0]}], ids=["of the label", "its own"])
+def test_gravity_and_base_across_an_inclined_cavity(tmp_path, given):
     """A block that touches nothing falls to the ceiling's side, and lags behind a base that moves across, too."""
     file = rigid_cavity(tmp_path / "rom.h5", INCLINED)
     model = ReducedModel.load(file)
-    # along y of the space: the label of the excitation gives the base's direction
+    # along y of the space: unless it has its own, the label of the excitation gives the base's direction
     directions = np.array(model.directions)
-    directions[model.interface.index("all")] = [0.0, 1.0, 0.0]
+    directions[model.interface.index("all")] = [1.0, 0.0, 0.0] if given else [0.0, 1.0, 0.0]
     replace(model, directions=directions, stiffness=1e12 * np.array(model.mass)).save(file)
     gravity, level, frequency = np.array([1.0, 2.0, 3.0]), 0.4, 2.0
     block = {
         "cavity": "c1", "shape": "block", "length": LENGTH, "height": HEIGHT, "mass": 0.05, "lift": 5.0,
     }  # fmt: skip
+    base = {"frequency": frequency, "base_acceleration": level, "at": "all"}
     scene = cavity_scene(
-        file, FOUR, "all", excitation={"frequency": frequency, "base_acceleration": level, "at": "all"}, damper=[block],
+        file, FOUR, excitation=base | given, damper=[block],
         gravity={"acceleration": 0.2, "direction": gravity.tolist()},
         cavity=[{"name": "c1", "gap": 20.0, "play": 10.0} | FOUR],
     )  # fmt: skip

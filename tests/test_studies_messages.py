@@ -1,5 +1,7 @@
 """One line for what is wrong: in files that look right, and for work that nobody would wait for."""
 
+from importlib.metadata import version
+
 import pytest
 
 from tests.tools.input_files import BLOCK, SCENE, changed
@@ -8,6 +10,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.meshes.benchmarks import Block
 from vanedamp.meshes.parameters import ParameterError, VaneCluster
 from vanedamp.studies.cli import BAD_INPUT, main
+from vanedamp.studies.terminal import progress
 
 RANGE = '"excitation.frequency" = {start = 15.4, stop = 16.2, num = 4}'
 
@@ -169,3 +172,27 @@ def test_a_run_in_blocks_is_the_same(monkeypatch, folder):
         response = simulate(scene)
         found.append((response.amplitude_mean, response.amplitude_rms, response.events, response.energy))
     assert found[0] == found[1]
+
+
+def test_long_work_says_in_a_log_how_far_it_is(capsys, monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("vanedamp.studies.terminal.time.monotonic", lambda: now[0])
+    with progress("sweep") as report:
+        for done in range(100, 401, 100):  # the first hundred was there before
+            report(done, 400)
+            now[0] += 20.0
+    assert capsys.readouterr().err == "vanedamp: sweep: 300 of 400, 5 a second, 0.333 min left\n"
+
+
+def test_figures_of_a_run_have_units(folder, capsys):
+    assert main(["run", "scene.toml"]) == 0
+    lines = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert lines["amplitude_mean"].endswith(" m") and lines["frequency"].endswith(" Hz")
+    assert lines["status"] == "ok"
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"vanedamp {version('vanedamp')}\n"

@@ -28,7 +28,6 @@ from vanedamp.studies.paper.figure_file import (
     Structure,
     linear_peaks,
     with_length,
-    write_scene,
 )
 from vanedamp.studies.paper.plots import blocks_picture
 from vanedamp.studies.paper.runner import Session, run_paper, study
@@ -118,7 +117,7 @@ def test_unknown_unit_is_refused():
 
 def test_written_scene_is_the_scene(tmp_path):
     scene = PaperFigure.load("fig10", STRUCTURE).scenes["shared"]
-    write_scene(scene, tmp_path / "scene.toml")
+    scene.save(tmp_path / "scene.toml")
     assert Scene.load(tmp_path / "scene.toml") == scene
 
 

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from vanedamp.coupling.sweep.record import Sweep
     from vanedamp.coupling.sweep.steady_states import steady_states
     from vanedamp.coupling.sweep.sweep import sweep
+    from vanedamp.coupling.transients.ramp import ramp
+    from vanedamp.coupling.transients.ramp_record import Ramp
+    from vanedamp.coupling.transients.ring_down import ring_down
+    from vanedamp.coupling.transients.ring_down_record import RingDown
     from vanedamp.files.errors import VanedampError
     from vanedamp.files.toml_input import InputError
     from vanedamp.modal.campbell import Campbell, campbell
@@ -33,9 +37,9 @@ if TYPE_CHECKING:
     from vanedamp.studies.case.tables import Case
 
 __all__ = [
-    "Branches", "Campbell", "Case", "InputError", "Interface", "Modes", "ReducedModel", "Response", "RigidModel",
-    "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "campbell", "find_orbit", "orbits", "reduce",
-    "rigid_model", "simulate", "solve_modes", "steady_states", "sweep",
+    "Branches", "Campbell", "Case", "InputError", "Interface", "Modes", "Ramp", "ReducedModel", "Response",
+    "RigidModel", "RingDown", "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "campbell", "find_orbit",
+    "orbits", "ramp", "reduce", "rigid_model", "ring_down", "simulate", "solve_modes", "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -46,9 +50,11 @@ _HOMES = {
     "InputError": "files.toml_input",
     "Interface": "rom.interface",
     "Modes": "modal.eigen",
+    "Ramp": "coupling.transients.ramp_record",
     "ReducedModel": "rom.reduced",
     "Response": "coupling.response.response",
     "RigidModel": "modal.rigid_model",
+    "RingDown": "coupling.transients.ring_down_record",
     "Scene": "coupling.scene.scene",
     "Status": "coupling.response.response",
     "Sweep": "coupling.sweep.sweep",
@@ -57,8 +63,10 @@ _HOMES = {
     "campbell": "modal.campbell",
     "find_orbit": "coupling.orbits.orbits",
     "orbits": "coupling.orbits.orbits",
+    "ramp": "coupling.transients.ramp",
     "reduce": "rom.reduction",
     "rigid_model": "modal.rigid_model",
+    "ring_down": "coupling.transients.ring_down",
     "simulate": "coupling.engine",
     "solve_modes": "modal.eigen",
     "steady_states": "coupling.sweep.steady_states",

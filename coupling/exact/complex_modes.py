@@ -101,7 +101,9 @@ def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> tuple[np.ndarra
     (critical damping) or do not satisfy the equation.
     """
     q = len(frequency)
-    number, block = connected_components(damping != 0, directed=False) if q else (0, np.zeros(0, int))
+    number, block = q, np.arange(q)
+    if np.count_nonzero(damping) > np.count_nonzero(np.diagonal(damping)):  # the library takes its time
+        number, block = connected_components(damping != 0, directed=False)
     values, shapes, left = np.zeros(2 * q, complex), np.zeros((2 * q, q), complex), np.zeros((2 * q, 2 * q), complex)
     done = 0
     single = np.flatnonzero(np.bincount(block, minlength=number)[block] == 1)

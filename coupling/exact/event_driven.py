@@ -9,7 +9,7 @@ import numpy as np
 from vanedamp.coupling.exact import automaton
 from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes
 from vanedamp.coupling.exact.state import new_event_functions, new_scratch, new_state
-from vanedamp.coupling.exact.subsystem_assembly import add_flow, empty_flows
+from vanedamp.coupling.exact.subsystem_assembly import Subsystem, add_flow, empty_flows
 from vanedamp.coupling.numerics.codes import (
     AWAKE,
     DONE,
@@ -49,10 +49,18 @@ class _Log:
 
 
 class EngineRun:
-    """The mutable state of one run and the subsystems it has met."""
+    """The mutable state of one run and the subsystems it has met.
 
-    def __init__(self, system: System, initial: InitialMotion, records: Records, events: bool, max_events: int) -> None:
+    known: subsystems that earlier runs have met, of this system or of one that differs by its frequency only; new ones
+    are added.
+    """
+
+    def __init__(
+        self, system: System, initial: InitialMotion, records: Records, events: bool, max_events: int,
+        known: dict[bytes, Subsystem] | None = None,
+    ) -> None:  # fmt: skip
         self.system, self.records, self.max_events = system, records, max_events
+        self.known = {} if known is None else known
         self.begun, self.ended = False, False
         self.flows = empty_flows(system)
         self.log = _Log(events, [])
@@ -67,10 +75,11 @@ class EngineRun:
         Raises InputError for a structure that is critically damped without any contact.
         """
         self.begun, modes = True, self.system.of_structure
-        try:
-            complex_modes(np.sqrt(modes.stiffness), modes.damping)
-        except IllConditioned as error:
-            raise InputError(f"structure: {error}; change its damping slightly") from None
+        if not self.known:
+            try:
+                complex_modes(np.sqrt(modes.stiffness), modes.damping)
+            except IllConditioned as error:
+                raise InputError(f"structure: {error}; change its damping slightly") from None
         if not automaton.begin(self.system, self.state, self.records, self.scratch):
             return UNDECIDED
         return self.advance(0, max_events)
@@ -94,7 +103,7 @@ class EngineRun:
     def _add_flow(self) -> int:
         """Add the subsystem that the state calls for. Return DONE or ILL_CONDITIONED."""
         try:
-            self.flows = add_flow(self.flows, self.system, self.state.active_set)
+            self.flows = add_flow(self.flows, self.system, self.state.active_set, self.known)
         except IllConditioned:
             return ILL_CONDITIONED
         return DONE

@@ -152,11 +152,35 @@ def empty_flows(system: System, capacity: int = 4) -> Flows:
     )
 
 
-def add_flow(flows: Flows, system: System, closed: np.ndarray) -> Flows:
+class Subsystem(NamedTuple):
+    """A linear subsystem before anything excites it: no frequency of the excitation changes it.
+
+    Coordinates z = (p, xi), q of them free: bodies are at x = carrier p + xi, free ones with parabolas added.
+    """
+
+    rigid: np.ndarray  # closed rows without springs
+    sprung: np.ndarray  # closed rows with springs
+    carrier: np.ndarray  # (b, n) functional of each body that moves with the structure
+    held: np.ndarray  # (b,) whether rigid rows hold a body to the structure
+    free: np.ndarray  # (b,) whether a body moves freely
+    cluster: np.ndarray  # (b,) number of the bodies that move freely together
+    functional: np.ndarray  # (r, n) of p in each row
+    law: np.ndarray  # (closed springs, n + b) functional of their elongation
+    kept: np.ndarray  # (n + b, n) constant z that constraints inside the structure keep; no rows without any
+    real: RealModes
+    modes: _Modes
+    lift: np.ndarray  # (n + b, q): z = lift times the amplitudes of the real modes
+    drop: np.ndarray  # (q, n + b): and these from z
+    loads: np.ndarray  # (q, n + b): loads on (p, x) as loads on them
+    static: np.ndarray  # (n + b, n + b): z under constant loads on (p, x)
+
+
+def add_flow(flows: Flows, system: System, closed: np.ndarray, known: dict[bytes, Subsystem] | None = None) -> Flows:
     """Return the stack with the subsystem of the closed rows (r,) in its first free place.
 
-    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins again.
-    Raises IllConditioned (exact.complex_modes) for one that doubles cannot resolve.
+    known: subsystems of this system by their closed rows, or of one that differs by its frequency only, to which new
+    ones are added. Many bodies close in more combinations than memory holds: a stack that has grown to ROOM begins
+    again. Raises IllConditioned (exact.complex_modes) for one that doubles cannot resolve.
     """
     free = np.flatnonzero(flows.modes == 0)
     if len(free) == 0:
@@ -167,24 +191,27 @@ def add_flow(flows: Flows, system: System, closed: np.ndarray) -> Flows:
             more = empty_flows(system, size)
             flows = Flows._make(np.concatenate(pair) for pair in zip(flows, more, strict=True))
         free = np.flatnonzero(flows.modes == 0)
-    place = free[0]
-    _fill(flows, system, place, np.flatnonzero(closed))
+    place, key = free[0], closed.tobytes()
+    subsystem = None if known is None else known.get(key)
+    if subsystem is None:
+        subsystem = _subsystem(system, np.flatnonzero(closed))
+        if known is not None:
+            known[key] = subsystem
+    _fill(flows, system, place, subsystem)
     flows.active_set[place] = closed
     return flows
 
 
-def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
-    n, b, e = system.modes, system.bodies, len(system.frequency)
+def _subsystem(system: System, closed: np.ndarray) -> Subsystem:
+    n, b = system.modes, system.bodies
     rigid, sprung = closed[np.isinf(system.spring[closed])], closed[np.isfinite(system.spring[closed])]
     carrier, cluster, inner = _attachment(system, rigid)
     springs = _sprung_bodies(system, cluster, sprung)
     carrier[springs.anchored] = system.floor[springs.anchored]
-    free = (cluster >= 0) & ~springs.anchored
-    # coordinates z = (p, xi): bodies are at x = carrier p + xi, free ones with parabolas added; z = lift eta
     basis = null_space(inner) if len(inner) else np.eye(n)
     lift, drop = block_diag(basis, springs.lift), block_diag(basis.T, springs.drop)
     spread = np.vstack([np.hstack([np.eye(n), carrier.T]), np.hstack([np.zeros((b, n)), np.eye(b)])])
-    loads = lift.T @ spread  # loads on (p, x) become loads on eta
+    loads = lift.T @ spread  # loads on (p, x) become loads on eta, z = lift eta
     functional = _functional(system, carrier)
     law = np.hstack([functional[sprung], system.of_bodies.J[sprung]])
     elastic = (
@@ -201,18 +228,32 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
         real = real_modes(np.sqrt(np.r_[np.ones(n), system.of_bodies.mass])[:, None] * loads.T, elastic @ lift, loss)
     # from here on eta are the amplitudes of the real modes
     lift, drop, loads = lift @ real.shape, real.project @ drop, real.shape.T @ loads
-    damping, stiffness = real.damping, np.diag(real.frequency**2)
-    modes, harmonic, driver, growth = _excite(
-        system, damping, stiffness, loads @ system.load.T, complex_modes(real.frequency, damping)
-    )
+    flexibility, kept = lift / real.frequency**2, np.zeros((0, n))
+    if len(inner):
+        kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
+        kept -= flexibility @ (elastic @ lift).T @ elastic @ kept
+    return Subsystem(
+        rigid=rigid, sprung=sprung, carrier=carrier, held=cluster < 0, free=(cluster >= 0) & ~springs.anchored,
+        cluster=springs.cluster, functional=functional, law=law, kept=kept, real=real,
+        modes=complex_modes(real.frequency, real.damping), lift=lift, drop=drop, loads=loads,
+        static=flexibility @ loads,
+    )  # fmt: skip
+
+
+def _fill(flows: Flows, system: System, s: int, subsystem: Subsystem) -> None:
+    n, b, e = system.modes, system.bodies, len(system.frequency)
+    rigid, sprung, carrier, functional = subsystem.rigid, subsystem.sprung, subsystem.carrier, subsystem.functional
+    lift, drop, loads, free = subsystem.lift, subsystem.drop, subsystem.loads, subsystem.free
+    damping, stiffness = subsystem.real.damping, np.diag(subsystem.real.frequency**2)
+    modes, harmonic, driver, growth = _excite(system, damping, stiffness, loads @ system.load.T, subsystem.modes)
     eigenvalue, shape, project = _one_of_each_pair(*modes)
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
     felt = np.abs(np.vstack([functional, system.of_structure.response]))
-    _check_split(system, felt.max(axis=0), law, sprung, shape, project)
-    flexibility = lift / real.frequency**2
-    _check_rest(system, felt, flexibility @ loads)
+    carried = np.abs(carrier).max(axis=0, initial=0.0)
+    _check_split(system, np.maximum(felt.max(axis=0), carried), subsystem.law, sprung, shape, project)
+    _check_rest(system, felt, subsystem.static)
     m = len(eigenvalue) + e
-    flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, cluster < 0
+    flows.modes[s], flows.sprung[s], flows.attached[s] = m, len(sprung) > 0, subsystem.held
     flows.eigenvalue[s, :m] = np.r_[1j * system.frequency, eigenvalue]
     driven = len(driver)
     flows.driven[s], flows.load[s, e : e + driven] = e + np.searchsorted(driver, range(e + 1)), growth
@@ -227,18 +268,15 @@ def _fill(flows: Flows, system: System, s: int, closed: np.ndarray) -> None:
     own = full[n : n + b].copy()
     own[free, :e] -= (system.of_bodies.load / system.of_bodies.mass).T[free] / system.frequency**2
     body = carrier @ full[:n] + own
-    for c in np.unique(springs.cluster[free]):
-        members = free & (springs.cluster == c)
+    for c in np.unique(subsystem.cluster[free]):
+        members = free & (subsystem.cluster == c)
         flows.body_acceleration[s][np.ix_(members, members)] = 1 / system.of_bodies.mass[members].sum()
     motion = functional @ full[:n] + system.of_bodies.J @ own
     terms = np.abs(functional) @ np.abs(full[:n]) + np.abs(system.of_bodies.J) @ np.abs(own)
     # a row that others hold is at rest: round-off would make a Jenkins element there stick and slip without end
     flows.motion[s, :, :m] = np.where(np.abs(motion) <= HELD_STILL * terms, 0, motion)
     flows.velocity[s, :, :m] = _rate(flows, s, flows.motion[s, :, :m])
-    flows.static[s] = flexibility @ loads
-    if len(inner):
-        kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
-        flows.constrained[s] = kept - flexibility @ (elastic @ lift).T @ elastic @ kept
+    flows.static[s], flows.constrained[s, : len(subsystem.kept)] = subsystem.static, subsystem.kept
     flows.response[s, :m] = system.of_structure.response @ full[:n]
     flows.response[s, :e] += system.table
     rate = np.abs(flows.eigenvalue[s, :m])
@@ -258,8 +296,8 @@ def _check_split(
 ) -> None:
     """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
 
-    Each coordinate counts by its share in the rows and the response (felt (n,)), its rate by its own frequency or
-    that of the excitation.
+    Each coordinate counts by its share in the rows, the response and the motion of carried bodies (felt (n,)), its rate
+    by its own frequency or that of the excitation.
     """
     n, b = system.modes, system.bodies
     size = np.r_[1 / np.maximum(felt, _UNFELT * felt.max(initial=np.finfo(float).tiny)), np.ones(b)]

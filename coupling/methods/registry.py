@@ -118,6 +118,11 @@ def check_waveform(scene: Scene, method: str) -> None:
     signal = scene.excitation.signal
     if signal is not None and (reason := _why_not(method, "WAVEFORMS")):
         raise InputError(f'excitation.waveform: shape "{signal.shape}" is no sum of sines and {reason}')
+    steps = getattr(scene.solver, "steps_per_period", None)
+    if signal is not None and steps is not None and steps < signal.least_steps:
+        raise InputError(
+            f'solver.steps_per_period: {steps} miss rows of shape "{signal.shape}"; take at least {signal.least_steps}'
+        )
 
 
 def _why_not(method: str, ability: str) -> str | None:

@@ -79,7 +79,8 @@ def select_model_orders(scenes: Sequence[Scene]) -> list[Selected]:
 def choices_of(scenes: Iterable[Scene]) -> Choices:
     """Return the number of modes that suits all scenes with one model and tolerance, for each of these.
 
-    Raises InputError for a scene with stops, whose impacts the estimate does not know, or with a waveform.
+    Raises InputError for a scene with stops, whose impacts the estimate does not know, and for one whose sines it
+    cannot try.
     """
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in scenes:
@@ -93,8 +94,20 @@ def choices_of(scenes: Iterable[Scene]) -> Choices:
                     'structure.modes: "auto" weighs errors at the frequencies of sines, and a waveform has no highest '
                     "one; give a number of modes"
                 )
+            if not _has_first_order(scene):
+                raise InputError(
+                    'structure.modes: "auto" tries the bodies at resonances that sines of order 1 meet, and this '
+                    "excitation has none; give a number of modes"
+                )
             groups.setdefault(_group(scene), []).append(scene)
     return {key: _choice(members) for key, members in groups.items()}
+
+
+def _has_first_order(scene: Scene) -> bool:
+    excitation = scene.excitation
+    if excitation.distributed:
+        return any(load.order == 1 and load.force for load in excitation.loads.values())
+    return excitation.waveform is None or bool(excitation.shares[1])
 
 
 def needs_selection(scene: Scene) -> bool:
@@ -209,7 +222,8 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     first = scenes[0]
     structure, at = first.structure, first.excitation.at
     assert isinstance(structure, Rom) and at is not None
-    labels = list(dict.fromkeys([at, *(label for scene in scenes for label in _surfaces(scene))]))
+    forced = list(dict.fromkeys(label for scene in scenes for label in _forced(scene)))
+    labels = list(dict.fromkeys([at, *forced, *(label for scene in scenes for label in _surfaces(scene))]))
     driven = [scene.frequency * order for scene in scenes for order in scene.excitation.shares]
     speeds = sorted({scene.speed for scene in scenes})
     found = []
@@ -245,6 +259,7 @@ def _ladders(
     scenes: Sequence[Scene], model: ReducedModel, frequencies: np.ndarray, at: str, labels: list[str]
 ) -> _Ladders:
     """Return the errors of models of fewer modes for scenes at the speed of a whole model."""
+    forced = list(dict.fromkeys(label for scene in scenes for label in _forced(scene)))
 
     def collisions(smaller: ReducedModel) -> list[Collision]:
         if any(scene.contact.needs_residual_flexibility for scene in scenes) and not _yields(smaller):
@@ -256,18 +271,37 @@ def _ladders(
     loose, attached = (
         [
             replace(rung, collision=share * rung.collision)
-            for rung in natural_ladder(model, frequencies, labels, [at], collisions, attached)
+            for rung in natural_ladder(model, frequencies, labels, forced, collisions, attached)
         ]
         for attached in (False, True)
     )
-    return _Ladders(float(rigid_errors(model, frequencies, at, labels, [at]).max()), (loose, attached))
+    return _Ladders(float(rigid_errors(model, frequencies, at, labels, forced).max()), (loose, attached))
 
 
 def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
     """Return the difference of the responses with loose and with glued bodies, relative to the larger."""
+    loose, glued = (_waves(scene, item, frequencies) for item in (model, _glued(scene, model)))
+    size = np.maximum(np.abs(loose), np.abs(glued)).max(axis=0)
+    return float((np.abs(glued - loose).max(axis=0) / size).max())
+
+
+def _forced(scene: Scene) -> list[str]:
+    """Return the labels at which forces act."""
+    if not scene.excitation.distributed:
+        return [str(scene.excitation.at)]
+    return list(dict.fromkeys(load.at for load in scene.excitation.loads.values()))
+
+
+def _waves(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> np.ndarray:
+    """Return complex displacements (e, f) of the response to the forces of each order, m, for a level of 1."""
     at = str(scene.excitation.at)
-    loose, glued = (item.frf(frequencies, at, at) for item in (model, _glued(scene, model)))
-    return float((np.abs(glued - loose) / np.maximum(np.abs(loose), np.abs(glued))).max())
+    if not scene.excitation.distributed:
+        return model.frf(frequencies, at, at)[None]
+    orders: dict[int, np.ndarray] = {}
+    for load in scene.excitation.loads.values():
+        wave = load.amplitude * model.frf(frequencies, at, load.at)
+        orders[load.order] = orders.get(load.order, 0.0) + wave
+    return np.array(list(orders.values()))
 
 
 def _glued(scene: Scene, model: ReducedModel) -> ReducedModel:
@@ -312,11 +346,11 @@ def _trials(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> tuple
     The highest resonances in the range, from that of the loose to that of the glued bodies, between which a damped peak
     lies; without one, the ends and the middle of the range.
     """
-    at, low, high = str(scene.excitation.at), float(frequencies[0]), float(frequencies[-1])
+    low, high = float(frequencies[0]), float(frequencies[-1])
     loose = model.natural_frequencies_hz
     glued = _glued(scene, model).natural_frequencies_hz
     inside = [k for k in range(model.rigid_modes, len(loose)) if loose[k] >= low and glued[k] <= high]
-    heights = np.abs(model.frf(loose, at, at))
+    heights = np.abs(_waves(scene, model, loose)).max(axis=0)
     chosen = sorted(inside, key=lambda k: -heights[k])[:_RESONANCES]
     chosen = [k for k in chosen if heights[k] > _SEEN * heights[chosen[0]]]
     if not chosen:
@@ -329,8 +363,7 @@ def _undamped(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> flo
     """Return the largest amplitude without bodies in the range, m; 0 where no force drives it."""
     assert isinstance(scene.structure, Rom)
     force = excitation_force(replace(scene, structure=replace(scene.structure, modes=None)))
-    at = str(scene.excitation.at)
-    return force * float(np.abs(model.frf(frequencies, at, at)).max())
+    return force * float(np.abs(_waves(scene, model, frequencies)).max())
 
 
 def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:

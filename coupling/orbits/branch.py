@@ -13,6 +13,7 @@ import numpy as np
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.scene.paths import unit_of
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.display import Displayed
 from vanedamp.files.store import Variable, frozen, load, save
 from vanedamp.files.toml_input import validate
 
@@ -125,8 +126,8 @@ class Branch:
         }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Branches:
+@dataclass(frozen=True, eq=False, repr=False)
+class Branches(Displayed):
     """Branches of periodic orbits of a scene over one of its numbers.
 
     scene: with its [orbit] table; names, scale: (k,) of the coordinates of states; branches: in the order in which they

@@ -28,7 +28,7 @@ class Checkpoint:
         """Take up what the file holds. Raises InputError for the file of other branches, or one that cannot be read."""
         belongs = {
             "scene": ("scene", scene.to_dict()),
-            "model": ("reduced model", digests(scene.files)),
+            "model": ("reduced model or CSV file", digests(scene.files)),
             "provenance": ("version of the software", provenance),
         }
         self._current = current

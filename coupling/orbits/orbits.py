@@ -24,14 +24,13 @@ from vanedamp.coupling.response.restart import at_speed_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.coupling.scene.paths import number_at
-from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS, hertz_of
+from vanedamp.coupling.scene.rotation import FREQUENCY, hertz_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 #: tables whose numbers are none of the motion's equations
-_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "initial")
+_NO_PARAMETERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring_down", "initial")
 
 
 def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
@@ -108,11 +107,6 @@ class _Search:
         if self.to == self.low:
             raise InputError(f"orbit.to: {self.to:g} is where the branch begins; give another value")
         base = replace(scene, sweep={}, orbit=None)
-        if path in SPEEDS and isinstance(scene.structure, Rom):
-            raise InputError(
-                f"orbit.parameter: {path} turns a reduced model's modes, in which states are compared along a branch; "
-                'sweep it with continuation.direction = "up" or "down", or take a rigid structure'
-            )
         hertz = hertz_of(path, scene.excitation.engine_order)
         if math.isfinite(hertz) and self.to is not None and scene.excitation.resonance_near is None:
             # the level is that of one resonance along the branch, as in a sweep

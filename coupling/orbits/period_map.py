@@ -5,7 +5,10 @@ from __future__ import annotations
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.orbits.passage import PeriodMap
 from vanedamp.coupling.orbits.slider_passage import slider_map
+from vanedamp.coupling.orbits.speed_map import SpeedMap
+from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
 
 
@@ -22,5 +25,8 @@ def period_map(scene: Scene, parameter: str = "excitation.frequency", periods: i
     if chosen.planar:
         from vanedamp.coupling.orbits.planar_passage import planar_map
 
-        return planar_map(chosen, parameter, periods)
-    return slider_map(chosen, parameter, periods)
+        made: PeriodMap = planar_map(chosen, parameter, periods)
+    else:
+        made = slider_map(chosen, parameter, periods)
+    turns = parameter in SPEEDS and isinstance(chosen.structure, Rom)
+    return SpeedMap(made, chosen.speed) if turns else made

@@ -26,6 +26,8 @@ from vanedamp.coupling.system.transient import outlasted
 _CHUNK = 100
 #: share of the energy there is that counts as flow in any case
 _CARRIED = 1e-3
+#: share of the largest order's load below which that of order 1 is none
+_NO_SHARE = 1e-9
 #: columns of the log of bodies in the plane
 LOG_WIDTH = 8
 #: statuses of runs that came to their end
@@ -140,7 +142,9 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     harmonic = 2 / span * records.harmonic[window].sum()
     evaluated = {name: float(value) for name, value in zip(ENERGIES, ledger[-1], strict=True)}
     peaks = records.peak[window]
-    balance = residual(records.ledger[: done + 1], records.parts[: done + 1], _exchanged(system, records))
+    balance = residual(
+        records.ledger[: done + 1], records.parts[: done + 1], exchanged_energy(system, records.collided)
+    )
     if not balance <= run.open_ledger and status in _USABLE:
         status = Status.ENERGY
     samples = records.samples_per_period
@@ -169,7 +173,11 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         ),
         energy=evaluated,
         energy_residual=balance,
-        attached_mass_fraction=_attached(system, section, records.momentum[window].sum(), harmonic, first, span),
+        attached_mass_fraction=(
+            None
+            if _without_first_order(scene, system)
+            else _attached(system, section, records.momentum[window].sum(), harmonic, first, span)
+        ),
         wall_time_s=time.perf_counter() - started,
         periods=done,
         transient=first,
@@ -226,12 +234,12 @@ def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> f
     return 0.0 if flowed == 0.0 else float(abs(imbalance) / flowed)
 
 
-def _exchanged(system: System, records: Records) -> float:
-    """Return the energy that comes and goes within a period, J: in collisions, and lent by the loads."""
+def exchanged_energy(system: System, collided: np.ndarray) -> float:
+    """Return the energy that comes and goes within a period, J: in collisions (periods,), and lent by the loads."""
     rate = np.maximum(system.frequency, system.omega)[:, None]  # the mean of a waveform counts as a slow load
     modes = np.abs(system.of_structure.load) ** 2 / np.maximum(system.of_structure.stiffness, rate**2)
     bodies = np.abs(system.of_bodies.load) ** 2 / (system.of_bodies.mass * rate**2)
-    return float(max(records.collided.max(), (modes.sum() + bodies.sum()) / 2))
+    return float(max(collided.max(), (modes.sum() + bodies.sum()) / 2))
 
 
 def _state_scale(system: System, section: np.ndarray) -> np.ndarray:
@@ -246,6 +254,14 @@ def _state_scale(system: System, section: np.ndarray) -> np.ndarray:
     slips = np.maximum(largest[3 : 3 + b], largest[3 + b :] / system.omega)
     momentum = system.of_bodies.mass.sum() * system.omega * max(x, slips.max(initial=0.0))
     return np.array([x, system.omega * x, momentum, *slips, *(system.omega * slips)]) + np.finfo(float).tiny
+
+
+def _without_first_order(scene: Scene, system: System) -> bool:
+    """Whether a waveform or loads have sines of higher orders only, by which no attached mass is measured."""
+    if scene.excitation.waveform is None and not scene.excitation.distributed:
+        return False
+    sizes = np.abs(np.column_stack([system.load, system.table])).max(axis=1)
+    return bool(sizes[0] <= _NO_SHARE * sizes.max())
 
 
 def _attached(

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.files.store import Variable, save
+from vanedamp.files.display import Displayed
+from vanedamp.files.store import Variable, dataset, save
 
 #: figures of each body in the plane
 _OF_BODIES = ("tilt_max", "lift_share", "linearisation")
@@ -107,8 +108,15 @@ class PlanarSamples(NamedTuple):
         return variables
 
 
-@dataclass(frozen=True)
-class Response:
+#: units of the figures of a response that have one
+UNITS = {
+    "frequency": "Hz", "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m",
+    "amplitude_rms": "m", "amplitude_harmonic": "m", "phase": "rad", "wall_time_s": "s",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, repr=False)
+class Response(Displayed):
     """The response of a structure with loose bodies. Amplitudes and energies are those of the evaluated periods.
 
     amplitude_*: of the displacement at excitation.at (m), with the half width of the mean's 95 % confidence interval
@@ -187,6 +195,14 @@ class Response:
 
     def save(self, path: str | Path, provenance: dict[str, Any] | None = None) -> None:
         """Write HDF5 that xarray opens: per-period series, samples and events."""
+        variables, attributes = self._record()
+        save(path, "response", variables, attributes | {"provenance": provenance or {}})
+
+    def to_xarray(self) -> Any:
+        """Return the xarray.Dataset of the file that `save` writes."""
+        return dataset(*self._record())
+
+    def _record(self) -> tuple[dict[str, Variable], dict[str, Any]]:
         variables = {
             "period": Variable(np.arange(len(self.section)), ("period",)),
             "section": Variable(self.section, ("period", "state"), "m, m/s"),
@@ -205,7 +221,7 @@ class Response:
         attributes = {k: v for k, v in self.to_json().items() if v is not None}
         for name in attributes.keys() & _OF_BODIES:
             attributes[name] = np.array(attributes[name], float)  # None, of sliders, is nan
-        save(path, "response", variables, attributes | {"provenance": provenance or {}})
+        return variables, attributes
 
     def _event_variables(self) -> dict[str, Variable]:
         units = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -74,8 +74,7 @@ def check_size(system: System, start: RestartState, planar: bool = False) -> Non
     """Raise InputError for a state of a scene of another size; planar: whether its bodies move in the plane."""
     b, friction = system.bodies, system.friction_rows
     sizes = (system.modes, system.modes, b, b, friction - b, len(system.J) - friction, *4 * (b if planar else 0,))
-    *lengths, _ = (len(array) for array in astuple(start))
-    found = tuple(lengths)
+    found = tuple(len(getattr(start, entry.name)) for entry in fields(start) if entry.name != "speed")
     if found[:6] != sizes[:6]:
         raise InputError(
             f"continuation: a state of {found[0]} modes, {found[2]} bodies and {found[4]} friction dampers does not "

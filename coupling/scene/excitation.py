@@ -10,7 +10,10 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from vanedamp.coupling.scene.waveform import AnyWaveform, Waveform
+from vanedamp.coupling.scene.load_pattern import Load, pattern_loads, repeated
+from vanedamp.coupling.scene.waveform import Waveform
+from vanedamp.coupling.scene.waveforms.registry import AnyWaveform
+from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, Real, Whole
 
 
@@ -41,10 +44,14 @@ class Excitation:
     model with several, the one that responds most within `resonance_near`, a frequency or [lowest, highest] (Hz);
     default: the excitation's frequency, or the range over which it is swept. With an engine order and a range it is the
     one that the order's line meets, at the speed where it does.
-    `at` is the interface label of force and response on a reduced model; the base moves in its direction.
+    `at` is the interface label of force and response on a reduced model; the base moves in its direction, or in
+    `base_direction`, in the model's axes.
+    load: forces at several interface labels in place of the one at `at`; pattern: a CSV file of them, with the columns
+    at, order, force, phase_deg. load_factor: times all of them (1); relative with resonance_amplitude, which finds it.
     harmonic: sines whose sum excites, at multiples of the frequency; that of order 1 has amplitude 1 and phase 0 unless
     it is among them. resonance_amplitude speaks of a sine of order 1 and amplitude 1.
-    waveform: another signal over the period in place of the sines, by a class of other code (scene.waveform).
+    waveform: another signal over the period in place of the sines (scene.waveform); one with a duration of its own
+    needs no frequency.
     """
 
     frequency: Positive | None = None
@@ -56,13 +63,17 @@ class Excitation:
     at: str | None = None
     harmonic: tuple[Harmonic, ...] = ()
     waveform: AnyWaveform | None = None
+    base_direction: Direction | None = None
+    load: tuple[Load, ...] = ()
+    pattern: str | None = None
+    load_factor: NonNegative | None = None
 
     def __post_init__(self) -> None:
-        if (self.frequency is None) == (self.engine_order is None):
-            raise ValueError("give one of frequency (Hz) and engine_order (periods a revolution)")
+        self._check_period()
         given = [self.force, self.base_acceleration, self.resonance_amplitude]
         if sum(value is not None for value in given) > 1:
             raise ValueError("give at most one of force, base_acceleration and resonance_amplitude")
+        self._check_loads()
         if isinstance(self.resonance_near, tuple) and self.resonance_near[0] > self.resonance_near[1]:
             low, high = self.resonance_near
             raise ValueError(f"resonance_near: expected [lowest, highest], not [{low:g}, {high:g}]")
@@ -73,14 +84,64 @@ class Excitation:
         if self.waveform is not None and self.harmonic:
             raise ValueError("give one of harmonic and waveform")
 
+    def _check_period(self) -> None:
+        """Raise ValueError unless one thing says how long the period is."""
+        if self.waveform is not None and self.waveform.timed:
+            if self.engine_order is not None:
+                raise ValueError(f'engine_order: the period is that of shape = "{self.waveform.shape}"; leave it out')
+        elif (self.frequency is None) == (self.engine_order is None):
+            raise ValueError("give one of frequency (Hz) and engine_order (periods a revolution)")
+
+    def _check_loads(self) -> None:
+        """Raise ValueError for loads beside what they replace, and for keys that belong to something left out."""
+        if self.base_direction is not None and (self.distributed or self.force or self.resonance_amplitude):
+            raise ValueError("base_direction: is that of base_acceleration; leave it out")
+        if not self.distributed:
+            if self.load_factor is not None:
+                raise ValueError("load_factor: is that of load or pattern; give one of them")
+            return
+        if self.load and self.pattern is not None:
+            raise ValueError("give one of load and pattern")
+        name = "load" if self.load else "pattern"
+        for other in ("force", "base_acceleration", "harmonic", "waveform"):
+            if getattr(self, other) not in (None, ()):
+                raise ValueError(f"give one of {name} and {other}")
+        if self.load_factor is not None and self.resonance_amplitude is not None:
+            raise ValueError("give one of load_factor and resonance_amplitude, which finds it")
+        if fault := repeated({f"load[{index}]": load for index, load in enumerate(self.load)}):
+            raise ValueError(fault)
+
+    @property
+    def distributed(self) -> bool:
+        """Whether forces at several interface labels excite, rather than one at `at` or the base."""
+        return bool(self.load) or self.pattern is not None
+
+    @property
+    def level(self) -> float:
+        """Amplitude of the force, N, or factor of the loads, as far as they are given."""
+        if self.distributed:
+            return 1.0 if self.load_factor is None else self.load_factor
+        return self.force or 0.0
+
+    @property
+    def loads(self) -> dict[str, Load]:
+        """The forces at interface labels, by the place that names them in messages. Raises InputError for the file."""
+        if self.pattern is not None:
+            return pattern_loads(self.pattern, file_stamp(self.pattern))
+        return {f"excitation.load[{index}]": load for index, load in enumerate(self.load)}
+
     @property
     def shares(self) -> dict[int, complex]:
         """Complex amplitudes of the sines by their orders, 1 first: it is there even if it has none.
 
+        They multiply the level. Loads have amplitudes of their own, and nothing beside them: zeros, by their orders.
         Of a `signal` those of its Fourier series, which drive no run (Waveform.harmonics).
         """
         if self.waveform is not None:
             return self.waveform.harmonics()
+        if self.distributed:
+            orders = {load.order for load in self.loads.values() if load.force}
+            return dict.fromkeys(sorted({1} | orders), 0.0j)
         given = {1: 1.0 + 0.0j} | {harmonic.order: harmonic.share for harmonic in self.harmonic}
         return {order: given[order] for order in sorted(given) if order == 1 or given[order]}
 

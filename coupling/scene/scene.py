@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import tomli_w
 from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter
 from pydantic.dataclasses import dataclass
 
@@ -20,9 +21,13 @@ from vanedamp.coupling.scene.contact_laws.registry import Contact
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.paths import Range, assign, axis_values
+from vanedamp.coupling.scene.ramp import Ramp
+from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of
 from vanedamp.coupling.scene.solver_options import Solver, options_of
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom, Structure
+from vanedamp.files.display import Displayed
+from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import (
     STRICT,
     InputError,
@@ -66,6 +71,12 @@ class Time:
         return self.simulated * 2 // 3 if self.transient is None else self.transient
 
 
+#: share by which a frequency may be off that of a waveform with its own duration
+_SAME_PERIOD = 1e-4
+#: where a scene names files, relative to its own
+_FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "waveform", "file"))
+
+
 def _several(axis: Any) -> Any:
     if not isinstance(axis, Mapping | list | tuple | Range):
         raise ValueError("a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}")
@@ -96,8 +107,8 @@ class Continuation:
     along: str | None = None
 
 
-@dataclass(frozen=True, config=STRICT)
-class Scene:
+@dataclass(frozen=True, config=STRICT, repr=False)
+class Scene(Displayed):
     """Everything one run needs. Change a scene by making another: `scene.replace({"cavity.c1.gap": 1e-5})`."""
 
     structure: Structure
@@ -115,6 +126,8 @@ class Scene:
     continuation: Continuation = field(default_factory=Continuation)
     sweep: dict[str, Axis] = field(default_factory=dict)
     orbit: Orbit | None = None
+    ramp: Ramp | None = None
+    ring_down: RingDownTable | None = None
 
     def __post_init__(self) -> None:
         names = [cavity.name for cavity in self.cavity]
@@ -146,7 +159,16 @@ class Scene:
 
     @property
     def frequency(self) -> float:
-        """Frequency of the excitation, Hz: its own, or that of its engine order."""
+        """Frequency of the excitation, Hz: its own, that of its engine order, or of its waveform. Raises InputError."""
+        signal = self.excitation.waveform
+        if signal is not None and signal.timed:
+            given = self.excitation.frequency
+            if given is not None and not abs(given * signal.duration - 1.0) <= _SAME_PERIOD:
+                raise InputError(
+                    f'excitation.frequency: shape "{signal.shape}" lasts {signal.duration:.6g} s, a period of '
+                    f"{1 / signal.duration:.6g} Hz, not {given:.6g}; leave the frequency out"
+                )
+            return 1.0 / signal.duration
         if self.excitation.engine_order is not None:
             return frequency_of(self.excitation.engine_order, self.speed)
         assert self.excitation.frequency is not None
@@ -271,6 +293,17 @@ class Scene:
                 "gravity.direction: a direction in space is for a reduced model, whose interface has directions; "
                 "give orientation_deg"
             )
+        elif self.excitation.distributed:
+            key = "load" if self.excitation.load else "pattern"
+            remedy = "leave it out" if isinstance(self.structure, Prescribed) else "give force"
+            raise ValueError(
+                f"excitation.{key}: interface labels are a reduced model's; this structure has no points: {remedy}"
+            )
+        elif self.excitation.base_direction is not None:
+            raise ValueError(
+                "excitation.base_direction: a direction in space is for a reduced model, whose interface has "
+                "directions; the base of this structure moves along its one axis"
+            )
         elif self.contact.takes_residual_flexibility:
             raise ValueError(
                 'contact: the residual flexibility is that of a reduced model; take structure.model = "rom"'
@@ -284,7 +317,12 @@ class Scene:
                 )
         if isinstance(self.structure, Prescribed):
             excitation = self.excitation
-            if excitation.force or excitation.base_acceleration or excitation.resonance_amplitude:
+            if excitation.base_acceleration:
+                raise ValueError(
+                    "excitation.base_acceleration: a prescribed motion is that of the base; leave it out, "
+                    "structure.displacement_amplitude sets the level"
+                )
+            if excitation.force or excitation.resonance_amplitude:
                 raise ValueError(
                     "excitation: a prescribed motion takes only frequency and harmonics; structure sets the amplitude"
                 )
@@ -298,25 +336,37 @@ class Scene:
 
     @classmethod
     def load(cls, path: str | Path) -> Scene:
-        """Read the scene in a TOML file; a reduced model's file is taken relative to it. Raises InputError."""
+        """Read the scene in a TOML file; the files that it names are taken relative to it. Raises InputError."""
         return cls.of(read_toml(path), path)
 
     @classmethod
     def of(cls, data: dict[str, Any], path: str | Path) -> Scene:
         """Return the scene in the tables of a TOML file that lies at `path`."""
-        structure = data.get("structure")
-        if isinstance(structure, dict) and isinstance(structure.get("file"), str):
-            structure["file"] = str(Path(path).parent / structure["file"])
+        for table, key in _named_files(data):
+            table[key] = str(Path(path).parent / table[key])
         return validate(cls, data, str(path))
+
+    def save(self, path: str | Path) -> None:
+        """Write the TOML file that `load` reads; files beside it, such as a reduced model's, are relative to it."""
+        data, folder = self.to_dict(), Path(path).resolve().parent
+        for table, key in _named_files(data):
+            file = Path(table[key]).resolve()
+            table[key] = str(file.relative_to(folder) if file.is_relative_to(folder) else file)
+        with replacing(path) as temporary:
+            temporary.write_text(tomli_w.dumps(data), encoding="utf-8")
 
     @property
     def files(self) -> list[str]:
-        """The reduced models that the scene and its sweep name."""
-        swept = self.sweep.get("structure.file", ())
-        return [
-            *([self.structure.file] if isinstance(self.structure, Rom) else []),
-            *(() if isinstance(swept, Range) else map(str, swept)),
-        ]
+        """The files that the scene and its sweep name."""
+        found = []
+        for place in _FILES:
+            node: Any = self
+            for step in place:
+                node = getattr(node, step, None)
+            swept = self.sweep.get(".".join(place), ())
+            found += [node] if isinstance(node, str) else []
+            found += [] if isinstance(swept, Range) else list(map(str, swept))
+        return found
 
     @property
     def points(self) -> int:
@@ -331,6 +381,7 @@ class Scene:
         return (
             isinstance(self.structure, Prescribed)
             or any(value is not None for value in given)
+            or self.excitation.distributed
             or self.initial != Initial()
             or any(damper.velocity or (damper.sprung and damper.position) for damper in self.damper)
             or (bool(self.speed) and any(cavity.centrifugal_deg for cavity in self.cavity))
@@ -360,3 +411,22 @@ class Scene:
         axes = {path: axis_values(values) for path, values in self.sweep.items()}
         points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
         return {path: np.asarray(values) for path, values in axes.items()}, points
+
+
+def _named_files(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield the tables of a scene that name a file, each with its key."""
+    for place in _FILES:
+        table: Any = data
+        for step in place[:-1]:
+            table = table.get(step) if isinstance(table, dict) else None
+        if isinstance(table, dict) and isinstance(table.get(place[-1]), str):
+            yield table, place[-1]
+
+
+def loaded(scene: Scene | str | Path) -> Scene:
+    """Return a scene, or the one in a TOML file. Raises InputError for anything else."""
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, str | Path):
+        return Scene.load(scene)
+    raise InputError(f"scene: expected a Scene or its TOML file, not {type(scene).__name__}")

@@ -25,6 +25,8 @@ class Rigid:
 
     centrifugal_stiffness: kg, N/m a squared speed, which the spring gains by rotation (Southwell's coefficient times
     the mass); below zero where spin softening prevails.
+    base_mass: kg, by which an acceleration of the base loads the mode at its point (default: the mass, of a rigid body
+    on a spring); that of a continuous structure's mode is larger, or below zero (`vanedamp calibrate` gives it).
     """
 
     model: Literal["rigid"]
@@ -33,6 +35,7 @@ class Rigid:
     damping_ratio: NonNegative | None = None
     damping: NonNegative | None = None
     centrifugal_stiffness: Real = 0.0
+    base_mass: Real | None = None
 
     def __post_init__(self) -> None:
         if (self.damping_ratio is None) == (self.damping is None):

@@ -1,4 +1,4 @@
-"""Waveforms: excitations that other code adds, named in the table [excitation.waveform] of a scene.
+"""Waveforms: signals over a period, named in the table [excitation.waveform] of a scene (ours are in waveforms/).
 
 A waveform is the time signal of one period, w(omega t), where a plain excitation has sin(omega t): frequency, level
 (force, base acceleration) and place stay the excitation's. So a new excitation is one class, which need not know the
@@ -8,7 +8,7 @@ structure, and all that reads a level goes on as it is.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
+from typing import ClassVar
 
 import numpy as np
 
@@ -29,6 +29,18 @@ class Waveform:
 
     #: the value of `shape` in the scene
     shape: str
+    #: whether the signal has a duration of its own, which is the period then
+    timed: ClassVar[bool] = False
+
+    @property
+    def duration(self) -> float:
+        """Duration of a timed signal, s."""
+        raise NotImplementedError(f"{type(self).__qualname__} has no duration")
+
+    @property
+    def least_steps(self) -> int:
+        """Fewest steps a period that know the signal from its values."""
+        return 0
 
     @property
     def shares(self) -> Mapping[int, complex] | None:
@@ -72,6 +84,3 @@ class Waveform:
 WAVEFORMS = Variants("waveform", Waveform, "shape", "vanedamp.waveforms")
 #: adds a waveform; may decorate its class
 register = WAVEFORMS.register
-
-#: type of an excitation's `waveform`
-AnyWaveform = Annotated[Waveform, WAVEFORMS]

@@ -25,7 +25,7 @@ class Checkpoint:
         self.finished = SweepTable(size, width_of(scene))
         belongs = {
             "scene": ("scene", scene.to_dict()),
-            "model": ("reduced model", digests(scene.files)),
+            "model": ("reduced model or CSV file", digests(scene.files)),
             "provenance": ("version of the software", provenance),
         }
         self._file = CheckpointFile(path, "sweep-checkpoint", belongs, self._content)

@@ -14,7 +14,8 @@ from vanedamp.coupling.scene.paths import unit_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
-from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.display import Displayed
+from vanedamp.files.store import Variable, dataset, frozen, load, save
 from vanedamp.files.toml_input import validate
 
 _KIND = "sweep"
@@ -25,8 +26,8 @@ PEAKS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Sweep:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(Displayed):
     """Responses over the product of the axes; every array has the shape of the grid, in the axes' order.
 
     scene                 the scene of the sweep, with its [sweep] table
@@ -95,6 +96,13 @@ class Sweep:
 
     def save(self, path: str | Path) -> None:
         """Write HDF5 that xarray opens. Dimensions are the axes' paths with _ for dots."""
+        save(path, _KIND, *self._record())
+
+    def to_xarray(self) -> Any:
+        """Return the xarray.Dataset of the file that `save` writes."""
+        return dataset(*self._record())
+
+    def _record(self) -> tuple[dict[str, Variable], dict[str, Any]]:
         dims = tuple(_dimension(axis) for axis in self.axes)
         units = self.units()
         variables = {_dimension(axis): Variable(v, (_dimension(axis),), units[axis]) for axis, v in self.axes.items()}
@@ -112,7 +120,7 @@ class Sweep:
             "scene": self.scene.to_dict(),
             "provenance": dict(self.provenance),
         }
-        save(path, _KIND, variables, attributes)
+        return variables, attributes
 
     @classmethod
     def load(cls, path: str | Path) -> Sweep:

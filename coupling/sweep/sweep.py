@@ -12,7 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.rotation import SPEEDS
-from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.scene import Scene, loaded
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
@@ -25,7 +25,7 @@ from vanedamp.files.toml_input import InputError, validate
 
 
 def sweep(
-    scene: Scene | Grid,
+    scene: Scene | Grid | str | Path,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
     checkpoint: str | Path | None = None,
@@ -33,14 +33,14 @@ def sweep(
 ) -> Sweep:
     """Run every point of the scene's [sweep] table, in this process or on an executor.
 
-    scene: with its grid, if the caller has made it; progress: called with the number of points done and their total, at
+    scene: or its TOML file, or its grid; progress: called with the number of points done and their total, at
     the beginning, too; checkpoint: a file to which finished points are written and from which a sweep that was killed
     goes on; the caller removes it once the result is safe (files.checkpoint_file.clear).
     Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks, or
     takes its worker with it, is a point with the status "error: ...". Raises StoreError when the checkpoint cannot be
     written, SweepError when the executor has lost its workers for good.
     """
-    grid = scene if isinstance(scene, Grid) else grid_of(scene)
+    grid = scene if isinstance(scene, Grid) else grid_of(loaded(scene))
     provenance = dict(provenance or {})
     with Checkpoint(checkpoint, grid.scene, grid.size, provenance) as kept:
         finished = kept.finished

@@ -14,6 +14,7 @@ from vanedamp.coupling.scene.waveform import Waveform
 from vanedamp.coupling.system.body_loads import body_loads
 from vanedamp.coupling.system.cavities import check_directions
 from vanedamp.coupling.system.constraints import constraints_of
+from vanedamp.coupling.system.loads import force_shapes
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row
 from vanedamp.coupling.system.resonance import force_amplitude
 from vanedamp.coupling.system.restitution import law_address
@@ -40,15 +41,16 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     """
     basis = basis or basis_of(scene)
     omega, n, shares = 2 * np.pi * scene.frequency, len(basis.stiffness), scene.excitation.shares
-    frequency, share = omega * np.array(list(shares)), np.array(list(shares.values()))[:, None]
+    frequency = omega * np.array(list(shares))
     check_directions(scene, basis)
     at = forced_label(scene)
     response = interface_row(basis, at, "excitation.at")
     base = base_acceleration(scene, basis)
-    table = np.zeros((len(share), 1), complex)
+    table = np.zeros((len(shares), 1), complex)
     if isinstance(scene.structure, Prescribed):
-        table = share * -1j * scene.structure.displacement_amplitude
-    force = share * -1j * response * force_amplitude(scene, basis, response) - base @ basis.base.T
+        table = np.array(list(shares.values()))[:, None] * -1j * scene.structure.displacement_amplitude
+    shapes = force_shapes(scene, basis, response)
+    force = shapes * -1j * force_amplitude(scene, basis, response) - base @ basis.base.T
     made = constraints_of(scene, basis, at)
     travel = made.free_travel.copy()
     if scene.stop:  # whose gap may be none: how far their place moves counts as well
@@ -82,6 +84,8 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
 def base_acceleration(scene: Scene, basis: ModalBasis) -> np.ndarray:
     """Return the complex amplitudes (e, 3) of the base's acceleration in the model's axes, m/s^2."""
     excitation, direction = scene.excitation, basis.directions[forced_label(scene)]
+    if excitation.base_direction is not None:
+        direction = np.array(excitation.base_direction) / np.linalg.norm(excitation.base_direction)
     share = np.array(list(excitation.shares.values()))[:, None]
     if isinstance(scene.structure, Prescribed):
         frequency = 2 * np.pi * scene.frequency * np.array(list(excitation.shares))[:, None]
@@ -91,9 +95,14 @@ def base_acceleration(scene: Scene, basis: ModalBasis) -> np.ndarray:
 
 def loads_of(scene: Scene, signal: Waveform) -> Loads:
     """Return the loads of the scene's excitation with a signal in place of its sine."""
-    sine = assemble(replace(scene, excitation=replace(scene.excitation, waveform=None)))
-    level = -sine.load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
+    level = -assemble(with_sine(scene)).load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
     return lambda angle: np.outer(signal.sampled(angle), level)
+
+
+def with_sine(scene: Scene) -> Scene:
+    """Return the scene with a sine in place of its waveform."""
+    plain = replace(scene.excitation, waveform=None, frequency=scene.frequency, engine_order=None)
+    return replace(scene, excitation=plain)
 
 
 def initial_motion(scene: Scene, system: System) -> InitialMotion:

@@ -56,7 +56,7 @@ def check_known(scene: Scene, directions: Vectors) -> None:
     """Raise InputError where base acceleration or gravity need a direction that the reduced model does not know."""
     excitation, gravity = scene.excitation, scene.gravity
     reasons = ["excitation.base_acceleration"] if excitation.base_acceleration else []
-    wanted = [("excitation.at", str(excitation.at))] if reasons else []
+    wanted = [("excitation.at", str(excitation.at))] if reasons and excitation.base_direction is None else []
     if gravity.direction is not None and gravity.acceleration:
         reasons.append("gravity.direction")
     if reasons:
@@ -79,6 +79,7 @@ def check_displacements(scene: Scene, rotations: frozenset[str]) -> None:
         keys |= {f"cavity[{index}].{side}": getattr(cavity, side) for side in ("left", "right", "floor", "ceiling")}
     for index, stop in enumerate(scene.stop):
         keys |= {f"stop[{index}].at": stop.at, f"stop[{index}].to": stop.to}
+    keys |= {place: load.at for place, load in scene.excitation.loads.items()}
     keys |= {f"friction_damper[{index}].at": damper.at for index, damper in enumerate(scene.friction_damper)}
     for key, label in keys.items():
         if label in rotations:

@@ -14,6 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.sines import peaks
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.engine_order import Natural, crossings
 from vanedamp.coupling.system.resonance import receptance_of
@@ -58,7 +59,7 @@ class LinearResponse:
     def amplitude(self, frequencies: np.ndarray) -> np.ndarray:
         """Return amplitudes of the response (f,), m, at frequencies (f,), Hz; of harmonics the peak over a period."""
         waves = [self._wave(h, np.asarray(frequencies, float)) for h in range(len(self.order))]
-        return np.abs(waves[0]) if len(waves) == 1 else _peak(np.array(waves), self.order)
+        return np.abs(waves[0]) if len(waves) == 1 else peaks(np.array(waves), self.order)
 
     def _wave(self, h: int, frequencies: np.ndarray) -> np.ndarray:
         """Return complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,) in Hz."""
@@ -74,8 +75,7 @@ class LinearResponse:
         inside = (natural >= low) & (natural <= high)
         for frequency in natural[inside & (widths == 0.0)]:
             return LinearPeak(float(frequency), math.inf, 0.0)
-        near = (natural[:, None] + widths[:, None] * _AROUND).ravel()
-        grid = np.unique(np.concatenate([np.linspace(low, high, _EVEN), np.clip(near, low, high)]))
+        grid = self.grid(low, high)
         heights = self.amplitude(grid)
         padded = np.concatenate([[-1.0], heights, [-1.0]])
         tops = np.flatnonzero((heights >= padded[:-2]) & (heights >= padded[2:]))
@@ -83,6 +83,12 @@ class LinearResponse:
         amplitude, frequency = max(self._refined(grid, heights, int(top)) for top in tops)
         width = float(widths[np.argmin(np.abs(natural - frequency))]) if len(natural) else 0.0
         return LinearPeak(frequency, amplitude, width)
+
+    def grid(self, low: float, high: float) -> np.ndarray:
+        """Return frequencies (k,), Hz, from low to high between which the amplitude hides no maximum."""
+        natural, widths = self.resonances()
+        near = (natural[:, None] + widths[:, None] * _AROUND)[widths > 0.0].ravel()
+        return np.unique(np.concatenate([np.linspace(low, high, _EVEN), np.clip(near, low, high)]))
 
     def _refined(self, grid: np.ndarray, heights: np.ndarray, top: int) -> tuple[float, float]:
         """Return height and frequency of the maximum around a point of the grid; that point at an edge."""
@@ -175,21 +181,6 @@ def _resonances(
         # a natural frequency that rises with the line stays near it for longer
         rise = (natural(speed + step)[mode] - natural(speed)[mode]) / frequency_of(order, step)
         yield speed, float(widths[nearest] / max(abs(1.0 - rise), 1e-3))
-
-
-def _peak(waves: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """Return the largest |Re sum_h waves_h exp(i order_h angle)| (f,) over all angles; waves (e, f). By Newton."""
-    step = np.pi / (8 * order.max())
-    angle = np.broadcast_to(np.arange(0, 2 * np.pi, step)[:, None], (16 * order.max(), waves.shape[1]))
-    found = np.zeros(waves.shape[1])
-    for _ in range(6):
-        turning = waves * np.exp(1j * np.multiply.outer(angle, order)).swapaxes(1, 2)
-        value, slope, bend = ((turning * (1j * order[:, None]) ** p).sum(axis=1).real for p in range(3))
-        found = np.maximum(found, np.abs(value).max(axis=0))
-        # towards a maximum of |x|, no further than the neighbours
-        move = np.divide(-slope, bend, out=np.copysign(step, value * slope), where=value * bend < 0)
-        angle = angle + np.clip(move, -step, step)
-    return found
 
 
 def linear_responses(scene: Scene) -> tuple[LinearResponse, LinearResponse]:

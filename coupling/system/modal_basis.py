@@ -10,8 +10,8 @@ import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom, Structure
-from vanedamp.coupling.system.reduced_model_file import file_stamp, restricted
-from vanedamp.files.store import frozen
+from vanedamp.coupling.system.reduced_model_file import restricted
+from vanedamp.files.store import file_stamp, frozen
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.dense_modes import rounding
 from vanedamp.rom.reduced import NORMAL, ReducedModel
@@ -94,9 +94,10 @@ def structure_basis(structure: Structure, speed: float) -> ModalBasis:
                 f"rotation: at {speed:.6g} rad/s the stiffness of the structure is {stiffness:.4g} N/m: it is "
                 f"unstable from {np.sqrt(-structure.stiffness / structure.centrifugal_stiffness):.6g} rad/s on"
             )
+        inertia = root if structure.base_mass is None else structure.base_mass / root
         return ModalBasis(
             frozen([stiffness / structure.mass]), frozen([[structure.viscous_at(speed) / structure.mass]]),
-            frozen([root * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {},
+            frozen([inertia * _AXIS]), {"structure": frozen([1 / root])}, {"structure": _AXIS}, {},
         )  # fmt: skip
     if isinstance(structure, Prescribed):
         none = np.zeros(0)

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.checks import ReducedModelError
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless, truncated, with_attachment_modes
-
-
-def file_stamp(file: str) -> int:
-    """Return a number that distinguishes a file from a later one of that name."""
-    path = Path(file)
-    return path.stat().st_mtime_ns if path.is_file() else 0
 
 
 class Restricted(NamedTuple):

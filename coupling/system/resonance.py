@@ -13,13 +13,17 @@ from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom, Structure
 from vanedamp.coupling.system.engine_order import crossings
+from vanedamp.coupling.system.loads import force_shapes
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, forced_label, interface_row, structure_basis
-from vanedamp.coupling.system.reduced_model_file import file_stamp
+from vanedamp.files.store import file_stamp
 from vanedamp.files.toml_input import InputError
+
+#: share of the largest product of response and loads below which loads do not excite a mode
+_UNMOVED = 1e-9
 
 
 def excitation_force(scene: Scene) -> float:
-    """Return the amplitude of the exciting force, N (resonance_amplitude resolved)."""
+    """Return the amplitude of the exciting force, N, or the factor of several loads (resonance_amplitude resolved)."""
     if isinstance(scene.structure, Prescribed):
         return 0.0
     basis = basis_of(scene)
@@ -28,7 +32,7 @@ def excitation_force(scene: Scene) -> float:
 
 class Resonance(NamedTuple):
     """A resonance without bodies: its mode (from 0), the number of modes, frequency (Hz), displacement of the
-    response per newton (m/N) and modal mass there (kg)."""
+    response per newton (m/N; of several loads for their factor 1, m) and modal mass there (kg)."""
 
     mode: int
     modes: int
@@ -49,18 +53,22 @@ def chosen_resonance(scene: Scene) -> Resonance:
 
 
 def receptance_of(
-    stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, response: np.ndarray, omega: np.ndarray
-) -> np.ndarray:
+    stiffness: np.ndarray, damping: np.ndarray, mass: np.ndarray, response: np.ndarray, omega: np.ndarray,
+    force: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Return the response (f,) to modal forces (n,) at angular frequencies (f,); default: a newton at the response."""
+    force = response if force is None else force
     dynamic = np.diag(stiffness) + 1j * omega[:, None, None] * damping - omega[:, None, None] ** 2 * mass
-    loads = np.broadcast_to(response[:, None], (len(omega), len(response), 1))
+    loads = np.broadcast_to(force[:, None], (len(omega), len(response), 1))
     return np.linalg.solve(dynamic, loads)[:, :, 0] @ response
 
 
 def force_amplitude(scene: Scene, basis: ModalBasis, response: np.ndarray) -> float:
-    """Return the amplitude of the exciting force at the functional `response` (n,) of the basis, N."""
+    """Return the amplitude of the exciting force at the functional `response` (n,) of the basis, N, or of several
+    loads their factor."""
     excitation = scene.excitation
     if excitation.resonance_amplitude is None:
-        return excitation.force or 0.0
+        return excitation.level
     if (meant := _at_resonance(scene)) is not scene:
         return excitation.resonance_amplitude / chosen_resonance(meant).flexibility
     return excitation.resonance_amplitude / _chosen(scene, basis, response).flexibility
@@ -68,25 +76,37 @@ def force_amplitude(scene: Scene, basis: ModalBasis, response: np.ndarray) -> fl
 
 def _at_resonance(scene: Scene) -> Scene:
     """Return a scene at the speed at which its engine order is in resonance, where that is sought over a range."""
-    order, (low, high) = scene.excitation.engine_order, scene.resonance_range
+    excitation, at = scene.excitation, forced_label(scene)
+    order, (low, high) = excitation.engine_order, scene.resonance_range
     if order is None or low == high:
         return scene
     structure = scene.structure
     stamp = file_stamp(structure.file) if isinstance(structure, Rom) else 0
-    speed = _resonant_speed(structure, forced_label(scene), order, speed_of(order, low), speed_of(order, high), stamp)
-    near = replace(scene.excitation, resonance_near=frequency_of(order, speed))
+    sine = {load.at: load.amplitude for load in excitation.loads.values() if load.order == 1} or {at: 1.0 + 0.0j}
+    ends = speed_of(order, low), speed_of(order, high)
+    speed = _resonant_speed(structure, at, tuple(sine.items()), order, *ends, stamp)
+    near = replace(excitation, resonance_near=frequency_of(order, speed))
     return replace(scene, rotation=Rotation(speed=speed), excitation=near)
 
 
 @lru_cache(maxsize=64)
-def _resonant_speed(structure: Structure, at: str, order: float, low: float, high: float, _stamp: int) -> float:
-    """Return the speed, rad/s, of the highest response along an engine order, without bodies: once for a sweep."""
+def _resonant_speed(
+    structure: Structure, at: str, sine: tuple[tuple[str, complex], ...], order: float, low: float, high: float,
+    _stamp: int,
+) -> float:  # fmt: skip
+    """Return the speed, rad/s, of the highest response along an engine order, without bodies: once for a sweep.
+
+    sine: the forces that excite it, by their labels.
+    """
 
     def response(speed: float) -> float:
         basis, omega = structure_basis(structure, speed), np.array([order * speed])
         _check_damped(basis)
         row = interface_row(basis, at, "excitation.at")
-        return float(np.abs(receptance_of(basis.stiffness, basis.damping, np.eye(len(row)), row, omega)[0]))
+        force = np.zeros(len(row), complex)
+        for label, amplitude in sine:
+            force += amplitude * interface_row(basis, label, "excitation.load")
+        return float(np.abs(receptance_of(basis.stiffness, basis.damping, np.eye(len(row)), row, omega, force)[0]))
 
     def natural(speed: float) -> np.ndarray:
         return np.sqrt(structure_basis(structure, speed).stiffness) / (2 * np.pi)
@@ -107,20 +127,38 @@ def _chosen(scene: Scene, basis: ModalBasis, response: np.ndarray) -> Resonance:
     low, high = (2 * np.pi * frequency for frequency in scene.resonance_range)
     omega = np.clip(np.sqrt(basis.stiffness), low, high)
     dynamic = basis.stiffness - omega**2 + 1j * omega * np.diag(basis.damping)
-    mode = int(np.argmax(response**2 / np.abs(dynamic)))
-    frequency, flexibility = _resonance(basis.stiffness.tobytes(), basis.damping.tobytes(), response.tobytes(), mode)
+    force = _sine(scene, basis, response)
+    mode = int(np.argmax(np.abs(response * force) / np.abs(dynamic)))
+    frequency, flexibility = _resonance(
+        basis.stiffness.tobytes(), basis.damping.tobytes(), response.tobytes(), force.astype(complex).tobytes(), mode
+    )
     return Resonance(mode, len(response), frequency, flexibility, float(1 / response[mode] ** 2))
 
 
+def _sine(scene: Scene, basis: ModalBasis, response: np.ndarray) -> np.ndarray:
+    """Return the modal forces (n,) that are to reach a resonance: loads of order 1, or a sine of amplitude 1."""
+    if not scene.excitation.distributed:
+        return response
+    force: np.ndarray = force_shapes(scene, basis, response)[0]
+    moved = np.abs(response * force).max()
+    if not moved > _UNMOVED * np.linalg.norm(response) * np.linalg.norm(force):
+        raise InputError(
+            "excitation.resonance_amplitude: the loads of order 1 excite no mode that moves excitation.at; give "
+            "load_factor"
+        )
+    return force
+
+
 @lru_cache(maxsize=64)
-def _resonance(stiffness_: bytes, damping_: bytes, response_: bytes, mode: int) -> tuple[float, float]:
+def _resonance(stiffness_: bytes, damping_: bytes, response_: bytes, force_: bytes, mode: int) -> tuple[float, float]:
     """Return frequency (Hz) and height (m/N) of a mode's resonance: once for all frequencies of a sweep."""
-    stiffness, response = np.frombuffer(stiffness_), np.frombuffer(response_)
+    stiffness, response, force = np.frombuffer(stiffness_), np.frombuffer(response_), np.frombuffer(force_, complex)
     damping = np.frombuffer(damping_).reshape(len(stiffness), -1)
     resonance = np.sqrt(stiffness[mode])
 
     def negative(omega: float) -> float:
-        return -float(abs(receptance_of(stiffness, damping, np.eye(len(response)), response, np.array([omega]))[0]))
+        reached = receptance_of(stiffness, damping, np.eye(len(response)), response, np.array([omega]), force)
+        return -float(abs(reached[0]))
 
     width = min(1.5 * damping[mode, mode] / resonance, 0.5)
     bounds = (resonance * (1 - width), resonance * (1 + width))

@@ -20,7 +20,7 @@ from vanedamp.modal.model_updating import Tuning, tune
 from vanedamp.modal.rigid_model import RigidModel, rigid_model
 from vanedamp.modal.stress import HotSpot
 from vanedamp.studies.case.calibration_tables import CalibrationTable, TuneTable
-from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, modal_analysis
+from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, base_inertia, modal_analysis
 from vanedamp.studies.case.tables import Case, MaterialTable
 
 # a pole farther from the computed mode than this share of its frequency belongs to another one
@@ -148,7 +148,10 @@ def calibrate(case: Case) -> Calibration:
         warnings += tuple(
             f"calibration.damping: {doubt}" for doubt in _doubts(frf, band, poles.misfit, measured, frequency)
         )
-    rigid = rigid_model(analysis.modes, analysis.first_bending, analysis.functional, case.response_label, ratio)
+    inertia = base_inertia(structure.case, structure.matrices, case.response_label)
+    rigid = rigid_model(
+        analysis.modes, analysis.first_bending, analysis.functional, case.response_label, ratio, inertia
+    )
     return Calibration(structure.case, analysis, rigid, tuning, poles, pole, warnings, time.perf_counter() - started)
 
 

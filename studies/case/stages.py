@@ -103,6 +103,15 @@ def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
     return interface(case, matrices, [label]).vectors[:, 0]
 
 
+def base_inertia(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray | None:
+    """Return M r (N,) of a translation of the base along a label's direction; None of a rotation, which has none."""
+    (coordinate, *_) = interface(case, matrices, [label]).coordinates
+    if coordinate.motion == "rotation":
+        return None
+    translation = matrices.rigid_translations() @ unit_direction(coordinate.direction)
+    return np.asarray(matrices.mass @ translation)
+
+
 def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
     """Return the case's interface coordinates on its matrices, all of them or those named."""
     tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
@@ -254,7 +263,8 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     table = case.calibration or CalibrationTable()
     if label is not None and functional is not None and bending is not None:
         warnings += _rivals(modes, bending, functional, label)
-        rigid = rigid_model(modes, bending, functional, label, case.damping_ratio)
+        inertia = base_inertia(case, matrices, label)
+        rigid = rigid_model(modes, bending, functional, label, case.damping_ratio, inertia)
         cavities = _cavities(case, matrices, modes.shapes[bending], functional)
         strengths = case.strengths(structure.solid.domain.volumes)
         if strengths:

@@ -61,6 +61,7 @@ def _print_summary(result: Mapping[str, Any]) -> None:
     print(
         f"rigid model at {rigid['at']}: {rigid['frequency_hz']:.2f} Hz, mass {rigid['mass']:.5g} kg, "
         f"stiffness {rigid['stiffness']:.5g} N/m, damping {rigid['damping']:.4g} N s/m"
+        + ("" if rigid["base_mass"] is None else f", base mass {rigid['base_mass']:.5g} kg")
     )
     print_cavities(result)
     if excitation:

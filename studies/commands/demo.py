@@ -15,6 +15,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_output(parser, "DIR")
     parser.set_defaults(output="out")
     add_workers(parser)
+    parser.add_argument("--rigid", action="store_true", help="its rigid model only, without finite elements")
 
 
 def run(arguments: Namespace) -> None:
@@ -22,4 +23,4 @@ def run(arguments: Namespace) -> None:
     from vanedamp.studies.commands.support.outputs import output_folder
     from vanedamp.studies.demo import run_demo
 
-    run_demo(output_folder(arguments), arguments.workers)
+    run_demo(output_folder(arguments), arguments.workers, arguments.rigid)

@@ -31,6 +31,7 @@ def run(arguments: Namespace) -> None:
 
     scene = load_scene(arguments.input, outputs)
     from vanedamp.coupling.engine import simulate
+    from vanedamp.coupling.response.response import UNITS
     from vanedamp.files.provenance import versions
     from vanedamp.studies.commands.support.budget import check_run
 
@@ -46,7 +47,7 @@ def run(arguments: Namespace) -> None:
     if arguments.json != "-":
         for name, value in result.items():
             if not isinstance(value, dict | list):
-                print(f"{name:24} {_format(value)}")
+                print(f"{name:26} {_format(value)} {UNITS.get(name, '')}".rstrip())
 
 
 def _format(value: Any) -> str:

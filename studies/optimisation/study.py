@@ -261,9 +261,9 @@ class Study(NamedTuple):
         """Return what a design, off by a deviation of the tolerances, changes in the scene with its bodies."""
         scene, first = self.scene, self.scene.damper[0]
         gap = design.gap_ratio * self.amplitude * (1 + deviation["gap"])
-        level = scene.excitation.resonance_amplitude or scene.excitation.force
-        assert level is not None
-        key = "force" if scene.excitation.resonance_amplitude is None else "resonance_amplitude"
+        level = scene.excitation.resonance_amplitude or scene.excitation.level
+        key = "load_factor" if scene.excitation.distributed else "force"
+        key = key if scene.excitation.resonance_amplitude is None else "resonance_amplitude"
         cavities = [damper.cavity for damper in self.with_bodies(design.bodies).damper]
         places = {
             f"damper.{index}.position": gap * ((cavities[:index].count(name) + 1) / (cavities.count(name) + 1) - 0.5)

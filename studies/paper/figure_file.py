@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import tomli_w
 from pydantic import Field
 from pydantic.dataclasses import dataclass as checked
 
@@ -29,7 +28,7 @@ from vanedamp.coupling.scene.rotation import FREQUENCY, speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rigid, Rom
 from vanedamp.coupling.system.reduced_model_file import reduced_model
-from vanedamp.files.store import load, replacing
+from vanedamp.files.store import load
 from vanedamp.files.toml_input import STRICT, InputError, Positive, Whole, read_toml, validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.report.forced_response import resonance_grid
@@ -45,7 +44,7 @@ class Structure:
     """The units of a figure's quantities: the rigid model of the first bending, and its excitation.
 
     mass (kg), stiffness (N/m), damping_ratio, frequency (Hz) of the rigid model; amplitude (m) of its undamped
-    resonance; rom: file of the reduced model.
+    resonance; rom: file of the reduced model, if there is one.
     """
 
     mass: float
@@ -53,7 +52,12 @@ class Structure:
     damping_ratio: float
     frequency: float
     amplitude: float
-    rom: Path
+    rom: Path | None = None
+
+    @classmethod
+    def shipped(cls) -> Structure:
+        """Return the rigid model of the shipped cluster, which needs no finite elements."""
+        return cls(**read_toml(FOLDER / "rigid_model.toml"))
 
     @classmethod
     def load(cls, modes: Path, rom: Path) -> Structure:
@@ -210,15 +214,6 @@ def linear_peaks(scene: Scene) -> list[float]:
         mass, stiffness = mass - structure.centrifugal_stiffness / order**2, structure.stiffness
     masses = {mass, mass + sum(damper.mass for damper in scene.damper)}
     return sorted(math.sqrt(stiffness / mass) / (2 * math.pi) for mass in masses)
-
-
-def write_scene(scene: Scene, path: Path) -> None:
-    """Write a scene as the TOML file of `vanedamp run` and `vanedamp sweep`, a model's file relative to it."""
-    data = scene.to_dict()
-    if isinstance(scene.structure, Rom):
-        data["structure"]["file"] = Path(scene.structure.file).name
-    with replacing(path) as temporary:
-        temporary.write_text(tomli_w.dumps(data), encoding="utf-8")
 
 
 def _whole(structure: Rom, speed: float) -> ReducedModel:

@@ -40,7 +40,7 @@ from vanedamp.studies.paper import (
     plots_rotation,
 )
 from vanedamp.studies.paper.curve import Curve, curves
-from vanedamp.studies.paper.figure_file import FOLDER, Bar, Effort, PaperFigure, Structure, write_scene
+from vanedamp.studies.paper.figure_file import FOLDER, Bar, Effort, PaperFigure, Structure
 from vanedamp.studies.report.claims import CLAIMS, Claim, Study
 from vanedamp.studies.terminal import progress
 from vanedamp.studies.workers import workers
@@ -165,7 +165,7 @@ def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
     if old is None or old.scene != scene or any(old.provenance.get(key) != provenance[key] for key in provenance):
         if not session.resume:
             clear(checkpoint)
-        write_scene(scene, session.folder / f"{stem}.toml")
+        scene.save(session.folder / f"{stem}.toml")
         with progress(stem) as report:
             old = sweep(scene, session.pool, report, checkpoint, provenance)
         old.save(path)
@@ -276,7 +276,7 @@ def _history(session: Session) -> Study:
         runs[curve] = scene, simulate(scene, events=True, samples_per_period=data["samples"]), simulate(aside)
     scene, response, alike = runs["reduced"]
     folder = session.folder
-    write_scene(scene, folder / "fig13.toml")
+    scene.save(folder / "fig13.toml")
     response.save(folder / "fig13_response.h5", {"versions": versions(), "scene": scene.to_dict()})
     title = f"{data['title']}, {response.frequency:.1f} Hz"
     plots.history_picture(response, session.structure.amplitude, title, folder / "fig13.png")

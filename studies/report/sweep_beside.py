@@ -15,7 +15,7 @@ from vanedamp.coupling.sweep.steady_states import is_start
 from vanedamp.files.toml_input import InputError
 
 #: tables that say how a scene is run and what of it is kept, and nothing about its steady states
-_ABOUT_RUNS = ("time", "initial", "continuation", "sweep", "orbit")
+_ABOUT_RUNS = ("time", "initial", "continuation", "sweep", "orbit", "ramp", "ring_down")
 
 
 def points_beside(scene: Scene, parameter: str, sweep: Sweep) -> tuple[np.ndarray, np.ndarray]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid, time_grid
@@ -15,7 +13,7 @@ from vanedamp.coupling.planar.constraints import (
     planar_system,
 )
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import Loads, assemble
+from vanedamp.coupling.system.assembly import Loads, assemble, with_sine
 from vanedamp.coupling.system.system import System
 
 
@@ -28,7 +26,7 @@ def planar_start(scene: Scene, flat: System, steps: int) -> tuple[PlanarSystem, 
     system, signal = on_structure(planar_system(scene, flat)), scene.excitation.signal
     if signal is None:
         return system, planar_motion(scene, flat, system), time_grid(flat, steps, _harmonics(flat, system))
-    sine = replace(scene, excitation=replace(scene.excitation, waveform=None))
+    sine = with_sine(scene)
     level = -planar_system(sine, assemble(sine)).load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
     times = time_grid(flat, steps, lambda angle: np.outer(signal.sampled(angle), level))
     return system, planar_motion(scene, flat, system), times

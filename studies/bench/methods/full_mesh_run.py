@@ -52,6 +52,8 @@ def explicit_run(
     step.
     Raises InputError for another scene.
     """
+    if scene.excitation.distributed:
+        raise InputError("excitation: the whole mesh takes one force; leave load and pattern out")
     springless = scene.contact.rigid or scene.contact.needs_residual_flexibility
     if len(scene.damper) != 1 or scene.damper[0].friction > 0 or springless:
         raise InputError("scene: the whole mesh takes one body without friction and a compliant contact")

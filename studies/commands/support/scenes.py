@@ -17,15 +17,21 @@ from vanedamp.studies.commands.support.outputs import Outputs
 
 def load_scene(path: str, outputs: Outputs) -> Scene:
     """Load a scene that moves and whose files are there; none of them may be an output. Raises InputError."""
+    scene = load_any_scene(path, outputs)
+    if not scene.moved:
+        raise InputError(
+            "excitation: nothing moves the structure; give force, base_acceleration, resonance_amplitude or load, or "
+            "an [initial] state"
+        )
+    return scene
+
+
+def load_any_scene(path: str, outputs: Outputs) -> Scene:
+    """Load a scene whose files are there, whether or not something moves it; as load_scene."""
     scene = Scene.load(path)
     outputs.keep(scene.files)
     if isinstance(scene.structure, Rom) and not Path(scene.structure.file).is_file():
         raise InputError(f"structure.file: no such file {scene.structure.file}; `vanedamp reduce` writes one")
-    if not scene.moved:
-        raise InputError(
-            "excitation: nothing moves the structure; give force, base_acceleration or resonance_amplitude, or an "
-            "[initial] state"
-        )
     return scene
 
 
@@ -51,10 +57,13 @@ def print_resonance(source: str, scene: Scene) -> dict[str, Any]:
         scene = replace(scene, structure=replace(scene.structure, modes=None))
     resonance = chosen_resonance(scene)
     force = level / resonance.flexibility
+    loads = scene.excitation.distributed
     if resonance.modes > 1:
         print_note(
             source,
             f"excitation.resonance_amplitude: of the resonance at {resonance.frequency:.6g} Hz (mode "
-            f"{resonance.mode + 1}), force {force:.4g} N; resonance_near names another",
+            f"{resonance.mode + 1}), {f'loads times {force:.4g}' if loads else f'force {force:.4g} N'}; resonance_near "
+            "names another",
         )
-    return {"resonance": {"frequency": resonance.frequency, "mode": resonance.mode, "force": force}}
+    key = "load_factor" if loads else "force"
+    return {"resonance": {"frequency": resonance.frequency, "mode": resonance.mode, key: force}}

@@ -1,0 +1,48 @@
+"""The largest value over a period of a sum of sines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: samples of a period per order: a sum of sines is nowhere larger than its largest sample over cos(pi/16)
+_SAMPLES = 16
+#: product of the number of sines and their highest order beyond which Newton's method begins near the top only
+_FEW = 1024
+#: share of the largest sample from which on a sample is near the top: cos(pi/16) and less
+_TOP = 0.98
+#: numbers in a batch of sampled sums
+_BATCH = 1 << 22
+
+
+def peaks(waves: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Return the largest |Re sum_h waves_h exp(i order_h angle)| (f,) over all angles.
+
+    waves: (e, f) complex; order: (e,) whole numbers above 0. To round-off, by Newton's method.
+    """
+    count, sums = _SAMPLES * int(order.max()), waves.shape[1]
+    if len(order) * order.max() <= _FEW:
+        every = (2 * np.pi / count) * np.arange(count)
+        return _climb(waves, order, np.broadcast_to(every[:, None], (count, sums)))
+    found = np.zeros(sums)
+    for some in np.array_split(np.arange(sums), 1 + sums * count // _BATCH):
+        spectrum = np.zeros((count, len(some)), complex)
+        spectrum[order] = waves[:, some]
+        sampled = np.abs(np.fft.ifft(spectrum, axis=0, norm="forward").real)
+        place, column = np.nonzero(sampled >= _TOP * sampled.max(axis=0))
+        tops = _climb(waves[:, some[column]], order, (2 * np.pi / count) * place[None])
+        np.maximum.at(found, some[column], tops)
+    return found
+
+
+def _climb(waves: np.ndarray, order: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Return the largest value (f,) that Newton's method meets from angles (k, f) less than a sample from the tops."""
+    step = np.pi / (_SAMPLES / 2 * order.max())
+    found = np.zeros(waves.shape[1])
+    for _ in range(6):
+        turning = waves * np.exp(1j * np.multiply.outer(angle, order)).swapaxes(1, 2)
+        value, slope, bend = ((turning * (1j * order[:, None]) ** p).sum(axis=1).real for p in range(3))
+        found = np.maximum(found, np.abs(value).max(axis=0))
+        # towards a maximum of |x|, no further than the neighbours
+        move = np.divide(-slope, bend, out=np.copysign(step, value * slope), where=value * bend < 0)
+        angle = angle + np.clip(move, -step, step)
+    return found

@@ -1,0 +1,1 @@
+"""The waveforms of the package: multi-sine and measured history."""

@@ -1,0 +1,1 @@
+"""Motions that are not steady: run-up and run-down, ring-down."""

@@ -1,0 +1,289 @@
+"""Run-up and run-down: the excitation's frequency, or the speed of rotation, changes at the start of every period.
+
+Within a period both are constant (transients.ramp_course), so that the exact engine stays exact. Phase and force are
+continuous, and the motion goes on as it is: a period begins with the state that the one before has left
+(response.restart). Where the speed changes the stiffness, it changes the energy stored in it: work of the rotation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.exact.subsystem_assembly import Subsystem
+from vanedamp.coupling.methods.registry import final_state
+from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
+from vanedamp.coupling.model_order.selection import warnings_of
+from vanedamp.coupling.response.evaluation import Outcome, Run, exchanged_energy, residual
+from vanedamp.coupling.response.records import EXCITATION, STORED, VISCOUS, new_records
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import at_speed_of, restart_from
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.ramp import Ramp as Table
+from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
+from vanedamp.coupling.system.linear_response import (
+    LinearPeak,
+    LinearResponse,
+    linear_amplitudes,
+    linear_peaks,
+    linear_responses,
+)
+from vanedamp.coupling.system.system import System
+from vanedamp.coupling.transients.ramp_course import Course, courses, ramped, scene_at, table_of
+from vanedamp.coupling.transients.ramp_record import WORKS, Ramp, RampRun
+from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import InputError
+
+#: share of the gap, and of its product with the angular frequency, below which a body counts as at rest
+_AT_REST = 1e-9
+#: points of the linear curves from end to end, and around their peaks, in half-power widths
+_EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
+#: share of the range over which the detuning of a resonance is differentiated
+_STEP = 1e-4
+
+
+def ramp(
+    scene: Scene, progress: Callable[[int, int], None] | None = None, provenance: Mapping[str, Any] | None = None
+) -> Ramp:
+    """Run a scene up or down, or both, at all rates of its [ramp] table.
+
+    progress: called with the number of periods done and of those to do, of all runs.
+    Raises InputError for a scene without the table, or one that cannot be run so; numerical trouble is a status of the
+    run.
+    """
+    table, base, planned = table_of(scene), ramped(scene), courses(scene)
+    ends = [scene_at(base, table, value) for value in (table.from_, table.to)]
+    choices = choices_of(ends) if leaves_open(base) else NOTHING
+    for end in ends:  # before the first run: a speed may be too high
+        assemble(with_choices(end, choices).scene)
+    total, before = sum(len(course.time) for course in planned), 0
+    runs: list[RampRun] = []
+    notes: list[str] = []
+    for course in planned:
+        chosen = with_choices(scene_at(base, table, float(course.value[0])), choices)
+        first, start = chosen.scene, chosen.start
+        if not runs:
+            notes += warnings_of(first)
+        if table.start == "steady":
+            start, warnings = _steady(first, start)
+            notes += warnings
+        run = _Run(first, table, course, start)
+        for done in run:
+            if progress is not None:
+                progress(before + done, total)
+        before += len(course.time)
+        runs.append(run.result())
+    curves, tops = _stationary(first, table)
+    return Ramp(scene, tuple(runs), curves, tops, tuple(dict.fromkeys(notes)), dict(provenance or {}))
+
+
+def _steady(scene: Scene, start: RestartState | None) -> tuple[RestartState, list[str]]:
+    """Return the end of a run of the scene, and what is to be said about it. Raises InputError if it ends early."""
+    response = simulate(scene, start=start)
+    if response.final is None:
+        raise InputError(
+            f'ramp.start: the run at {scene.frequency:.6g} Hz ends early ({response.status}); take start = "rest"'
+        )
+    ended = f"ramp.start: the run at {scene.frequency:.6g} Hz before the ramp is {response.status}; give more periods"
+    return response.final, [] if response.status is Status.OK else [ended]
+
+
+def at_frequency(system: System, frequency: float) -> System:
+    """Return a system at another frequency of the excitation, Hz, which leaves the amplitudes of the loads."""
+    omega = 2 * np.pi * frequency
+    return system._replace(omega=omega, period=2 * np.pi / omega, frequency=omega * system.order)
+
+
+class _Run(Iterator[int]):
+    """A run, an iterator over the number of periods done: it ends with the last one, or within one (`status`)."""
+
+    def __init__(self, scene: Scene, table: Table, course: Course, start: RestartState | None) -> None:
+        self.scene, self.table, self.course, self.state = scene, table, course, start
+        self.over_speed = table.quantity != "frequency"
+        self.system, self.known = assemble(scene), dict[bytes, Subsystem]()
+        self.status, self.done, self.events, self.tilted, self.open_ledger = Status.OK, 0, 0, False, np.inf
+        p, b = len(course.time), self.system.bodies
+        travel = {cavity.name: cavity.gap for cavity in scene.cavity}
+        self.travel = np.array([travel[damper.cavity] for damper in scene.damper])
+        self.amplitude, self.impacts, self.collided = np.zeros((3, p))
+        self.stuck = np.zeros((p, b), bool)
+        self.section, self.parts = np.zeros((p + 1, 2)), np.zeros((p + 1, 1 + b))
+        # the ledger without the work of the rotation, which is counted apart
+        self.ledger, self.stored, self.rotation = np.zeros((p + 1, STORED + 1)), 0.0, 0.0
+
+    def __next__(self) -> int:
+        """Run the next period. Return the number of those done."""
+        if self.done == len(self.course.time) or self.status is not Status.OK:
+            raise StopIteration
+        run = self._begin(self.done)
+        self.status = run.advance_to(1)
+        if self.status is Status.OK:
+            self._record(self.done, run.outcome())
+            self.state = final_state(self.scene, run)
+            self.done += 1
+        return self.done
+
+    def _begin(self, k: int) -> Run:
+        """Return a run of period k that begins with the motion so far."""
+        state = self.state
+        if self.over_speed:
+            self.scene = scene_at(self.scene, self.table, float(self.course.value[k]))
+            system = assemble(self.scene)
+            if not _alike(system, self.system):
+                self.known = {}
+            self.system = system
+            if self.state is not None:
+                state = at_speed_of(self.scene, self.state)
+                # fewer modes than the model has may not hold the motion: what they lose is no work of the rotation
+                self.rotation -= 0.5 * (_square(state.velocity) - _square(self.state.velocity))
+        else:
+            self.system = at_frequency(self.system, float(self.course.frequency[k]))
+        scene, system, solver = self.scene, self.system, self.scene.solver
+        records, left = new_records(system, 1, 0), solver.max_events - self.events
+        if scene.planar:
+            from vanedamp.coupling.planar.planar_run import begin_run
+
+            return begin_run(scene, system, records, True, left, getattr(solver, "linearisation", 0.01), state)
+        if state is None:
+            motion = initial_motion(scene, system)
+        else:
+            motion = restart_from(system, physical_scale(scene, system), state)
+        return EngineRun(system, motion, records, True, left, self.known)
+
+    def _record(self, k: int, outcome: Outcome) -> None:
+        records, b = outcome.records, self.system.bodies
+        (begun, ended), section = records.ledger, records.section
+        if k == 0:
+            self.section[0], self.parts[0], self.ledger[0] = section[0, :2], records.parts[0], begun
+        elif self.over_speed:
+            # impacts at the very start of the period come after the change of the speed
+            self.rotation += begun[STORED] + begun[VISCOUS:STORED].sum() - begun[EXCITATION] - self.stored
+        self.stored = ended[STORED]
+        self.section[k + 1], self.parts[k + 1] = section[1, :2], records.parts[1]
+        self.ledger[k + 1] = ended
+        self.ledger[k + 1, :STORED] += self.ledger[k, :STORED] if k else 0.0
+        self.ledger[k + 1, STORED] -= self.rotation
+        self.amplitude[k], self.impacts[k], self.collided[k] = records.peak[0], records.impacts[0], records.collided[0]
+        slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
+        same = np.abs(section[1, 3 : 3 + b] - section[0, 3 : 3 + b]) <= _AT_REST * self.travel
+        self.stuck[k] = slow.all(axis=0) & same & ~_named(outcome)
+        self.events, self.open_ledger = self.events + outcome.events, outcome.open_ledger
+        if outcome.plane is not None:
+            neglected = outcome.plane.neglected * outcome.plane.tilt[0] ** 2  # nan for sliders
+            self.tilted = self.tilted or bool(np.any(neglected > outcome.plane.bound))
+
+    def result(self) -> RampRun:
+        """Return the record of the periods done."""
+        p, course, status = self.done, self.course, self.status
+        exchanged = exchanged_energy(self.system, self.collided)
+        balance = residual(self.ledger[: p + 1], self.parts[: p + 1], exchanged)
+        if status is Status.OK and not balance <= self.open_ledger:
+            status = Status.ENERGY
+        elif status is Status.OK and self.tilted:
+            status = Status.TILTED
+        change = self.ledger[p] - self.ledger[0]
+        works = *change[:STORED], self.rotation, change[STORED] + self.rotation
+        return RampRun(
+            rate=course.rate, status=status.value, time=course.time[:p], frequency=course.frequency[:p],
+            speed=course.speed[:p], amplitude=frozen(self.amplitude[:p]), impacts=frozen(self.impacts[:p]),
+            stuck=frozen(self.stuck[:p], bool), displacement=frozen(self.section[: p + 1, 0]),
+            velocity=frozen(self.section[: p + 1, 1]),
+            energy={name: float(value) for name, value in zip(WORKS, works, strict=True)}, energy_residual=balance,
+        )  # fmt: skip
+
+
+def _square(values: np.ndarray) -> float:
+    return float(values @ values)
+
+
+def _alike(system: System, other: System) -> bool:
+    """Whether two systems have the same subsystems (exact.subsystem_assembly.Subsystem)."""
+    names = ("stiffness", "damping", "mass", "floor", "J", "spring", "dashpot")
+    return all(np.array_equal(getattr(system, name), getattr(other, name)) for name in names)
+
+
+def _named(outcome: Outcome) -> np.ndarray:
+    """Return whether an event names a body (b,); states at rest are logged as a run begins, at time zero."""
+    system, named = outcome.system, np.zeros(outcome.system.bodies, bool)
+    for row in {int(row) for chunk in outcome.log for row in chunk[chunk[:, 0] > 0.0, 2]}:
+        if outcome.plane is None:
+            named |= system.of_bodies.J[row] != 0.0
+        elif outcome.plane.places[row][1] not in ("stop", "casing"):
+            named[outcome.plane.places[row][0]] = True
+    return named
+
+
+def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict[str, float]]:
+    """Return the amplitudes of the linear structure in steady state over the ramp, and their tops: see Ramp."""
+    low, high = min(table.from_, table.to), max(table.from_, table.to)
+    hertz, unit = hertz_of(table.path, scene.excitation.engine_order), SPEEDS.get(table.path, 1.0)
+    if np.isfinite(hertz):
+        peaks = list(linear_peaks(scene, low * unit, high * unit))
+        near = [peak.frequency + peak.width * _AROUND for peak in peaks]
+        if table.quantity == "frequency":
+            near = [response.grid(low, high) for response in linear_responses(scene)]
+        lines = np.linspace(low, high, _EVEN) * hertz
+        frequency = np.unique(np.clip(np.concatenate([lines, *near]), lines[0], lines[-1]))
+        value, (undamped, fixed) = frequency / hertz, linear_amplitudes(scene, frequency)
+        top = peaks[0].frequency / hertz
+    else:
+        value, undamped, fixed = _at_one_frequency(scene, table, low, high)
+        peaks = [LinearPeak(scene.frequency, float(heights.max()), 0.0) for heights in (undamped, fixed)]
+        frequency, top = np.full(len(value), scene.frequency), float(value[np.argmax(undamped)])
+    speed = value * unit if table.path in SPEEDS else np.full(len(value), scene.speed)
+    width, leaving = _crossing(scene, table, top, low, high)
+    tops = {"half_power_width": width, "detuning_rate": leaving}
+    for name, peak in zip(("undamped", "fixed"), peaks, strict=True):
+        tops |= {f"{name}_peak": peak.amplitude, f"{name}_peak_frequency": peak.frequency}
+    curves = {"frequency": frequency, "speed": speed, "undamped": undamped, "fixed": fixed}
+    return {name: frozen(values) for name, values in curves.items()}, tops
+
+
+def _at_one_frequency(scene: Scene, table: Table, low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return values (k,) of a speed, resonances among them, and amplitudes (k,) without bodies and with them glued."""
+
+    @cache
+    def responses(value: float) -> tuple[LinearResponse, LinearResponse]:
+        return linear_responses(scene_at(scene, table, value))
+
+    def natural(value: float, curve: int) -> np.ndarray:
+        return np.sort(responses(value)[curve].resonances()[0])
+
+    def apart(value: float, curve: int, mode: int) -> float:
+        return float(natural(value, curve)[mode] - scene.frequency)
+
+    values = np.linspace(low, high, _EVEN).tolist()
+    tops = []
+    for curve in range(2):
+        above = np.array([natural(value, curve) > scene.frequency for value in values])
+        for place, mode in np.argwhere(above[:-1] != above[1:]).tolist():
+            tops.append(float(brentq(apart, *values[place : place + 2], args=(curve, mode))))
+    values = sorted({*values, *tops})
+    at = np.array([scene.frequency])
+    undamped, fixed = np.array([[one.amplitude(at)[0] for one in responses(value)] for value in values]).T
+    return np.array(values), undamped, fixed
+
+
+def _crossing(scene: Scene, table: Table, value: float, low: float, high: float) -> tuple[float, float]:
+    """Return half-power width and detuning rate of the resonance at a value of the quantity: see Ramp."""
+
+    def detuning(value: float) -> tuple[np.ndarray, np.ndarray]:
+        here = scene_at(scene, table, value)
+        natural, widths = linear_responses(here)[0].resonances()
+        return here.frequency - natural, widths
+
+    apart, widths = detuning(value)
+    mode = int(np.argmin(np.abs(apart)))
+    if detuning(low)[0][mode] * detuning(high)[0][mode] >= 0.0:
+        return 0.0, 0.0
+    ends = (max(value - _STEP * (high - low), low), min(value + _STEP * (high - low), high))
+    before, behind = (float(detuning(end)[0][mode]) for end in ends)
+    return float(widths[mode]), abs(behind - before) / (ends[1] - ends[0])

@@ -1,0 +1,205 @@
+"""The record of run-ups and run-downs, in memory and on disk."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vanedamp.coupling.response.records import ENERGIES
+from vanedamp.coupling.scene.ramp import Ramp as Table
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.toml_input import validate
+
+if TYPE_CHECKING:
+    import xarray
+
+KIND = "ramp"
+DIRECTIONS = ("up", "down")
+#: entries of a run's energies, J: `rotation` is the work of a speed that changes stiffness and loads
+WORKS = (*ENERGIES[:-1], "rotation", ENERGIES[-1])
+#: series of a run, an entry a period, and their units
+SERIES = {"time": "s", "frequency": "Hz", "speed": "rad/s", "amplitude": "m", "impacts": "1"}
+#: states at both ends of every period, and their units
+STATES = {"displacement": "m", "velocity": "m/s"}
+#: curves of the linear structure in steady state, and their units
+CURVES = {"frequency": "Hz", "speed": "rad/s", "undamped": "m", "fixed": "m"}
+
+
+@dataclass(frozen=True, eq=False)
+class RampRun:
+    """A run through p excitation periods with b bodies.
+
+    rate             change of the ramp's quantity in a second, below zero where it falls
+    status           "ok", or another response.response.Status that ended the run early or spoils its figures
+    time             (p,) s, at the start of each period
+    frequency, speed  (p,) Hz and rad/s in it: the means of the ramp over the period
+    amplitude        (p,) m, the largest |x| in it
+    impacts          (p,) in it
+    stuck            (p, b) whether a body stays at rest in its cavity over the period
+    displacement, velocity  (p + 1,) m and m/s at the start of each period, and at the end
+    energy           J by the names of WORKS, over the run
+    energy_residual  imbalance of the run's ledger, relative to the largest term
+    """
+
+    rate: float
+    status: str
+    time: np.ndarray
+    frequency: np.ndarray
+    speed: np.ndarray
+    amplitude: np.ndarray
+    impacts: np.ndarray
+    stuck: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+    energy: Mapping[str, float]
+    energy_residual: float
+
+    @property
+    def direction(self) -> str:
+        """ "up" or "down"."""
+        return DIRECTIONS[int(self.rate < 0.0)]
+
+    @property
+    def top(self) -> int:
+        """Number of the period with the largest amplitude."""
+        return int(np.argmax(self.amplitude))
+
+    @property
+    def peak(self) -> float:
+        """Largest amplitude, m; nan for a run that ended in its first period."""
+        return float(self.amplitude[self.top]) if len(self.amplitude) else np.nan
+
+    def at_peak(self, name: str) -> float:
+        """Return the value of a series in the period with the largest amplitude."""
+        return float(getattr(self, name)[self.top]) if len(self.amplitude) else np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Ramp:
+    """Run-ups and run-downs of a scene with a [ramp] table.
+
+    runs: one for each rate, then those in the other direction; curves: by the names of CURVES, (k,) amplitudes of the
+    linear structure in steady state without bodies and with every body glued to its cavity; tops: the largest of both
+    from end to end and where they are, `undamped_peak` and `fixed_peak` (m), `undamped_peak_frequency` and
+    `fixed_peak_frequency` (Hz); of the resonance without bodies its `half_power_width` (Hz), and `detuning_rate`, by
+    which the frequency leaves it for a unit of the quantity (Hz), both 0 where the ramp does not pass it; warnings: to
+    be read before figures are used; provenance: versions and further data of the caller (JSON-able).
+    """
+
+    scene: Scene
+    runs: tuple[RampRun, ...]
+    curves: Mapping[str, np.ndarray]
+    tops: Mapping[str, float]
+    warnings: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def table(self) -> Table:
+        """The scene's [ramp] table."""
+        assert self.scene.ramp is not None
+        return self.scene.ramp
+
+    def share(self, run: RampRun) -> float:
+        """Return the peak of a run over that of the linear structure without bodies in steady state."""
+        top = self.tops["undamped_peak"]
+        return run.peak / top if 0.0 < top < np.inf else np.nan
+
+    def lewis_rate(self, run: RampRun) -> float:
+        """Return the rate of a run in the measure of transients.lewis.peak_ratio; nan without a resonance or damping.
+
+        Of a mode with the half-power width 2 zeta f, whose resonance the excitation's frequency leaves at that rate.
+        """
+        width, leaving = self.tops["half_power_width"], self.tops["detuning_rate"]
+        return 2 * abs(run.rate) * leaving / (np.pi * width**2) if width > 0.0 else np.nan
+
+    def to_json(self) -> dict[str, Any]:
+        """Return peaks, energies and status of each run as plain data (nan where there is none)."""
+        runs = [
+            {
+                "rate": run.rate, "direction": run.direction, "status": run.status, "periods": len(run.time),
+                "peak": run.peak, "peak_frequency": run.at_peak("frequency"), "peak_speed": run.at_peak("speed"),
+                "peak_time": run.at_peak("time"), "peak_share": self.share(run),
+                "lewis_rate": self.lewis_rate(run), "impacts": int(run.impacts.sum()),
+                "stuck_share": run.stuck.mean(axis=0).tolist() if len(run.time) else [],
+                "energy": dict(run.energy), "energy_residual": run.energy_residual,
+            }
+            for run in self.runs
+        ]  # fmt: skip
+        return {
+            "quantity": self.table.quantity, "unit": self.table.unit, "runs": runs, "stationary": dict(self.tops),
+            "warnings": list(self.warnings),
+        }  # fmt: skip
+
+    def variables(self) -> dict[str, Variable]:
+        """Return the variables of a file: the periods of all runs one after the other, runs, and linear curves."""
+        runs, unit = self.runs, f"{self.table.unit}/s"
+        dampers = len(self.scene.damper)
+
+        def joined(name: str) -> np.ndarray:
+            return np.concatenate([getattr(run, name) for run in runs])
+
+        periods = [len(run.time) for run in runs]
+        found = {
+            "run_of_period": Variable(np.repeat(np.arange(len(runs)), periods), ("period",)),
+            **{name: Variable(joined(name), ("period",), units) for name, units in SERIES.items()},
+            "run_of_start": Variable(np.repeat(np.arange(len(runs)), np.add(periods, 1)), ("start",)),
+            **{name: Variable(joined(name), ("start",), units) for name, units in STATES.items()},
+            "rate": Variable([run.rate for run in runs], ("run",), unit),
+            "direction": Variable(np.array([run.direction for run in runs], object), ("run",)),
+            "status": Variable(np.array([run.status for run in runs], object), ("run",)),
+            "peak": Variable([run.peak for run in runs], ("run",), "m"),
+            "peak_frequency": Variable([run.at_peak("frequency") for run in runs], ("run",), "Hz"),
+            "peak_speed": Variable([run.at_peak("speed") for run in runs], ("run",), "rad/s"),
+            "energy_residual": Variable([run.energy_residual for run in runs], ("run",)),
+            "work": Variable(np.array(WORKS, object), ("work",)),
+            "energy": Variable([[run.energy[name] for name in WORKS] for run in runs], ("run", "work"), "J"),
+            **{f"linear_{name}": Variable(self.curves[name], ("linear",), units) for name, units in CURVES.items()},
+        }
+        if dampers:
+            found["stuck"] = Variable(joined("stuck").astype(np.int8), ("period", "damper"))
+        return found
+
+    def save(self, path: str | Path) -> None:
+        """Write HDF5 that xarray opens."""
+        attributes = {
+            "scene": self.scene.to_dict(), "tops": dict(self.tops),
+            "warnings": json.dumps(list(self.warnings)), "provenance": dict(self.provenance),
+        }  # fmt: skip
+        save(path, KIND, self.variables(), attributes)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Ramp:
+        """Read the record that `save` wrote. Raises files.store.StoreError."""
+        values, attributes = load(path, KIND)
+        scene = validate(Scene, json.loads(attributes["scene"]), str(path))
+        runs = []
+        for number, rate in enumerate(values["rate"]):
+            inside, starts = values["run_of_period"] == number, values["run_of_start"] == number
+            stuck = values["stuck"][inside] if scene.damper else np.zeros((np.count_nonzero(inside), 0))
+            runs.append(
+                RampRun(
+                    rate=float(rate), status=str(values["status"][number]), stuck=frozen(stuck, bool),
+                    energy=dict(zip(WORKS, values["energy"][number].tolist(), strict=True)),
+                    energy_residual=float(values["energy_residual"][number]),
+                    **{name: frozen(values[name][inside]) for name in SERIES},
+                    **{name: frozen(values[name][starts]) for name in STATES},
+                )
+            )  # fmt: skip
+        return cls(
+            scene=scene, runs=tuple(runs), curves={name: frozen(values[f"linear_{name}"]) for name in CURVES},
+            tops=json.loads(attributes["tops"]), warnings=tuple(json.loads(attributes["warnings"])),
+            provenance=json.loads(attributes["provenance"]),
+        )  # fmt: skip
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the variables of the file as a data set of xarray, which must be installed."""
+        from xarray import Dataset
+
+        data = {name: (item.dims, item.values, {"units": item.units}) for name, item in self.variables().items()}
+        return Dataset(data, attrs={"quantity": self.table.quantity})

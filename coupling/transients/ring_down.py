@@ -1,0 +1,150 @@
+"""Ring-down of a scene: free motion from a steady response, a hammer blow or a static pull, by the exact engine."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.methods.registry import respond, run_of
+from vanedamp.coupling.model_order.choices import Chosen, choose
+from vanedamp.coupling.model_order.selection import warnings_of
+from vanedamp.coupling.planar.planar_run import PlanarRun
+from vanedamp.coupling.response.evaluation import evaluate
+from vanedamp.coupling.response.records import STORED, VISCOUS
+from vanedamp.coupling.response.response import Response, Status
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.ring_down import RingDownTable
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble, physical_scale
+from vanedamp.coupling.system.linear_response import glued_mass
+from vanedamp.coupling.system.modal_basis import forced_label
+from vanedamp.coupling.system.system import System
+from vanedamp.coupling.transients.instantaneous import TurningPoint, TurningPoints, without_rebounds
+from vanedamp.coupling.transients.ring_down_record import PARTS, LinearMode, RingDown
+from vanedamp.coupling.transients.ring_down_segments import Walk
+from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
+from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import InputError
+
+#: share of the largest motion of excitation.at by one mode below which it does not show another
+_UNSEEN = 1e-9
+
+
+def ring_down(
+    scene: Scene,
+    progress: Callable[[int, int], None] | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> RingDown:
+    """Let a scene ring down as its [ring_down] table says, and find the turning points of one natural mode.
+
+    progress: called with the number of periods done and of those to do. Raises InputError for a scene without the
+    table, one that the exact engine cannot run, or in which nothing moves; numerical trouble is a status of the result.
+    """
+    began, table = time.perf_counter(), table_of(scene)
+    chosen = choose(scene)
+    free = free_scene(chosen.scene, table)
+    periods = free.time.simulated
+    drive = _drive(chosen, periods, progress) if table.start == "steady" else None
+    start = blown_or_pulled(chosen.scene, table) if drive is None else drive.final
+    system = assemble(free)
+    mode = _followed(chosen.scene, system, table, start)
+    record = RingDown(
+        scene=scene, status=Status.OK, linear=_linear(system, mode),
+        duration=periods * system.period, time=frozen(()), displacement=frozen(()), energy=frozen(()),
+        structure_energy=frozen(()), impacts=frozen((), int), rest_time=None, energies={}, energy_residual=0.0,
+        drive=None if drive is None else _of_drive(drive), wall_time_s=0.0, estimate=chosen.estimate,
+        advice=chosen.advice, warnings=warnings_of(chosen.scene), provenance=dict(provenance or {}),
+    )  # fmt: skip
+    if drive is not None and drive.status is not Status.OK:
+        record = replace(record, status=drive.status)
+    if start is not None:
+        before = 0 if drive is None else drive.periods
+        record = _rung_down(
+            record, free, system, start, lambda done: progress and progress(before + done, before + periods)
+        )
+    return replace(record, wall_time_s=time.perf_counter() - began)
+
+
+def _drive(chosen: Chosen, periods: int, progress: Callable[[int, int], None] | None) -> Response:
+    """Return the response before the excitation ceases. periods: of the free motion after it."""
+    scene = chosen.scene
+    if not assemble(scene).load.any():
+        raise InputError('ring_down.start: nothing moves; "steady" needs an excitation, such as force')
+    report = None if progress is None else lambda done, of: progress(done, of + periods)
+    return respond(scene, start=chosen.start, progress=report)
+
+
+def _of_drive(drive: Response) -> dict[str, Any]:
+    return {
+        "status": drive.status.value, "frequency_hz": drive.frequency, "amplitude_mean_m": drive.amplitude_mean,
+        "classification": drive.classification,
+    }  # fmt: skip
+
+
+def _followed(scene: Scene, system: System, table: RingDownTable, start: RestartState | None) -> int:
+    """Return the number of the mode to follow. Raises InputError for one that does not move or does not show."""
+    omega, shown = np.sqrt(system.of_structure.stiffness), np.abs(system.of_structure.response)
+    if table.mode is not None and table.mode >= system.modes:
+        raise InputError(f"ring_down.mode: expected 0 to {system.modes - 1}, not {table.mode}; modes count from 0")
+    size = np.ones(system.modes)
+    if start is not None:
+        size = np.hypot(start.displacement, start.velocity / omega) / physical_scale(scene, system)
+    if table.mode is not None:
+        mode = table.mode
+    elif table.start == "steady":
+        mode = int(np.argmin(np.abs(omega - system.omega)))
+    else:
+        mode = int(np.argmax(shown * size))
+    if shown[mode] <= _UNSEEN * shown.max():
+        at = forced_label(scene)
+        raise InputError(f"ring_down.mode: mode {mode} does not move '{at}'; name another excitation.at or mode")
+    if not size[mode] > 0.0:
+        raise InputError(f"ring_down.mode: mode {mode} does not move at the start; name another, or act elsewhere")
+    return mode
+
+
+def _linear(system: System, mode: int) -> LinearMode:
+    """Return the figures of a mode without bodies, and with all of them glued: of the mode that is most like it."""
+    modes = system.of_structure
+    squares, shapes = eigh(np.diag(modes.stiffness), glued_mass(system))
+    like = int(np.argmax(np.abs(shapes[mode])))
+    omega, fixed, shape = np.sqrt(modes.stiffness[mode]), np.sqrt(squares[like]), shapes[:, like]
+    return LinearMode(
+        mode, float(omega / (2 * np.pi)), float(modes.damping[mode, mode] / (2 * omega)),
+        float(fixed / (2 * np.pi)), float(shape @ modes.damping @ shape / (2 * fixed)),
+    )  # fmt: skip
+
+
+def _rung_down(
+    record: RingDown, free: Scene, system: System, start: RestartState, report: Callable[[int], Any]
+) -> RingDown:
+    """Return the record with the free motion from a state on."""
+    began, mode = time.perf_counter(), record.linear.mode
+    run = run_of(free, events=True, start=start)
+    assert isinstance(run, EngineRun | PlanarRun)
+    walk, turning, done = Walk(run, mode, free.time.simulated), TurningPoints(), 0
+    for segment, since, duration in walk:
+        turning.add(segment, since, duration)
+        if int(since / system.period) > done:
+            report(done := int(since / system.period))
+    outcome = run.outcome()
+    response = evaluate(free, outcome, walk.status, 0, began)
+    points = without_rebounds([*turning.found, *([] if turning.rest is None else [turning.rest])])
+    moments, coordinate, energy, structure = np.array(points or np.zeros((0, len(TurningPoint._fields)))).T
+    hit = np.array([event.time for event in response.event_list if event.kind == "impact"])
+    ledger = outcome.records.ledger[: outcome.periods + 1]
+    parts = ledger[0, STORED], *ledger[-1, VISCOUS:STORED], ledger[-1, STORED]
+    return replace(
+        record, status=response.status if record.status is Status.OK else record.status, time=frozen(moments),
+        displacement=frozen(system.response[mode] * coordinate), energy=frozen(energy),
+        structure_energy=frozen(structure), impacts=frozen(np.diff(np.searchsorted(hit, moments)), int),
+        rest_time=None if turning.rest is None else turning.rest.time,
+        energies=dict(zip(PARTS, map(float, parts), strict=True)),
+        energy_residual=response.energy_residual,
+    )  # fmt: skip

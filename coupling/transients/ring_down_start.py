@@ -1,0 +1,111 @@
+"""The state that a free motion begins with."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from vanedamp.coupling.methods.registry import why_no_restart
+from vanedamp.coupling.planar.constraints import planar_motion, planar_system
+from vanedamp.coupling.planar.restart import planar_restart_state
+from vanedamp.coupling.response.restart import before_stops, restart_state
+from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.scene.excitation import Excitation
+from vanedamp.coupling.scene.ring_down import RingDownTable
+from vanedamp.coupling.scene.scene import Scene, Time
+from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom
+from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
+from vanedamp.coupling.system.modal_basis import basis_of, forced_label, interface_row
+from vanedamp.coupling.system.system import System
+from vanedamp.files.store import frozen
+from vanedamp.files.toml_input import InputError
+
+
+def table_of(scene: Scene) -> RingDownTable:
+    """Return the [ring_down] table of a scene that can ring down. Raises InputError for others."""
+    table = scene.ring_down
+    if table is None:
+        raise InputError(
+            'ring_down: missing; say in a table [ring_down] how the motion begins, such as start = "steady"'
+        )
+    if isinstance(scene.structure, Prescribed):
+        raise InputError('ring_down: a prescribed motion does not ring down; take structure.model = "rigid" or "rom"')
+    if scene.solver.method != "exact":
+        raise InputError(f'ring_down: is for solver.method "exact", not "{scene.solver.method}"')
+    if reason := why_no_restart(scene):
+        raise InputError(f"ring_down: {reason}")
+    if table.at is not None and not isinstance(scene.structure, Rom):
+        raise InputError("ring_down.at: a structure of one mode has no interface labels; leave it out")
+    if table.start != "steady":
+        _check_at_rest(scene, table)
+    return table
+
+
+def _check_at_rest(scene: Scene, table: RingDownTable) -> None:
+    """Raise InputError where a blow or a pull moves nothing, or leaves open what only a steady motion decides."""
+    if table.start == "impulse" and not table.impulse:
+        raise InputError("ring_down.impulse: nothing moves; give an impulse that is not 0 (N s)")
+    if table.start == "displacement" and not (table.displacement or scene.initial != Initial()):
+        raise InputError("ring_down.displacement: nothing moves; give a displacement that is not 0 (m), or [initial]")
+    if (table.impulse or table.displacement) and scene.initial != Initial():
+        raise InputError(f"initial: the structure is at rest before ring_down.{table.start}; remove the table")
+    if isinstance(scene.structure, Rom) and scene.structure.modes == "auto":
+        raise InputError(
+            'structure.modes: "auto" chooses them for a steady excitation; a blow or a pull moves all: give a number'
+        )
+    if any(damper.shape == "auto" for damper in scene.damper):
+        raise InputError('damper.shape: "auto" compares steady motions; after a blow or a pull say which body each is')
+
+
+def free_scene(scene: Scene, table: RingDownTable) -> Scene:
+    """Return a scene without its excitation, whose frequency stays the unit of time, over the free motion."""
+    periods = table.periods or math.ceil((table.duration or 0.0) * scene.frequency)
+    return replace(
+        scene, excitation=Excitation(frequency=scene.frequency, at=scene.excitation.at),
+        time=Time(periods=periods, transient=0), sweep={}, orbit=None,
+    )  # fmt: skip
+
+
+def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
+    """Return the state right after a hammer blow, at a static pull, or the scene's initial one.
+
+    A blow acts on the structure only: what it makes bodies do comes by friction and impacts. A pull moves the cavities
+    with their bodies, and leaves the springs of friction dampers unloaded. Raises InputError.
+    """
+    system = assemble(scene)
+    state, scale = _initial(scene, system), physical_scale(scene, system)
+    if table.impulse is None and table.displacement is None:
+        return state
+    at = table.at or forced_label(scene)
+    row = interface_row(basis_of(scene), at, "ring_down.at")
+    if not row.any():
+        raise InputError(f"ring_down.at: nothing moves; no mode of the model moves '{at}'; name another label")
+    if table.displacement is not None:
+        softness = row / system.of_structure.stiffness
+        p = softness * (table.displacement / (row @ softness))
+        if np.any(before_stops(system, p) != p):
+            raise InputError(
+                f"ring_down.displacement: {table.displacement:g} m would bring the structure beyond a stop; take less"
+            )
+        return replace(state, displacement=frozen(state.displacement + scale * p))
+    rate = row * (table.impulse or 0.0)
+    slip = state.slip_velocity - system.floor @ rate
+    moved = {"velocity": state.velocity + scale * rate, "slip_velocity": slip}
+    if scene.planar:
+        plane, n = planar_system(scene, system), system.modes
+        extended = plane.tilt >= 0
+        moved["lift_velocity"] = state.lift_velocity - np.where(extended, plane.rise[:, :n] @ rate, 0.0)
+        moved["tilt_rate"] = state.tilt_rate - np.where(extended, plane.turn[:, :n] @ rate, 0.0)
+    return replace(state, **{name: frozen(values) for name, values in moved.items()})
+
+
+def _initial(scene: Scene, system: System) -> RestartState:
+    """Return the state that the scene begins with."""
+    scale = physical_scale(scene, system)
+    if not scene.planar:
+        return restart_state(system, scale, initial_motion(scene, system))
+    plane = planar_system(scene, system)
+    motion = planar_motion(scene, system, plane)
+    return planar_restart_state(system, plane, scale, motion.q, motion.v)

@@ -1,0 +1,72 @@
+"""How a record prints: a line a field, arrays by their shape and range, as scipy's results print."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+#: entries of an array that are shown, and characters of any other value
+_ENTRIES, _WIDTH = 6, 88
+
+
+class Displayed:
+    """Base of records, dataclasses with repr=False, that print so that a notebook can show them."""
+
+    def __repr__(self) -> str:
+        """Return the record's name and a line for each of its fields that has a value."""
+        names = [item.name for item in fields(self)]  # type: ignore[arg-type]
+        shown = {name: _shown(getattr(self, name)) for name in names}
+        width = max(map(len, names))
+        lines = [f"{name:>{width + 2}}: {text}" for name, text in shown.items() if text is not None]
+        return "\n".join([type(self).__name__, *lines])
+
+
+def _shown(value: Any) -> str | None:
+    """Return a value as one short line; None for one that is not there."""
+    if isinstance(value, Enum):
+        return str(value.value)
+    if isinstance(value, np.ndarray):
+        return _array(value)
+    if value is None or (hasattr(value, "__len__") and len(value) == 0):
+        return None
+    if hasattr(value, "nnz"):
+        return f"{'×'.join(map(str, value.shape))} sparse, {value.nnz} entries"
+    if isinstance(value, Displayed):
+        return type(value).__name__
+    if isinstance(value, Mapping):
+        return _cut(", ".join(f"{key}: {_shown(item)}" for key, item in value.items()))
+    if is_dataclass(value):
+        return _cut(f"{type(value).__name__}({_given(value)})")
+    if isinstance(value, list | tuple):
+        if len(value) > _ENTRIES:
+            return f"{len(value)} of {type(value[0]).__name__}"
+        return _cut(", ".join(filter(None, map(_shown, value))))
+    return _cut(f"{value:.6g}" if isinstance(value, float) else str(value))
+
+
+def _given(record: Any) -> str:
+    """Return the fields of a dataclass that have other values than their defaults."""
+    values = [(item.name, getattr(record, item.name), item.default) for item in fields(record)]
+    return ", ".join(f"{name}={_shown(value)}" for name, value, default in values if value is not default)
+
+
+def _array(values: np.ndarray) -> str | None:
+    if values.size == 0:
+        return None
+    if values.size <= _ENTRIES:
+        return _cut(np.array2string(values, precision=6, separator=", ").replace("\n", ""))
+    shape = "×".join(map(str, values.shape))
+    if values.dtype.kind not in "fiu":
+        kinds = sorted(set(map(str, values.ravel()[:1000]))) if values.dtype.kind in "OU" else [str(values.dtype)]
+        return _cut(f"{shape} of {', '.join(kinds)}")
+    if not np.isfinite(values).any():
+        return f"{shape} without values"
+    return f"{shape} from {np.nanmin(values):.6g} to {np.nanmax(values):.6g}"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _WIDTH else text[: _WIDTH - 3] + "..."

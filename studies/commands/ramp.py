@@ -1,0 +1,67 @@
+"""`vanedamp ramp`: run-up and run-down through resonance."""
+
+from __future__ import annotations
+
+import time
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
+from vanedamp.studies.terminal import progress
+
+if TYPE_CHECKING:
+    from vanedamp.coupling.transients.ramp_record import Ramp
+
+ORDER = 87
+SUMMARY = "run-up and run-down through resonance, as the scene's [ramp] table says"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a scene and the result files."""
+    add_input(parser, "SCENE.toml")
+    add_output(parser, "RAMP.h5")
+    add_json(parser)
+
+
+def run(arguments: Namespace) -> None:
+    """Run the scene up and down."""
+    from vanedamp.studies.commands.support.messages import print_warnings, write_result
+    from vanedamp.studies.commands.support.outputs import check_outputs
+
+    outputs = check_outputs(arguments)
+    from vanedamp.studies.commands.support.scenes import load_scene, print_resonance
+
+    scene = load_scene(arguments.input, outputs)
+    from vanedamp.coupling.transients.ramp import ramp
+    from vanedamp.coupling.transients.ramp_course import ramped
+    from vanedamp.files.provenance import versions
+
+    resonance = print_resonance(arguments.input, ramped(scene))
+    started = time.perf_counter()
+    with progress("ramp") as report:
+        result = ramp(scene, report, {"versions": versions()})
+    if arguments.output:
+        result.save(arguments.output)
+    seconds = time.perf_counter() - started
+    print_warnings(arguments.input, result.warnings)
+    # times are not kept in the result, which is the same however it came about
+    write_result(arguments.json, result.to_json() | {"wall_time_s": seconds} | resonance)
+    if arguments.json != "-":
+        _print_table(result)
+        periods = sum(len(run.time) for run in result.runs)
+        print(f"{periods} periods in {seconds:.1f} s")
+
+
+def _print_table(result: Ramp) -> None:
+    """Print the peak of every run, and how it compares with that of the steady state without bodies."""
+    print(
+        f"{f'rate, {result.table.unit}/s':>18} direction {'peak, m':>12} {'at, Hz':>10} of the stationary peak  status"
+    )
+    for run in result.runs:
+        print(
+            f"{abs(run.rate):18.6g} {run.direction:9} {run.peak:12.5g} {run.at_peak('frequency'):10.6g} "
+            f"{result.share(run):22.4f}  {run.status}"
+        )
+    tops = result.tops
+    for name, what in (("undamped", "without bodies"), ("fixed", "bodies fixed")):
+        print(f"stationary, {what}: {tops[f'{name}_peak']:.5g} m at {tops[f'{name}_peak_frequency']:.6g} Hz")

@@ -1,0 +1,73 @@
+"""`vanedamp ringdown`: free motion after a steady excitation, a hammer blow or a static pull."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
+from vanedamp.studies.terminal import progress
+
+if TYPE_CHECKING:
+    from vanedamp.coupling.transients.ring_down_record import RingDown
+
+ORDER = 88
+SUMMARY = "ring-down or hammer blow as the scene's [ring_down] table says: frequency and damping over the amplitude"
+#: rows of the table that is printed
+_ROWS = 10
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a scene and the result files."""
+    add_input(parser, "SCENE.toml")
+    add_output(parser, "RINGDOWN.h5")
+    add_json(parser)
+
+
+def run(arguments: Namespace) -> None:
+    """Let the scene ring down."""
+    from vanedamp.studies.commands.support.messages import write_result
+    from vanedamp.studies.commands.support.outputs import check_outputs
+
+    outputs = check_outputs(arguments)
+    from vanedamp.studies.commands.support.scenes import load_any_scene, print_choices, print_resonance
+
+    scene = load_any_scene(arguments.input, outputs)
+    from vanedamp.coupling.transients.ring_down import ring_down
+    from vanedamp.coupling.transients.ring_down_start import free_scene, table_of
+    from vanedamp.files.provenance import versions
+    from vanedamp.studies.commands.support.budget import check_run
+
+    table = table_of(scene)
+    check_run(free_scene(scene, table))
+    if table.start == "steady":
+        check_run(scene)
+    resonance = print_resonance(arguments.input, scene)
+    with progress("ringdown") as report:
+        result = ring_down(scene, report, {"versions": versions()})
+    if arguments.output:
+        result.save(arguments.output)
+    print_choices(arguments.input, result.estimate, result.advice, result.warnings)
+    write_result(arguments.json, result.to_json() | resonance)
+    if arguments.json != "-":
+        _print_summary(result)
+
+
+def _print_summary(result: RingDown) -> None:
+    """Print the linear mode, and frequency and damping at some amplitudes."""
+    linear, half, cycles = result.linear, result.half_cycles, result.cycles
+    print(
+        f"mode {linear.mode}: {linear.frequency:.6g} Hz, damping ratio {linear.damping_ratio:.6g}; bodies glued: "
+        f"{linear.fixed_frequency:.6g} Hz, {linear.fixed_damping_ratio:.6g}"
+    )
+    print(f"status {result.status.value}: {len(half.time)} half cycles, {result.impacts.sum()} impacts")
+    if len(cycles.time):
+        print(f"{'time, s':>12} {'amplitude, m':>14} {'frequency, Hz':>14} {'damping ratio':>14} {'by energy':>12}")
+    for k in range(0, len(cycles.time), max(-(-len(cycles.time) // _ROWS), 1)):
+        frequency = result.table.cycles / (result.time[k + 2 * result.table.cycles] - result.time[k])
+        print(
+            f"{cycles.time[k]:12.6g} {cycles.amplitude[k]:14.6g} {frequency:14.8g} {cycles.damping_ratio[k]:14.6g} "
+            f"{cycles.damping_ratio_energy[k]:12.6g}"
+        )
+    if result.rest_time is not None:
+        print(f"at rest from {result.rest_time:.6g} s on, at {result.displacement[-1]:.6g} m")

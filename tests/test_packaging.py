@@ -1,0 +1,73 @@
+"""The project as packages: built from what it ships, installed where there is no checkout and no finite elements."""
+
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.tools.input_files import DAMPED_BLOCK
+from vanedamp.studies.case.stages import assemble, modal_analysis
+from vanedamp.studies.case.tables import Case
+from vanedamp.studies.demo import run_demo
+from vanedamp.studies.paper.figure_file import FOLDER, Structure
+
+ROOT = Path(__file__).parent.parent
+PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
+SUFFIXES = {".py", ".toml", ".html", ".js", ".msh"}
+
+
+def test_shipped_rigid_model_is_that_of_the_shipped_mesh(cluster_modes_file):
+    modes = Structure.load(cluster_modes_file, Path("rom.h5"))
+    shipped = Structure.shipped()
+    for name in ("mass", "stiffness", "damping_ratio", "frequency", "amplitude"):
+        assert getattr(shipped, name) == pytest.approx(getattr(modes, name), rel=1e-7)
+
+
+@pytest.fixture(scope="module")
+def cluster_modes_file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cluster")
+    for source in (FOLDER / "case.toml", ROOT / "meshes" / "vane_cluster.msh"):
+        shutil.copy(source, folder)
+    modal_analysis(assemble(Case.load(folder / "case.toml"))).save(folder / "modes.h5")
+    return folder / "modes.h5"
+
+
+def test_rigid_demo_needs_no_finite_elements(tmp_path):
+    report = run_demo(tmp_path / "out", workers=1, rigid=True)
+    stems = ["fig9", "fig10_single", "fig10_separate", "fig10_shared"]
+    names = {f"{stem}{suffix}" for stem in stems for suffix in (".toml", ".h5")}
+    names |= {f"{figure}{suffix}" for figure in ("fig9", "fig10") for suffix in (".png", ".claims.json")}
+    assert {path.name for path in report.parent.iterdir()} == names | {"report.html"}
+
+
+@pytest.mark.slow
+def test_packages_hold_the_project_and_run_without_a_checkout(tmp_path):
+    source = tmp_path / "source"
+    tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout.decode()
+    for name in tracked.rstrip("\0").split("\0"):
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, source / name, follow_symlinks=False)
+    # the wheel is built from the sdist
+    subprocess.run([sys.executable, "-m", "build", "--no-isolation", str(source)], check=True, capture_output=True)
+    (wheel,) = (source / "dist").glob("*.whl")
+    held = set(zipfile.ZipFile(wheel).namelist())
+    shipped = {path.relative_to(ROOT) for part in PARTS for path in (ROOT / part).rglob("*") if path.suffix in SUFFIXES}
+    tracked_files = set(tracked.split("\0"))
+    assert {f"vanedamp/{path}" for path in shipped if str(path) in tracked_files} <= held
+    assert {name.split("/")[0].split("-")[0] for name in held} == {"vanedamp"}
+    fresh = tmp_path / "fresh"
+    subprocess.run([sys.executable, "-m", "venv", str(fresh)], check=True)
+    install = [str(fresh / "bin" / "pip"), "install", "--quiet", str(wheel)]
+    subprocess.run(install, check=True, cwd=tmp_path)
+    command = str(fresh / "bin" / "vanedamp")
+    ran = subprocess.run([command, "demo", "--rigid", "-o", "out"], cwd=tmp_path, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert (tmp_path / "out" / "report.html").is_file()
+    (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
+    refused = subprocess.run([command, "modal", "case.toml"], cwd=tmp_path, capture_output=True, text=True)
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1
+    assert "pip install 'vanedamp[fem]'" in refused.stderr
