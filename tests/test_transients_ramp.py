@@ -17,7 +17,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.transients.lewis import chirp_response, peak_ratio
 from vanedamp.coupling.transients.ramp import at_frequency, ramp
-from vanedamp.coupling.transients.ramp_course import courses
+from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
@@ -355,6 +355,20 @@ def test_run_up_of_a_rotor():
     assert found.tops["undamped_peak_frequency"] == pytest.approx(4 * resonance / (2 * np.pi), rel=1e-3)
 
 
+def test_level_of_the_resonance_along_an_engine_order():
+    """One force for all speeds: that with which the stationary peak has the given height."""
+    table = {"quantity": "rpm", "from": 120.0, "to": 220.0, "rate": 40.0}
+    given = scene(table, ROTOR | {"excitation": {"engine_order": 4.0, "resonance_amplitude": 2e-3}})
+    found = ramp(given)
+    assert found.tops["undamped_peak"] == pytest.approx(2e-3, rel=1e-3)
+    base = ramped(given)
+    loads = [assemble(scene_at(base, given.ramp, rpm)).load for rpm in (120.0, 171.0, 220.0)]
+    assert np.ptp(loads, axis=0) == pytest.approx(0.0, abs=1e-12)
+    (forced,) = ramp(scene(table, ROTOR)).runs
+    scaled = FORCE / (np.abs(loads[0]).max() * np.sqrt(MASS)) * found.runs[0].amplitude
+    assert scaled == pytest.approx(forced.amplitude, rel=1e-9)
+
+
 def test_speed_at_a_constant_frequency():
     """The frequency stays, and the structure's own passes it."""
     data = ROTOR | {"excitation": {"frequency": 11.7, "force": FORCE}}
@@ -454,8 +468,8 @@ REFUSED = [
     (UP | {"quantity": "rpm", "from": 0.0}, ROTOR, "at standstill"),
     (UP | {"quantity": "speed", "to": 400.0}, SOFTENED, "unstable from 100 rad/s on"),
     (
-        UP | {"quantity": "rpm"}, ROTOR | {"excitation": {"engine_order": 4.0, "resonance_amplitude": 1e-4}},
-        "give excitation.force",
+        UP | {"quantity": "rpm"}, ROTOR | {"excitation": {"frequency": 11.0, "resonance_amplitude": 1e-4}},
+        "give excitation.engine_order",
     ),
 ]  # fmt: skip
 

@@ -107,19 +107,24 @@ def ramped(scene: Scene) -> Scene:
     check_waveform(scene, "exact")
     if reason := why_no_restart(scene):
         raise InputError(f"ramp: a period begins with the motion that the one before has left, which {reason}")
+    order, near = excitation.engine_order, excitation.resonance_near
     if table.quantity == _FREQUENCY:
-        if excitation.engine_order is not None:
+        if order is not None:
             raise InputError('ramp.quantity: the frequency follows the speed (engine_order); take "speed" or "rpm"')
-        if excitation.resonance_near is None:  # the level is that of one resonance, as in a sweep
-            near = (min(table.from_, table.to), max(table.from_, table.to))
-            scene = replace(scene, excitation=replace(excitation, resonance_near=near))
     else:
         if scene.rotation is None:
             raise InputError(f'ramp.quantity: "{table.quantity}" changes [rotation], which is missing')
-        if excitation.resonance_amplitude is not None:
-            raise InputError("ramp: the resonance of resonance_amplitude changes with the speed; give excitation.force")
-        if excitation.engine_order is not None and not min(table.from_, table.to) > 0.0:
+        if excitation.resonance_amplitude is not None and (order is None or isinstance(near, float)):
+            raise InputError(
+                "ramp: over a speed resonance_amplitude is that of one resonance along an engine order; give "
+                "excitation.engine_order, and resonance_near as a range, or excitation.force"
+            )
+        if order is not None and not min(table.from_, table.to) > 0.0:
             raise InputError("ramp: an engine order has no frequency at standstill; give from and to above zero")
+    hertz = hertz_of(table.path, order)
+    if near is None and math.isfinite(hertz):  # the level is that of one resonance, as in a sweep
+        ends = sorted((table.from_ * hertz, table.to * hertz))
+        scene = replace(scene, excitation=replace(excitation, resonance_near=(ends[0], ends[1])))
     return replace(scene, ramp=None, sweep={}, orbit=None)
 
 
