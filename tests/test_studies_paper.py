@@ -325,3 +325,8 @@ def test_the_whole_paper(tmp_path, capsys):
     assert 0.5 < figures["blocks"][4]["ratio_median"] < 1
     assert figures["blocks"][6]["double_horizontal"] < 0.16
     assert figures["fit"][1]["horizontal"] > figures["fit"][1]["vertical"] + 0.1
+    assert verdicts["campbell"] == ["shown"] * 4
+    assert verdicts["rotating_body"][:3] == ["shown"] * 3
+    assert figures["rotating_body"][2]["largest_error"] < 0.03
+    assert figures["self_tuning"][0]["highest"] < 0.01
+    assert figures["self_tuning"][3]["down_1"] < 0.01 < figures["self_tuning"][3]["worst_1"]

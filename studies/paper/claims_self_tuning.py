@@ -1,8 +1,9 @@
 """What the cited work says of the self-tuning impact damper, and what the model shows.
 
-Duffy, Bagley and Mehmed (2000), NASA TM-2000-210215, and US 6,827,551, in words of our own; order-tuned absorbers: Den
-Hartog (1956), Mechanical Vibrations, section 6.7. Amplitudes are relative to the undamped maximum X; frequencies are
-the excitation's, which follow the speed.
+Duffy, Bagley and Mehmed (2000), a NASA memorandum, and US 6,827,551, in words of our own, and what a designer would ask
+beside: other blades, starts, errors of the track, other orders. Order-tuned absorbers: Den Hartog (1956), Mechanical
+Vibrations, section 6.7. Amplitudes are relative to the undamped maximum X; frequencies are the excitation's, which
+follow the speed.
 """
 
 from __future__ import annotations
@@ -129,7 +130,7 @@ def _starts(curves: Curves, scenes: Scenes) -> Claim:
         ),
         verdict(max(worst.max(), up.max(), down.max()) < _SUPPRESSED, share.max() < 1),
         "The tuned state and one of impacts are both steady: a release that throws the body against the walls can "
-        "keep it there, with an amplitude like that of an impact damper.",
+        "keep it there, with an amplitude like that of an impact damper; between near walls a rising speed brings it.",
         {f"impacts_{gap:g}": value for gap, value in zip(gaps[wide], share, strict=True)}
         | {f"worst_{gap:g}": value for gap, value in zip(gaps[wide], worst, strict=True)}
         | {f"up_{gap:g}": value for gap, value in zip(gaps[wide], up, strict=True)}
