@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from vanedamp.files.toml_input import InputError
+from vanedamp.files.toml_input import LARGEST, InputError
 
 
 class CsvRow(NamedTuple):
@@ -18,7 +18,7 @@ class CsvRow(NamedTuple):
     words: dict[str, str]
 
     def number(self, column: str) -> float:
-        """Return the finite number in a column. Raises InputError."""
+        """Return the finite number in a column, no larger than those of other input files. Raises InputError."""
         word = self.words[column]
         try:
             value = float(word)
@@ -26,6 +26,8 @@ class CsvRow(NamedTuple):
             value = math.nan
         if not math.isfinite(value):
             raise InputError(f"{self.place}: {column}: expected a finite number (got {word!r})")
+        if abs(value) > LARGEST:
+            raise InputError(f"{self.place}: {column}: expected a number up to {LARGEST:g} in SI units (got {word!r})")
         return value
 
 
@@ -40,7 +42,9 @@ def read_csv(path: str | Path, columns: Sequence[str], least: int = 1) -> list[C
         raise InputError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
-    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
+    lines = [
+        (n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")
+    ]
     try:  # line by line, so that no quotation mark joins two of them
         table = [[word.strip() for word in next(csv.reader([line]))] for _, line in lines]
     except csv.Error as error:

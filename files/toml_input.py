@@ -27,24 +27,32 @@ _NO_LIST = ("tuple_type", "list_type")
 
 #: no quantity is larger, in any units, and none that must not be zero is smaller than its inverse: their products and
 #: squares are numbers, too
-_LARGEST = 1e40
+LARGEST = 1e40
+#: and no whole number is longer than those of TOML
+_LONGEST = 2**63 - 1
 
 
 def _not_huge(value: float) -> float:
-    if abs(value) > _LARGEST:
-        raise ValueError(f"expected a number up to {_LARGEST:g} in SI units")
+    if abs(value) > LARGEST:
+        raise ValueError(f"expected a number up to {LARGEST:g} in SI units")
     return value
 
 
 def _not_tiny(value: float) -> float:
-    if value < 1.0 / _LARGEST:
-        raise ValueError(f"expected at least {1.0 / _LARGEST:g} in SI units")
+    if value < 1.0 / LARGEST:
+        raise ValueError(f"expected at least {1.0 / LARGEST:g} in SI units")
+    return value
+
+
+def _not_long(value: int) -> int:
+    if abs(value) > _LONGEST:
+        raise ValueError(f"expected a whole number up to {_LONGEST}")
     return value
 
 
 # numbers are numbers: no text, no booleans
 Real = Annotated[float, Strict(), AfterValidator(_not_huge)]
-Whole = Annotated[int, Strict()]
+Whole = Annotated[int, Strict(), AfterValidator(_not_long)]
 Positive = Annotated[Real, Field(gt=0), AfterValidator(_not_tiny)]
 NonNegative = Annotated[Real, Field(ge=0)]
 Fraction = Annotated[Real, Field(ge=0, le=1)]

@@ -182,6 +182,8 @@ HEADER = "time,value\n"
         (HEADER + "0,1\n1,inf\n2,1\n", "line 3: value: expected a finite number (got 'inf')"),
         (HEADER + "0,1\nnan,2\n2,1\n", "line 3: time: expected a finite number (got 'nan')"),
         (HEADER + "0,1\n# later\n2,2\n1,1\n", "line 5: time: expected more than 2 s, that of the row before"),
+        (HEADER + "0,1\n1e300,2\n2e300,1\n", "line 3: time: expected a number up to 1e+40 in SI units (got '1e300')"),
+        (HEADER + "0,1\n1e-320,2\n2e-320,1\n", "time: expected a period from 1e-40 to 1e+40 s, not 1.99998e-320"),
         (HEADER + "0,1\n0,2\n1,1\n", "line 3: time: expected more than 0 s, that of the row before"),
     ],
 )  # fmt: skip

@@ -11,10 +11,12 @@ from scipy.integrate import solve_ivp
 
 import vanedamp as vd
 from tests.test_coupling_continuation import BISTABLE, DAMPING, EPS, RATIOS, one_to_one
+from tests.test_coupling_loads import ring, travelling
 from tests.tools.processes import ROOT
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.linear_response import linear_amplitudes
 from vanedamp.coupling.transients.lewis import chirp_response, peak_ratio
 from vanedamp.coupling.transients.ramp import at_frequency, ramp
 from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
@@ -460,6 +462,8 @@ REFUSED = [
     ({"from": 90.0, "to": 110.0, "rate": []}, {}, "ramp.rate"),
     ({"from": 90.0, "to": 110.0, "rate": 1e6}, {}, "in less than one period"),
     ({"from": 90.0, "to": 110.0, "rate": 1e-9}, {}, "take a higher rate"),
+    ({"from": 90.0, "to": 110.0, "rate": [3e-4] * 4}, {}, "periods of the excitation together"),
+    ({"from": 90.0, "to": 110.0, "periods": 10**400}, {}, "ramp.periods: expected a whole number up to"),
     (UP, TABLE, "jump"),
     (UP, {"solver": {"method": "moreau"}}, 'run-ups are those of the exact engine, not of "moreau"'),
     (UP, PLANAR_SPRINGS, "contacts are springs"),
@@ -484,6 +488,52 @@ def test_refusals_are_one_line(table, further, said):
 def test_a_scene_without_the_table_is_refused():
     with pytest.raises(InputError, match="ramp: missing"):
         ramp(validate(Scene, ONE_MODE, "x"))
+
+
+@pytest.mark.parametrize("start", ["rest", "steady"])
+@pytest.mark.parametrize("over_speed", [False, True], ids=["frequency", "speed"])
+def test_a_wave_around_a_ring(over_speed, start, tmp_path):
+    """Of both modes with one nodal diameter the response feels one only: the other is no gap in the ledger."""
+    structure, model = ring(tmp_path)
+    excitation, ends = {"frequency": 104.0, "at": "tip0", "load": travelling(1)}, {"from": 110.0, "to": 140.0}
+    further = {"gravity": {"acceleration": 0.0}, "time": {"periods": 400, "transient": 300}}
+    if over_speed:
+        excitation |= {"frequency": None, "engine_order": 3.0}
+        ends = {"quantity": "speed", "from": 2 * np.pi / 3 * 110.0, "to": 2 * np.pi / 3 * 140.0}
+        further["rotation"] = {"speed": 200.0}
+        # it turns, and the speed does not change it
+        turning = {"rotation_axis": np.array([0.0, 0.0, 1.0]), "rotation_point": np.zeros(3), "greatest_speed": 400.0}
+        replace(model, centrifugal_stiffness=np.zeros((4, 4)), **turning).save(structure["file"])
+    (run,) = ramp(
+        scene(ends | {"periods": 40, "start": start}, {"structure": structure, "excitation": excitation, **further})
+    ).runs
+    assert run.status == "ok" and run.energy_residual < 1e-10
+    assert abs(run.energy["rotation"]) < 1e-10 * run.energy["excitation"]
+    if start == "rest":
+        loads = np.array([2.0 * np.exp(-0.5j * np.pi * blade) for blade in range(4)])
+        state = np.zeros(8)
+        for frequency, displacement in zip(run.frequency, run.displacement[1:], strict=True):
+            omega = 2 * np.pi * frequency
+
+            def rate(t, y, omega=omega):
+                return np.r_[
+                    y[4:], (loads * np.exp(1j * omega * t)).imag - model.damping @ y[4:] - model.stiffness @ y[:4]
+                ]
+
+            state = solve_ivp(rate, (0, 1 / frequency), state, method="DOP853", rtol=1e-11, atol=1e-16).y[:, -1]
+            assert displacement == pytest.approx(state[0], abs=1e-8 * run.peak)
+
+
+def test_a_resonance_without_damping_that_a_point_of_the_curve_meets():
+    """The stationary amplitude is infinite there, to the last bit of the frequency, and the ramp's is not."""
+    undamped = ONE_MODE | {"structure": {"model": "rigid", "mass": 1.0, "stiffness": 4.0, "damping_ratio": 0.0}}
+    undamped |= {"excitation": {"frequency": 1 / np.pi, "force": 1.0}}
+    given = scene({"from": 0.5 / np.pi, "to": 1.5 / np.pi, "periods": 5}, undamped)
+    assert 2 * np.pi * (1 / np.pi) == 2.0  # the middle of the range is the resonance
+    found = ramp(given)
+    assert found.runs[0].status == "ok" and np.isfinite(found.runs[0].peak)
+    assert found.tops["undamped_peak"] == np.inf and np.isnan(found.share(found.runs[0]))
+    assert linear_amplitudes(given, np.array([0.1, 1 / np.pi]))[0][1] == np.inf
 
 
 def test_a_run_that_ends_early_says_so():

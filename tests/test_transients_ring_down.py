@@ -9,6 +9,7 @@ import tomli_w
 from scipy.linalg import eigh
 
 import vanedamp as vd
+from tests.test_coupling_loads import ring, travelling
 from tests.test_studies_report import charts
 from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.methods.registry import run_of
@@ -88,6 +89,34 @@ def chain(folder, damping_ratio=0.003, **tables):
     tip, fourth = np.eye(5)[4], np.eye(5)[3]
     ReducedModel.from_matrices(MASS, STIFFNESS, {"tip": tip, "fourth": fourth}, damping_ratio=damping_ratio).save(path)
     return scene(structure={"model": "rom", "file": str(path)}, excitation={"frequency": 100.0, "at": "tip"}, **tables)
+
+
+def test_the_mode_that_is_followed_is_one_that_moves(tmp_path):
+    """A wave with one nodal diameter leaves the mode without any, which is nearer to its frequency, at rest."""
+    structure, _ = ring(tmp_path)
+    wave = scene(
+        structure=structure, excitation={"frequency": 104.0, "at": "tip0", "load": travelling(1)},
+        gravity={"acceleration": 0.0}, time={"periods": 400, "transient": 300},
+        ring_down={"start": "steady", "periods": 20},
+    )  # fmt: skip
+    found = vd.ring_down(wave)
+    assert found.linear.frequency == pytest.approx(100 * math.sqrt(1.6), rel=1e-9)
+    assert found.cycles.damping_ratio == pytest.approx(0.02, rel=1e-9) and len(found.half_cycles.time) > 40
+    with pytest.raises(InputError, match=r"ring_down.mode: mode 0 does not move at the start"):
+        vd.ring_down(wave.replace({"ring_down.mode": 0}))
+
+
+def test_the_mode_that_noise_moves_the_most(tmp_path):
+    """Lines of a multi-sine around a higher mode: the distance between them says nothing of the modes."""
+    structure, _ = ring(tmp_path)
+    noise = scene(
+        structure=structure,
+        excitation={
+            "frequency": 2.0, "at": "tip0", "force": 1.0, "waveform": {"shape": "multisine", "orders": [62, 65]},
+        },
+        gravity={"acceleration": 0.0}, time={"periods": 8, "transient": 6}, ring_down={"start": "steady", "periods": 1},
+    )  # fmt: skip
+    assert vd.ring_down(noise).linear.frequency == pytest.approx(100 * math.sqrt(1.6), rel=1e-9)
 
 
 @pytest.mark.parametrize("mode", [0, 3])
@@ -445,6 +474,8 @@ def test_the_report_of_a_motion_with_few_turning_points_or_none(tmp_path):
         ({"ring_down": blow(None)}, "ring_down: impulse .*: give it with"),
         ({"ring_down": pull(start="steady")}, 'ring_down: displacement .*: is for start = "displacement"'),
         ({"ring_down": {"start": "steady", "periods": 5, "at": "tip"}}, "ring_down: at: is where an impulse"),
+        ({"ring_down": blow(periods=None, duration=1e30)}, "ring_down.duration: takes .* periods .* at most 10000000"),
+        ({"ring_down": blow(periods=10**400)}, "ring_down.periods: expected a whole number up to"),
         ({"ring_down": blow(at="tip")}, "ring_down.at: a structure of one mode has no interface labels"),
         ({"ring_down": blow(mode=1)}, "ring_down.mode: expected 0 to 0, not 1"),
         ({"ring_down": blow(), "initial": {"velocity": 1.0}}, "initial: the structure is at rest before"),

@@ -12,7 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files.csv_input import read_csv
-from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Real, Whole
+from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Real, Whole, validate
 
 _COLUMNS = ("at", "order", "force", "phase_deg")
 
@@ -57,7 +57,8 @@ def pattern_loads(file: str, _stamp: int) -> dict[str, Load]:
             raise InputError(f"{row.place}: force: expected 0 or more, its sign in phase_deg (got {force:g})")
         if not row.words["at"]:
             raise InputError(f"{row.place}: at: name an interface label")
-        loads[f"excitation.pattern: {row.place}"] = Load(row.words["at"], force, row.number("phase_deg"), int(order))
+        values = {"at": row.words["at"], "force": force, "phase": row.number("phase_deg"), "order": int(order)}
+        loads[f"excitation.pattern: {row.place}"] = validate(Load, values, row.place)
     if fault := repeated(loads):
         raise InputError(fault)
     return loads

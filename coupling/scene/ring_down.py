@@ -18,9 +18,9 @@ class RingDownTable:
     hammer blow of `impulse` (N s) on the structure at rest; "displacement", a static pull by `displacement` (m), or the
     scene's [initial] state, released. Blow and pull act at the interface label `at` of a reduced model, by default
     excitation.at. duration: s, or periods: of the excitation, which remain the unit of time of the run; mode: number of
-    the natural mode that is followed, from 0, by default the one that the excitation's frequency is nearest to
-    ("steady") or that moves the most; cycles: periods of that mode over which damping is averaged; bins: of amplitude,
-    for means over many cycles (0: none).
+    the natural mode that is followed, from 0, by default, of those that move, the one that the excitation's frequency
+    is nearest to ("steady", one sine) or the one that moves the most; cycles: periods of that mode over which damping
+    is averaged; bins: of amplitude, for means over many cycles (0: none).
     """
 
     start: Literal["steady", "impulse", "displacement"]

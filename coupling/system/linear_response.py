@@ -57,16 +57,28 @@ class LinearResponse:
     order: np.ndarray
 
     def amplitude(self, frequencies: np.ndarray) -> np.ndarray:
-        """Return amplitudes of the response (f,), m, at frequencies (f,), Hz; of harmonics the peak over a period."""
-        waves = [self._wave(h, np.asarray(frequencies, float)) for h in range(len(self.order))]
-        return np.abs(waves[0]) if len(waves) == 1 else peaks(np.array(waves), self.order)
+        """Return amplitudes of the response (f,), m, at frequencies (f,), Hz; of harmonics the peak over a period.
+
+        Infinite at a frequency that is, to the last bit, that of a resonance without damping.
+        """
+        waves = np.array([self._wave(h, np.asarray(frequencies, float)) for h in range(len(self.order))])
+        finite = np.isfinite(waves).all(axis=0)
+        amplitude = np.full(len(finite), np.inf)
+        amplitude[finite] = np.abs(waves[0, finite]) if len(waves) == 1 else peaks(waves[:, finite], self.order)
+        return amplitude
 
     def _wave(self, h: int, frequencies: np.ndarray) -> np.ndarray:
         """Return complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,) in Hz."""
         omega = 2 * np.pi * self.order[h] * frequencies[:, None, None]
         dynamic = np.diag(self.stiffness) + 1j * omega * self.damping - omega**2 * self.mass
         loads = np.broadcast_to(self.load[h][:, None], (len(omega), self.load.shape[1], 1))
-        wave: np.ndarray = np.linalg.solve(dynamic, loads)[:, :, 0] @ self.response + self.table[h]
+        try:
+            solved = np.linalg.solve(dynamic, loads)
+        except np.linalg.LinAlgError:
+            if len(frequencies) == 1:
+                return np.array([complex(np.inf)])
+            return np.concatenate([self._wave(h, half) for half in np.array_split(frequencies, 2)])
+        wave: np.ndarray = solved[:, :, 0] @ self.response + self.table[h]
         return wave
 
     def peak(self, low: float, high: float) -> LinearPeak:

@@ -44,6 +44,8 @@ from vanedamp.files.toml_input import InputError
 
 #: share of the gap, and of its product with the angular frequency, below which a body counts as at rest
 _AT_REST = 1e-9
+#: share of the largest motion of a place by a mode below which it does not feel another
+_UNSEEN = 1e-11
 #: points of the linear curves from end to end, and around their peaks, in half-power widths
 _EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
 #: share of the range over which the detuning of a resonance is differentiated
@@ -96,6 +98,23 @@ def _steady(scene: Scene, start: RestartState | None) -> tuple[RestartState, lis
     return response.final, [] if response.status is Status.OK else [ended]
 
 
+def seen_only(system: System) -> System:
+    """Return a system without the loads on modes that neither the response nor a body nor a contact feels.
+
+    The engine lets such modes be: it carries no free motion of them from one period to the next. At rest they have no
+    energy either, and the ledger is that of all that moves.
+    """
+    rows = np.abs(np.vstack([system.of_structure.response, system.floor, system.of_structure.J]))
+    felt = (rows / np.maximum(rows.max(axis=1, initial=0.0), np.finfo(float).tiny)[:, None]).max(axis=0, initial=0.0)
+    own = system.of_structure.damping - np.diag(np.diag(system.of_structure.damping))
+    unseen = np.flatnonzero((felt < _UNSEEN) & ~own.any(axis=0))
+    if not system.load[:, unseen].any():
+        return system
+    load = system.load.copy()
+    load[:, unseen] = 0.0
+    return system._replace(load=load)
+
+
 def at_frequency(system: System, frequency: float) -> System:
     """Return a system at another frequency of the excitation, Hz, which leaves the amplitudes of the loads."""
     omega = 2 * np.pi * frequency
@@ -108,7 +127,7 @@ class _Run(Iterator[int]):
     def __init__(self, scene: Scene, table: Table, course: Course, start: RestartState | None) -> None:
         self.scene, self.table, self.course, self.state = scene, table, course, start
         self.over_speed = table.quantity != "frequency"
-        self.system, self.known = assemble(scene), dict[bytes, Subsystem]()
+        self.system, self.known = seen_only(assemble(scene)), dict[bytes, Subsystem]()
         self.status, self.done, self.events, self.tilted, self.open_ledger = Status.OK, 0, 0, False, np.inf
         p, b = len(course.time), self.system.bodies
         travel = {cavity.name: cavity.gap for cavity in scene.cavity}
@@ -136,7 +155,7 @@ class _Run(Iterator[int]):
         state = self.state
         if self.over_speed:
             self.scene = scene_at(self.scene, self.table, float(self.course.value[k]))
-            system = assemble(self.scene)
+            system = seen_only(assemble(self.scene))
             if not _alike(system, self.system):
                 self.known = {}
             self.system = system

@@ -23,7 +23,7 @@ from vanedamp.files.toml_input import InputError
 
 _FREQUENCY = "frequency"
 #: periods of a run that anyone would wait for: some hours
-_MOST = 10_000_000
+MOST_PERIODS = 10_000_000
 
 
 class Course(NamedTuple):
@@ -48,7 +48,17 @@ def courses(scene: Scene) -> list[Course]:
     """
     table, base = table_of(scene), ramped(scene)
     ends = [(table.from_, table.to), (table.to, table.from_)][: 1 + table.both]
-    return [_course(base, table, begin, end, rate) for begin, end in ends for rate in table.rate or (None,)]
+    planned: list[Course] = []
+    for begin, end in ends:
+        for rate in table.rate or (None,):
+            planned.append(_course(base, table, begin, end, rate))
+            periods = sum(len(course.time) for course in planned)
+            if periods > MOST_PERIODS:
+                raise InputError(
+                    f"ramp.rate: the runs take more than {MOST_PERIODS} periods of the excitation together; take "
+                    "higher or fewer rates"
+                )
+    return planned
 
 
 def _course(base: Scene, table: Table, begin: float, end: float, rate: float | None) -> Course:
@@ -68,10 +78,10 @@ def _course(base: Scene, table: Table, begin: float, end: float, rate: float | N
             f"ramp.rate: {rate:g} {table.unit} a second passes the range in less than one period of the excitation; "
             "take a lower one"
         )
-    if periods > _MOST:
+    if periods > MOST_PERIODS:
         raise InputError(
             f"ramp.rate: at {rate:g} {table.unit} a second the range takes {periods:.3g} periods of the excitation; at "
-            f"most {_MOST}: take a higher rate"
+            f"most {MOST_PERIODS}: take a higher rate"
         )
     number = np.arange(periods + 1)
     if constant:

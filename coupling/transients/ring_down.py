@@ -34,6 +34,8 @@ from vanedamp.files.toml_input import InputError
 
 #: share of the largest motion of excitation.at by one mode below which it does not show another
 _UNSEEN = 1e-9
+#: share of the largest motion of a mode at the start below which another is at rest, but for round-off
+_STILL = 1e-12
 
 
 def ring_down(
@@ -95,16 +97,17 @@ def _followed(scene: Scene, system: System, table: RingDownTable, start: Restart
     size = np.ones(system.modes)
     if start is not None:
         size = np.hypot(start.displacement, start.velocity / omega) / physical_scale(scene, system)
+    moves = size > _STILL * size.max()
     if table.mode is not None:
         mode = table.mode
-    elif table.start == "steady":
-        mode = int(np.argmin(np.abs(omega - system.omega)))
+    elif table.start == "steady" and list(scene.excitation.shares) == [1]:
+        mode = int(np.argmin(np.where(moves, np.abs(omega - system.omega), np.inf)))
     else:
         mode = int(np.argmax(shown * size))
     if shown[mode] <= _UNSEEN * shown.max():
         at = forced_label(scene)
         raise InputError(f"ring_down.mode: mode {mode} does not move '{at}'; name another excitation.at or mode")
-    if not size[mode] > 0.0:
+    if not moves[mode]:
         raise InputError(f"ring_down.mode: mode {mode} does not move at the start; name another, or act elsewhere")
     return mode
 

@@ -19,6 +19,7 @@ from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom
 from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
 from vanedamp.coupling.system.modal_basis import basis_of, forced_label, interface_row
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.transients.ramp_course import MOST_PERIODS
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -60,8 +61,14 @@ def _check_at_rest(scene: Scene, table: RingDownTable) -> None:
 
 
 def free_scene(scene: Scene, table: RingDownTable) -> Scene:
-    """Return a scene without its excitation, whose frequency stays the unit of time, over the free motion."""
+    """Return a scene without its excitation, whose frequency stays the unit of time, over the free motion.
+
+    Raises InputError for a motion of more periods than anyone would wait for.
+    """
     periods = table.periods or math.ceil((table.duration or 0.0) * scene.frequency)
+    if periods > MOST_PERIODS:
+        name = "periods" if table.periods else "duration"
+        raise InputError(f"ring_down.{name}: takes {periods:.3g} periods of the excitation; at most {MOST_PERIODS}")
     return replace(
         scene, excitation=Excitation(frequency=scene.frequency, at=scene.excitation.at),
         time=Time(periods=periods, transient=0), sweep={}, orbit=None,

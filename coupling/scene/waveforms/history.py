@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 from vanedamp.coupling.scene.waveform import Waveform
 from vanedamp.files.csv_input import read_csv
 from vanedamp.files.store import file_stamp, frozen
-from vanedamp.files.toml_input import STRICT, InputError
+from vanedamp.files.toml_input import LARGEST, STRICT, InputError
 
 _COLUMNS = ("time", "value")
 
@@ -58,4 +58,8 @@ def _read(file: str, _stamp: int) -> tuple[np.ndarray, np.ndarray]:
     if late.size:
         row = rows[late[0] + 1]
         raise InputError(f"{row.place}: time: expected more than {time[late[0]]:g} s, that of the row before")
+    if not 1.0 / LARGEST <= time[-1] - time[0] <= LARGEST:
+        raise InputError(
+            f"{file}: time: expected a period from {1.0 / LARGEST:g} to {LARGEST:g} s, not {time[-1] - time[0]:g}"
+        )
     return frozen(time), frozen(value)
