@@ -150,6 +150,12 @@ class _Body(NamedTuple):
         """Its greatest acceleration then, m/s^2."""
         return 2 * math.pi * self.scene.frequency * self.speed
 
+    def aside(self, field: _Field) -> float:
+        """Return the acceleration across the plane of its motion, m/s^2; 0 of a slider, which has no such plane."""
+        if field.across is None or self.damper.shape == "slider":
+            return 0.0
+        return abs(float(field.acceleration @ np.cross(field.along, field.across)))
+
 
 def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tuple[str, str]]:
     """Yield kinds and sentences of what the loads in a rotating frame neglect. gravity: (3,) that counts, m/s^2."""
@@ -177,6 +183,13 @@ def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tu
             "rotation",
             f"a cavity that turns by its rotation turns the load on its floor, which is left out; it is "
             f"{turn / body.inertia:.2g} of the body's inertia",
+        )
+    aside = body.aside(field)
+    if body.damper.friction > 0.0 and aside > _SEEN * abs(body.across):
+        yield (
+            "side",
+            f"the load has {aside:.3g} m/s^2 across the plane in which the body moves, beside {abs(body.across):.3g} "
+            "between floor and ceiling; what it presses on there, and that friction, are left out",
         )
     if body.damper.friction > 0.0 and body.across > 0.0:
         change = 2 * scene.speed * body.speed / body.across
@@ -237,7 +250,8 @@ def _field(scene: Scene, basis: ModalBasis, index: int) -> _Field:
             )
     place = basis.positions[label] - point
     walls = [str(wall) for wall in cavity.labels()[:2]]
-    if label not in walls and all(wall in basis.positions for wall in walls):
+    own = cavity.floor is None or label not in walls  # else a wall is the floor, and its place that of the cavity
+    if own and all(wall in basis.positions for wall in walls):
         middle = 0.5 * (basis.positions[walls[0]] + basis.positions[walls[1]]) - point
         place = place + along * float((middle - place) @ along)
     if across is not None:
