@@ -136,6 +136,11 @@ class _Body(NamedTuple):
         return self.scene.cavity[_cavity(self.scene, self.damper)]
 
     @property
+    def pressed(self) -> float:
+        """Acceleration that presses on the floor, or of a body with extent on the ceiling, m/s^2."""
+        return abs(self.across)
+
+    @property
     def reach(self) -> float:
         """Travel from the middle to a wall, m."""
         return self.cavity.gap / 2
@@ -169,7 +174,7 @@ def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tu
         )
     if not _held(body.damper):
         drift = field.gradient * body.reach
-        others = max(body.damper.friction * body.across, abs(body.along), body.inertia)
+        others = max(body.damper.friction * body.pressed, abs(body.along), body.inertia)
         if drift > _SEEN * others:
             yield (
                 "gradient",
@@ -177,7 +182,7 @@ def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tu
                 f"which is left out; it is {drift / others:.2g} of what else moves the body. A body with a stiffness "
                 "or a track_radius feels it",
             )
-    turn = abs(body.cavity.rotation) * body.across * body.reach
+    turn = abs(body.cavity.rotation) * body.pressed * body.reach
     if turn > _SEEN * body.inertia:
         yield (
             "rotation",
@@ -185,14 +190,14 @@ def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tu
             f"{turn / body.inertia:.2g} of the body's inertia",
         )
     aside = body.aside(field)
-    if body.damper.friction > 0.0 and aside > _SEEN * abs(body.across):
+    if body.damper.friction > 0.0 and aside > _SEEN * body.pressed:
         yield (
             "side",
-            f"the load has {aside:.3g} m/s^2 across the plane in which the body moves, beside {abs(body.across):.3g} "
+            f"the load has {aside:.3g} m/s^2 across the plane in which the body moves, beside {body.pressed:.3g} "
             "between floor and ceiling; what it presses on there, and that friction, are left out",
         )
-    if body.damper.friction > 0.0 and body.across > 0.0:
-        change = 2 * scene.speed * body.speed / body.across
+    if body.damper.friction > 0.0 and body.pressed > 0.0:
+        change = 2 * scene.speed * body.speed / body.pressed
         if change > _SEEN:
             yield (
                 "coriolis",
