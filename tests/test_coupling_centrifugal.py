@@ -166,7 +166,7 @@ FLOORS = {
 }
 
 
-def model(path, **changes):
+def model(path, labels=None, **changes):
     """A reduced model of one mode that turns about an inclined axis, with three cavities that differ in direction."""
     directions = {label: floor[0] for label, floor in FLOORS.items()}
     directions |= {f"{label}.normal": floor[1] for label, floor in FLOORS.items()}
@@ -175,7 +175,7 @@ def model(path, **changes):
         "rotation_point": POINT, "greatest_speed": 2 * SPEED,
         "positions": np.array([FLOORS[label[0]][2] for label in directions]),
     } | changes  # fmt: skip
-    made = ReducedModel.from_matrices([[1.0]], [[1e6]], {label: [1e-3] for label in directions}, **fields)
+    made = ReducedModel.from_matrices([[1.0]], [[1e6]], {label: [1e-3] for label in labels or directions}, **fields)
     made.save(path)
     return {
         "structure": {"model": "rom", "file": str(path)},
@@ -209,6 +209,41 @@ def test_friction_and_pull_in_the_cavities_of_a_reduced_model(tmp_path):
     for i, label in enumerate(FLOORS):
         along, across, _ = by_hand(label, 0.005)
         assert (loads.along[i], loads.across[i]) == pytest.approx((along, -across), rel=1e-12, abs=1e-9)
+
+
+@pytest.mark.parametrize("floor", [None, "floor"])
+def test_a_body_stands_in_the_middle_between_its_walls(tmp_path, floor):
+    """With or without a floor of its own, which may lie anywhere along the cavity."""
+    places = {"left": [0.4, -0.03, 0.0], "right": [0.4, 0.05, 0.0], "floor": [0.4, 0.2, 0.0]}
+    tables = model(
+        tmp_path / "rom.h5", labels=places, positions=np.array(list(places.values())),
+        directions={label: (0.0, 1.0, 0.0) for label in places},
+        rotation_axis=[0.0, 0.0, 1.0], rotation_point=[0.0, 0.0, 0.0],
+    )  # fmt: skip
+    tables["excitation"]["at"] = "left"
+    tables["cavity"] = [
+        {"name": "c", "gap": 1e-3, "left": "left", "right": "right"} | ({"floor": floor} if floor else {})
+    ]
+    loads = loads_of(scene(**tables, damper=[{"cavity": "c", "mass": MASS, "friction": 0.1}]))
+    assert loads.along[0] == pytest.approx(SPEED**2 * 0.01, rel=1e-12)
+    assert loads.across[0] == pytest.approx(SPEED**2 * 0.4, rel=1e-12)
+
+
+def test_a_load_across_the_plane_of_a_body_is_warned_of(tmp_path):
+    """Blocks feel no wall beside their plane; sliders are pressed on whatever floor there is."""
+    tables = model(tmp_path / "rom.h5")
+    sort = {"cavity": "of b", "mass": MASS, "friction": 0.3}
+    block = sort | {"shape": "block", "length": 0.02, "height": 0.01}
+    arm = np.array(FLOORS["b"][2]) - POINT
+    side = abs(np.cross(SPEED * AXIS, np.cross(SPEED * AXIS, arm)) @ np.cross(*np.array(FLOORS["b"][:2])))
+    assert side < 1e-9  # the cavity lies in the plane of rotation
+    assert "across the plane" not in warnings(**tables, damper=[block])
+    inclined = sort | block | {"cavity": "of c"}
+    arm = np.array(FLOORS["c"][2]) - POINT
+    side = abs(np.cross(SPEED * AXIS, np.cross(SPEED * AXIS, arm)) @ np.cross(*np.array(FLOORS["c"][:2])))
+    assert f"the load has {side:.3g} m/s^2 across the plane" in warnings(**tables, damper=[inclined])
+    assert "across the plane" not in warnings(**tables, damper=[inclined | {"friction": 0.0}])
+    assert "across the plane" not in warnings(**tables, damper=[sort | {"cavity": "of c"}])
 
 
 def test_tracks_in_the_plane_of_rotation_and_along_the_axis(tmp_path):
@@ -332,6 +367,10 @@ def test_what_is_left_out_is_warned_of_where_it_shows():
     crossing = 2 * 20.0 * 2e-4 / (R + RHO)
     assert f"{crossing:.2g} of it" in warnings(
         {"friction": 0.3}, cavity={"gap": 4e-4}, excitation={"engine_order": 20.0}
+    )
+    outboard = {"gap": 4e-4, "play": 1e-4, "centrifugal_deg": 180.0}  # of a body with extent: the ceiling presses it
+    assert f"{crossing:.2g} of it" in warnings(
+        DISC | {"friction": 0.3}, cavity=outboard, excitation={"engine_order": 20.0}
     )
     turning = {"gap": 1e-4, "rotation": 20.0}
     assert f"{20 * (R + RHO) / 400:.2g} of the body's inertia" in warnings(

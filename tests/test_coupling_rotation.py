@@ -93,6 +93,21 @@ def test_a_state_stays_where_it_is_when_the_speed_changes(turning_model):
     assert modal_transfer(fewer, 100.0, 100.0) == pytest.approx(np.eye(2), abs=1e-12)
 
 
+def test_a_state_at_standstill_stays_where_it_is_when_the_structure_begins_to_turn(turning_model):
+    """Left by a scene without [rotation], whose modes are those of standstill."""
+    _, file = turning_model
+    tables = {
+        "structure": {"model": "rom", "file": file}, "time": {"periods": 2, "transient": 0},
+        "excitation": {"frequency": 5.0, "force": 1.0, "at": "tip"},
+    }  # fmt: skip
+    still = validate(Scene, tables, "scene")
+    final = simulate(still).final
+    moved = at_speed_of(validate(Scene, tables | {"rotation": {"speed": 80.0}}, "scene"), final)
+    transfer = modal_transfer(still.structure, 0.0, 80.0)
+    assert np.abs(transfer - np.eye(6)).max() > 0.1
+    np.testing.assert_allclose(moved.displacement, transfer @ final.displacement, rtol=1e-12)
+
+
 def test_a_run_goes_on_at_another_speed_from_where_it_was(turning_model):
     _, file = turning_model
     body = {"cavity": "c", "mass": 0.01, "friction": 0.1, "restitution": 0.5}

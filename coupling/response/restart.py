@@ -11,6 +11,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import InitialMotion, row_motion
 from vanedamp.coupling.system.modal_basis import modal_transfer
+from vanedamp.coupling.system.reduced_model_file import greatest_speed
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -47,7 +48,8 @@ def restart_from(system: System, scale: float, start: RestartState) -> InitialMo
 
 def marked_with_speed(scene: Scene, state: RestartState) -> RestartState:
     """Return a state that a scene has left with the speed of its modes, if these depend on one."""
-    if not isinstance(scene.structure, Rom) or scene.rotation is None:
+    structure = scene.structure
+    if not isinstance(structure, Rom) or not greatest_speed(structure):
         return state
     return replace(state, speed=frozen([scene.speed]))
 

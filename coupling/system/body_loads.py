@@ -136,6 +136,11 @@ class _Body(NamedTuple):
         return self.scene.cavity[_cavity(self.scene, self.damper)]
 
     @property
+    def pressed(self) -> float:
+        """Acceleration that presses on the floor, or of a body with extent on the ceiling, m/s^2."""
+        return abs(self.across)
+
+    @property
     def reach(self) -> float:
         """Travel from the middle to a wall, m."""
         return self.cavity.gap / 2
@@ -150,6 +155,12 @@ class _Body(NamedTuple):
         """Its greatest acceleration then, m/s^2."""
         return 2 * math.pi * self.scene.frequency * self.speed
 
+    def aside(self, field: _Field) -> float:
+        """Return the acceleration across the plane of its motion, m/s^2; 0 of a slider, which has no such plane."""
+        if field.across is None or self.damper.shape == "slider":
+            return 0.0
+        return abs(float(field.acceleration @ np.cross(field.along, field.across)))
+
 
 def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tuple[str, str]]:
     """Yield kinds and sentences of what the loads in a rotating frame neglect. gravity: (3,) that counts, m/s^2."""
@@ -163,7 +174,7 @@ def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tu
         )
     if not _held(body.damper):
         drift = field.gradient * body.reach
-        others = max(body.damper.friction * body.across, abs(body.along), body.inertia)
+        others = max(body.damper.friction * body.pressed, abs(body.along), body.inertia)
         if drift > _SEEN * others:
             yield (
                 "gradient",
@@ -171,15 +182,22 @@ def _of_rotation(body: _Body, field: _Field, gravity: np.ndarray) -> Iterator[tu
                 f"which is left out; it is {drift / others:.2g} of what else moves the body. A body with a stiffness "
                 "or a track_radius feels it",
             )
-    turn = abs(body.cavity.rotation) * body.across * body.reach
+    turn = abs(body.cavity.rotation) * body.pressed * body.reach
     if turn > _SEEN * body.inertia:
         yield (
             "rotation",
             f"a cavity that turns by its rotation turns the load on its floor, which is left out; it is "
             f"{turn / body.inertia:.2g} of the body's inertia",
         )
-    if body.damper.friction > 0.0 and body.across > 0.0:
-        change = 2 * scene.speed * body.speed / body.across
+    aside = body.aside(field)
+    if body.damper.friction > 0.0 and aside > _SEEN * body.pressed:
+        yield (
+            "side",
+            f"the load has {aside:.3g} m/s^2 across the plane in which the body moves, beside {body.pressed:.3g} "
+            "between floor and ceiling; what it presses on there, and that friction, are left out",
+        )
+    if body.damper.friction > 0.0 and body.pressed > 0.0:
+        change = 2 * scene.speed * body.speed / body.pressed
         if change > _SEEN:
             yield (
                 "coriolis",
@@ -237,7 +255,8 @@ def _field(scene: Scene, basis: ModalBasis, index: int) -> _Field:
             )
     place = basis.positions[label] - point
     walls = [str(wall) for wall in cavity.labels()[:2]]
-    if label not in walls and all(wall in basis.positions for wall in walls):
+    own = cavity.floor is None or label not in walls  # else a wall is the floor, and its place that of the cavity
+    if own and all(wall in basis.positions for wall in walls):
         middle = 0.5 * (basis.positions[walls[0]] + basis.positions[walls[1]]) - point
         place = place + along * float((middle - place) @ along)
     if across is not None:
