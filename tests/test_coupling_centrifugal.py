@@ -12,8 +12,10 @@ from tests.tools.planar import run_planar
 from tests.tools.processes import ROOT
 from vanedamp import InputError, ReducedModel, Scene
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.records import FRICTION
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.body_loads import body_loads, load_warnings
 from vanedamp.coupling.system.linear_response import linear_responses
@@ -378,3 +380,18 @@ def test_what_is_left_out_is_warned_of_where_it_shows():
     )
     still = {"rotation": {"speed": 0.0}, "excitation": {"frequency": 10.0}}
     assert warnings({"friction": 0.3}, **still, gravity={"acceleration": 9.81}) == ""
+
+
+def test_a_sweep_that_begins_at_standstill_warns_of_its_end():
+    still = scene(
+        {"friction": 0.3}, excitation={"frequency": 20.0}, rotation={"speed": 0.0}, gravity={"acceleration": 9.81}
+    )
+    swept = still.replace({"sweep": {"rotation.speed": [0.0, 2.0]}})
+    assert warnings_of(still) == ()
+    assert "gravity turns once a revolution" in " ".join(grid(swept).warnings)
+
+
+def test_tables_of_other_commands_are_no_axes_of_a_sweep():
+    made = scene({"friction": 0.3}, ramp={"from": 10.0, "to": 20.0, "rate": 1.0}, excitation={"frequency": 20.0})
+    with pytest.raises(InputError, match=r"^sweep: ramp.rate changes no run of a sweep"):
+        grid(made.replace({"sweep": {"ramp.rate": [1.0, 2.0]}}))

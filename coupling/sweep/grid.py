@@ -24,6 +24,8 @@ from vanedamp.files.toml_input import InputError, nearest, validate
 _DIRECTION, _ALONG = "continuation.direction", "continuation.along"
 #: values that cannot change from one run to the next: their states would not fit
 _FIXED = ("structure.model", "structure.file", "structure.modes", "structure.natural", "structure.tolerance")
+#: tables of other commands, which no run of a sweep feels
+_OF_OTHERS = ("orbit", "ramp", "ring_down")
 
 
 class Points:
@@ -70,7 +72,7 @@ class Grid:
     choices   that suit all points, of what they leave open
     estimate  of the model chosen, None where there was no choice
     advice    on the bodies, None where their shapes were given
-    warnings  of the first point's scene, to be read before figures are used
+    warnings  of the scenes of the first and the last point, to be read before figures are used
     along     the axis along which runs are linked, None if they are not
     """
 
@@ -135,6 +137,9 @@ def grid(scene: Scene) -> Grid:
         raise InputError(
             'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
         )
+    for path in axes:
+        if path.split(".")[0] in _OF_OTHERS:
+            raise InputError(f"sweep: {path} changes no run of a sweep; its table is for another command")
     points = Points(replace(scene, sweep={}))
     first, linked, undecided = None, False, False
     for values in _telling(axes):
@@ -152,7 +157,9 @@ def grid(scene: Scene) -> Grid:
     start = with_choices(first, choices)
     assemble(start.scene)
     advice = None if choices.body is None else choices.body.to_json()
-    return Grid(scene, axes, base, choices, start.estimate, advice, along, warnings_of(start.scene))
+    last = points.scene({path: values[-1] for path, values in axes.items()}) if not undecided else start.scene
+    warnings = tuple(dict.fromkeys(warnings_of(start.scene) + warnings_of(last)))
+    return Grid(scene, axes, base, choices, start.estimate, advice, along, warnings)
 
 
 def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
