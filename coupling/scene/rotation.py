@@ -50,4 +50,4 @@ class Rotation:
     @property
     def omega(self) -> float:
         """Speed, rad/s."""
-        return 2 * math.pi / 60 * self.rpm if self.rpm is not None else (self.speed or 0.0)
+        return SPEEDS["rotation.rpm"] * self.rpm if self.rpm is not None else (self.speed or 0.0)

@@ -358,15 +358,9 @@ class Scene(Displayed):
     @property
     def files(self) -> list[str]:
         """The files that the scene and its sweep name."""
-        found = []
-        for place in _FILES:
-            node: Any = self
-            for step in place:
-                node = getattr(node, step, None)
-            swept = self.sweep.get(".".join(place), ())
-            found += [node] if isinstance(node, str) else []
-            found += [] if isinstance(swept, Range) else list(map(str, swept))
-        return found
+        own = [table[key] for table, key in _named_files(self.to_dict())]
+        swept = [self.sweep.get(".".join(place), ()) for place in _FILES]
+        return own + [str(file) for files in swept if not isinstance(files, Range) for file in files]
 
     @property
     def points(self) -> int:

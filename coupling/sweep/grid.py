@@ -157,8 +157,8 @@ def grid(scene: Scene) -> Grid:
     start = with_choices(first, choices)
     assemble(start.scene)
     advice = None if choices.body is None else choices.body.to_json()
-    last = points.scene({path: values[-1] for path, values in axes.items()}) if not undecided else start.scene
-    warnings = tuple(dict.fromkeys(warnings_of(start.scene) + warnings_of(last)))
+    last = with_choices(points.raw({path: values[-1] for path, values in axes.items()}), choices)
+    warnings = tuple(dict.fromkeys(warnings_of(start.scene) + warnings_of(last.scene)))
     return Grid(scene, axes, base, choices, start.estimate, advice, along, warnings)
 
 

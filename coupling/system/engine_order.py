@@ -1,4 +1,4 @@
-"""Engine orders: where their lines, frequency = order speed / (2 pi), meet the resonances of a structure."""
+"""Where lines of the excitation's frequency over the speed, such as engine orders, meet a structure's resonances."""
 
 from __future__ import annotations
 
@@ -7,26 +7,29 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import brentq
 
-from vanedamp.coupling.scene.rotation import frequency_of
-
-#: speeds over a range, between two of which a natural frequency meets the line once at most
+#: speeds over a range unless the caller says how many
 _EVEN = 65
 #: accuracy of a speed, relative to the highest
 _ACCURACY = 1e-12
 
-#: natural frequencies (n,), Hz, ascending, at a speed, rad/s
+#: natural frequencies (n,), Hz, ascending, at a speed
 Natural = Callable[[float], np.ndarray]
 
 
-def crossings(natural: Natural, order: float, low: float, high: float) -> list[float]:
-    """Return the speeds from low to high, rad/s, at which an engine order meets a natural frequency, ascending."""
-    speeds = np.linspace(low, high, _EVEN)
-    above = np.array([natural(float(speed)) - frequency_of(order, speed) for speed in speeds])
+def crossings(
+    natural: Natural, line: Callable[[float], float], low: float, high: float, even: int = _EVEN
+) -> list[float]:
+    """Return the speeds from low to high at which a line (Hz over the speed) meets a natural frequency, ascending.
+
+    even: speeds over the range, between two of which each natural frequency meets the line once at most.
+    """
+    speeds = np.linspace(low, high, even)
+    above = np.array([natural(float(speed)) - line(float(speed)) for speed in speeds])
     found = []
     for place, mode in np.argwhere((above[:-1] > 0.0) != (above[1:] > 0.0)):
 
         def distance(speed: float, mode: int = int(mode)) -> float:
-            return float(natural(speed)[mode]) - frequency_of(order, speed)
+            return float(natural(speed)[mode]) - line(speed)
 
         left, right = speeds[place : place + 2]
         found.append(float(brentq(distance, left, right, xtol=_ACCURACY * high)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -184,7 +184,7 @@ def _resonances(
     response: Callable[[float], LinearResponse], natural: Natural, order: float, low: float, high: float
 ) -> Iterator[tuple[float, float]]:
     """Yield the crossings of an engine order, rad/s, and the half-power widths along it, Hz."""
-    for speed in crossings(natural, order, low, high):
+    for speed in crossings(natural, partial(frequency_of, order), low, high):
         frequencies, widths = response(speed).resonances()
         line = frequency_of(order, speed)
         nearest = int(np.argmin(np.abs(frequencies - line)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -111,7 +111,7 @@ def _resonant_speed(
     def natural(speed: float) -> np.ndarray:
         return np.sqrt(structure_basis(structure, speed).stiffness) / (2 * np.pi)
 
-    return max([low, high, *crossings(natural, order, low, high)], key=response)
+    return max([low, high, *crossings(natural, partial(frequency_of, order), low, high)], key=response)
 
 
 def _check_damped(basis: ModalBasis) -> None:

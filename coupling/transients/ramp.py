@@ -7,12 +7,12 @@ continuous, and the motion goes on as it is: a period begins with the state that
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact.event_driven import EngineRun
@@ -29,6 +29,7 @@ from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
+from vanedamp.coupling.system.engine_order import crossings
 from vanedamp.coupling.system.linear_response import (
     LinearPeak,
     LinearResponse,
@@ -273,19 +274,11 @@ def _at_one_frequency(scene: Scene, table: Table, low: float, high: float) -> tu
     def responses(value: float) -> tuple[LinearResponse, LinearResponse]:
         return linear_responses(scene_at(scene, table, value))
 
-    def natural(value: float, curve: int) -> np.ndarray:
+    def natural(curve: int, value: float) -> np.ndarray:
         return np.sort(responses(value)[curve].resonances()[0])
 
-    def apart(value: float, curve: int, mode: int) -> float:
-        return float(natural(value, curve)[mode] - scene.frequency)
-
-    values = np.linspace(low, high, _EVEN).tolist()
-    tops = []
-    for curve in range(2):
-        above = np.array([natural(value, curve) > scene.frequency for value in values])
-        for place, mode in np.argwhere(above[:-1] != above[1:]).tolist():
-            tops.append(float(brentq(apart, *values[place : place + 2], args=(curve, mode))))
-    values = sorted({*values, *tops})
+    tops = [crossings(partial(natural, curve), lambda _: scene.frequency, low, high, _EVEN) for curve in range(2)]
+    values = sorted({*np.linspace(low, high, _EVEN).tolist(), *itertools.chain(*tops)})
     at = np.array([scene.frequency])
     undamped, fixed = np.array([[one.amplitude(at)[0] for one in responses(value)] for value in values]).T
     return np.array(values), undamped, fixed

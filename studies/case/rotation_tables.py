@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from pydantic.dataclasses import dataclass
 
+from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, Real
 
 
@@ -46,4 +46,4 @@ class RotationTable:
 
 
 def _radians(speed: Any, rpm: Any) -> float:
-    return float(speed) if speed is not None else 2 * math.pi / 60 * float(rpm or 0.0)
+    return float(speed) if speed is not None else SPEEDS["rotation.rpm"] * float(rpm or 0.0)
