@@ -18,6 +18,10 @@ def _listed(rate: Any) -> Any:
     return [rate] if isinstance(rate, int | float) else rate
 
 
+_Several = Annotated[tuple[Positive, ...], Field(min_length=1)]
+Rates = Annotated[_Several, BeforeValidator(_listed, json_schema_input_type=Positive | _Several)]
+
+
 @dataclass(frozen=True, config=STRICT)
 class Ramp:
     """A change of the excitation frequency or the speed of rotation that is linear in time."""
@@ -29,7 +33,7 @@ class Ramp:
     quantity: Literal["frequency", "speed", "rpm"] = "frequency"
     """what changes: "frequency" (Hz), or "speed" (rad/s) or "rpm", whose frequency follows by excitation.engine_order
     or stays"""
-    rate: Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(_listed)] | None = None
+    rate: Rates | None = None
     """change in a second, above zero; of several each is a run of its own; or give `periods` [unit of the
     quantity/s]"""
     periods: Annotated[Whole, Field(gt=0)] | None = None

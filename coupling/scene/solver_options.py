@@ -8,10 +8,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, ValidationError, WrapValidator
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    PlainSerializer,
+    ValidationError,
+    WrapValidator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
 from vanedamp.files.extensions import Registry
+from vanedamp.files.reference import require
 from vanedamp.files.toml_input import InputError, Positive, Whole, nearest
 
 _METHODS = "vanedamp.coupling.methods"
@@ -129,5 +139,19 @@ def _plain(options: SolverOptions) -> dict[str, Any]:
     return options.model_dump(mode="json", include=options.model_fields_set | set(SolverOptions.model_fields))
 
 
+class _EveryMethod:
+    """JSON Schema of the [solver] table: the options of one method, of "exact" where none is named."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        tables = {name: handler(part.Options.__pydantic_core_schema__) for name, part in METHODS.all().items()}
+        for name, made in tables.items():
+            table = handler.resolve_ref_schema(made)
+            table["title"] = name
+            if name != "exact":
+                require(table, "method")
+        return {"anyOf": list(tables.values())}
+
+
 #: the [solver] table
-Solver = Annotated[SolverOptions, WrapValidator(_by_method), PlainSerializer(_plain)]
+Solver = Annotated[SolverOptions, WrapValidator(_by_method), PlainSerializer(_plain), _EveryMethod]

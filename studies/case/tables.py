@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, GetJsonSchemaHandler, Tag
 from pydantic.dataclasses import dataclass
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from vanedamp.files.toml_input import (
     STRICT,
@@ -64,8 +66,21 @@ class MeshFile:
         return not self.file.lower().endswith(".msh")
 
 
+class _Generated:
+    """Base of meshes by a generator, whose parameters are keys of [mesh] beside its own."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        made = handler(schema)
+        table = handler.resolve_ref_schema(made)
+        parameters = handler.resolve_ref_schema(table["properties"].pop("parameters"))
+        table["properties"] |= parameters["properties"]
+        table["required"] = [*parameters.get("required", ()), "generator"]
+        return made
+
+
 @dataclass(frozen=True, config=STRICT)
-class VaneClusterMesh:
+class VaneClusterMesh(_Generated):
     """The parametric vane cluster; in the file its parameters are keys of [mesh]."""
 
     generator: Literal["vane_cluster"]
@@ -80,7 +95,7 @@ class VaneClusterMesh:
 
 
 @dataclass(frozen=True, config=STRICT)
-class BlockMesh:
+class BlockMesh(_Generated):
     """A block for verification; in the file its parameters are keys of [mesh]."""
 
     generator: Literal["block"]
@@ -165,6 +180,11 @@ class MaterialTable:
         return Material(self.young, self.poisson, self.density, self.expansion, self.young_at)
 
 
+#: facet groups with the components that are held
+_Components = dict[str, Annotated[str, Field(pattern="^[xyz]+$")]]
+_Clamped = _Components | list[str | _Components]
+
+
 def _components(clamped: Any) -> Any:
     """Return {facet group: components} from a list of groups and of such tables."""
     merged: dict[Any, Any] = {}
@@ -178,6 +198,9 @@ def _components(clamped: Any) -> Any:
     return merged
 
 
+_Axes = tuple[NonNegative, NonNegative, NonNegative]
+
+
 def _axes(stiffness: Any) -> Any:
     """Return one number for each of three axes, which a single one stands for."""
     return [stiffness] * 3 if isinstance(stiffness, int | float) else stiffness
@@ -187,7 +210,7 @@ def _axes(stiffness: Any) -> Any:
 class ElasticTable:
     """Springs spread over a facet group."""
 
-    stiffness: Annotated[tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(_axes)] = (0.0, 0.0, 0.0)
+    stiffness: Annotated[_Axes, BeforeValidator(_axes, json_schema_input_type=NonNegative | _Axes)] = (0.0, 0.0, 0.0)
     """stiffness a unit of area, in all directions or [x, y, z] [N/m^3]"""
     normal: NonNegative = 0.0
     """stiffness a unit of area across the facets [N/m^3]"""
@@ -210,8 +233,11 @@ class ElasticTable:
 class Support:
     """What holds the structure."""
 
-    clamped: Annotated[dict[str, str], BeforeValidator(_components)] = field(default_factory=dict)
-    """groups of facets, edges or points that are held: ["clamp"], or single components as in [{clamp = "y"}]"""
+    clamped: Annotated[_Components, BeforeValidator(_components, json_schema_input_type=_Clamped)] = field(
+        default_factory=dict
+    )
+    """groups of facets, edges or points that are held: ["clamp"], single components as in [{clamp = "y"}] or
+    {clamp = "y"}, where "xyz" are all"""
     elastic: dict[str, ElasticTable] = field(default_factory=dict)
     """springs, by the facet group that they are spread over"""
 
@@ -270,7 +296,7 @@ class InterfaceTable:
     of them (rom.interface.plane_motion).
     """
 
-    facets: Annotated[str | tuple[str, ...], BeforeValidator(_groups)]
+    facets: Annotated[str | Annotated[tuple[str, ...], Field(min_length=1)], BeforeValidator(_groups)]
     """facet group, or several as one; or else a group of edges or points (a node set)"""
     direction: Annotated[Direction | str, Field(union_mode="left_to_right")]
     """direction of the motion, that from the left wall of a cavity to its right one; "normal": the facets' own; or a

@@ -36,9 +36,12 @@ def _bounds(value: Any) -> Any:
 
 
 _Values = Range | Annotated[tuple[Positive, ...], Field(min_length=1)]
-Bounds = Annotated[tuple[Positive, Positive], BeforeValidator(_bounds)]
+_Count = Annotated[Whole, Field(ge=1, le=32)]
+Bounds = Annotated[
+    tuple[Positive, Positive], BeforeValidator(_bounds, json_schema_input_type=Positive | tuple[Positive, Positive])
+]
 Counts = Annotated[
-    tuple[Annotated[Whole, Field(ge=1, le=32)], Annotated[Whole, Field(ge=1, le=32)]], BeforeValidator(_bounds)
+    tuple[_Count, _Count], BeforeValidator(_bounds, json_schema_input_type=_Count | tuple[_Count, _Count])
 ]
 
 
