@@ -19,6 +19,9 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
+    # ours, in _ext
+    "commands",
+    "toml_keys",
 ]
 exclude_patterns = ["_build", "_ext", "examples", "gallery"]
 nitpicky = True
