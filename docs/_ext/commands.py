@@ -38,7 +38,7 @@ def _lines(name: str, parser: argparse.ArgumentParser) -> Iterator[str]:
     yield from (f".. _command-{name}:", "", title, "=" * len(title), "")
     yield from description(name).replace("`", "``").splitlines()
     usage = " ".join(parser.format_usage().removeprefix("usage: ").replace("[-h] ", "").split())
-    yield from ("", ".. code-block:: text", "", f"   {usage}", "", f".. program:: {title}", "")
+    yield from ("", ".. code-block:: text", "   :class: usage", "", f"   {usage}", "", f".. program:: {title}", "")
     for action in parser._actions:
         if not isinstance(action, argparse._HelpAction):
             yield from (f".. option:: {_signature(action)}", "", f"   {_meaning(action)}", "")

@@ -90,8 +90,8 @@ def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[T
         own = isinstance(others, dict) and not _own_tables(schema, others)
         if one.get("properties") or own:
             keys = _keys(schema, one) + ((_key(schema, '"path"', others, False),) if own else ())
-            said = "" if own else one.get("description", "")
-            yield Table(path, heading, "".join(told.values()), _sentences(text, said), keys)
+            said = text if own else one.get("description", text)
+            yield Table(path, heading, "".join(told.values()), said, keys)
         yield from _inner(schema, one, path)
 
 
@@ -171,10 +171,6 @@ def _toml(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
     return f"[{', '.join(map(_toml, value))}]" if isinstance(value, list | tuple) else str(value)
-
-
-def _sentences(*texts: str) -> str:
-    return "\n\n".join(text[0].upper() + text[1:].rstrip(".") + "." for text in texts if text)
 
 
 # nodes
