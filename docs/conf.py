@@ -12,7 +12,6 @@ project_copyright = author
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx-mathjax-offline",
     "sphinx_copybutton",
@@ -21,10 +20,15 @@ extensions = [
     # ours, in _ext
     "docs._ext.commands",
     "docs._ext.pages",
+    "docs._ext.python_api",
     "docs._ext.toml_keys",
 ]
 exclude_patterns = ["_build", "_ext", "examples", "gallery"]
-nitpicky = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+maximum_signature_line_length = 100
+toc_object_entries_show_parents = "hide"
 highlight_language = "none"
 smartquotes = False
 
