@@ -19,6 +19,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     # ours, in _ext
     "docs._ext.commands",
+    "docs._ext.fields",
     "docs._ext.pages",
     "docs._ext.python_api",
     "docs._ext.toml_keys",
@@ -44,7 +45,7 @@ html_show_sourcelink = False
 html_theme_options = {
     "show_prev_next": True,
     "secondary_sidebar_items": ["page-toc"],
-    "header_links_before_dropdown": 7,
+    "header_links_before_dropdown": 5,
     "footer_start": ["copyright"],
     "footer_end": [],
 }
