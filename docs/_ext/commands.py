@@ -12,6 +12,7 @@ from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.util.nodes import nested_parse_with_titles
+
 from vanedamp.studies.cli import _parser
 from vanedamp.studies.commands import COMMANDS
 

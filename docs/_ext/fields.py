@@ -10,9 +10,9 @@ from docutils import nodes
 from docutils.parsers.rst import Directive
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
-from vanedamp.files.reference import unit_in
 
 from docs._ext.toml_keys import table_node, with_literals
+from vanedamp.files.reference import unit_in
 
 
 class Fields(Directive):
