@@ -31,10 +31,16 @@ _BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", 
 
 
 class FileKind(NamedTuple):
-    """A kind of input file: its name, and the place of its record, "module:class", loaded when it is wanted."""
+    """A kind of input file.
+
+    name; place: of its record, "module:class", which is loaded when it is wanted; tables: that tell it from other
+    kinds; commands: that read it.
+    """
 
     name: str
     place: str
+    tables: tuple[str, ...] = ()
+    commands: tuple[str, ...] = ()
 
     @property
     def record(self) -> Any:
