@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import plotly.graph_objects as go
+
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.response.response import Response, Status
@@ -24,14 +26,14 @@ _SAMPLES, _MOST_SAMPLES, _MOST_PERIODS = 200, 1_000_000, 100_000
 
 
 class PointView(NamedTuple):
-    """A run as it is shown: its figures in words, two charts as plotly's data, and the document of the motion.
+    """A run as it is shown: its figures in words, two charts, and the document of the motion.
 
     Charts are None, and the document is empty, where there is nothing to show.
     """
 
     summary: str
-    history: dict[str, Any] | None = None
-    phase: dict[str, Any] | None = None
+    history: go.Figure | None = None
+    phase: go.Figure | None = None
     motion: str = ""
 
 
@@ -64,10 +66,7 @@ def view_of(scene: Scene, response: Response) -> PointView:
     if not len(response.time):
         return PointView(f"{_summary(response)}. The run ended within its first period: there is nothing to draw.")
     late = History.of(response, scene).late()
-    return PointView(
-        _summary(response), history_figure(late).to_plotly_json(), phase_figure(response).to_plotly_json(),
-        _motion(scene, late),
-    )  # fmt: skip
+    return PointView(_summary(response), history_figure(late), phase_figure(response), _motion(scene, late))
 
 
 def _motion(scene: Scene, late: History) -> str:

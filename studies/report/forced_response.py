@@ -93,11 +93,18 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
             setting(path, axis[index], units[path])
             for path, axis, index in zip(labels, others, combination, strict=True)
         ]
-        responses.append(_response(sweep, point, paths[along], ", ".join([name or model_name(sweep.scene), *values])))
+        responses.append(
+            response_along(sweep, point, paths[along], ", ".join([name or model_name(sweep.scene), *values]))
+        )
     return responses
 
 
-def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> ForcedResponse:
+def response_along(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> ForcedResponse:
+    """Return the forced response along an axis of a sweep.
+
+    point: what is taken of each axis, in the axes' order: of `axis` the places in the order of the curve, of the others
+    one place.
+    """
     ok = sweep.status[point] == "ok"
     damped = {
         "damped_max": sweep.amplitude_max, "damped_mean": sweep.amplitude_mean, "impacts_per_period":
