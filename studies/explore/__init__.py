@@ -1,1 +1,10 @@
-"""The explorer: a local page on which sliders change a scene, and its curve follows."""
+"""A page to explore a scene: sliders, the forced response that follows them, and the motion at a point of it.
+
+controls      what can be moved in a scene, and the scene with its values moved
+curves        a forced response under way in worker processes: coarse first, then fine, cancelled when it is not wanted
+chart         its picture and its key figures
+page          the page: its parts, and what they do
+point         the motion at a point of the curve that was clicked
+sweep_files   sweeps from files
+server        the address that the page has, for this machine and this browser only
+"""

@@ -81,7 +81,7 @@ class PointRuns:
             return PointView(" ".join(f"The run failed: {type(error).__name__}: {error}".split()))
 
 
-def panel() -> html.Section:
+def panel() -> html.Div:
     """Return the part of the page that shows the motion at a point."""
     choice = [
         html.Label("at frequency, Hz ", htmlFor="point-frequency"),
@@ -100,7 +100,7 @@ def panel() -> html.Section:
             style={"width": "100%", "height": "520px", "border": "0"},
         ),
     ]  # fmt: skip
-    return html.Section(
+    return html.Div(
         id="point",
         children=[
             html.H2("Motion at a point"),

@@ -34,7 +34,7 @@ def open_sweeps(paths: Sequence[str | Path]) -> dict[str, Sweep]:
     return {names[file]: result.record for file, result in found.items()}
 
 
-def panel(sweeps: Mapping[str, Sweep]) -> html.Section:
+def panel(sweeps: Mapping[str, Sweep]) -> html.Div:
     """Return the part of the page that shows sweeps, by the names of their files; hidden without any."""
     names = list(sweeps)
     children = [
@@ -54,7 +54,7 @@ def panel(sweeps: Mapping[str, Sweep]) -> html.Section:
         dcc.Graph(id="sweep-curve", config=GRAPH),
         html.P(id="sweep-status", className="note"),
     ]
-    return html.Section(children, id="sweeps", style={} if names else {"display": "none"})
+    return html.Div(children, id="sweeps", style={} if names else {"display": "none"})
 
 
 def register(app: Dash, sweeps: Mapping[str, Sweep]) -> None:
