@@ -150,7 +150,7 @@ def grid(scene: Scene) -> Grid:
         _check_method(made)
     assert first is not None
     along = _along(scene, axes) if linked else None
-    base = _with_range(points.base, axes)
+    base = with_range(points.base, axes)
     points = Points(base)
     _check_speeds(points, axes)
     choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if undecided else NOTHING
@@ -162,8 +162,8 @@ def grid(scene: Scene) -> Grid:
     return Grid(scene, axes, base, choices, start.estimate, advice, along, warnings)
 
 
-def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
-    """Return the scene whose level is that of one resonance for all of the swept frequencies."""
+def with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
+    """Return a scene whose level is that of one resonance for all of the swept frequencies; axes: by their paths."""
     swept, hertz = resonance_axis(scene, axes)
     if swept is None or not _ordered(axes[swept]) or scene.excitation.resonance_near is not None:
         return scene

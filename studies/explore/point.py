@@ -131,17 +131,20 @@ def register(app: Dash, submit: Callable[..., Future[Any]]) -> None:
         Input("point-higher", "n_clicks"),
         State("curve", "figure"),
         State("scene", "data"),
+        State("sweep", "data"),
         State("point-run", "data"),
         prevent_initial_call=True,
     )
     def begin(
-        click: Any, given: Any, _show: Any, _lower: Any, _higher: Any, figure: Any, data: Any, former: Any
+        click: Any, given: Any, _show: Any, _lower: Any, _higher: Any, figure: Any, scene: Any, sweep: Any, former: Any
     ) -> tuple[Any, ...]:
         frequency = chosen_frequency(str(ctx.triggered_id), click, given, figure)
-        if not isinstance(frequency, float) or not data:
+        if scene is None:
+            return no_update, no_update, "There is no curve yet.", no_update
+        if frequency is None:
             return no_update, no_update, "frequency: give a number above 0, in Hz", no_update
-        key = runs.begin(data, frequency, former)
-        return key, False, runs.look(key) if not isinstance(runs.look(key), PointView) else "", frequency
+        key = runs.begin(scene | {"sweep": sweep or {}}, frequency, former)
+        return key, False, f"{frequency:.6g} Hz: running …", frequency
 
     @app.callback(
         Output("point-history", "figure"),
@@ -165,10 +168,17 @@ def register(app: Dash, submit: Callable[..., Future[Any]]) -> None:
         shown = frame | {"display": "block" if view.motion else "none"}
         return view.history, view.phase, view.motion, shown, {}, view.summary, True
 
-    @app.callback(Output("point-stale", "children"), Input("scene", "data"), Input("point-run", "data"))
-    def compare(data: Any, key: Any) -> str:
+    @app.callback(
+        Output("point-stale", "children"),
+        Input("scene", "data"),
+        Input("sweep", "data"),
+        Input("point-run", "data"),
+        prevent_initial_call=True,
+    )
+    def compare(scene: Any, sweep: Any, key: Any) -> str:
         former = runs.scene_of(key)
-        return "" if former is None or former == data else "The scene has changed since: Show runs it as it is now."
+        same = former is None or scene is None or former == scene | {"sweep": sweep or {}}
+        return "" if same else "The scene has changed since: Show runs it as it is now."
 
 
 def chosen_frequency(trigger: str, click: Any, given: Any, figure: Any) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import plotly.graph_objects as go
@@ -11,9 +12,11 @@ import plotly.graph_objects as go
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.response.response import Response, Status
+from vanedamp.coupling.scene.paths import axis_values
 from vanedamp.coupling.scene.rotation import speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.sweep.grid import with_range
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.report.motion import motion_of
 from vanedamp.studies.report.motion_page import motion_page
@@ -38,7 +41,10 @@ class PointView(NamedTuple):
 
 
 def scene_at(data: Mapping[str, Any], frequency: float) -> Scene:
-    """Return a scene given as data at an excitation frequency, Hz. Raises InputError."""
+    """Return a scene given as data at an excitation frequency, Hz: a point of the curve that its [sweep] says.
+
+    Raises InputError.
+    """
     if not (math.isfinite(frequency) and frequency > 0.0):
         raise InputError(f"frequency: {frequency:g} Hz; take a number above 0")
     excitation = dict(data["excitation"])
@@ -47,7 +53,9 @@ def scene_at(data: Mapping[str, Any], frequency: float) -> Scene:
         changes["rotation"] = {"speed": speed_of(excitation["engine_order"], frequency)}
     else:
         excitation["frequency"] = frequency
-    return validate(Scene, {**data, **changes}, "scene")
+    scene = validate(Scene, {**data, **changes}, "scene")
+    axes = {path: axis_values(values) for path, values in scene.sweep.items()}
+    return replace(with_range(scene, axes), sweep={})
 
 
 def point_view(data: Mapping[str, Any], frequency: float) -> PointView:
