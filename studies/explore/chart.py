@@ -41,7 +41,7 @@ def response_figure(sweep: Sweep, linear: Linear, marks: dict[str, Any]) -> go.F
         figure.add_scatter(
             x=response.x, y=values / reference, name=name, mode="lines+markers", line=line,
             marker={"symbol": [full if good else hollow for good in ok], "size": size},
-            customdata=response.x, text=[_hover(*point) for point in zip(values, sweep.status, strict=True)],
+            customdata=response.x.tolist(), text=[_hover(*point) for point in zip(values, sweep.status, strict=True)],
             hovertemplate=f"{name}: %{{y:.3f}}, %{{text}}, at %{{x:.6g}} Hz<extra></extra>",
         )  # fmt: skip
     dressed(figure, _HEIGHT)
