@@ -26,7 +26,8 @@ const looking = setInterval(() => {
   if (!chart || !chart.on) return;
   clearInterval(looking);
   chart.on("plotly_afterplot", () => {
-    if (chart.layout.meta) window.seen.drawn.push([performance.now(), chart.layout.meta.version, chart.layout.meta.complete]);
+    const shows = chart.layout.meta;
+    if (shows) window.seen.drawn.push([performance.now(), shows.version, shows.complete]);
   });
 }, 20);
 """
