@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,44 +16,57 @@ from vanedamp.studies.explore.curves import Linear
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
 from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses
 
-_FREE, _FIXED, _DAMPED, _TOUCHED = COLOURS[7], COLOURS[2], COLOURS[0], COLOURS[1]
+_FREE, _FIXED, _MEAN, _MAXIMUM = COLOURS[7], COLOURS[2], COLOURS[0], COLOURS[1]
 _HEIGHT = 480
 
 
-def response_figure(sweep: Sweep, linear: Linear, marks: dict[str, Any]) -> go.Figure:
-    """Draw damped and linear amplitudes, relative to the undamped maximum; open markers are points that are not ok.
+def response_figure(sweep: Sweep, linear: Linear, marks: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the picture of damped and linear amplitudes, relative to the undamped maximum, as plotly's plain data.
 
-    Points of the damped curve carry their frequency (Hz). marks: kept as the figure's `meta`.
+    Points of the damped curve carry their frequency (Hz); open markers are points that are not ok. marks: kept as the
+    figure's `meta`. Plain, since plotly's own objects take longer than the runs of a coarse curve.
     """
     (response,) = forced_responses(sweep)
-    reference, ok = response.reference, sweep.status == "ok"
-    figure = go.Figure()
-    for values, name, dash, colour in (
-        (linear.undamped, "undamped", "dot", _FREE), (linear.fixed, "bodies fixed", "dash", _FIXED)
-    ):  # fmt: skip
-        figure.add_scatter(
-            x=linear.frequencies, y=np.where(np.isfinite(values), values / reference, np.nan), name=name, mode="lines",
-            line={"color": colour, "dash": dash, "width": 1.8}, hoverinfo="skip",
-        )  # fmt: skip
-    for values, name, line, marker in (
-        (sweep.amplitude_max, "damped, maximum", {"color": _TOUCHED, "width": 0.9}, ("diamond", "diamond-open", 5)),
-        (sweep.amplitude_mean, "damped, mean of peaks", {"color": _DAMPED, "width": 2.6}, ("circle", "circle-open", 7)),
-    ):
-        full, hollow, size = marker
-        figure.add_scatter(
-            x=response.x, y=values / reference, name=name, mode="lines+markers", line=line,
-            marker={"symbol": [full if good else hollow for good in ok], "size": size},
-            customdata=response.x.tolist(), text=[_hover(*point) for point in zip(values, sweep.status, strict=True)],
-            hovertemplate=f"{name}: %{{y:.3f}}, %{{text}}, at %{{x:.6g}} Hz<extra></extra>",
-        )  # fmt: skip
-    dressed(figure, _HEIGHT)
+    reference = response.reference
+    lines = [
+        {
+            "x": linear.frequencies, "y": np.where(np.isfinite(values), values / reference, np.nan), "name": name,
+            "mode": "lines", "line": {"color": colour, "dash": dash, "width": 1.8}, "hoverinfo": "skip",
+        }
+        for values, name, dash, colour in (
+            (linear.undamped, "undamped", "dot", _FREE), (linear.fixed, "bodies fixed", "dash", _FIXED),
+        )
+    ]  # fmt: skip
+    points = [
+        {
+            "x": response.x, "y": values / reference, "name": name, "mode": "lines+markers", "line": line,
+            "marker": {"size": size, "symbol": [f"{symbol}{_open(state)}" for state in sweep.status]},
+            "customdata": response.x, "text": [_hover(*point) for point in zip(values, sweep.status, strict=True)],
+            "hovertemplate": f"{name}: %{{y:.3f}}, %{{text}}, at %{{x:.6g}} Hz<extra></extra>",
+        }
+        for values, name, line, symbol, size in (
+            (sweep.amplitude_max, "damped, maximum", {"color": _MAXIMUM, "width": 0.9}, "diamond", 5),
+            (sweep.amplitude_mean, "damped, mean of peaks", {"color": _MEAN, "width": 2.6}, "circle", 7),
+        )
+    ]  # fmt: skip
+    return {"data": lines + points, "layout": _layout() | {"meta": dict(marks)}}
+
+
+@cache
+def _layout() -> dict[str, Any]:
+    figure = dressed(go.Figure(), _HEIGHT)
     figure.update_xaxes(title_text=axis_title(FREQUENCY, "Hz"))
     figure.update_yaxes(title_text="amplitude / undamped maximum", rangemode="tozero")
     figure.update_layout(
         legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0}, hovermode="closest", uirevision="kept",
-        margin={"t": 30, "r": 12, "l": 60, "b": 50}, meta=marks,
+        margin={"t": 30, "r": 12, "l": 60, "b": 50},
     )  # fmt: skip
-    return figure
+    layout: dict[str, Any] = figure.to_plotly_json()["layout"]
+    return layout
+
+
+def _open(status: str) -> str:
+    return "" if status == "ok" else "-open"
 
 
 def _hover(value: float, status: str) -> str:
