@@ -22,7 +22,7 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import main
 from vanedamp.studies.report.forced_response import forced_responses, linear_curves
-from vanedamp.studies.report.mode_chart import sharp_edges, surface
+from vanedamp.studies.report.mode_chart import sharp_edges, surface, viewpoint
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
 from vanedamp.studies.report.sections import modes as modes_section
@@ -340,3 +340,20 @@ def test_scenes_say_what_they_share_and_what_is_their_own(results, tmp_path):
         page = (tmp_path / "report.html").read_text(encoding="utf-8")
         assert told in page
         assert page.count("<td><code>damper[0].restitution</code></td><td>0.6</td>") == 1
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mode_is_seen_from_the_side_that_moves(axis, side):
+    """A plate that is held hides a plate that moves, unless one looks from the other side."""
+    other = 1 - axis
+    across, up = (part.ravel() for part in np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21)))
+    points = np.zeros((2, len(up), 3))
+    points[:, :, other], points[:, :, 2] = across, up
+    points[0, :, axis], points[1, :, axis] = -side, side
+    shape = np.zeros_like(points)
+    shape[1, :, other] = 1.0
+    view = viewpoint(points.reshape(-1, 3), shape.reshape(-1, 3))
+    assert np.linalg.norm(view) == pytest.approx(1.0)
+    assert side * view[axis] > 0.5
+    assert view[2] > 0
