@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import plotly.graph_objects as go
@@ -12,11 +11,10 @@ import plotly.graph_objects as go
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.response.response import Response, Status
-from vanedamp.coupling.scene.paths import axis_values
 from vanedamp.coupling.scene.rotation import speed_of
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.sweep.grid import with_range
+from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.report.motion import motion_of
 from vanedamp.studies.report.motion_page import motion_page
@@ -53,9 +51,7 @@ def scene_at(data: Mapping[str, Any], frequency: float) -> Scene:
         changes["rotation"] = {"speed": speed_of(excitation["engine_order"], frequency)}
     else:
         excitation["frequency"] = frequency
-    scene = validate(Scene, {**data, **changes}, "scene")
-    axes = {path: axis_values(values) for path, values in scene.sweep.items()}
-    return replace(with_range(scene, axes), sweep={})
+    return base_scene(validate(Scene, {**data, **changes}, "scene"))
 
 
 def point_view(data: Mapping[str, Any], frequency: float) -> PointView:

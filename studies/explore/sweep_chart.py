@@ -15,7 +15,13 @@ from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import is_start
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
-from vanedamp.studies.report.forced_response import ForcedResponse, for_people, response_along, setting
+from vanedamp.studies.report.forced_response import (
+    ForcedResponse,
+    for_people,
+    linear_curves,
+    response_along,
+    setting,
+)
 
 #: curves behind the chosen one at most; of more, evenly chosen ones are drawn
 _MOST_BEHIND = 60
@@ -107,12 +113,9 @@ def best_sentence(sweep: Sweep, best: Best | None) -> str:
 def chosen_curve(sweep: Sweep, along: str, places: Mapping[str, int]) -> ForcedResponse:
     """Return the curve along an axis at places on the others."""
     units = sweep.units()
-    values = [
-        setting(path, axis[places[path]], units[path])
-        for path, axis in sweep.axes.items()
-        if path != along and len(axis) > 1
-    ]
-    return response_along(sweep, _point(sweep, along, places), along, ", ".join(values) or "damped")
+    settings = {path: axis.tolist()[places[path]] for path, axis in sweep.axes.items() if path != along}
+    values = [setting(path, value, units[path]) for path, value in settings.items() if len(sweep.axes[path]) > 1]
+    return response_along(sweep, _point(sweep, along, places), along, ", ".join(values) or "damped", settings)
 
 
 def curve_figure(sweep: Sweep, along: str, places: Mapping[str, int]) -> go.Figure:
@@ -131,22 +134,22 @@ def curve_figure(sweep: Sweep, along: str, places: Mapping[str, int]) -> go.Figu
             mode="lines", line={"color": "#94a3b8", "width": 1}, opacity=0.35, hoverinfo="skip",
             name="other values",
         )  # fmt: skip
-    styles: list[tuple[str, str, dict[str, Any], str]] = [
-        ("undamped", "undamped", {"dash": "dot", "width": 1.8, "color": _LINEAR}, "lines"),
-        ("fixed", "bodies fixed", {"dash": "dash", "width": 1.8, "color": _LINEAR}, "lines"),
-        ("damped_max", "damped, maximum", {"width": 0.8, "color": _CHOSEN}, "lines"),
-        ("damped_mean", "damped, mean of peaks", {"width": 2.8, "color": _CHOSEN}, "lines+markers"),
+    linear = linear_curves(sweep, response)
+    between = linear.x if text else factor * linear.x
+    curves: list[tuple[str, np.ndarray, np.ndarray, dict[str, Any], str]] = [
+        ("undamped", between, linear.undamped, {"dash": "dot", "width": 1.8, "color": _LINEAR}, "lines"),
+        ("bodies fixed", between, linear.fixed, {"dash": "dash", "width": 1.8, "color": _LINEAR}, "lines"),
+        ("damped, maximum", x, response.damped_max, {"width": 0.8, "color": _CHOSEN}, "lines"),
+        ("damped, mean of peaks", x, response.damped_mean, {"width": 2.8, "color": _CHOSEN}, "lines+markers"),
     ]
-    for curve, title, line, mode in styles:
-        values = getattr(response, curve)
-        if not np.isfinite(values).any():
-            continue
-        figure.add_scatter(
-            x=x, y=1e6 * np.where(np.isfinite(values), values, np.nan), name=title, mode=mode, line=line,
-            marker={"size": 5}, hovertemplate=f"{title}: %{{y:.4g}} µm<extra></extra>",
-        )  # fmt: skip
+    for title, at, values, line, mode in curves:
+        if np.isfinite(values).any():
+            figure.add_scatter(
+                x=at, y=1e6 * np.where(np.isfinite(values), values, np.nan), name=title, mode=mode, line=line,
+                marker={"size": 5}, hovertemplate=f"{title}: %{{y:.4g}} µm<extra></extra>",
+            )  # fmt: skip
     _add_troubles(figure, sweep, along, places, x)
-    _add_best(figure, sweep, along, factor)
+    _add_best(figure, sweep, along, places, factor)
     figure.update_xaxes(title_text=axis_title(along, unit, response.hertz), hoverformat=".6g")
     figure.update_yaxes(title_text="amplitude, µm", rangemode="tozero")
     figure.update_layout(hovermode="x unified", uirevision=along)
@@ -194,19 +197,20 @@ def status_sentence(sweep: Sweep, along: str, places: Mapping[str, int]) -> str:
     return f"{good} of {len(states)} points are ok" + (f"; left out: {troubles}." if troubles else ".")
 
 
-def _add_best(figure: go.Figure, sweep: Sweep, along: str, factor: float) -> None:
-    """Mark the highest point of the best design, and its curve."""
+def _add_best(figure: go.Figure, sweep: Sweep, along: str, places: Mapping[str, int], factor: float) -> None:
+    """Mark the highest point of the best design, and draw its curve where it is not the chosen one."""
     best = best_design(sweep)
     if best is None or sweep.axes[along].dtype.kind not in "if":
         return
-    curve = chosen_curve(sweep, along, best.places)
-    figure.add_scatter(
-        x=factor * curve.x, y=1e6 * curve.damped_mean, mode="lines", name="best design",
-        line={"color": _BEST, "width": 1.6, "dash": "longdashdot"}, hoverinfo="skip",
-    )  # fmt: skip
+    if any(best.places[path] != places[path] for path in sweep.axes if path != along):
+        curve = chosen_curve(sweep, along, best.places)
+        figure.add_scatter(
+            x=factor * curve.x, y=1e6 * curve.damped_mean, mode="lines", name="best design",
+            line={"color": _BEST, "width": 1.6, "dash": "longdashdot"}, hoverinfo="skip",
+        )  # fmt: skip
     figure.add_scatter(
         x=[factor * sweep.axes[along][best.places[along]]], y=[1e6 * best.amplitude], mode="markers",
-        name="its highest point", marker={"symbol": "star", "size": 14, "color": _BEST},
+        name="highest point of the best", marker={"symbol": "star", "size": 14, "color": _BEST},
         hovertemplate="best design: %{y:.4g} µm<extra></extra>",
     )  # fmt: skip
 
