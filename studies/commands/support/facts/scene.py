@@ -142,9 +142,9 @@ def _of_cost(scene: Scene, whole: Scene) -> Iterator[Fact]:
     if not lasting.time.steady:
         yield Fact("transient", lasting.time.dropped, "", "of these are not evaluated")
         yield Fact("transient_left", left_over(lasting, lasting.time.dropped), "", "of the linear transient, after it")
-    yield Fact("run_seconds", run_seconds(lasting), "s", "of processor time, roughly, with one body")
+    yield Fact("run_seconds", run_seconds(lasting), "s", "of processor time at least")
     if whole.sweep:
         cores = available_cores()
         cost = sweep_seconds(replace(whole, time=lasting.time), cores)
         yield Fact("sweep_points", whole.points)
-        yield Fact("sweep_seconds", cost, "s", f"on {cores} cores")
+        yield Fact("sweep_seconds", cost, "s", f"at least, on {cores} cores")
