@@ -148,7 +148,7 @@ def test_a_case_takes_the_file_as_its_mesh(meshes, tmp_path, monkeypatch, capfd)
     ours = assemble(meshes["tetra10"], {"default": STEEL}, {"root": "xyz"})
     assert f"{solve_modes(ours, 1).frequencies_hz[0]:.2f}" in capfd.readouterr().out
     for old, new, told in [
-        ('"ROOT"', '"FOOT"', "no set of nodes or shells 'FOOT'; there are: ALL, ROOT, TIP"),
+        ('"ROOT"', '"FOOT"', "no set or surface 'FOOT'; there are: ALL, ROOT, TIP"),
         ("material.inner", "material.iner", "no set of volume elements 'iner'; there are: inner, outer"),
         ('facets = "TIP"', 'facets = "ALL"', "'ROOT' and 'ALL' share"),
         ("scale = 1e-3", "scale = 0.0", "mesh.scale: should be greater than 0"),
@@ -162,7 +162,7 @@ def test_what_cannot_be_taken_is_told(tmp_path):
     for name, text, message in [
         ("none.inp", None, "no such mesh file"),
         ("empty.inp", "nothing\n", "volume elements: none; expected one kind"),
-        ("bad.bdf", "GRID\n", "this mesh cannot be read"),
+        ("bad.bdf", "GRID\n", "no ENDDATA: the file is cut short"),
         ("flat.inp", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*ELEMENT,TYPE=S3\n1,1,2,3\n", "volume elements: none"),
         (
             "wedge.inp",
