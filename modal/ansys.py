@@ -91,7 +91,8 @@ def read(path: Path) -> LabelledMesh:
 
     Raises MeshError with file and line.
     """
-    mesh, kinds = LabelledMesh(), {}  # number of a type -> its element, and its first option where that is given
+    mesh = LabelledMesh()
+    kinds: dict[int, tuple[int, int | None]] = {}  # of a type: its element, and its first option where that is given
     lines = iter([_Line(path, number, text) for number, text in enumerate(text_lines(path), 1)])
     for line in lines:
         name, *words = line.words
@@ -218,6 +219,8 @@ def _rows(head: _Line, lines: Iterator[_Line]) -> Iterator[tuple[_Line, list[int
         text = line.text.rstrip()
         if text.strip() == "-1" or text.upper().startswith("N,"):
             return
+        if not text:
+            continue
         split = count * width if real else len(text)
         try:
             whole = [int(text[place : place + width]) for place in range(0, min(split, len(text)), width)]

@@ -102,8 +102,8 @@ def _datasets(path: Path) -> Iterator[tuple[int, list[_Line]]]:
             yield int(head[0]), lines[start + 1 : place]
         start = None
     if start is not None:
-        name = lines[start].text.strip() if start < len(lines) else "none"
-        raise MeshError(f"{path}: dataset {name} is not closed by -1: the file is cut short; write it again")
+        name = "".join(line.text.strip() for line in lines[start : start + 1])
+        raise MeshError(f"{path}: the last dataset {name} is not closed by -1: the file is cut short; write it again")
 
 
 def _take_node(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line] | None) -> int:

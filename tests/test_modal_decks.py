@@ -12,7 +12,7 @@ from vanedamp.modal.mesh_import import convert
 from vanedamp.modal.msh import MeshError
 from vanedamp.studies.cli import BAD_INPUT, main
 
-meshio = pytest.importorskip("meshio")
+meshlane = pytest.importorskip("meshlane")
 
 STEEL = Material(young=2e11, poisson=0.3, density=8000.0)
 TETRAHEDRON = "*ELEMENT, TYPE=C3D4, ELSET=all\n1, 1, 2, 3, 4\n"
@@ -191,10 +191,10 @@ def test_what_would_change_a_nastran_mesh_is_refused(cards, told, tmp_path):
 
 
 def test_a_cylindrical_deck_has_the_frequencies_of_the_block(tmp_path, monkeypatch, capfd):
-    """The whole way by the command: meshio alone reads a radius and an angle as x and y."""
+    """The whole way by the command: meshlane alone reads a radius and an angle as x and y."""
     monkeypatch.chdir(tmp_path)
     path = build(Block(0.1, 0.02, 0.01, divisions=(6, 2, 1)), tmp_path / "block.msh")
-    mesh = meshio.read(path)
+    mesh = meshlane.read(path)
     cells = mesh.cells_dict["tetra"]
     deck = "*NODE, SYSTEM=C\n" + nodes(cylindrical(mesh.points)) + "*ELEMENT, TYPE=C3D4, ELSET=block\n"
     deck += "".join(f"{i}, {', '.join(map(str, row + 1))}\n" for i, row in enumerate(cells, 1))
