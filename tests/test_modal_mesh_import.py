@@ -82,7 +82,9 @@ def exported(path, kind, target, scale=1000.0):
             "inner": [np.arange(sizes[0]), np.empty(0, int)],
             "outer": [np.empty(0, int), np.arange(sizes[1])],
         }
-        mesh = meshlane.Mesh(scale * points, blocks, point_sets=sets | {"ALL": np.arange(len(points))}, cell_sets=halves)
+        mesh = meshlane.Mesh(
+            scale * points, blocks, point_sets=sets | {"ALL": np.arange(len(points))}, cell_sets=halves
+        )
     mesh.write(target)
     return target
 

@@ -22,7 +22,7 @@ Name = Annotated[str, Field(min_length=1)]
 
 @dataclass(frozen=True, config=STRICT)
 class MatricesTable:
-    """Where the matrices are: names in one `file` (npz, OP4), or files of their own (Matrix Market, npy,
+    """Where the matrices are: names in one `file` (npz, MATLAB, OP4), or files of their own (CSV, Matrix Market, npy,
     scipy's save_npz).
 
     damping is a matrix too; or else damping_ratio is that of every mode. base_load: (n, 3) T^T M r. mass_scale: kg a
@@ -117,8 +117,9 @@ def _doubts(model: ReducedModel) -> tuple[str, ...]:
 
 
 def _matrix(key: str, name: str, in_file: dict[str, np.ndarray], folder: Path) -> np.ndarray:
-    if name.lower() in in_file:
-        return in_file[name.lower()]
+    for spelling in (name, name.lower()):
+        if spelling in in_file:
+            return in_file[spelling]
     if "" in in_file:
         raise InputError("matrices.file: holds one matrix without a name; name the file as mass or stiffness instead")
     if in_file and not Path(name).suffix:
@@ -127,6 +128,6 @@ def _matrix(key: str, name: str, in_file: dict[str, np.ndarray], folder: Path) -
     if "" not in own:
         raise InputError(
             f"{key}: {name!r} is the name of a matrix, or of a file of several: name the file in matrices.file and the "
-            "matrix here; or here a file of one matrix (.mtx, .npy, scipy's save_npz)"
+            "matrix here; or here a file of one matrix (.csv, .mtx, .npy, scipy's save_npz)"
         )
     return own[""]
