@@ -39,7 +39,12 @@ def read(path: Path) -> LabelledMesh:
     for start, block in zip(starts, mesh.cells, strict=False):
         rows = [(block.type, [1 + int(node) for node in row]) for row in block.data]
         labelled.elements |= dict(enumerate(rows, int(start)))
-    for name, parts in mesh.cell_sets.items():
+    references = [np.asarray(block, dtype=int) for block in mesh.cell_data.get("medit:ref", [])]
+    numbered = {
+        str(number): [np.flatnonzero(block == number) for block in references]
+        for number in sorted({number for block in references for number in block.tolist()})
+    }
+    for name, parts in (numbered | mesh.cell_sets).items():
         members = [start + np.asarray(part, dtype=int) for start, part in zip(starts, parts, strict=False)]
         labelled.element_sets[name.strip()] = np.concatenate(members).tolist()
     return labelled

@@ -1,4 +1,4 @@
-"""Reduced models of other codes: small dense M, K (and C) from npz, MATLAB, CSV, Matrix Market or Nastran OP4 files.
+"""Reduced models of other codes: small dense M, K (and C) from npz, Matrix Market or Nastran OP4 files.
 
 Coordinates without mass, such as boundary points that another code's reduction left without any, are condensed: their
 additional static flexibility becomes the model's residual flexibility, a massless boundary.

@@ -371,3 +371,14 @@ def test_what_meshlane_cannot_read_is_told_in_one_line(forks, tmp_path):
         with pytest.raises(MeshError, match=f"{name}: cannot be read as .*; expected .msh, .inp, .*") as refused:
             convert(tmp_path / name, tmp_path / "out.msh")
         assert str(refused.value).count("\n") == 0
+
+
+def test_references_of_medit(forks, expected, tmp_path):
+    """A format that only meshlane reads: numbers as sets."""
+    pytest.importorskip("meshlane")
+    (path,) = fork_mesh.write(tmp_path, "tetra", "mesh")
+    names = {name: NUMBERS[name] for name in ("base", "arms", "clamp", "tip")}
+    again = convert(path, tmp_path / "again.msh", [names["base"], names["arms"]], [names["clamp"], names["tip"]])
+    system = Solid(again, {"default": STEEL}).assemble({names["clamp"]: "xyz"}, 0.0)
+    assert system.patches[names["tip"]].area == pytest.approx(4e-4, rel=1e-9)
+    assert solve_modes(system, 3).frequencies_hz == pytest.approx(expected["tetra"], rel=1e-9)
