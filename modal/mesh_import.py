@@ -91,6 +91,8 @@ def _read(path: Path) -> LabelledMesh:
 
 def _source(path: Path, mesh: LabelledMesh) -> _Source:
     """Return the mesh by indices, with its volume elements of one kind."""
+    if not mesh.nodes:
+        raise MeshError(f"{path}: holds no nodes: empty, or not of the format of {path.suffix}")
     points = mesh.coordinates(mesh.nodes)
     labels = np.array(list(mesh.nodes), dtype=int)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))

@@ -298,6 +298,33 @@ def test_node_groups_and_archives_that_meshlane_writes(forks, tmp_path):
         assert system.patches["feet"].area == pytest.approx(12e-4, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("ending", "changes"),
+    [
+        # of older versions: the end of a block of rotations, whole numbers of several widths, no counts
+        ("cdb", {"N,R5.3,LOC,       -1,": "N,R5.3,LOC,       -1,\nN,R5.1,LOC,       -1,"}),
+        ("cdb", {"(3i9,6e21.13e3)": "(1I9,2I9,6G21.13)"}),
+        (
+            "cdb",
+            {"NBLOCK,6,SOLID,        99,        99": "nblock,6,solid", "CMBLOCK,tip     ,ELEM": "cmblock,tip,element"},
+        ),
+        ("bdf", {"ENDDATA": "ENDDATA 45c1b6cc"}),
+        ("bdf", {"CTETRA  ": "ctetra  ", "GRID*   ": "grid*   "}),
+        ("inp", {"C3D4": "c3d4", "*NODE": "*node", "*ELEMENT, type": "*Element ,Type", "CPS3": "s3r"}),
+    ],
+)
+def test_other_spellings_are_the_same_mesh(forks, tmp_path, ending, changes):
+    text = forks["tetra"][ending].read_text()
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / f"fork.{ending}").write_text(text)
+    ours, again = read(forks["tetra"][ending]), read(tmp_path / f"fork.{ending}")
+    assert again.elements == ours.elements
+    assert again.element_sets == ours.element_sets
+    assert again.coordinates(again.nodes) == pytest.approx(ours.coordinates(ours.nodes), abs=1e-9)
+
+
 # of every format: a change of the text (old, new), and what is told of it
 @pytest.mark.parametrize(
     ("ending", "old", "new", "told"),
