@@ -310,6 +310,9 @@ def test_node_groups_and_archives_that_meshlane_writes(forks, tmp_path):
         ),
         ("bdf", {"ENDDATA": "ENDDATA 45c1b6cc"}),
         ("bdf", {"CTETRA  ": "ctetra  ", "GRID*   ": "grid*   "}),
+        ("inp", {"type=T3D2": "type=B31"}),
+        # Salome's empty group
+        ("unv", {"  2477\n": "  2477\n" + f"{99:10d}" + 7 * f"{0:10d}" + "\nnothing\n\n"}),
         ("inp", {"C3D4": "c3d4", "*NODE": "*node", "*ELEMENT, type": "*Element ,Type", "CPS3": "s3r"}),
     ],
 )
@@ -409,3 +412,12 @@ def test_references_of_medit(forks, expected, tmp_path):
     system = Solid(again, {"default": STEEL}).assemble({names["clamp"]: "xyz"}, 0.0)
     assert system.patches[names["tip"]].area == pytest.approx(4e-4, rel=1e-9)
     assert solve_modes(system, 3).frequencies_hz == pytest.approx(expected["tetra"], rel=1e-9)
+
+
+def test_shells_say_more_than_a_node_set_of_their_name(tmp_path):
+    """Of one tetrahedron two faces have all of its nodes."""
+    deck = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n"
+    deck += "*ELEMENT, TYPE=S3, ELSET=walls\n2, 1, 2, 4\n3, 1, 3, 4\n*NSET, NSET=walls\n1, 2, 3, 4\n"
+    (tmp_path / "one.inp").write_text(deck)
+    solid = Solid(convert(tmp_path / "one.inp", tmp_path / "one.msh", facets=["walls"]), {"default": STEEL})
+    assert solid.assemble({}, 0.0).patches["walls"].area == pytest.approx(1.0, rel=1e-12)
