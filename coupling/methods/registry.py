@@ -16,6 +16,7 @@ from vanedamp.coupling.response.restart import at_speed_of, marked_with_speed, r
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import InitialMotion, assemble, initial_motion, loads_of, physical_scale
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
@@ -73,7 +74,7 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     system = assemble(scene)
     scale = physical_scale(scene, system)
     start = None if start is None else at_speed_of(scene, start)
-    records = new_records(system, scene.time.simulated, samples_per_period)
+    records = new_records(system, scene.time.simulated, samples_per_period, isinstance(scene.structure, Rom))
     if scene.planar:
         return _begin_planar(scene, system, method, records, events, start)
     initial = initial_motion(scene, system) if start is None else restart_from(system, scale, start)
