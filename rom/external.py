@@ -208,18 +208,24 @@ def _op4(path: str) -> dict[str, Any]:
 
 
 def _op2(path: str) -> dict[str, Any]:
-    with _nastran(path).op2.OP2(path) as file:
-        found = file.rdop2mats()
+    nastran = _nastran(path)
+    with nastran.op2.OP2(path) as file:
+        found = dict(file.rdop2mats())
+    found = found or _assembled(nastran.rddmig(path))
     if not found:
-        raise ExternalError(f"{path}: holds no matrices; Nastran writes them by OUTPUT2 in DMAP or EXTSEOUT(DMIGOP2)")
-    return dict(found)
+        raise ExternalError(f"{path}: holds no matrices; OUTPUT2 of DMAP or EXTSEOUT(DMIGOP2) of Nastran write them")
+    return found
 
 
 def _dmig(path: str) -> dict[str, Any]:
-    """Return the square matrices of DMIG entries, all over the freedoms of any of them, and those of form 9."""
-    found = _nastran(path).rddmig(path)
-    if not found:
-        raise ExternalError(f"{path}: holds no DMIG entries")
+    with open(path, encoding="latin-1") as stream:
+        if not any(line.upper().startswith("DMIG") for line in stream):
+            raise ExternalError(f"{path}: holds no DMIG entries")
+    return _assembled(_nastran(path).rddmig(path))
+
+
+def _assembled(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the matrices of DMIG entries (pandas.DataFrame), square ones over the freedoms of any of them."""
     square = {name: frame for name, frame in found.items() if frame.columns.nlevels == 2}
     freedoms = sorted(
         {place for frame in found.values() for place in frame.index}

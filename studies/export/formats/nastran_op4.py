@@ -7,23 +7,25 @@ from pathlib import Path
 from vanedamp.files.store import replacing
 from vanedamp.rom.external import plain_matrices
 from vanedamp.studies.export.record import Record
-from vanedamp.studies.export.reduced_matrices import DESCRIPTION, describe, left_out
+from vanedamp.studies.export.reduced_matrices import COORDINATES, DESCRIPTION, describe, left_out, model_in
 
 SUMMARY = "a reduced model's matrices MAA, KAA, BAA, SELECT, BASE in binary: Nastran, pyyeti"
 ENDINGS = (".op4",)
-OPTIONS = (DESCRIPTION,)
+OPTIONS = (DESCRIPTION, COORDINATES)
 #: names in the file
 _NAMES = {"mass": "MAA", "stiffness": "KAA", "damping": "BAA", "selection": "SELECT", "base_load": "BASE"}
 
 
-def write(record: Record, path: Path, description: str | None = None) -> tuple[str, ...]:
+def write(
+    record: Record, path: Path, description: str | None = None, coordinates: str | None = None
+) -> tuple[str, ...]:
     """Write mass, stiffness and damping (n, n), the interface's rows SELECT (k, n) and the base load BASE (n, 3).
 
     description: the file by which `vanedamp import` reads them back.
     """
     from pyyeti.nastran import op4
 
-    model = record.reduced_model()
+    model = model_in(record, coordinates)
     matrices = plain_matrices(model)
     square, rectangular = 6, 2  # forms: symmetric, and any other
     entries = {
