@@ -35,13 +35,14 @@ if TYPE_CHECKING:
     from vanedamp.rom.reduced import ReducedModel
     from vanedamp.rom.reduction import reduce
     from vanedamp.studies.case.tables import Case
+    from vanedamp.studies.export.export import export
     from vanedamp.studies.report.plot import plot
 
 __all__ = [
     "Branches", "Campbell", "Case", "InputError", "Interface", "Modes", "Ramp", "ReducedModel", "Response",
-    "RigidModel", "RingDown", "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "campbell", "find_orbit",
-    "orbits", "plot", "ramp", "reduce", "rigid_model", "ring_down", "simulate", "solve_modes", "steady_states",
-    "sweep",
+    "RigidModel", "RingDown", "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "campbell", "export",
+    "find_orbit", "orbits", "plot", "ramp", "reduce", "rigid_model", "ring_down", "simulate", "solve_modes",
+    "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -63,6 +64,7 @@ _HOMES = {
     "SystemMatrices": "modal.matrices",
     "VanedampError": "files.errors",
     "campbell": "modal.campbell",
+    "export": "studies.export.export",
     "find_orbit": "coupling.orbits.orbits",
     "orbits": "coupling.orbits.orbits",
     "plot": "studies.report.plot",

@@ -132,7 +132,8 @@ class Response(Displayed):
     before its figures are used; final: the state at its end, with which another run can begin, None for one
     that ended within a period, or whose method leaves none; tilt_max (rad), lift_share (of the time), linearisation:
     largest tilt of each body in its cavity, its share of the time off the floor, and what small tilts neglect over the
-    smallest play; None for sliders, and without bodies in the plane; in_plane: their samples, None without any.
+    smallest play; None for sliders, and without bodies in the plane; in_plane: their samples, None without any;
+    coordinates: (n, m) samples of a reduced model's mass-normalised modal coordinates (kg^0.5 m), None without.
     """
 
     status: Status
@@ -170,6 +171,7 @@ class Response(Displayed):
     linearisation: tuple[float | None, ...] | None = None
     in_plane: PlanarSamples | None = None
     advice: dict[str, Any] | None = None
+    coordinates: np.ndarray | None = None
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
@@ -214,6 +216,8 @@ class Response(Displayed):
             variables["time"] = Variable(self.time, ("time",), "s")
             variables["displacement"] = Variable(self.displacement, ("time",), "m")
             variables["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
+        if self.coordinates is not None:
+            variables["coordinates"] = Variable(self.coordinates, ("time", "mode"), "kg^0.5 m")
         if self.in_plane is not None:
             variables |= self.in_plane.variables()
         if self.event_list:

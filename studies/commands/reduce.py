@@ -41,6 +41,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--hot-spots", type=_spots, default=0, metavar="N",
         help="keep the stresses at the N most stressed places of the first mode as outputs",
     )  # fmt: skip
+    parser.add_argument(
+        "--recovery", action="store_true",
+        help="keep the basis, so that `vanedamp export` can show responses on the mesh",
+    )  # fmt: skip
 
 
 def run(arguments: Namespace) -> None:
@@ -65,12 +69,13 @@ def run(arguments: Namespace) -> None:
     structure = assemble(case)
     spots = arguments.hot_spots
     model = reduction(
-        structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, bool(spots)
-    )
+        structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency,
+        arguments.recovery or bool(spots),
+    )  # fmt: skip
     if spots:
-        model = replace(
-            with_hot_spots(structure, model, spots), recovery=None, residual_recovery=None, coordinates=None
-        )
+        model = with_hot_spots(structure, model, spots)
+    if not arguments.recovery:
+        model = replace(model, recovery=None, residual_recovery=None, coordinates=None)
     estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
     if arguments.output:
         model.save(arguments.output)
