@@ -91,12 +91,14 @@ class BlockMesh:
 
 
 #: keys that name a file of measurements
-_FILES = (
+_MEASURED = (
     ("modes", "shape"),
     ("calibration", "damping", "frf"),
     ("calibration", "tune", "shapes"),
     ("temperature", "file"),
 )
+#: keys that name a file
+FILES = (("mesh", "file"), *_MEASURED)
 
 #: the records of the generators' parameters
 GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
@@ -321,7 +323,7 @@ class Case:
         mesh = data.get("mesh")
         if isinstance(mesh, dict):
             _check_mesh(mesh, path)
-        for keys in _FILES:
+        for keys in _MEASURED:
             _find_file(data, keys, path)
         case = validate(cls, data, str(path))
         for group, table in case.material.items():
