@@ -1,8 +1,12 @@
 """`vanedamp calibrate` leaves a case and a scene to go on with: nothing is copied by hand."""
 
+import base64
+import io
 import json
+import re
 import tomllib
 
+import h5py
 import numpy as np
 import pytest
 
@@ -150,7 +154,7 @@ def test_every_way_to_write_a_number_is_tuned(rig, old, new, capfd):
 
 
 def test_a_group_with_the_default_material_gets_its_own(rig, capfd):
-    text = (rig / "test" / "case.toml").read_text().replace("material.default\", ", "material.block\", ")
+    text = (rig / "test" / "case.toml").read_text().replace('material.default", ', 'material.block", ')
     tables, _ = written(rig, "own.toml", text, capfd)
     assert tables["material"]["default"]["young"] == 2.1e11
     assert tables["material"]["block"]["young"] == pytest.approx(YOUNG, rel=1e-3)
@@ -182,3 +186,39 @@ def test_bad_outputs(rig, words, told, monkeypatch, capfd):
     error = capfd.readouterr().err
     assert told in error
     assert error.count("\n") == 1
+
+
+def test_the_report_shows_the_calibration(rig):
+    """Its numbers, and the charts' data as CSV: errors, the response and a fit that is the response."""
+    page = rig / "report.html"
+    assert main(["report", str(rig / "calibration.h5"), "-o", str(page)]) == 0
+    text = page.read_text()
+    calibration = json.loads((rig / "calibration.json").read_text())
+    tuning = calibration["tuning"]
+    for target, before in zip(tuning["target_hz"], tuning["before_hz"], strict=True):
+        assert f"<td>{target:.2f}</td><td>{before:.2f}</td>" in text
+        assert f"<td>{100 * (before / target - 1):+.3f} %</td>" in text
+    for name, factor in tuning["factor"].items():
+        assert f"<td><code>{name}</code></td><td>{factor:.6g}</td>" in text
+    assert f"{calibration['excitation']['force']:.4g} N" in text
+    tables = [base64.b64decode(found).decode() for found in re.findall(r'csv;charset=utf-8;base64,([^"]+)"', text)]
+    errors, response = (np.genfromtxt(io.StringIO(table), delimiter=",", skip_header=1) for table in tables)
+    assert errors[:, :3] == pytest.approx(np.transpose([tuning[f"{n}_hz"] for n in ("target", "before", "after")]))
+    frequencies, *measured_and_fitted = response.T
+    inside = abs(frequencies / tuning["target_hz"][0] - 1) < 0.0499
+    measured, fitted = measured_and_fitted[:2], measured_and_fitted[2:]
+    assert inside.sum() > 300
+    assert np.allclose(np.array(measured)[:, inside], np.array(fitted)[:, inside], atol=1e-6 * np.abs(measured).max())
+    assert np.isnan(fitted[0][0]) and np.isfinite(measured[0][0])
+
+
+def test_records_of_before_have_no_response_and_are_shown(rig, tmp_path):
+    path = tmp_path / "old.h5"
+    path.write_bytes((rig / "calibration.h5").read_bytes())
+    with h5py.File(path, "a") as file:
+        for name in ("line", "label", "response_real", "response_imaginary", "fitted_real", "fitted_imaginary"):
+            del file[name]
+    assert main(["report", str(path), "-o", str(tmp_path / "report.html")]) == 0
+    text = (tmp_path / "report.html").read_text()
+    assert "Rigid model and excitation" in text
+    assert "Measured response" not in text

@@ -24,7 +24,10 @@ _SCHEMA = "#:schema "
 
 
 def save_calibration(
-    source: str | Path, calibration: Calibration, record: str | Path | None, case: str | Path | None,
+    source: str | Path,
+    calibration: Calibration,
+    record: str | Path | None,
+    case: str | Path | None,
     scene: str | Path | None,
 ) -> None:
     """Write the record, the tuned case and the rigid scene of a calibrated case file `source`; None: not that one."""
@@ -47,7 +50,9 @@ def save_tuned_case(source: str | Path, calibration: Calibration, path: str | Pa
 
 def save_rigid_scene(source: str | Path, calibration: Calibration, path: str | Path) -> None:
     """Write a scene of the calibrated rigid model that runs: its cavities, one body in each, and a sweep."""
-    lines = [f"The rigid model of {Path(source).name}, by vanedamp calibrate: {_damping_note(calibration)}."]
+    lines = [
+        f"The rigid model of {Path(source).name}, by vanedamp calibrate; damping ratio: {_damping_note(calibration)}."
+    ]
     lines += _scene_notes(calibration)
     head = "".join(f"# {line}\n" for line in lines)
     with replacing(path) as temporary:
@@ -66,8 +71,8 @@ def tuned_text(source: Path, calibration: Calibration, target: Path) -> str:
         notes.append(f"Frequencies: {reached} Hz, measured {asked} Hz.")
         for name, factor in zip(tuning.names, tuning.factors.tolist(), strict=True):
             _tune(document, name, factor)
-    if calibration.poles is not None:
-        notes.append(f"Damping: {_damping_note(calibration)}.")
+    if calibration.damping is not None:
+        notes.append(f"Damping ratio: {_damping_note(calibration)}.")
         if "modes" not in document:
             document.add("modes", tomlkit.table())
         _change(document["modes"], "damping_ratio", calibration.rigid.damping_ratio, "measured")
@@ -82,7 +87,7 @@ def tuned_text(source: Path, calibration: Calibration, target: Path) -> str:
 def rigid_scene(calibration: Calibration) -> dict[str, Any]:
     """Return the tables of a scene with the rigid model of a calibration, its force and its cavities.
 
-    A case that has no cavities with a motion across gets one; the bodies are a start (`_BODY`, `_GAPS`), to be replaced.
+    A case without cavities that move across gets one; the bodies are a start (`_BODY`, `_GAPS`), to be replaced.
     """
     rigid, amplitude = calibration.rigid, calibration.analysis.amplitude
     structure: dict[str, Any] = {
@@ -113,6 +118,7 @@ def rigid_scene(calibration: Calibration) -> dict[str, Any]:
 
 def _scene_notes(calibration: Calibration) -> Iterator[str]:
     rigid, analysis = calibration.rigid, calibration.analysis
+    yield f"Damping ratio: {_damping_note(calibration)}."
     if analysis.amplitude is None:
         yield "No fatigue strength in the case: the force is 1 N, give that of your excitation."
     else:
@@ -128,19 +134,17 @@ def _scene_notes(calibration: Calibration) -> Iterator[str]:
 
 
 def _damping_note(calibration: Calibration) -> str:
-    ratio, poles, pole = calibration.rigid.damping_ratio, calibration.poles, calibration.pole
-    if poles is None or pole is None:
-        return f"damping ratio {ratio:.6g}, the case's"
-    table = calibration.case.calibration
-    assert table is not None and table.damping is not None
-    return f"damping ratio {ratio:.6g} +- {poles.deviations[pole, 1]:.1g}, from {Path(table.damping.frf).name}"
+    measured = calibration.damping
+    if measured is None:
+        return f"{calibration.rigid.damping_ratio:.6g}, the case's"
+    return f"{measured.ratio:.6g} +- {measured.deviation:.1g}, from {Path(measured.file).name}"
 
 
 def _tune(document: tomlkit.TOMLDocument, name: str, factor: float) -> None:
     """Multiply the numbers of a part of the stiffness (`material.<group>`, `support.<group>`) in a case file."""
     kind, group = name.split(".", 1)
     if kind == "support":
-        springs = document["support"]["elastic"][group]  # type: ignore[index]
+        springs = document["support"]["elastic"][group]
         for key in ("stiffness", "normal", "tangential"):
             if key in springs:
                 _scale(springs, key, factor)
@@ -172,7 +176,7 @@ def _scale(table: AbstractTable, key: str, factor: float) -> None:
 
 def _change(table: AbstractTable, key: str, value: float, note: str) -> None:
     """Give a key another number, and a comment that says why and what it was."""
-    was = f"; was {float(table[key]):.6g}" if key in table else ""  # type: ignore[arg-type]
+    was = f"; was {float(table[key]):.6g}" if key in table else ""
     table[key] = _number(value)
     _remark(table, key, note + was)
 
@@ -186,8 +190,12 @@ def _remark(table: AbstractTable, key: str, note: str) -> None:
 
 
 def _number(value: float) -> Any:
-    text = f"{value:.{_DIGITS}g}"
-    return tomlkit.value(text if {".", "e"} & set(text) else f"{text}.0")
+    """Return a number as TOML writes moduli: 1.9e11."""
+    mantissa, _, exponent = f"{value:.{_DIGITS - 1}e}".partition("e")
+    if abs(int(exponent)) < 5:
+        text = f"{value:.{_DIGITS}g}"
+        return tomlkit.value(text if "." in text else f"{text}.0")
+    return tomlkit.value(f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}")
 
 
 def _rounded(value: float) -> float:
