@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, InputError, Real, Whole, nearest
@@ -20,7 +20,7 @@ _UNITS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=STRICT | ConfigDict(json_schema_extra={"x-inline": True}))
 class Range:
     """`num` values from start to stop, both included."""
 

@@ -8,10 +8,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-import tomli_w
 from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter
 from pydantic.dataclasses import dataclass
 
@@ -37,6 +36,7 @@ from vanedamp.files.toml_input import (
     read_toml,
     validate,
 )
+from vanedamp.files.toml_output import toml
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -335,12 +335,12 @@ class Scene(Displayed):
                 raise ValueError("initial: a prescribed motion has no initial state; remove the table")
 
     @classmethod
-    def load(cls, path: str | Path) -> Scene:
+    def load(cls, path: str | Path) -> Self:
         """Read the scene in a TOML file; the files that it names are taken relative to it. Raises InputError."""
         return cls.of(read_toml(path), path)
 
     @classmethod
-    def of(cls, data: dict[str, Any], path: str | Path) -> Scene:
+    def of(cls, data: dict[str, Any], path: str | Path) -> Self:
         """Return the scene in the tables of a TOML file that lies at `path`."""
         for table, key in _named_files(data):
             table[key] = str(Path(path).parent / table[key])
@@ -353,7 +353,7 @@ class Scene(Displayed):
             file = Path(table[key]).resolve()
             table[key] = str(file.relative_to(folder) if file.is_relative_to(folder) else file)
         with replacing(path) as temporary:
-            temporary.write_text(tomli_w.dumps(data), encoding="utf-8")
+            temporary.write_text(toml(data), encoding="utf-8")
 
     @property
     def files(self) -> list[str]:

@@ -23,7 +23,7 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_peaks
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.files.store import frozen
-from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml, validate
+from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 
 _MOST_FREQUENCIES = 10_000
 #: what the points of a band are, and their unit
@@ -156,9 +156,12 @@ class Design(NamedTuple):
     bodies: int
 
 
-@dataclass(frozen=True, config=STRICT)
-class _File:
-    optimise: Optimise
+@dataclass(frozen=True, config=STRICT, repr=False)
+class StudyFile(Scene):
+    """A scene, and what is best for it."""
+
+    optimise: Optimise = field(kw_only=True)
+    """what is best, and which designs are tried"""
 
 
 class LinearCurves(NamedTuple):
@@ -196,13 +199,13 @@ class Study(NamedTuple):
         data = read_toml(path)
         if "optimise" not in data:
             raise InputError(f"{path}: optimise: missing; say what is best in an [optimise] table (docs/sweeps.md)")
-        given = data.pop("optimise")
+        given = data["optimise"]
         if isinstance(given, dict) and not set(_UNITS) & set(given):
             raise InputError(
                 f"{path}: optimise.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
             )
-        table = validate(_File, {"optimise": given}, str(path)).optimise
-        scene = Scene.of(data, path)
+        file = StudyFile.of(data, path)
+        table, scene = file.optimise, Scene(**{item.name: getattr(file, item.name) for item in fields(Scene)})
         worst = table.over_band == "worst"
         try:
             band = table.frequencies(scene.excitation.engine_order)
