@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +21,16 @@ from vanedamp.files.toml_input import plain
 _WIDTH = 120
 
 
-def write_commented(path: str | Path, data: Mapping[str, Any], kind: FileKind) -> None:
-    """Write tables as a commented TOML file, and the JSON Schema of its kind beside it. Raises StoreError."""
+def write_commented(path: str | Path, data: Mapping[str, Any], kind: FileKind, notes: Iterable[str] = ()) -> None:
+    """Write tables as a commented TOML file, and the JSON Schema of its kind beside it. Raises StoreError.
+
+    notes: lines of comment at the head.
+    """
     made = kind.schema
     with replacing(Path(path).with_name(schema_name(kind.name))) as temporary:
         temporary.write_text(json.dumps(made, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     with replacing(path) as temporary:
-        temporary.write_text(commented(data, made, kind.name), encoding="utf-8")
+        temporary.write_text(commented(data, made, kind.name, notes), encoding="utf-8")
 
 
 def schema_name(kind: str) -> str:
@@ -40,12 +43,13 @@ def toml(data: Mapping[str, Any]) -> str:
     return _text(data, {})
 
 
-def commented(data: Mapping[str, Any], schema: dict[str, Any], kind: str) -> str:
+def commented(data: Mapping[str, Any], schema: dict[str, Any], kind: str, notes: Iterable[str] = ()) -> str:
     """Return tables as TOML text with the descriptions of their keys as comments, from the JSON Schema of their kind.
 
-    The first line names the schema for editors; values of None are left out.
+    The first line names the schema for editors, notes are lines of comment after it; values of None are left out.
     """
-    return f"#:schema ./{schema_name(kind)}\n\n{_text(data, schema)}"
+    head = "".join(f"# {note}\n" for note in notes)
+    return f"#:schema ./{schema_name(kind)}\n{head}\n{_text(data, schema)}"
 
 
 def _text(data: Mapping[str, Any], schema: dict[str, Any]) -> str:

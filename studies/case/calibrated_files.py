@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import tomli_w
 import tomlkit
 from tomlkit.items import AbstractTable, Array, InlineTable
 
 from vanedamp.files.store import replacing
+from vanedamp.files.toml_output import write_commented
 from vanedamp.studies.case.calibration import Calibration
 from vanedamp.studies.case.tables import FILES
+from vanedamp.studies.file_kinds import KINDS
 
 #: digits of a tuned number: the frequencies are those of the calibration to 1e-11
 _DIGITS = 12
@@ -49,14 +50,12 @@ def save_tuned_case(source: str | Path, calibration: Calibration, path: str | Pa
 
 
 def save_rigid_scene(source: str | Path, calibration: Calibration, path: str | Path) -> None:
-    """Write a scene of the calibrated rigid model that runs: its cavities, one body in each, and a sweep."""
-    lines = [
-        f"The rigid model of {Path(source).name}, by vanedamp calibrate; damping ratio: {_damping_note(calibration)}."
-    ]
-    lines += _scene_notes(calibration)
-    head = "".join(f"# {line}\n" for line in lines)
-    with replacing(path) as temporary:
-        temporary.write_text(head + "\n" + tomli_w.dumps(rigid_scene(calibration)), encoding="utf-8")
+    """Write a scene of the calibrated rigid model that runs: its cavities, one body in each, and a sweep.
+
+    The schema of scenes is written beside it, for editors.
+    """
+    notes = [f"The rigid model of {Path(source).name}, by vanedamp calibrate.", *_scene_notes(calibration)]
+    write_commented(path, rigid_scene(calibration), KINDS["scene"], notes)
 
 
 def tuned_text(source: Path, calibration: Calibration, target: Path) -> str:

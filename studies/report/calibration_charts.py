@@ -80,11 +80,16 @@ def response_figure(record: Mapping[str, Any], damping: Mapping[str, Any], unit:
                 hovertemplate=f"{name}<br>%{{x:.6g}} Hz<br>%{{y:.1f}} degrees<extra></extra>",
             )  # fmt: skip
     dressed(figure, height=560)
-    low, high = damping.get("band", (line[0], line[-1]))
+    low, high = damping["band"]
     figure.add_vrect(low, high, fillcolor="#94a3b8", opacity=0.12, line_width=0)
     figure.add_vline(damping["frequency_hz"], line={"color": "#334155", "width": 1, "dash": "dash"})
     figure.update_yaxes(
-        title_text=f"{damping.get('quantity', 'response')}, {unit}", type="log", exponentformat="power", row=1, col=1
+        title_text=f"{damping.get('quantity', 'response')}, {unit}",
+        type="log",
+        dtick="D2",
+        exponentformat="power",
+        row=1,
+        col=1,
     )
     figure.update_yaxes(title_text="phase, degrees", tickvals=[-180, -90, 0, 90, 180], row=2, col=1)
     figure.update_xaxes(title_text="frequency, Hz", row=2, col=1)
