@@ -416,6 +416,12 @@ class Case:
                 _check_group(f"material.{group}", group, {"volume": [*volumes, "default"]})
 
 
+def check_interface(case: Case) -> None:
+    """Raise InputError for a case without interface coordinates, which cannot be reduced."""
+    if not case.interface:
+        raise InputError("interface: missing; a reduction needs at least one [interface.<label>] table")
+
+
 def _check_materials(materials: Mapping[str, MaterialTable], reference: float) -> None:
     """Raise ValueError for materials that no temperature changes, and for two moduli at the reference temperature."""
     if not any(table.expansion or table.young_at for table in materials.values()):
