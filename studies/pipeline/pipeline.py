@@ -123,7 +123,7 @@ def _plan(listed: Sequence[Stage], record: Record, say: Callable[[str], None]) -
         before = tuple(dict.fromkeys(running[path] for path in stage.takes if path in running))
         status: Literal["kept", "runs", "perhaps"] = "runs" if reasons else "perhaps" if before else "kept"
         if not reasons and before:
-            reasons = tuple(f"takes what {name} makes" for name in before)
+            reasons = (f"takes results of {', '.join(before)}",)
         if status != "kept":
             running |= dict.fromkeys(stage.outputs, stage.name)
         word = {"kept": "kept", "runs": "runs, ", "perhaps": "runs if its input changes, "}[status]
@@ -139,11 +139,12 @@ def _check(
     inputs = {(source.parent / file).resolve() if file != source else source.resolve() for file in files}
     made: dict[Path, str] = {}
     for stage in listed:
-        inputs |= {Path(file).resolve() for file in _located(stage, lambda stage=stage: stage.check(check_scene))}
+        with _located(stage):
+            inputs |= {Path(file).resolve() for file in stage.check(check_scene)}
         for path in stage.outputs:
             if path in made:
                 raise InputError(
-                    f"{source}: {made[path]} and {stage.name} both write {path.name}; name one of them otherwise"
+                    f"{source}: {made[path]} and {stage.name} both write {path.name}; give one of them another name"
                 )
             made[path] = stage.name
     taken = {path for stage in listed for path in stage.takes}

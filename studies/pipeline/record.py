@@ -85,7 +85,7 @@ def changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
             continue
         one, other = leaves(before), leaves(after)
         paths = [path for path in dict.fromkeys([*other, *one]) if one.get(path) != other.get(path)]
-        told = [f"{path} {_shown(one.get(path))} -> {_shown(other.get(path))}" for path in paths[:_MOST]]
+        told = [f"{path} {_pair(one.get(path), other.get(path))}" for path in paths[:_MOST]]
         more = f" and {len(paths) - _MOST} more" if len(paths) > _MOST else ""
         yield f"{subject} changed: {', '.join(told)}{more}"
 
@@ -113,9 +113,19 @@ def _lost(made: Mapping[str, str], outputs: Sequence[Path]) -> Iterator[str]:
             yield f"{path.name} is not as it was made"
 
 
-def _shown(value: Any) -> str:
+def _pair(before: Any, after: Any) -> str:
+    """Return two values that differ as text, in as many digits as it takes."""
+    for digits in (6, 9, 12, 17):
+        one, other = _shown(before, digits), _shown(after, digits)
+        if one != other:
+            break
+    return f"{one} -> {other}"
+
+
+def _shown(value: Any, digits: int) -> str:
     if isinstance(value, float):
-        return f"{value:.8g}"
-    if isinstance(value, list) and len(value) > _ENTRIES:
-        return f"[{len(value)} values]"
+        return f"{value:.{digits}g}"
+    if isinstance(value, list):
+        entries = ", ".join(_shown(entry, digits) for entry in value[:_ENTRIES])
+        return f"[{entries}, ... {len(value)} values]" if len(value) > _ENTRIES else f"[{entries}]"
     return "nothing" if value is None else str(value)

@@ -36,6 +36,11 @@ _OF_CALIBRATE, _OF_CAMPBELL = "calibration", "campbell"
 _OF_OTHERS = ("orbit", "ramp", "ring_down")
 #: keys of the rigid model that a scene takes
 _RIGID = ("mass", "stiffness", "damping_ratio", "base_mass")
+#: the model of a structure that the pipeline gives, and the keys of the scene's own that it replaces
+_MODELS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "rigid": ("rigid", (*_RIGID, "damping")),
+    "reduced": ("rom", ("file",)),
+}
 #: the level of a scene, which `level` replaces
 _LEVELS = ("force", "base_acceleration", "resonance_amplitude", "load_factor")
 #: the rigid model and the reduced one before they are made, to check a scene with
@@ -203,20 +208,18 @@ class Sweep(Stage):
         return [self.file, *(file for file in scene.files if Path(file).resolve() not in made)]
 
     def inputs(self) -> dict[str, Any]:
-        """Return the scene with its structure, and the files that it names."""
+        """Return the scene, what the pipeline gives it, and the files that it names."""
         if not self.file.exists():
             return {}
-        scene = self._scene()
-        tables = {key: table for key, table in self._own_tables().items() if key not in _OF_OTHERS}
-        if scene is not None and self.table.structure == "rigid":
-            tables["structure"] = {"model": "rigid"} | self._model()[0]
+        scene, (rigid, amplitude) = self._scene(), self._model()
+        tables = {key: table for key, table in self._kept(read_toml(self.file)).items() if key not in _OF_OTHERS}
+        given: dict[str, Any] = {"option": {key: getattr(self.table, key) for key in ("structure", "level", "peak")}}
+        if self.table.structure == "rigid":
+            given["rigid model"] = rigid
         if self.table.level is not None:
-            tables["excitation"] = _without(tables["excitation"], _LEVELS) | {"resonance_amplitude": self._model()[1]}
+            given["fatigue level"] = {"amplitude": amplitude}
         files = [] if scene is None else scene.files
-        if self.table.structure == "reduced":
-            tables["structure"] = _without(_table_of(tables, "structure", "rom"), ("file",))
-        options = {"structure": self.table.structure, "level": self.table.level, "peak": self.table.peak}
-        return {f"scene {self.file.name}": tables, "option": options} | _digests(files, self.file.parent) | _software()
+        return {f"scene {self.file.name}": tables} | given | _digests(files, self.file.parent) | _software()
 
     def work(self, tools: Tools) -> str:
         """Run the points that are not done."""
@@ -237,7 +240,10 @@ class Sweep(Stage):
             tools.note(f"{self.name}: {prepared.resumed} of {prepared.points.size} points are done, the rest goes on")
         result = run_points(prepared, self.outputs[0], tools.pool(), self.name)
         if self.table.peak:
-            run_peak(prepared, result, self.outputs[1], lambda text: tools.note(f"{self.name}: {text}"))
+            peak = self.outputs[1]
+            run_peak(
+                prepared, result, peak, lambda text: tools.note(f"{self.name}: {text.replace(str(peak), peak.name)}")
+            )
         finish(prepared, self.outputs[0])
         bad = int((result.status != "ok").sum())
         told = f"{bad} of {result.status.size} points are not ok; " if bad else ""
@@ -251,9 +257,6 @@ class Sweep(Stage):
                 'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
             )
 
-    def _own_tables(self) -> dict[str, Any]:
-        return read_toml(self.file)
-
     def _scene(self) -> Scene | None:
         """Return the scene on its structure; None as long as that is not made."""
         rigid, amplitude = self._model()
@@ -263,17 +266,24 @@ class Sweep(Stage):
 
     def _tables(self, rigid: dict[str, Any], amplitude: float | None, reduced: str) -> dict[str, Any]:
         """Return the scene's tables with the structure and the level that the pipeline gives."""
-        tables = self._own_tables()
-        if self.table.structure == "rigid":
-            kept = _without(_table_of(tables, "structure", "rigid"), (*_RIGID, "damping"))
-            tables["structure"] = kept | rigid
-        elif self.table.structure == "reduced":
-            tables["structure"] = _table_of(tables, "structure", "rom") | {"file": reduced}
+        tables = self._kept(read_toml(self.file))
+        if self.table.structure is not None:
+            tables["structure"] |= rigid if self.table.structure == "rigid" else {"file": reduced}
         if self.table.level is not None:
-            excitation = tables.get("excitation", {})
-            if not isinstance(excitation, dict):
-                raise InputError("excitation: expected a table, headed [excitation]")
-            tables["excitation"] = _without(excitation, _LEVELS) | {"resonance_amplitude": amplitude}
+            tables["excitation"]["resonance_amplitude"] = amplitude
+        return tables
+
+    def _kept(self, tables: dict[str, Any]) -> dict[str, Any]:
+        """Return the scene's tables without the keys in whose place the pipeline gives others."""
+        structure, excitation = tables.get("structure", {}), tables.get("excitation", {})
+        if not (isinstance(structure, dict) and isinstance(excitation, dict)):
+            raise InputError("structure, excitation: expected tables, headed [structure] and [excitation]")
+        if self.table.structure is not None:
+            model, replaced = _MODELS[self.table.structure]
+            own = structure if structure.get("model") == model else {}
+            tables["structure"] = {"model": model} | _without(own, replaced)
+        if self.table.level is not None:
+            tables["excitation"] = _without(excitation, _LEVELS)
         return tables
 
     def _model(self) -> tuple[dict[str, Any], float | None]:
@@ -379,12 +389,6 @@ def _software(*packages: str) -> dict[str, Any]:
         with suppress(importlib.metadata.PackageNotFoundError):
             found[package] = importlib.metadata.version(package)
     return {"version": found}
-
-
-def _table_of(tables: dict[str, Any], name: str, model: str) -> dict[str, Any]:
-    """Return a structure's table if it is of the model, or else one that names the model only."""
-    table = tables.get(name)
-    return dict(table) if isinstance(table, dict) and table.get("model") == model else {"model": model}
 
 
 def _without(table: dict[str, Any], keys: Iterable[str]) -> dict[str, Any]:
