@@ -31,10 +31,16 @@ _BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", 
 
 
 class FileKind(NamedTuple):
-    """A kind of input file: its name, and the place of its record, "module:class", loaded when it is wanted."""
+    """A kind of input file.
+
+    name; place: of its record, "module:class", which is loaded when it is wanted; tables: that tell it from other
+    kinds; commands: that read it.
+    """
 
     name: str
     place: str
+    tables: tuple[str, ...] = ()
+    commands: tuple[str, ...] = ()
 
     @property
     def record(self) -> Any:
@@ -87,10 +93,8 @@ def constants(node: dict[str, Any]) -> dict[str, str]:
 def table_at(schema: dict[str, Any], node: dict[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the schema of a table among the variants that a node stands for: the one whose constants it has."""
     tables = [option for option in options(schema, node) if option.get("type") == "object"]
-    for option in tables:
-        if all(table.get(key) == value for key, value in constants(option).items()):
-            return option
-    return tables[0] if tables else {}
+    fitting = [one for one in tables if all(table.get(key) == value for key, value in constants(one).items())]
+    return max(fitting, key=lambda one: len(constants(one))) if fitting else next(iter(tables), {})
 
 
 def key_in(table: dict[str, Any], key: str) -> dict[str, Any]:
@@ -98,6 +102,12 @@ def key_in(table: dict[str, Any], key: str) -> dict[str, Any]:
     others = table.get("additionalProperties")
     node: dict[str, Any] = table.get("properties", {}).get(key, others if isinstance(others, dict) else {})
     return node
+
+
+def require(table: dict[str, Any], key: str) -> None:
+    """Demand a key in the schema of a table, which then has no default."""
+    table["required"] = sorted({*table.get("required", ()), key})
+    table["properties"][key].pop("default", None)
 
 
 class _Generator(GenerateJsonSchema):
@@ -126,8 +136,7 @@ class _Generator(GenerateJsonSchema):
         tag = schema["discriminator"]
         if isinstance(tag, str):
             for option in made["oneOf"]:
-                table = self.resolve_ref_schema(option)
-                table["required"] = sorted({*table.get("required", ()), tag})
+                require(self.resolve_ref_schema(option), tag)
         return made
 
     def field_title_should_be_set(self, schema: Any) -> bool:

@@ -22,11 +22,14 @@ _UNITS = {
 
 @dataclass(frozen=True, config=STRICT | ConfigDict(json_schema_extra={"x-inline": True}))
 class Range:
-    """`num` values from start to stop, both included."""
+    """Equidistant values, both ends included."""
 
     start: Real
+    """first value [unit of the key]"""
     stop: Real
+    """last value [unit of the key]"""
     num: Annotated[Whole, Field(gt=0)]
+    """number of values"""
 
 
 def axis_values(values: Range | Sequence[Any]) -> list[Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -54,8 +53,8 @@ def save_rigid_scene(source: str | Path, calibration: Calibration, path: str | P
 
     The schema of scenes is written beside it, for editors.
     """
-    notes = [f"The rigid model of {Path(source).name}, by vanedamp calibrate.", *_scene_notes(calibration)]
-    write_commented(path, rigid_scene(calibration), KINDS["scene"], notes)
+    head = {"": f"The rigid model of {Path(source).name}, by vanedamp calibrate."}
+    write_commented(path, rigid_scene(calibration), KINDS["scene"], head | _scene_notes(calibration))
 
 
 def tuned_text(source: Path, calibration: Calibration, target: Path) -> str:
@@ -115,21 +114,25 @@ def rigid_scene(calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def _scene_notes(calibration: Calibration) -> Iterator[str]:
+def _scene_notes(calibration: Calibration) -> dict[str, str]:
+    """Return comments on the tables of the scene, by their names."""
     rigid, analysis = calibration.rigid, calibration.analysis
-    yield f"Damping ratio: {_damping_note(calibration)}."
-    if analysis.amplitude is None:
-        yield "No fatigue strength in the case: the force is 1 N, give that of your excitation."
-    else:
-        yield (
+    force = "No fatigue strength in the case: 1 N, put the force of your excitation in its place."
+    if analysis.amplitude is not None:
+        force = (
             f"The force brings the resonance without bodies to {analysis.amplitude:.6g} m at {rigid.at}, "
             f"{analysis.share:.0%} of the fatigue strength."
         )
-    for label, motion in analysis.cavities.items():
-        yield f"Cavity {label} moves by {motion.along:.4g} of {rigid.at} along itself; the scene takes 1."
-    yield f"Bodies and gaps are a start: {_BODY:.0%} of the mass and half of the amplitude; put yours in their place."
-    if analysis.cavities:
-        yield "normal_motion and rotation are for bodies with extent: shape, length and height in [[damper]], play."
+    motions = [f"{label} moves by {motion.along:.4g} of {rigid.at}" for label, motion in analysis.cavities.items()]
+    plane = (
+        f"Along itself {', '.join(motions)}, in this scene by 1; normal_motion and rotation are for bodies with extent."
+    )
+    return {
+        "structure": f"{rigid.frequency_hz:.6g} Hz; damping ratio: {_damping_note(calibration)}.",
+        "excitation": force,
+        "cavity": "A start: put your gaps in their place. " + (plane if motions else ""),
+        "damper": f"A start: {_BODY:.0%} of the mass; put your bodies in their place.",
+    }
 
 
 def _damping_note(calibration: Calibration) -> str:
