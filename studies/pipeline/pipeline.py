@@ -78,6 +78,8 @@ def pipeline(
     started = time.perf_counter()
     table, source = PipelineFile.load(path), Path(path)
     target = Path(folder) if folder is not None else source.parent / table.folder
+    if target.exists() and not target.is_dir():
+        raise InputError(f"{path}: folder: {target} is a file; name a folder for the results")
     listed = stages(table, source, target)
     say = note or (lambda line: None)
     _check(listed, [source, *table.named_files.values()], source, check_scene or (lambda scene, peak: None))

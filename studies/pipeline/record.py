@@ -115,16 +115,15 @@ def _lost(made: Mapping[str, str], outputs: Sequence[Path]) -> Iterator[str]:
 
 def _pair(before: Any, after: Any) -> str:
     """Return two values that differ as text, in as many digits as it takes."""
-    for digits in (6, 9, 12, 17):
-        one, other = _shown(before, digits), _shown(after, digits)
-        if one != other:
-            break
+    shown = ((_shown(before, digits), _shown(after, digits)) for digits in (".6g", ".9g", ".12g", "r"))
+    one, other = next(pair for pair in shown if pair[0] != pair[1])
     return f"{one} -> {other}"
 
 
-def _shown(value: Any, digits: int) -> str:
+def _shown(value: Any, digits: str) -> str:
+    """Return a value as text, floats in a format ("r": all digits)."""
     if isinstance(value, float):
-        return f"{value:.{digits}g}"
+        return repr(value) if digits == "r" else f"{value:{digits}}"
     if isinstance(value, list):
         entries = ", ".join(_shown(entry, digits) for entry in value[:_ENTRIES])
         return f"[{entries}, ... {len(value)} values]" if len(value) > _ENTRIES else f"[{entries}]"

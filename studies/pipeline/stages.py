@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -109,8 +109,12 @@ class CaseStage(Stage):
         """Return the case's tables without those of others, and the files that it names."""
         if not self.file.exists():
             return {}
-        tables, case = self.tables(read_toml(self.file)), Case.load(self.file)
-        return {f"case {self.file.name}": tables} | _digests(case.files, self.file.parent) | _software(*_DOLFINX)
+        tables, files = self.tables(read_toml(self.file)), self.files(Case.load(self.file))
+        return {f"case {self.file.name}": tables} | _digests(files, self.file.parent) | _software(*_DOLFINX)
+
+    def files(self, case: Case) -> list[str]:
+        """Return the files that the stage reads: those of the case without the measurements of its calibration."""
+        return replace(case, calibration=None).files
 
     def tables(self, data: dict[str, Any]) -> dict[str, Any]:
         """Return the tables that the stage reads."""
@@ -124,6 +128,10 @@ class Calibrate(CaseStage):
     def tables(self, data: dict[str, Any]) -> dict[str, Any]:
         """Return the tables that the stage reads: with the measurements."""
         return {key: table for key, table in data.items() if key != _OF_CAMPBELL}
+
+    def files(self, case: Case) -> list[str]:
+        """Return the files that the stage reads."""
+        return case.files
 
     def work(self, tools: Tools) -> str:
         """Calibrate."""
@@ -205,6 +213,8 @@ class Sweep(Stage):
         self._check(scene)
         check_scene(scene, self.table.peak)
         made = {path.resolve() for path in self.takes}
+        if self.table.structure is None and not made:
+            check_model(scene)
         return [self.file, *(file for file in scene.files if Path(file).resolve() not in made)]
 
     def inputs(self) -> dict[str, Any]:
