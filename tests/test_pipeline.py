@@ -45,7 +45,8 @@ GAPS = changed(
 )
 REDUCED = changed(
     GAPS,
-    ("\n[excitation]", '\n[structure]\nmodel = "rom"\nfile = "out/rom.h5"\nmodes = 1\n[excitation]\nat = "tip"\nforce = 1'),
+    ("\n[excitation]", '\n[structure]\nmodel = "rom"\nfile = "out/rom.h5"\nmodes = 1\n[excitation]\nat = "tip"'),
+    ("frequency = 800.0", "frequency = 800.0\nforce = 1.0"),
     ("gap", 'floor = "tip"\ngap'),
 )  # fmt: skip
 PIPELINE = """
