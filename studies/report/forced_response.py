@@ -114,7 +114,7 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
         settings = {path: axis[index] for path, axis, index in zip(labels, others, combination, strict=True)}
         values = [setting(path, value, units[path]) for path, value in settings.items()]
         title = ", ".join([name or model_name(sweep.scene), *values])
-        responses.append(_response(sweep, point, paths[along], title, settings))
+        responses.append(response_along(sweep, point, paths[along], title, settings))
     return responses
 
 
@@ -123,9 +123,14 @@ def best_first(responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:
     return sorted(responses, key=lambda response: np.nan_to_num(response.headline.peak_ratio, nan=math.inf))
 
 
-def _response(
+def response_along(
     sweep: Sweep, point: tuple[Any, ...], axis: str, name: str, settings: Mapping[str, Any]
 ) -> ForcedResponse:
+    """Return the forced response along an axis of a sweep, at settings of the others by their paths.
+
+    point: what is taken of each axis, in the axes' order: of `axis` the places in the order of the curve, of the others
+    one place.
+    """
     ok = sweep.status[point] == "ok"
     damped = {
         "damped_max": sweep.amplitude_max, "damped_mean": sweep.amplitude_mean, "impacts_per_period":

@@ -11,11 +11,10 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.sweep.sweep import LOSSES
-from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
+from vanedamp.studies.report.charts import COLOURS, DASHES, axis_title, dressed
 from vanedamp.studies.report.forced_response import ForcedResponse, LinearCurves
 
 _LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626", "contact": "#2563eb"}
-_DASHES = ("solid", "dash", "dot", "dashdot")  # of bodies
 _SHARED = "#475569"  # linear curves of several responses
 _PANELS, _PANEL_HEIGHT = 3, 260  # energy panels side by side; height of one, px
 _TITLE_WIDTH = 110  # characters of titles side by side
@@ -155,7 +154,7 @@ def plane_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | N
     figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05)
     for response, colour in zip(responses, cycle(len(responses)), strict=True):
         for body, name in bodies_in_plane(response):
-            dash = _DASHES[body % len(_DASHES)]
+            dash = DASHES[body % len(DASHES)]
             panels = (
                 (1e3 * response.in_plane["tilt_max"], "%{y:.4g} mrad"), (response.in_plane["lift_share"], "%{y:.3f}"),
                 (100 * response.in_plane["linearisation"], "%{y:.2g} %"),
