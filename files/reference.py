@@ -33,14 +33,12 @@ _BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", 
 class FileKind(NamedTuple):
     """A kind of input file.
 
-    name; place: of its record, "module:class", which is loaded when it is wanted; tables: that tell it from other
-    kinds; commands: that read it.
+    name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds.
     """
 
     name: str
     place: str
     tables: tuple[str, ...] = ()
-    commands: tuple[str, ...] = ()
 
     @property
     def record(self) -> Any:

@@ -13,20 +13,16 @@ KINDS = {
     kind.name: kind
     for kind in (
         FileKind(
-            "pipeline", "vanedamp.studies.pipeline.tables:PipelineFile",
-            ("calibrate", "modal", "reduce", "report", "folder"), ("pipeline",),
+            "pipeline",
+            "vanedamp.studies.pipeline.tables:PipelineFile",
+            ("calibrate", "modal", "reduce", "report", "folder"),
         ),
-        FileKind("external", "vanedamp.studies.case.external_model:External", ("matrices",), ("import",)),
-        FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",), ("optimise",)),
-        FileKind(
-            "case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support"),
-            ("modal", "calibrate", "campbell", "matrices", "reduce"),
-        ),
-        FileKind(
-            "scene", "vanedamp.coupling.scene.scene:Scene", ("structure", "excitation", "cavity", "damper"), ("run",)
-        ),
+        FileKind("external", "vanedamp.studies.case.external_model:External", ("matrices",)),
+        FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
+        FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),
+        FileKind("scene", "vanedamp.coupling.scene.scene:Scene", ("structure", "excitation", "cavity", "damper")),
     )
-}  # fmt: skip
+}
 
 
 def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:

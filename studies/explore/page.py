@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tomli_w
 from dash import ClientsideFunction, Dash, Input, Output, State, dcc, html, no_update
 from dash.exceptions import PreventUpdate
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.toml_input import InputError, validate
+from vanedamp.files.toml_output import toml
 from vanedamp.studies.explore import point
 from vanedamp.studies.explore.chart import Figure, key_figures, remarks, response_figure
 from vanedamp.studies.explore.controls import Control, controls_of, moved
@@ -220,7 +220,7 @@ def _term(figure: Figure) -> list[Any]:
 
 def scene_text(scene: Scene) -> str:
     """Return the TOML file of a scene."""
-    return tomli_w.dumps(scene.to_dict())
+    return toml(scene.to_dict())
 
 
 def _write(exploration: Exploration, scene: Scene) -> tuple[Any, str]:
