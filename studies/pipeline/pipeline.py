@@ -98,6 +98,16 @@ def pipeline(
     return result
 
 
+def adopt(path: str | Path) -> None:
+    """Note that results in the folder of a pipeline file are those of its inputs as they are: made by other means."""
+    table, source = PipelineFile.load(path), Path(path)
+    folder = source.parent / table.folder
+    record = Record(folder / f"{source.stem}.record.json")
+    for stage in stages(table, source, folder):
+        if all(output.exists() for output in stage.outputs):
+            record.end(stage.name, stage.inputs(), stage.outputs)
+
+
 def _done(stage: Stage, record: Record, say: Callable[[str], None], pool: Callable[[], Executor | None]) -> StageResult:
     """Run a stage unless its results are those of its inputs."""
     outputs, inputs = tuple(map(_shown, stage.outputs)), stage.inputs()
