@@ -209,6 +209,15 @@ def test_a_dry_run_writes_nothing(tmp_path, monkeypatch, capsys):
     assert {path.name for path in tmp_path.iterdir()} == before
 
 
+def test_check_says_what_would_run(folder, capsys):
+    replace_in(folder / "gaps.toml", "gap = 2e-4", "gap = 3e-4")
+    assert main(["check", "pipeline.toml", "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["kind"], found["stages"]) == ("pipeline", ALL)
+    assert (found["runs"], found["perhaps"]) == (["sweep gaps"], ["report"])
+    assert found["defaults"]["reduce.tolerance"] == 0.01
+
+
 def test_the_scene_that_calibrate_writes_runs_too(folder):
     (folder / "rigid_pipeline.toml").write_text(
         'case = "case.toml"\nfolder = "rigid"\n[calibrate]\n[reduce]\n[[sweep]]\nscene = "rigid/rigid.toml"\n'
