@@ -30,6 +30,8 @@ def short_form(scene: Scene) -> dict[str, Any]:
             continue
         if _reads_as(without, scene):
             data = without
+    if "law" in (contact := data.get("contact", {})):  # says what the other keys are
+        data["contact"] = {"law": contact["law"]} | contact
     return data
 
 

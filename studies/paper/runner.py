@@ -182,7 +182,8 @@ def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
 
 def _write_scene(scene: Scene, path: Path, title: str) -> None:
     """Write a scene as one would write it by hand, with comments."""
-    notes = {"": f"{title}. `vanedamp sweep {path.name}` runs it; every key: `vanedamp schema scene`. SI units."}
+    command = "sweep" if scene.sweep else "run"
+    notes = {"": f"{title}. `vanedamp {command} {path.name}` runs it; every key: `vanedamp schema scene`. SI units."}
     if isinstance(scene.sweep.get(FREQUENCY), tuple):
         notes["sweep"] = "The frequencies lie closer around the resonances with the bodies loose and fixed."
     write_commented(path, relative(short_form(scene), path), KINDS["scene"], notes)
