@@ -36,13 +36,14 @@ if TYPE_CHECKING:
     from vanedamp.rom.reduction import reduce
     from vanedamp.studies.case.tables import Case
     from vanedamp.studies.export.export import export
+    from vanedamp.studies.pipeline.pipeline import pipeline
     from vanedamp.studies.report.plot import plot
 
 __all__ = [
     "Branches", "Campbell", "Case", "InputError", "Interface", "Modes", "Ramp", "ReducedModel", "Response",
     "RigidModel", "RingDown", "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "campbell", "export",
-    "find_orbit", "orbits", "plot", "ramp", "reduce", "rigid_model", "ring_down", "simulate", "solve_modes",
-    "steady_states", "sweep",
+    "find_orbit", "orbits", "pipeline", "plot", "ramp", "reduce", "rigid_model", "ring_down", "simulate",
+    "solve_modes", "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -67,6 +68,7 @@ _HOMES = {
     "export": "studies.export.export",
     "find_orbit": "coupling.orbits.orbits",
     "orbits": "coupling.orbits.orbits",
+    "pipeline": "studies.pipeline.pipeline",
     "plot": "studies.report.plot",
     "ramp": "coupling.transients.ramp",
     "reduce": "rom.reduction",

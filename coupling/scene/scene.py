@@ -370,12 +370,8 @@ class Scene(Displayed):
 
     def save(self, path: str | Path) -> None:
         """Write the TOML file that `load` reads; files beside it, such as a reduced model's, are relative to it."""
-        data, folder = self.to_dict(), Path(path).resolve().parent
-        for table, key in _named_files(data):
-            file = Path(table[key]).resolve()
-            table[key] = str(file.relative_to(folder) if file.is_relative_to(folder) else file)
         with replacing(path) as temporary:
-            temporary.write_text(toml(data), encoding="utf-8")
+            temporary.write_text(toml(relative(self.to_dict(), path)), encoding="utf-8")
 
     @property
     def files(self) -> list[str]:
@@ -437,6 +433,15 @@ def _named_files(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
             table = table.get(step) if isinstance(table, dict) else None
         if isinstance(table, dict) and isinstance(table.get(place[-1]), str):
             yield table, place[-1]
+
+
+def relative(data: dict[str, Any], path: str | Path) -> dict[str, Any]:
+    """Name the files of a scene as one that lies at `path` does: those in its folder or below relative to it."""
+    folder = Path(path).resolve().parent
+    for table, key in _named_files(data):
+        file = Path(table[key]).resolve()
+        table[key] = str(file.relative_to(folder) if file.is_relative_to(folder) else file)
+    return data
 
 
 def loaded(scene: Scene | str | Path) -> Scene:
