@@ -42,14 +42,14 @@ def explore_app(exploration: page.Exploration | None, sweeps: Mapping[str, Sweep
     def layout() -> html.Div:
         parts = [] if exploration is None else [page.layout(exploration)]
         if sweeps:
-            parts.append(html.Main(html.Section(sweep_files.panel(dict(sweeps)), className="wide")))
+            parts.append(html.Main(html.Section(sweep_files.panel(sweeps), className="wide")))
         return html.Div([html.Header([html.H1("vanedamp explore"), html.P(_guide(exploration))]), *parts])
 
     app.layout = layout
     if exploration is not None:
         page.register(app, exploration, submit)
     if sweeps:
-        sweep_files.register(app, dict(sweeps))
+        sweep_files.register(app, sweeps, submit)
     return app
 
 
