@@ -69,10 +69,10 @@ def best_design(sweep: Sweep) -> Best | None:
     # designs that share their undamped maximum rank by either figure
     figure = relative if np.isfinite(relative[complete]).all() else peak
     chosen = np.unravel_index(np.argmin(np.where(complete, figure, np.inf)), complete.shape)
-    rest = iter(int(place) for place in chosen)
-    cut = tuple(slice(None) if k in over else next(rest) for k in range(len(paths)))
-    worst = iter(np.unravel_index(np.argmax(sweep.amplitude_mean[cut]), sweep.amplitude_mean[cut].shape))
-    places = {path: int(next(worst)) if k in over else cut[k] for k, path in enumerate(paths)}
+    places = dict(zip([path for k, path in enumerate(paths) if k not in over], map(int, chosen), strict=True))
+    runs = sweep.amplitude_mean[tuple(places.get(path, slice(None)) for path in paths)]
+    highest = np.unravel_index(np.argmax(runs), runs.shape)
+    places |= dict(zip([paths[k] for k in over], map(int, highest), strict=True))
     return Best(
         places, float(peak[chosen]), float(relative[chosen]), complete.size, complete.size - int(complete.sum())
     )
