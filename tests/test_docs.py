@@ -14,6 +14,7 @@ import tomli_w
 
 from tests.tools.input_files import CLUSTER, SCENE, changed
 from tests.tools.processes import RANKS, ROOT, environment
+from tests.tools.schemas import faults, kind_of
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
@@ -126,7 +127,9 @@ def test_files_are_read(example, tmp_path):
     for name in files_named(tables):
         (tmp_path / name).write_text("")
     path = tmp_path / "example.toml"
-    path.write_text(tomli_w.dumps(completed(tables, tmp_path)))
+    whole = completed(tables, tmp_path)
+    assert faults(kind_of(whole), whole) == []
+    path.write_text(tomli_w.dumps(whole))
     if "matrices" in tables:
         assert External.read(path).interface.keys() == tables["interface"].keys()
     elif "optimise" in tables:

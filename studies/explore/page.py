@@ -9,17 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tomli_w
 from dash import ClientsideFunction, Dash, Input, Output, State, dcc, html, no_update
 from dash.exceptions import PreventUpdate
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.toml_input import InputError, validate
+from vanedamp.files.toml_output import commented, write_commented
 from vanedamp.studies.explore import point
 from vanedamp.studies.explore.chart import Figure, key_figures, remarks, response_figure
 from vanedamp.studies.explore.controls import Control, controls_of, moved
 from vanedamp.studies.explore.curves import EVALUATED, Band, Curve, Curves, Submit, ends_of, explorable, seen
+from vanedamp.studies.file_kinds import KINDS
 
 #: steps of a slider, and the longest that a request waits for the next form of a curve, s
 _STEPS, _PATIENCE = 200, 0.5
@@ -218,22 +219,18 @@ def _term(figure: Figure) -> list[Any]:
     return [html.Dt(figure.name), html.Dd(figure.value)]
 
 
-def scene_text(scene: Scene) -> str:
-    """Return the TOML file of a scene."""
-    return tomli_w.dumps(scene.to_dict())
-
-
 def _write(exploration: Exploration, scene: Scene) -> tuple[Any, str]:
     """Return the file for the browser, and what to say; writes the file of the command line, too."""
     said = "saved by the browser"
     if exploration.output is not None:
         replaced = ", in place of the file that was there" if exploration.output.exists() else ""
         try:
-            scene.save(exploration.output)
+            write_commented(exploration.output, scene.tables(exploration.output), KINDS["scene"])
             said = f"{exploration.output} written{replaced}; {said}"
-        except OSError as error:
-            said = f"{exploration.output} cannot be written ({error.strerror}); {said}"
-    return {"content": scene_text(scene), "filename": "scene.toml", "type": "application/toml"}, said
+        except (OSError, VanedampError) as error:
+            said = f"{exploration.output} cannot be written ({error}); {said}"
+    text = commented(scene.tables(), KINDS["scene"].schema, "scene")
+    return {"content": text, "filename": "scene.toml", "type": "application/toml"}, said
 
 
 def _control(control: Control) -> html.Div:
