@@ -102,7 +102,7 @@ def remarks(sweep: Sweep, complete: bool) -> list[str]:
     if complete:
         found += response.headline.remarks
     bad = sorted({status for status in sweep.status.ravel() if status != "ok"})
-    return [*found, f"open markers: {', '.join(bad)}"] if bad else found
+    return [*found, f"not ok (open markers, none where a run broke): {', '.join(bad)}"] if bad else found
 
 
 def _most_reduced(response: ForcedResponse) -> str:

@@ -14,17 +14,18 @@ from dash.exceptions import PreventUpdate
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.toml_input import InputError, validate
+from vanedamp.files.toml_input import validate
 from vanedamp.files.toml_output import commented, write_commented
 from vanedamp.studies.explore import point
 from vanedamp.studies.explore.chart import Figure, key_figures, remarks, response_figure
-from vanedamp.studies.explore.controls import Control, controls_of, moved
+from vanedamp.studies.explore.controls import Control, controls_of, moved, number_in
 from vanedamp.studies.explore.curves import EVALUATED, Band, Curve, Curves, Submit, ends_of, explorable, seen
 from vanedamp.studies.file_kinds import KINDS
 
 #: steps of a slider, and the longest that a request waits for the next form of a curve, s
 _STEPS, _PATIENCE = 200, 0.5
-_BAND = ("low", "high", "evaluated")
+#: said while there is no point of a curve yet
+_FIRST = "computing; the first time that it runs, the engine is compiled, which takes a minute or two"
 
 
 @dataclass(frozen=True)
@@ -59,23 +60,12 @@ class Exploration:
 
 
 def _band(texts: Mapping[str, str]) -> Band:
-    numbers: list[float | None] = []
-    for name, label in zip(_BAND, ("from", "to", "periods evaluated"), strict=True):
-        text = texts[name].strip()
-        if not text and name != "evaluated":
-            numbers.append(None)
-            continue
-        try:
-            number = float(text)
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number) or (name == "evaluated" and number != int(number)):
-            kind = "a whole number" if name == "evaluated" else "a frequency in Hz, or nothing"
-            raise InputError(f"{label}: expected {kind}, not {text[:20]!r}")
-        numbers.append(number)
-    low, high, evaluated = numbers
-    assert evaluated is not None
-    return Band(low, high, int(evaluated))
+    """Return the band in its fields; a frequency that is left out is found. Raises InputError."""
+    low, high = (
+        number_in(texts[name], label, "Hz") if texts[name].strip() else None
+        for name, label in (("low", "frequencies from"), ("high", "frequencies to"))
+    )
+    return Band(low, high, int(number_in(texts["evaluated"], "periods evaluated", whole=True)))
 
 
 def layout(exploration: Exploration) -> html.Main:
@@ -195,7 +185,8 @@ def _draw(exploration: Exploration, curves: Curves, request: dict[str, Any]) -> 
         raise PreventUpdate
     reply |= {"have": curve.done, "complete": curve.done == curve.size}
     if curve.done == have:
-        return (*[no_update] * 7, reply)
+        said = _FIRST if have == 0 else no_update
+        return (*[no_update] * 4, said, no_update, no_update, reply)
     return (*_drawn(curve, request["version"]), reply)
 
 
