@@ -263,7 +263,6 @@ def test_run_is_looked_at_until_it_is_done():
     assert runs.look(key).summary == "done"  # a page that was slow asks again
     later = runs.begin(SCENE, 2410.0, former=key)
     assert "not known" in runs.look(key).summary
-    assert runs.scene_of(later) == SCENE
     other = runs.begin(SCENE, 2420.0)  # of another tab
     assert futures[1].cancel()
     assert "ended abruptly" in runs.look(later).summary

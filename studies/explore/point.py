@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from dash import Dash, Input, Output, State, ctx, dcc, html, no_update
+from dash import ClientsideFunction, Dash, Input, Output, State, ctx, dcc, html, no_update
 
 from vanedamp.coupling.scene.paths import unit_of
 from vanedamp.files.errors import VanedampError
 from vanedamp.studies.explore.curves import Submit
 from vanedamp.studies.explore.point_view import PointView, axis_of, point_view
-from vanedamp.studies.report.charts import axis_title
 from vanedamp.studies.report.forced_response import setting
 
 #: runs that are kept for the tabs of the page, and ms between looks at them
@@ -66,11 +65,6 @@ class PointRuns:
         if run is not None:
             run.future.cancel()
 
-    def scene_of(self, key: str | None) -> Mapping[str, Any] | None:
-        """Return the scene of a run as data; None of one that is not known."""
-        run = self._runs.get(key or "")
-        return None if run is None else run.data
-
     def look(self, key: str | None) -> PointView | str:
         """Return what a run shows, or a line on how long it has been at work; an unknown one has failed."""
         run = self._runs.get(key or "")
@@ -94,7 +88,7 @@ def panel(of: str = "") -> html.Div:
     """Return the part of the page that shows the motion at a point; of: with what its identifiers begin."""
     name = f"{of}point"
     choice = [
-        html.Label("at", id=f"{name}-label", htmlFor=f"{name}-value"),
+        html.Label("at excitation frequency, Hz", id=f"{name}-label", htmlFor=f"{name}-value"),
         dcc.Input(id=f"{name}-value", type="number", step="any", debounce=True, className="point-value"),
         html.Button("Show", id=f"{name}-show", type="button"),
         html.Button("◀ lower", id=f"{name}-lower", type="button", title="next lower point of the curve"),
@@ -120,6 +114,7 @@ def panel(of: str = "") -> html.Div:
             html.P(id=f"{name}-stale"),
             html.Div(views, id=f"{name}-views", style=_HIDDEN),
             dcc.Store(id=f"{name}-run"),
+            dcc.Store(id=f"{name}-asked"),
             dcc.Interval(id=f"{name}-clock", interval=_EVERY, disabled=True),
         ],
     )
@@ -138,6 +133,7 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
         Output(f"{name}-clock", "disabled"),
         Output(f"{name}-status", "children"),
         Output(f"{name}-value", "value"),
+        Output(f"{name}-asked", "data"),
         Input(f"{of}curve", "clickData"),
         Input(f"{name}-value", "value"),
         Input(f"{name}-show", "n_clicks"),
@@ -155,11 +151,12 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
         trigger = str(ctx.triggered_id).removeprefix(of)
         value = chosen_value(trigger, click, given, figure)
         if scene is None:
-            return no_update, no_update, "There is no curve yet.", no_update
+            return no_update, no_update, "There is no curve yet.", no_update, no_update
         if value is None:
             wanted = "click a point of the damped curve" if trigger == "curve" else "give a number, in SI units"
-            return no_update, no_update, f"No point: {wanted}.", no_update
-        return runs.begin(scene | {"sweep": sweep or {}}, value, former), False, "running …", value
+            return no_update, no_update, f"No point: {wanted}.", no_update, no_update
+        key = runs.begin(scene | {"sweep": sweep}, value, former)
+        return key, False, "running …", value, {"scene": scene, "sweep": sweep}
 
     @app.callback(
         Output(f"{name}-history", "figure"),
@@ -183,21 +180,13 @@ def register(app: Dash, submit: Submit, of: str = "") -> None:
         shown = frame | {"display": "block" if view.motion else "none"}
         return view.history, view.phase, view.motion, shown, {}, view.summary, True
 
-    @app.callback(
+    app.clientside_callback(  # in the browser: it is asked whenever the curve moves
+        ClientsideFunction("explore", "stale"),
         Output(f"{name}-stale", "children"),
-        Output(f"{name}-label", "children"),
         Input(f"{of}scene", "data"),
         Input(f"{of}sweep", "data"),
-        Input(f"{name}-run", "data"),
-        prevent_initial_call=True,
+        Input(f"{name}-asked", "data"),
     )
-    def compare(scene: Any, sweep: Any, key: Any) -> tuple[Any, ...]:
-        if scene is None:
-            return no_update, no_update
-        data, former = scene | {"sweep": sweep or {}}, runs.scene_of(key)
-        path = axis_of(data)
-        stale = "" if former in (None, data) else "The scene has changed since: Show runs it as it is now."
-        return stale, f"at {axis_title(path, unit_of(path))}"
 
 
 def chosen_value(trigger: str, click: Any, given: Any, figure: Any) -> float | None:

@@ -23,6 +23,7 @@ from vanedamp.studies.explore.sweep_chart import (
     start_places,
     status_sentence,
 )
+from vanedamp.studies.report.charts import axis_title
 from vanedamp.studies.report.forced_response import quantity
 from vanedamp.studies.report.results import collect, short_names
 
@@ -99,6 +100,7 @@ def register(app: Dash, sweeps: Mapping[str, Sweep], submit: Submit) -> None:
         Output("sweep-status", "children"),
         Output("sweep-scene", "data"),
         Output("sweep-sweep", "data"),
+        Output("sweep-point-label", "children"),
         Output({"type": "sweep-value", "path": ALL}, "children"),
         Input({"type": "sweep-axis", "path": ALL}, "value"),
         Input("sweep-along", "value"),
@@ -106,20 +108,21 @@ def register(app: Dash, sweeps: Mapping[str, Sweep], submit: Submit) -> None:
         State("sweep-file", "value"),
     )
     def draw(values: list[Any], along: Any, ids: list[Any], name: Any) -> tuple[Any, ...]:
-        unchanged = [no_update] * len(ctx.outputs_list[4])
+        unchanged = [no_update] * len(ctx.outputs_list[5])
         sweep = sweeps.get(name)
         places = {} if sweep is None else places_of(sweep, values, ids)
         if sweep is None or set(places) != set(sweep.axes) - {along}:  # controls of another file are on their way
-            return *[no_update] * 4, unchanged
+            return *[no_update] * 5, unchanged
         shown = {path: _value(sweep, path, place) for path, place in places.items()}
         curve = chosen_curve(sweep, along, places)
         said = f"{curve.sentence}. {status_sentence(sweep, along, places)}"
-        labels = [shown[output["id"]["path"]] for output in ctx.outputs_list[4]]
+        labels = [shown[output["id"]["path"]] for output in ctx.outputs_list[5]]
+        title = f"at {axis_title(along, sweep.units()[along])}"
         try:
             scene: tuple[Any, Any] = scene_of_curve(sweep, along, places)
         except VanedampError:  # of a point that is no scene, whose status says so
             scene = (None, None)
-        return curve_figure(sweep, along, places), " ".join([said, *_remarks(sweep)]), *scene, labels
+        return curve_figure(sweep, along, places), " ".join([said, *_remarks(sweep)]), *scene, title, labels
 
     @app.callback(
         Output({"type": "sweep-axis", "path": ALL}, "value"),
