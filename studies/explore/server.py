@@ -24,6 +24,8 @@ from vanedamp.studies.explore.curves import Submit
 from vanedamp.studies.workers import WorkerPool
 
 HOST = "127.0.0.1"
+#: of the workers: the browser draws on the same cores, and first
+_NICENESS = 5
 _INDEX = """<!DOCTYPE html>
 <html lang="en">
 <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}</head>
@@ -111,7 +113,7 @@ def serve(
     except (OSError, OverflowError) as error:
         raise InputError(f"--port: {port} is not to be had ({error}); leave it out for a free one") from None
     token = secrets.token_urlsafe(24)
-    with listening, WorkerPool(count) as pool:
+    with listening, WorkerPool(count, _NICENESS) as pool:
         for _ in range(count):
             pool.submit(warm_up)
         port = listening.getsockname()[1]
