@@ -21,6 +21,7 @@ from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.explore import page, sweep_files
 from vanedamp.studies.explore.curves import Submit
+from vanedamp.studies.report.motion_page import script_source
 from vanedamp.studies.workers import WorkerPool
 
 HOST = "127.0.0.1"
@@ -43,14 +44,14 @@ def explore_app(exploration: page.Exploration | None, sweeps: Mapping[str, Sweep
     def layout() -> html.Div:
         parts = [] if exploration is None else [page.layout(exploration)]
         if sweeps:
-            parts.append(html.Main(html.Section(sweep_files.panel(dict(sweeps)), className="wide")))
+            parts.append(html.Main(html.Section(sweep_files.panel(sweeps), className="wide")))
         return html.Div([html.Header([html.H1("vanedamp explore"), html.P(_guide(exploration))]), *parts])
 
     app.layout = layout
     if exploration is not None:
         page.register(app, exploration, submit)
     if sweeps:
-        sweep_files.register(app, dict(sweeps))
+        sweep_files.register(app, sweeps, submit)
     return app
 
 
@@ -67,7 +68,7 @@ def guard(app: Dash, port: int, token: str) -> None:
     """Refuse requests under another host's name or without the token, and forbid the page all other addresses."""
     hosts, cookie = {f"{name}:{port}" for name in (HOST, "localhost")}, f"vanedamp-{port}"
     server: Flask = app.server
-    scripts = " ".join(["'self'", *app.csp_hashes()])
+    scripts = " ".join(["'self'", *app.csp_hashes(), script_source()])
     policy = (
         f"default-src 'none'; script-src {scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
         "font-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
