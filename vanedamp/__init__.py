@@ -35,11 +35,13 @@ if TYPE_CHECKING:
     from vanedamp.rom.reduced import ReducedModel
     from vanedamp.rom.reduction import reduce
     from vanedamp.studies.case.tables import Case
+    from vanedamp.studies.report.plot import plot
 
 __all__ = [
     "Branches", "Campbell", "Case", "InputError", "Interface", "Modes", "Ramp", "ReducedModel", "Response",
     "RigidModel", "RingDown", "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "campbell", "find_orbit",
-    "orbits", "ramp", "reduce", "rigid_model", "ring_down", "simulate", "solve_modes", "steady_states", "sweep",
+    "orbits", "plot", "ramp", "reduce", "rigid_model", "ring_down", "simulate", "solve_modes", "steady_states",
+    "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -63,6 +65,7 @@ _HOMES = {
     "campbell": "modal.campbell",
     "find_orbit": "coupling.orbits.orbits",
     "orbits": "coupling.orbits.orbits",
+    "plot": "studies.report.plot",
     "ramp": "coupling.transients.ramp",
     "reduce": "rom.reduction",
     "rigid_model": "modal.rigid_model",

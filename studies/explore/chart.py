@@ -59,7 +59,7 @@ def _layout() -> dict[str, Any]:
     figure.update_yaxes(title_text="amplitude / undamped maximum", rangemode="tozero")
     figure.update_layout(
         legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0}, hovermode="closest", uirevision="kept",
-        margin={"t": 30, "r": 12, "l": 60, "b": 50},
+        margin={"t": 30, "r": 12, "l": 60, "b": 50}, plot_bgcolor="white", template="none",
     )  # fmt: skip
     layout: dict[str, Any] = figure.to_plotly_json()["layout"]
     return layout

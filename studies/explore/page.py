@@ -85,7 +85,7 @@ def layout(exploration: Exploration) -> html.Main:
                     *(_control(control) for control in exploration.controls),
                     html.Div(
                         [
-                            "frequencies from", _field("low", "lowest frequency, Hz", exploration.band["low"], "auto"),
+                            "frequencies", _field("low", "lowest frequency, Hz", exploration.band["low"], "auto"),
                             "to", _field("high", "highest frequency, Hz", exploration.band["high"], "auto"), "Hz",
                         ],
                         className="row",
@@ -187,14 +187,19 @@ def _draw(exploration: Exploration, curves: Curves, request: dict[str, Any]) -> 
     if curve.done == have:
         said = _FIRST if have == 0 else no_update
         return (*[no_update] * 4, said, no_update, no_update, reply)
-    return (*_drawn(curve, request["version"]), reply)
+    figure, figures, text = _drawn(curve, request["version"])
+    data: Any = no_update
+    table: Any = no_update
+    if not have:  # further forms of the curve are of the same scene
+        data = curve.scene.to_dict()
+        table, data["sweep"] = data["sweep"], {}
+    return figure, figures, data, table, text, "message", "", reply
 
 
-def _drawn(curve: Curve, version: int) -> tuple[Any, ...]:
+def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
+    """Return figure, key figures and a line on what there is of a curve so far."""
     sweep = curve.sweep()
     count, complete = len(sweep.status), len(sweep.status) == curve.size
-    data = curve.scene.to_dict()
-    table = data.pop("sweep")
     figures = html.Div(
         [
             html.Dl([part for figure in key_figures(sweep) for part in _term(figure)]),
@@ -203,7 +208,7 @@ def _drawn(curve: Curve, version: int) -> tuple[Any, ...]:
     )
     text = f"{count} frequencies" if complete else f"{count} of {curve.size} frequencies so far"
     figure = response_figure(sweep, curve.linear, {"version": version, "points": count, "complete": complete})
-    return figure, figures, data | {"sweep": {}}, table, text, "message", ""
+    return figure, figures, text
 
 
 def _term(figure: Figure) -> list[Any]:
