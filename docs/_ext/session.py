@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -25,6 +26,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 ROOT = Path(__file__).parents[2]
+_PROGRESS = re.compile(r"vanedamp: \w+: \d+ of \d+")
 
 
 class Session:
@@ -50,7 +52,9 @@ class Session:
         )  # fmt: skip
         if done.returncode:
             raise RuntimeError(f"{text}\n{done.stdout}")
-        return done.stdout.rstrip()
+        # a terminal would show a bar in one place
+        lines = [line for line in done.stdout.splitlines() if not _PROGRESS.match(line)]
+        return "\n".join(lines).rstrip()
 
     def python(self, text: str, dpi: int = 110) -> tuple[str, list[bytes]]:
         """Run a part of the session. Returns what it prints, and the PNG of each figure that it leaves open."""
