@@ -3,8 +3,7 @@
 import sys
 from pathlib import Path
 
-DOCS = Path(__file__).parent
-sys.path[:0] = [str(DOCS.parent), str(DOCS / "_ext")]
+sys.path.insert(0, str(Path(__file__).parent.parent))
 
 project = "vanedamp"
 author = "the authors of vanedamp"
@@ -19,11 +18,16 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
-    "session",
+    # ours, in _ext
+    "docs._ext.commands",
+    "docs._ext.pages",
+    "docs._ext.session",
+    "docs._ext.toml_keys",
 ]
 exclude_patterns = ["_build", "_ext", "examples", "gallery"]
 nitpicky = True
 highlight_language = "none"
+smartquotes = False
 
 # Markdown: the pages are read in the repository as well
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "fieldlist"]

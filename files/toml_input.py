@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.reference import constants, options
 
 T = TypeVar("T")
 
@@ -91,7 +92,7 @@ def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
     adapter: TypeAdapter[T] = _adapter(record)  # type: ignore[arg-type]
     with contextlib.suppress(ValidationError):
         return adapter.validate_python(dict(data))
-    data = _plain(data)
+    data = plain(data)
     try:
         return adapter.validate_python(data)
     except ValidationError as error:
@@ -100,12 +101,12 @@ def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
         raise InputError(f"{source}: {_explain(adapter, found[0], data)}") from None
 
 
-def _plain(data: Any) -> Any:
+def plain(data: Any) -> Any:
     """Return data with Python's own numbers and lists in place of numpy's."""
     if isinstance(data, Mapping):
-        return {key: _plain(value) for key, value in data.items()}
+        return {key: plain(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
-        return [_plain(value) for value in data]
+        return [plain(value) for value in data]
     return data.tolist() if isinstance(data, np.ndarray | np.generic) else data
 
 
@@ -147,18 +148,13 @@ def _unknown(schema: dict[str, Any], location: tuple[Any, ...], name: str) -> st
     """Explain a key that a table does not have: the variants that have it, or the keys that this one may have."""
     variants = _nodes(schema, location[:-1])
     # of several variants of a table the one at hand is a step of the location, by the value that distinguishes them
-    own = [node for node in variants if location[-2:-1] and location[-2] in _constants(node).values()] or variants
-    owners = [pair for node in variants if name in node.get("properties", {}) for pair in _constants(node).items()]
+    own = [node for node in variants if location[-2:-1] and location[-2] in constants(node).values()] or variants
+    owners = [pair for node in variants if name in node.get("properties", {}) for pair in constants(node).items()]
     if owners:
-        (tag, mine), *_ = _constants(own[0]).items()
+        (tag, mine), *_ = constants(own[0]).items()
         others = " or ".join(f'{tag} = "{value}"' for tag, value in owners)
         return f'belongs to {others}, not to {tag} = "{mine}"'
     return f"unknown key; {nearest(name, sorted({key for node in own for key in node.get('properties', {})}))}"
-
-
-def _constants(node: dict[str, Any]) -> dict[str, str]:
-    """Return the keys of a table that hold one value only, which distinguish variants of it."""
-    return {name: item["const"] for name, item in node.get("properties", {}).items() if "const" in item}
 
 
 def _path_in_data(location: tuple[Any, ...], data: Any, names_absent_key: bool) -> list[Any]:
@@ -188,21 +184,15 @@ def _tags(schema: dict[str, Any], location: tuple[Any, ...], tag: str) -> list[s
 def _nodes(schema: dict[str, Any], location: tuple[Any, ...]) -> list[dict[str, Any]]:
     """Return the JSON-schema objects that can stand at a location, unions spread out."""
 
-    def spread(node: dict[str, Any]) -> list[dict[str, Any]]:
-        if "$ref" in node:
-            return spread(schema["$defs"][node["$ref"].rsplit("/", 1)[1]])
-        options = node.get("anyOf", []) + node.get("oneOf", [])
-        return [deep for option in options for deep in spread(option)] if options else [node]
-
-    nodes = spread(schema)
+    nodes = options(schema, schema)
     for step in location:
         inner: list[dict[str, Any]] = []
         for node in nodes:
             if isinstance(step, int) and "items" in node:
-                inner += spread(node["items"])
+                inner += options(schema, node["items"])
             elif step in node.get("properties", {}):
-                inner += spread(node["properties"][step])
+                inner += options(schema, node["properties"][step])
             elif isinstance(node.get("additionalProperties"), dict):
-                inner += spread(node["additionalProperties"])
+                inner += options(schema, node["additionalProperties"])
         nodes = inner or nodes  # a union tag among the steps names no key
     return nodes

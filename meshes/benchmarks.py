@@ -18,26 +18,28 @@ _FACES = ("root", "tip", "left", "right", "bottom", "top")
 
 @dataclass(frozen=True)
 class Block:
-    """A block from x = 0 to `length`, symmetric about y = 0, from z = 0 to `thickness`; metres.
+    """A block from x = 0 to `length`, symmetric about y = 0, from z = 0 to `thickness`.
 
     Facet groups: `root` (x = 0), `tip` (x = length), `left` and `right` (the faces of negative and positive y),
     `bottom` (z = 0) and `top`. Volume group: `block`.
-
-    tip_width     width at x = length; left out: constant width
-    divisions     elements along x, y and z of a structured mesh
-    hexahedra     of a structured mesh; else its cells are split into tetrahedra
-    element_size  left out: structured; given: unstructured tetrahedra of about this size, `divisions` is not used
-    order         of the elements' geometry
     """
 
     length: float
+    """length along x, from the root (x = 0) to the tip [m]"""
     width: float
+    """width along y, at the root [m]"""
     thickness: float
+    """thickness along z [m]"""
     tip_width: float | None = None
+    """width at the tip (default: that of the root) [m]"""
     divisions: tuple[int, int, int] = (8, 1, 1)
+    """elements along x, y and z of a structured mesh"""
     hexahedra: bool = False
+    """hexahedra in a structured mesh, in place of tetrahedra"""
     element_size: float | None = None
+    """size of the tetrahedra of an unstructured mesh (default: structured) [m]"""
     order: int = 1
+    """order of the elements' geometry: 1 straight, 2 curved"""
 
     def __post_init__(self) -> None:
         for name in ("length", "width", "thickness", "tip_width", "element_size"):

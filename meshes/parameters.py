@@ -56,27 +56,49 @@ class VaneCluster:
     """
 
     airfoils: int = 4
+    """number of airfoils"""
     pitch_deg: float = 4.0
+    """angle between two airfoils [degree]"""
     inner_radius: float = 0.230
+    """inner radius of the inner shroud [m]"""
     inner_thickness: float = 0.010
+    """radial thickness of the inner shroud [m]"""
     span: float = 0.025
+    """radial length of the airfoils between the shrouds [m]"""
     outer_thickness: float = 0.008
+    """radial thickness of the outer shroud [m]"""
     axial_length: float = 0.024
+    """axial length of the shrouds [m]"""
     chord: float = 0.022
+    """chord of the airfoils [m]"""
     thickness: float = 0.00371
+    """largest thickness of the airfoils [m]"""
     edge_thickness: float = 0.0008
+    """thickness of the airfoils at the trailing edge [m]"""
     camber_deg: float = 20.0
+    """angle between the ends of the airfoils' camber line, a circular arc [degree]"""
     stagger_deg: float = 12.0
+    """angle of the chord to the axis [degree]"""
     cavities: int = 1
+    """number of cavities, spread evenly; 0: none"""
     cavity_width: float = 0.014
+    """tangential width of a cavity [m]"""
     cavity_height: float = 0.005
+    """radial height of a cavity [m]"""
     cavity_depth: float = 0.012
+    """axial depth of a cavity, from the end face at positive x [m]"""
     cavity_wall: float = 0.001
+    """least thickness of the wall around a cavity [m]"""
     damper_width: float = 0.0
+    """tangential width of a body tied into every cavity; 0: none [m]"""
     damper_height: float = 0.0
+    """radial height of the tied body [m]"""
     damper_depth: float = 0.0
+    """axial depth of the tied body [m]"""
     element_size: float = 0.0026
+    """size of the elements [m]"""
     order: int = 1
+    """order of the elements' geometry: 1 straight, 2 curved"""
 
     def __post_init__(self) -> None:
         for item in fields(self):

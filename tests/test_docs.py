@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 import tomli_w
 
+from docs._ext.pages import language
 from tests.tools.input_files import CLUSTER, SCENE, changed
 from tests.tools.processes import RANKS, ROOT, environment
+from tests.tools.schemas import faults, kind_of
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
@@ -26,8 +28,12 @@ from vanedamp.studies.demo import EFFORT
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.paper.figure_file import PaperFigure, Structure
 
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-SHELL = ("vanedamp", "mpirun", "cd", "make", ".venv/bin/python", ".venv/bin/pip")
+DOCS = ROOT / "docs"
+FOLDERS = (".", "tutorial", "howto", "reference")
+PAGES = [
+    ROOT / "README.md", ROOT / "CONTRIBUTING.md",
+    *(page for folder in FOLDERS for page in sorted((DOCS / folder).glob("*.md"))),
+]  # fmt: skip
 
 
 class Example(NamedTuple):
@@ -39,12 +45,7 @@ class Example(NamedTuple):
 
     @property
     def language(self) -> str:
-        first = self.text.split()[0]
-        if re.match(r"\[+[\w.]+\]", self.text):
-            return "toml"
-        if first in ("from", "import"):
-            return "python"
-        return "shell" if first in SHELL else "text"
+        return language(self.text)
 
     def __str__(self) -> str:
         return f"{self.page}:{self.line}"
@@ -126,7 +127,9 @@ def test_files_are_read(example, tmp_path):
     for name in files_named(tables):
         (tmp_path / name).write_text("")
     path = tmp_path / "example.toml"
-    path.write_text(tomli_w.dumps(completed(tables, tmp_path)))
+    whole = completed(tables, tmp_path)
+    assert faults(kind_of(whole), whole) == []
+    path.write_text(tomli_w.dumps(whole))
     if "matrices" in tables:
         assert External.read(path).interface.keys() == tables["interface"].keys()
     elif "optimise" in tables:

@@ -36,16 +36,16 @@ WAVEFORMS = True
 
 
 class Options(PenaltyOptions):
-    """The steps are macro-steps.
-
-    exchange: whether the bodies know the structure's new motion; hold: order of extrapolation within a macro-step;
-    substeps: of the bodies in it.
-    """
+    """Options of co-simulation."""
 
     method: Literal["cosim"] = "cosim"
+    """"cosim": structure and bodies exchange motion and forces once a macro-step, which `steps_per_period` counts"""
     exchange: Literal["jacobi", "gauss_seidel"] = "gauss_seidel"
+    """"gauss_seidel": the bodies know the structure's new motion; "jacobi": both start from the last exchange"""
     hold: Annotated[Whole, Field(ge=0, le=1)] = 1
+    """order of the extrapolation within a macro-step"""
     substeps: Annotated[Whole, Field(gt=0, le=10_000)] = 10
+    """steps of the bodies in a macro-step"""
 
     @property
     def smallest_steps(self) -> int:

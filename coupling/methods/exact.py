@@ -24,6 +24,7 @@ class Options(PlanarOptions):
     """No options of its own."""
 
     method: Literal["exact"] = "exact"
+    """"exact": event by event, without time steps"""
 
 
 def begin(system: System, options: SolverOptions, initial: InitialMotion, records: Records, events: bool) -> Run:

@@ -53,10 +53,12 @@ _CLOSED = 4
 
 
 class Options(SteppingOptions, PlanarOptions):
-    """theta: weight of a step's end in the smooth forces; 1/2 is of second order, 1 damps."""
+    """Options of Moreau-Jean's method."""
 
     method: Literal["moreau"] = "moreau"
+    """"moreau": time stepping by Moreau and Jean, with impulses"""
     theta: Annotated[Real, Field(ge=0.5, le=1)] = 0.5
+    """weight of a step's end in the smooth forces; 0.5 is of second order, 1 damps [-]"""
 
 
 def begin(

@@ -37,11 +37,14 @@ RUBBING_WARNING = (
 
 
 class Options(PenaltyOptions, PlanarOptions):
-    """scheme: of the steps; alpha: numerical damping of "hht"."""
+    """Options of penalty methods."""
 
     method: Literal["penalty"] = "penalty"
+    """"penalty": springs in place of rigid contacts"""
     scheme: Literal["central_difference", "newmark", "hht"] = "central_difference"
+    """"central_difference": explicit; "newmark", "hht" (Hilber, Hughes and Taylor): implicit time steps"""
     alpha: Annotated[Real, Field(ge=-1 / 3, le=0)] = -0.1
+    """numerical damping of scheme = "hht" [-]"""
 
     @model_validator(mode="after")
     def _check_alpha(self) -> Options:

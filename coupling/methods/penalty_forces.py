@@ -18,15 +18,14 @@ from vanedamp.files.toml_input import InputError, NonNegative, Positive, Real
 
 
 class PenaltyOptions(SteppingOptions):
-    """The options of methods with penalties.
-
-    contact_stiffness (N/m) of rigid contacts, or contact_steps, the duration of such a contact in steps; slip_velocity
-    below which friction is viscous, m/s. Their defaults are those of `with_penalty`.
-    """
+    """The options of methods with penalties. Their defaults are those of `with_penalty`."""
 
     contact_steps: Annotated[Real, Field(ge=4)] | None = None
+    """duration of a rigid contact in time steps; or give `contact_stiffness` [-]"""
     contact_stiffness: Positive | None = None
+    """stiffness of rigid contacts [N/m]"""
     slip_velocity: NonNegative | None = None
+    """slip speed below which friction is viscous [m/s]"""
 
     @model_validator(mode="after")
     def _check_contact(self) -> PenaltyOptions:

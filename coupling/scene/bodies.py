@@ -19,26 +19,33 @@ def _addressable(name: str) -> str:
 
 @dataclass(frozen=True, config=STRICT)
 class Cavity:
-    """A cavity with total free travel `gap` (m) along it and, for bodies with extent, `play` (m) across it.
+    """A cavity of the structure, in which bodies slide from its left wall (negative) to its right one (positive).
 
-    On a reduced model left, right, floor and ceiling name interface labels. normal_motion, rotation: motion across and
-    rotation (rad/m) per unit of the floor's motion along the cavity, where the structure has no coordinates for them.
-    radius: m, from the axis of rotation to the body's centre at mid-travel, with centrifugal_deg (0: the centrifugal
-    load presses the bodies on the floor, 90: it pulls them along the cavity to its left wall) for a structure without a
-    geometry; the cavity lies in the plane of rotation.
+    On a reduced model left, right, floor and ceiling name interface labels; one label may serve all of them.
     """
 
     name: Annotated[str, AfterValidator(_addressable)]
+    """name, by which bodies and dotted paths refer to it"""
     gap: Positive
+    """total free travel of one body along the cavity, from the left wall to the right one [m]"""
     left: str | None = None
+    """interface label of the left wall, at the negative end"""
     right: str | None = None
+    """interface label of the right wall, at the positive end"""
     floor: str | None = None
+    """interface label of the floor, on which the bodies slide"""
     ceiling: str | None = None
+    """interface label of the ceiling, for bodies with extent (default: the floor's)"""
     play: Positive | None = None
+    """free travel of a body with extent across the cavity, from the floor to the ceiling [m]"""
     normal_motion: Real = 0.0
+    """motion across the cavity per motion of the floor along it, where the structure has no coordinate for it [-]"""
     rotation: Real = 0.0
+    """rotation per motion of the floor along the cavity, where the structure has no coordinate for it [rad/m]"""
     radius: Positive | None = None
+    """from the axis of rotation to a body's centre at mid-travel; the cavity lies in the plane of rotation [m]"""
     centrifugal_deg: Real = 0.0
+    """angle of the centrifugal load: 0 presses the bodies on the floor, 90 pulls them to the left wall [degree]"""
 
     def labels(self) -> tuple[str | None, str | None, str | None]:
         """Return the labels of left wall, right wall and floor; a single one serves all three."""
@@ -48,35 +55,49 @@ class Cavity:
 
 @dataclass(frozen=True, config=STRICT)
 class Damper:
-    """A loose body: mass (kg), Coulomb friction and restitution coefficients, state relative to the cavity.
-
-    shape: "slider", one coordinate along the cavity; "block" (length, height, m) and "disc" (radius, m) move in the
-    plane of the cavity; "auto": a block, run as a slider where that changes the mean amplitude by at most `tolerance`
-    (relative, 0.05 unless given). inertia: kg m^2 about the centre, that of the homogeneous body unless given. lift:
-    height of its lowest point above the floor, m; tilt: rad. stiffness, dashpot: of a spring between body and floor,
-    along it. track_radius: m, of the path of its centre on a concave floor, whose middle is that of the free travel.
-    """
+    """A loose body in a cavity; bodies of one cavity stand in the file from left to right and hit each other."""
 
     cavity: str
+    """name of the cavity that the body is in"""
     mass: Positive
+    """mass of the body [kg]"""
     friction: NonNegative = 0.0
+    """Coulomb coefficient of friction on the floor [-]"""
     restitution: Fraction = 1.0
+    """coefficient of restitution at a wall; of two bodies the geometric mean of theirs [-]"""
     position: Real = 0.0
+    """position at time zero relative to the cavity, from mid-travel, positive to the right [m]"""
     velocity: Real = 0.0
+    """velocity at time zero relative to the cavity, positive to the right [m/s]"""
     normal_load: NonNegative | None = None
+    """load on the floor in place of the share of gravity and rotation, such as a centrifugal load [N]"""
     shape: Literal["slider", "block", "disc", "auto"] = "slider"
+    """"slider" moves along the cavity only, "block" and "disc" in its plane; "auto" is a block, run as a slider where
+    that changes the mean amplitude by `tolerance` at most"""
     length: Positive | None = None
+    """extent of a block along the cavity [m]"""
     height: Positive | None = None
+    """extent of a block across the cavity [m]"""
     radius: Positive | None = None
+    """radius of a disc [m]"""
     inertia: Positive | None = None
+    """moment of inertia about the centre (default: that of the homogeneous body) [kg m^2]"""
     lift: NonNegative = 0.0
+    """height of the lowest point above the floor at time zero [m]"""
     tilt: Real = 0.0
+    """rotation at time zero relative to the cavity, positive against the clock [rad]"""
     lift_velocity: Real = 0.0
+    """velocity across the cavity at time zero relative to it, positive away from the floor [m/s]"""
     tilt_rate: Real = 0.0
+    """angular velocity at time zero relative to the cavity, positive against the clock [rad/s]"""
     stiffness: Positive | None = None
+    """stiffness of a spring between body and floor, along the cavity, without force at mid-travel [N/m]"""
     dashpot: NonNegative | None = None
+    """viscous damping between body and floor, along the cavity [N s/m]"""
     track_radius: Positive | None = None
+    """radius of the path of the centre on a concave floor, whose lowest point is at mid-travel [m]"""
     tolerance: Annotated[Real, Field(gt=0, lt=1)] | None = None
+    """of shape "auto": relative change of the mean amplitude that is allowed (default: 0.05) [-]"""
 
     def __post_init__(self) -> None:
         block = ("length", "height")
@@ -126,30 +147,32 @@ class Damper:
 
 @dataclass(frozen=True, config=STRICT)
 class FrictionDamper:
-    """A Coulomb element between the structure and the casing: the spring-loaded damper that is the usual remedy.
-
-    With a tangential `stiffness` (N/m) a Jenkins element: spring and slider in series, unloaded at time zero.
-    It acts at interface label `at` of a reduced model (default: excitation.at).
-    """
+    """A Coulomb element between the structure and the casing: the spring-loaded damper that is the usual remedy."""
 
     normal_force: Positive
+    """normal force in the contact [N]"""
     friction: NonNegative
+    """Coulomb coefficient of friction [-]"""
     stiffness: Positive | None = None
+    """tangential stiffness in series with the contact, unloaded at time zero (default: rigid Coulomb) [N/m]"""
     at: str | None = None
+    """interface label of a reduced model where it acts (default: excitation.at)"""
 
 
 @dataclass(frozen=True, config=STRICT)
 class Stop:
-    """Contact of the structure with the ground or with itself: a stop on one `side` of it, `gap` (m) away at rest.
-
-    On a reduced model `at` and `to` name interface labels: the stop is at `to`, which moves, or at the ground.
-    """
+    """Contact of the structure with the ground, or with itself."""
 
     side: Literal["left", "right"]
+    """side of the structure: a stop on the right limits positive displacement"""
     gap: NonNegative
+    """distance at rest [m]"""
     restitution: Fraction = 1.0
+    """coefficient of restitution [-]"""
     at: str | None = None
+    """interface label of a reduced model that touches the stop (default: excitation.at)"""
     to: str | None = None
+    """interface label of a reduced model that the stop is at and moves with (default: the ground)"""
 
     def __post_init__(self) -> None:
         if self.to is not None and self.to == self.at:

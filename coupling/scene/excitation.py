@@ -19,14 +19,14 @@ from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, 
 
 @dataclass(frozen=True, config=STRICT)
 class Harmonic:
-    """One sine of an excitation: amplitude sin(order 2 pi f t + phase), the phase in degrees.
-
-    amplitude: in units of the force, base acceleration, or displacement of a prescribed motion.
-    """
+    """One sine of an excitation: amplitude sin(order 2 pi f t + phase), times the level."""
 
     order: Annotated[Whole, Field(gt=0)]
+    """multiple of the frequency"""
     amplitude: NonNegative
+    """amplitude relative to the level [-]"""
     phase: Real = 0.0
+    """phase of the sine [degree]"""
 
     @property
     def share(self) -> complex:
@@ -36,37 +36,40 @@ class Harmonic:
 
 @dataclass(frozen=True, config=STRICT)
 class Excitation:
-    """Periodic excitation at `frequency` (Hz): one of force (N), base_acceleration (m/s^2), resonance_amplitude (m).
+    """Periodic excitation by one of `force`, `base_acceleration`, `resonance_amplitude`, `load` and `pattern`.
 
-    engine_order: in place of the frequency, periods a revolution, so that the frequency follows the speed
-    (Scene.frequency).
-    resonance_amplitude is the displacement to which the force brings a resonance of the structure without bodies: of a
-    model with several, the one that responds most within `resonance_near`, a frequency or [lowest, highest] (Hz);
-    default: the excitation's frequency, or the range over which it is swept. With an engine order and a range it is the
-    one that the order's line meets, at the speed where it does.
-    `at` is the interface label of force and response on a reduced model; the base moves in its direction, or in
-    `base_direction`, in the model's axes.
-    load: forces at several interface labels in place of the one at `at`; pattern: a CSV file of them, with the columns
-    at, order, force, phase_deg. load_factor: times all of them (1); relative with resonance_amplitude, which finds it.
-    harmonic: sines whose sum excites, at multiples of the frequency; that of order 1 has amplitude 1 and phase 0 unless
-    it is among them. resonance_amplitude speaks of a sine of order 1 and amplitude 1.
-    waveform: another signal over the period in place of the sines (scene.waveform); one with a duration of its own
-    needs no frequency.
+    With a plain sine the load is the level times sin(2 pi f t). resonance_amplitude speaks of a sine of order 1 and
+    amplitude 1; with an engine order and a range of `resonance_near` its resonance is the one that the order's line
+    meets, at the speed where it does. Forces of `load` and `pattern` are relative beside it.
     """
 
     frequency: Positive | None = None
+    """frequency, the inverse of the period; or give `engine_order` [Hz]"""
     engine_order: Positive | None = None
+    """periods a revolution, in place of the frequency, which then follows the speed of [rotation] [-]"""
     force: NonNegative | None = None
+    """amplitude of the force at `at`, positive towards the right walls; the level of harmonics and waveform [N]"""
     base_acceleration: NonNegative | None = None
+    """amplitude of the acceleration of the base, in place of a force; all motion is relative to the base [m/s^2]"""
     resonance_amplitude: Positive | None = None
+    """amplitude to which the force, found from it, brings a resonance without bodies [m]"""
     resonance_near: Positive | tuple[Positive, Positive] | None = None
+    """frequency near that resonance, or [lowest, highest]; of several the one that responds most (default: the
+    frequency, or its range in a sweep) [Hz]"""
     at: str | None = None
+    """interface label of a reduced model where the force acts and the response is taken"""
     harmonic: tuple[Harmonic, ...] = ()
+    """sines whose sum excites; that of order 1 has amplitude 1 and phase 0 unless it is among them"""
     waveform: AnyWaveform | None = None
+    """another signal over the period in place of the sines"""
     base_direction: Direction | None = None
+    """direction of the base's motion in a reduced model's axes, of any length (default: that of `at`) [-]"""
     load: tuple[Load, ...] = ()
+    """forces at several interface labels, in place of the one at `at`"""
     pattern: str | None = None
+    """CSV file of such forces, with the columns at, order, force, phase_deg"""
     load_factor: NonNegative | None = None
+    """factor of all forces of `load` or `pattern` (default: 1) [-]"""
 
     def __post_init__(self) -> None:
         self._check_period()
@@ -159,15 +162,15 @@ def pulled(field: np.ndarray, cavity: np.ndarray, normal: np.ndarray | None) -> 
 
 @dataclass(frozen=True, config=STRICT)
 class Gravity:
-    """Gravity, by its angle to all cavities, or by its `direction` in space (of any length), which a reduced model's
-    cavities have too.
-
-    orientation_deg: 0 presses the bodies on the floor, 90 pulls them along the cavity to its left wall.
-    """
+    """Gravity, by its angle to all cavities, or by its direction in space."""
 
     acceleration: NonNegative = 9.81
+    """acceleration of gravity [m/s^2]"""
     orientation_deg: Real = 0.0
+    """angle to all cavities: 0 presses the bodies on the floor, 90 pulls them along the cavity to its left wall
+    [degree]"""
     direction: Direction | None = None
+    """direction in a reduced model's axes, of any length, in place of the angle [-]"""
 
     def __post_init__(self) -> None:
         if self.direction is not None and self.orientation_deg != 0.0:

@@ -19,15 +19,16 @@ _COLUMNS = ("at", "order", "force", "phase_deg")
 
 @dataclass(frozen=True, config=STRICT)
 class Load:
-    """One sine of force at an interface label of a reduced model: force sin(order 2 pi f t + phase).
-
-    force: N; phase: degrees.
-    """
+    """One sine of force at an interface label of a reduced model: force sin(order 2 pi f t + phase)."""
 
     at: str
+    """interface label of the reduced model"""
     force: NonNegative
+    """amplitude of the force [N]"""
     phase: Real = 0.0
+    """phase of the sine [degree]"""
     order: Annotated[Whole, Field(gt=0)] = 1
+    """multiple of the frequency"""
 
     @property
     def amplitude(self) -> complex:

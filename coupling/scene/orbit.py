@@ -12,25 +12,28 @@ from vanedamp.files.toml_input import STRICT, Real, Whole
 
 @dataclass(frozen=True, config=STRICT)
 class Orbit:
-    """A periodic motion, and the branch through it.
-
-    periods: of the excitation that the motion takes to repeat; start: "run", the end of a run of the scene, or
-    "linear", the motion without contact; parameter: dotted path of a number in the scene that changes along the
-    branch, from `from` (the scene's own value if left out) to `to` (no branch if left out); step, min_step, max_step:
-    of the arclength, as shares of that range; max_points: of a branch; switch: whether branches that begin at period
-    doublings and pitchforks are followed as well.
-    """
+    """A periodic motion, and the branch through it."""
 
     periods: Annotated[Whole, Field(ge=1, le=64)] = 1
+    """periods of the excitation that the motion takes to repeat"""
     start: Literal["run", "linear"] = "run"
+    """what the orbit is sought from: "run", the end of a run of the scene; "linear", the motion without contact"""
     parameter: str = "excitation.frequency"
+    """dotted path of the number that changes along the branch"""
     from_: Annotated[Real | None, Field(alias="from")] = None
+    """value of the parameter where the branch begins (default: the scene's own) [unit of the parameter]"""
     to: Real | None = None
+    """value of the parameter where the branch ends (default: one orbit, no branch) [unit of the parameter]"""
     step: Annotated[Real, Field(gt=0, le=1)] = 0.01
+    """first step of the arclength, as a share of the range of the parameter [-]"""
     min_step: Annotated[Real, Field(gt=0, le=1)] = 1e-6
+    """smallest step, as a share of the range [-]"""
     max_step: Annotated[Real, Field(gt=0, le=1)] = 0.05
+    """largest step, as a share of the range [-]"""
     max_points: Annotated[Whole, Field(ge=1, le=100_000)] = 500
+    """most points of a branch"""
     switch: bool = False
+    """follow the branches that begin at period doublings and pitchforks as well"""
 
     def __post_init__(self) -> None:
         if not self.min_step <= self.step <= self.max_step:

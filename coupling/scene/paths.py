@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, InputError, Real, Whole, nearest
@@ -20,13 +20,16 @@ _UNITS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=STRICT | ConfigDict(json_schema_extra={"x-inline": True}))
 class Range:
-    """`num` values from start to stop, both included."""
+    """Equidistant values, both ends included."""
 
     start: Real
+    """first value [unit of the key]"""
     stop: Real
+    """last value [unit of the key]"""
     num: Annotated[Whole, Field(gt=0)]
+    """number of values"""
 
 
 def axis_values(values: Range | Sequence[Any]) -> list[Any]:

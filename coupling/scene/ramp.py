@@ -18,24 +18,30 @@ def _listed(rate: Any) -> Any:
     return [rate] if isinstance(rate, int | float) else rate
 
 
+_Several = Annotated[tuple[Positive, ...], Field(min_length=1)]
+Rates = Annotated[_Several, BeforeValidator(_listed, json_schema_input_type=Positive | _Several)]
+
+
 @dataclass(frozen=True, config=STRICT)
 class Ramp:
-    """A change of the excitation frequency or the speed of rotation that is linear in time.
-
-    quantity: "frequency" (Hz), "speed" (rad/s) or "rpm", whose frequency follows by excitation.engine_order or
-    stays; from, to: where it begins and ends, in that unit; rate: its change in a second, one or several, each a run of
-    its own, or periods: of the excitation that it takes; both: whether it runs from `to` to `from` as well; start:
-    "rest", with the state that the scene begins with, or "steady", with the end of a run of the scene at constant
-    frequency and speed, those at the beginning.
-    """
+    """A change of the excitation frequency or the speed of rotation that is linear in time."""
 
     from_: Annotated[NonNegative, Field(alias="from")]
+    """value where the run begins [unit of the quantity]"""
     to: NonNegative
+    """value where it ends [unit of the quantity]"""
     quantity: Literal["frequency", "speed", "rpm"] = "frequency"
-    rate: Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(_listed)] | None = None
+    """what changes: "frequency" (Hz), or "speed" (rad/s) or "rpm", whose frequency follows by excitation.engine_order
+    or stays"""
+    rate: Rates | None = None
+    """change in a second, above zero; of several each is a run of its own; or give `periods` [unit of the
+    quantity/s]"""
     periods: Annotated[Whole, Field(gt=0)] | None = None
+    """excitation periods from one end to the other"""
     both: bool = False
+    """run from `to` to `from` as well"""
     start: Literal["rest", "steady"] = "rest"
+    """"rest": with the state that the scene begins with; "steady": after a run of the scene at the first value"""
 
     def __post_init__(self) -> None:
         if (self.rate is None) == (self.periods is None):

@@ -12,26 +12,28 @@ from vanedamp.files.toml_input import STRICT, Positive, Real, Whole
 
 @dataclass(frozen=True, config=STRICT)
 class RingDownTable:
-    """How the free motion begins, and how long it lasts.
-
-    start: "steady", the end of a run of the scene, whose excitation then ceases at the start of a period; "impulse", a
-    hammer blow of `impulse` (N s) on the structure at rest; "displacement", a static pull by `displacement` (m), or the
-    scene's [initial] state, released. Blow and pull act at the interface label `at` of a reduced model, by default
-    excitation.at. duration: s, or periods: of the excitation, which remain the unit of time of the run; mode: number of
-    the natural mode that is followed, from 0, by default, of those that move, the one that the excitation's frequency
-    is nearest to ("steady", one sine) or the one that moves the most; cycles: periods of that mode over which damping
-    is averaged; bins: of amplitude, for means over many cycles (0: none).
-    """
+    """How the free motion begins, and how long it lasts."""
 
     start: Literal["steady", "impulse", "displacement"]
+    """how the motion begins: "steady", a run of the scene whose excitation ceases at the start of a period; "impulse",
+    a hammer blow on the structure at rest; "displacement", a static pull, or the [initial] state, let go"""
     impulse: Real | None = None
+    """impulse of the hammer blow, positive towards the right walls [N s]"""
     displacement: Real | None = None
+    """displacement of the static pull, positive towards the right walls [m]"""
     at: str | None = None
+    """interface label of a reduced model where blow or pull acts (default: excitation.at)"""
     duration: Positive | None = None
+    """duration of the free motion; or give `periods` [s]"""
     periods: Annotated[Whole, Field(gt=0)] | None = None
+    """duration in periods of the excitation, which stay the unit of time"""
     mode: Annotated[Whole, Field(ge=0)] | None = None
+    """natural mode that is followed, from 0 (default: of those that move the nearest to the excitation's frequency, for
+    "steady" and one sine, or the one that moves most)"""
     cycles: Annotated[Whole, Field(ge=1, le=1000)] = 1
+    """periods of that mode over which damping is averaged"""
     bins: Annotated[Whole, Field(ge=0, le=1000)] = 0
+    """classes of amplitude for means over many cycles; 0: none"""
 
     def __post_init__(self) -> None:
         if (self.duration is None) == (self.periods is None):

@@ -41,7 +41,9 @@ class Rotation:
     """
 
     speed: NonNegative | None = None
+    """speed; or give `rpm` [rad/s]"""
     rpm: NonNegative | None = None
+    """revolutions a minute; or give `speed` [rpm]"""
 
     def __post_init__(self) -> None:
         if (self.speed is None) == (self.rpm is None):

@@ -8,10 +8,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-import tomli_w
 from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter
 from pydantic.dataclasses import dataclass
 
@@ -37,22 +36,29 @@ from vanedamp.files.toml_input import (
     read_toml,
     validate,
 )
+from vanedamp.files.toml_output import toml
 
 
 @dataclass(frozen=True, config=STRICT)
 class Time:
-    """Excitation periods simulated, and how many of the first are left out of the evaluation.
+    """Excitation periods simulated, and those evaluated.
 
-    Neither given: 1500 and 1000, or a longer transient where the structure's damping leaves more than `tolerance` of
-    the steady response (system.transient). transient = 0 evaluates the motion from the start, whatever it is.
-    steady = "auto" instead drops the transient by a statistical rule and ends the run, within `periods`, once the 95 %
-    confidence interval of the mean amplitude is narrower than `tolerance` of it on either side.
+    With neither `periods` nor `transient` the transient is 1000 of 1500 periods, or longer where the structure's
+    damping leaves more than `tolerance` of the steady response (system.transient). steady = "auto" drops it by a
+    statistical rule and ends the run once the 95 % confidence interval of the mean amplitude is narrower than
+    `tolerance` of it on either side.
     """
 
     periods: Annotated[Whole, Field(gt=0)] | None = None
+    """excitation periods simulated (default: 1500, or more where the structure's damping asks for a longer
+    transient)"""
     transient: Annotated[Whole, Field(ge=0)] | None = None
+    """periods of these that are left out of the evaluation (default: two thirds); 0 evaluates from the start"""
     steady: Literal["auto"] | None = None
+    """"auto" leaves out the transient by a statistical rule, and ends the run, within `periods`, once the mean
+    amplitude is known"""
     tolerance: Annotated[Real, Field(gt=0, lt=1)] = 0.01
+    """what is left of the transient, or half the 95 % confidence interval of the mean amplitude, relative to it [-]"""
 
     def __post_init__(self) -> None:
         if self.steady is not None and self.transient is not None:
@@ -99,14 +105,13 @@ Axis = Annotated[
 
 @dataclass(frozen=True, config=STRICT)
 class Continuation:
-    """How the runs of a sweep begin: each from its own initial state ("independent"), or from its neighbour's last one.
-
-    The neighbour is the next lower ("up") or higher ("down") value of the axis `along`, by default the excitation
-    frequency or the only axis. The phase of the excitation goes on.
-    """
+    """How the runs of a sweep begin. Between linked runs the phase of the excitation goes on."""
 
     direction: Literal["independent", "up", "down"] = "independent"
+    """where a run begins: "independent", at the scene's own initial state; "up", "down", at the last state of the run
+    at the next lower or next higher value of `along`"""
     along: str | None = None
+    """dotted path of an axis (default: the excitation frequency, or else the speed of rotation, or the only axis)"""
 
 
 @dataclass(frozen=True, config=STRICT, repr=False)
@@ -114,22 +119,39 @@ class Scene(Displayed):
     """Everything one run needs. Change a scene by making another: `scene.replace({"cavity.c1.gap": 1e-5})`."""
 
     structure: Structure
+    """what vibrates"""
     excitation: Excitation
+    """what moves it"""
     cavity: tuple[Cavity, ...] = ()
+    """cavities of the structure"""
     damper: tuple[Damper, ...] = ()
+    """loose bodies in the cavities"""
     friction_damper: tuple[FrictionDamper, ...] = ()
+    """friction dampers between structure and casing"""
     stop: tuple[Stop, ...] = ()
+    """stops that the structure hits"""
     initial: Initial = field(default_factory=Initial)
+    """state of a rigid structure at time zero (default: at rest)"""
     gravity: Gravity = field(default_factory=Gravity)
+    """gravity, which presses and pulls the bodies"""
     rotation: Rotation | None = None
+    """speed of the frame that everything turns with (default: standstill)"""
     contact: Contact = field(default_factory=Newton)
+    """law of impacts and contacts at walls, stops and between bodies"""
     time: Time = field(default_factory=Time)
+    """how long a run is, and what of it is evaluated"""
     solver: Solver = field(default_factory=partial(options_of, {}))
+    """method of time integration, and its options"""
     continuation: Continuation = field(default_factory=Continuation)
+    """how the runs of a sweep begin"""
     sweep: dict[str, Axis] = field(default_factory=dict)
+    """axes of a sweep, by dotted paths such as "cavity.c1.gap": a list or a range {start, stop, num} of values"""
     orbit: Orbit | None = None
+    """periodic motion that `vanedamp orbits` finds and follows"""
     ramp: Ramp | None = None
+    """run-up or run-down of `vanedamp ramp`"""
     ring_down: RingDownTable | None = None
+    """free motion of `vanedamp ringdown`"""
 
     def __post_init__(self) -> None:
         names = [cavity.name for cavity in self.cavity]
@@ -337,12 +359,12 @@ class Scene(Displayed):
                 raise ValueError("initial: a prescribed motion has no initial state; remove the table")
 
     @classmethod
-    def load(cls, path: str | Path) -> Scene:
+    def load(cls, path: str | Path) -> Self:
         """Read the scene in a TOML file; the files that it names are taken relative to it. Raises InputError."""
         return cls.of(read_toml(path), path)
 
     @classmethod
-    def of(cls, data: dict[str, Any], path: str | Path) -> Scene:
+    def of(cls, data: dict[str, Any], path: str | Path) -> Self:
         """Return the scene in the tables of a TOML file that lies at `path`."""
         for table, key in _named_files(data):
             table[key] = str(Path(path).parent / table[key])
@@ -355,7 +377,7 @@ class Scene(Displayed):
             file = Path(table[key]).resolve()
             table[key] = str(file.relative_to(folder) if file.is_relative_to(folder) else file)
         with replacing(path) as temporary:
-            temporary.write_text(tomli_w.dumps(data), encoding="utf-8")
+            temporary.write_text(toml(data), encoding="utf-8")
 
     @property
     def files(self) -> list[str]:

@@ -8,10 +8,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, ValidationError, WrapValidator
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    PlainSerializer,
+    ValidationError,
+    WrapValidator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
 from vanedamp.files.extensions import Registry
+from vanedamp.files.reference import require
 from vanedamp.files.toml_input import InputError, Positive, Whole, nearest
 
 _METHODS = "vanedamp.coupling.methods"
@@ -35,15 +45,16 @@ PERIOD_SECONDS, STEP_SECONDS = 20e-6, 0.1e-6
 class SolverOptions(BaseModel):
     """The options of every method; those of one derive from it, with a Literal for `method` and defaults for all.
 
-    max_events: the budget of events after which a run ends with status 'event_budget'. Unlike the other tables this is
-    a model, which knows the given options (`model_fields_set`): defaults differ from method to method, so that a scene
-    whose method is replaced keeps the given options, and nothing else.
+    Unlike the other tables this is a model, which knows the given options (`model_fields_set`): defaults differ from
+    method to method, so that a scene whose method is replaced keeps the given options, and nothing else.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
     method: str
+    """method of time integration"""
     max_events: Annotated[Whole, Field(gt=0)] = 20_000_000
+    """most events; beyond, the run ends as event_budget"""
 
     @property
     def seconds_per_period(self) -> float:
@@ -55,13 +66,12 @@ class SolverOptions(BaseModel):
 
 
 class SteppingOptions(SolverOptions):
-    """The options of methods with steps of equal size.
-
-    steps_per_period: of the excitation; penetration: share of the free travel by which a body may overlap a rigid wall.
-    """
+    """The options of methods with steps of equal size."""
 
     steps_per_period: Annotated[Whole, Field(ge=4, le=10_000_000)] = 1000
+    """equal steps in a period of the excitation"""
     penetration: Positive = 0.1
+    """share of the free travel by which a body may overlap a rigid wall [-]"""
 
     @property
     def smallest_steps(self) -> int:
@@ -82,12 +92,10 @@ class SteppingOptions(SolverOptions):
 
 
 class PlanarOptions(SolverOptions):
-    """The options of methods that take bodies with extent.
-
-    linearisation: how much a tilt may shorten a body, as a share of the smallest play; beyond, a run is not ok.
-    """
+    """The options of methods that take bodies with extent."""
 
     linearisation: Positive = 0.01
+    """how much a tilt may shorten a body, as a share of the smallest play; beyond, a run is not ok [-]"""
 
 
 def options_of(table: Mapping[str, Any]) -> SolverOptions:
@@ -131,5 +139,19 @@ def _plain(options: SolverOptions) -> dict[str, Any]:
     return options.model_dump(mode="json", include=options.model_fields_set | set(SolverOptions.model_fields))
 
 
+class _EveryMethod:
+    """JSON Schema of the [solver] table: the options of one method, of "exact" where none is named."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        tables = {name: handler(part.Options.__pydantic_core_schema__) for name, part in METHODS.all().items()}
+        for name, made in tables.items():
+            table = handler.resolve_ref_schema(made)
+            table["title"] = name
+            if name != "exact":
+                require(table, "method")
+        return {"anyOf": list(tables.values())}
+
+
 #: the [solver] table
-Solver = Annotated[SolverOptions, WrapValidator(_by_method), PlainSerializer(_plain)]
+Solver = Annotated[SolverOptions, WrapValidator(_by_method), PlainSerializer(_plain), _EveryMethod]

@@ -13,29 +13,34 @@ from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Real, Whole
 
 @dataclass(frozen=True, config=STRICT)
 class Prescribed:
-    """A shaker table: x = displacement_amplitude sin(2 pi f t), whatever the bodies do."""
+    """A shaker table: it moves by sines, whatever the bodies do."""
 
     model: Literal["prescribed"]
+    """"prescribed": a motion that the bodies do not change"""
     displacement_amplitude: Positive
+    """amplitude X of the sine X sin(2 pi f t) [m]"""
 
 
 @dataclass(frozen=True, config=STRICT)
 class Rigid:
-    """One mode: mass (kg) on a spring (N/m) with viscous damping (ratio, or N s/m).
-
-    centrifugal_stiffness: kg, N/m a squared speed, which the spring gains by rotation (Southwell's coefficient times
-    the mass); below zero where spin softening prevails.
-    base_mass: kg, by which an acceleration of the base loads the mode at its point (default: the mass, of a rigid body
-    on a spring); that of a continuous structure's mode is larger, or below zero (`vanedamp calibrate` gives it).
-    """
+    """One mode: a mass on a spring with viscous damping. Its displacement is positive towards the right walls."""
 
     model: Literal["rigid"]
+    """"rigid": one mode, a mass on a spring"""
     mass: Positive
+    """modal mass at the response point [kg]"""
     stiffness: Positive
+    """modal stiffness at the response point [N/m]"""
     damping_ratio: NonNegative | None = None
+    """share of critical damping; or give `damping` [-]"""
     damping: NonNegative | None = None
+    """coefficient of the viscous damping; or give `damping_ratio` [N s/m]"""
     centrifugal_stiffness: Real = 0.0
+    """stiffness gained by rotation over the squared speed, Southwell's coefficient times the mass; below zero where
+    spin softening prevails [kg]"""
     base_mass: Real | None = None
+    """load on the mode by an acceleration of the base, per acceleration (default: the mass); below zero for some modes
+    (`vanedamp calibrate` gives it) [kg]"""
 
     def __post_init__(self) -> None:
         if (self.damping_ratio is None) == (self.damping is None):
@@ -59,19 +64,20 @@ class Rigid:
 
 @dataclass(frozen=True, config=STRICT)
 class Rom:
-    """A reduced model from a file (`vanedamp reduce`), with the first `modes` of its modes (default: all).
-
-    natural: take the model's own lowest natural modes instead of those of its basis; attached: with residual attachment
-    modes, which keep its flexibility. modes = "auto": as many natural modes as keep the estimated error within
-    `tolerance`, attached where that is smaller.
-    """
+    """A reduced model from a file."""
 
     model: Literal["rom"]
+    """"rom": a reduced model"""
     file: str
+    """file of the reduced model (`vanedamp reduce`, `vanedamp import`), relative to the scene's"""
     modes: Annotated[Whole, Field(ge=0)] | Literal["auto"] | None = None
+    """number of modes, the first ones (default: all); "auto": as many natural modes as the tolerance needs"""
     natural: bool = False
+    """take the model's own lowest natural modes in place of those of its basis"""
     attached: bool = False
+    """add residual attachment modes to natural ones, which keep the model's flexibility"""
     tolerance: Annotated[Real, Field(gt=0, lt=1)] = 0.01
+    """of modes = "auto": estimated error that is allowed, relative [-]"""
 
     def __post_init__(self) -> None:
         if self.attached and not (self.natural and isinstance(self.modes, int)):
@@ -83,7 +89,9 @@ Structure = Annotated[Prescribed | Rigid | Rom, Field(discriminator="model")]
 
 @dataclass(frozen=True, config=STRICT)
 class Initial:
-    """Displacement (m) and velocity (m/s) of a rigid structure at time zero."""
+    """State of a rigid structure at time zero. The bodies' own states are relative to their cavities."""
 
     displacement: Real = 0.0
+    """displacement, positive towards the right walls [m]"""
     velocity: Real = 0.0
+    """velocity, positive towards the right walls [m/s]"""

@@ -15,17 +15,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, config=STRICT)
 class DampingTable:
-    """A frequency response (CSV: Hz, real, imaginary ...; or UFF 58) that gives the damping ratio of the first bending.
-
-    quantity  in a CSV, and columns its form: left out, the header decides; band in Hz, left out: 5 % to either side of
-    the mode; modes in that band
-    """
+    """A measured frequency response, which gives the damping ratio of the first bending."""
 
     frf: str
+    """file with the response, relative to the case's: CSV with Hz and two columns a response, or UFF 58"""
     quantity: Literal["receptance", "mobility", "accelerance"] = "receptance"
+    """what a CSV's columns are, per force: displacement, velocity or acceleration"""
     columns: Literal["real-imaginary", "magnitude-degrees", "magnitude-radians"] | None = None
+    """form of a CSV's columns (default: its header says)"""
     band: tuple[Positive, Positive] | None = None
+    """frequencies between which modes are fitted (default: 5 % to either side of the first bending) [Hz]"""
     modes: Annotated[Whole, Field(ge=1)] = 1
+    """number of modes in the band"""
 
     def __post_init__(self) -> None:
         if self.band is not None and not self.band[0] < self.band[1]:
@@ -34,14 +35,18 @@ class DampingTable:
 
 @dataclass(frozen=True, config=STRICT)
 class TuneTable:
-    """Measured frequencies (Hz), the modes they belong to (shapes in a file, or indices of computed modes from 0) and
-    the parts of the stiffness that may change: material.<group>, support.<facet group>."""
+    """Measured frequencies, and what of the stiffness is tuned to them."""
 
     frequencies: Annotated[list[Positive], Field(min_length=1)]
+    """measured natural frequencies [Hz]"""
     vary: Annotated[list[str], Field(min_length=1)]
+    """parts of the stiffness that may change: material.<volume group>, support.<facet group>"""
     shapes: str | None = None
+    """file with the measured shapes of these modes; or give `modes`"""
     modes: list[Annotated[Whole, Field(ge=0)]] | None = None
+    """computed modes that the frequencies belong to, from 0 (default: the first ones)"""
     starts: Annotated[Whole, Field(ge=1, le=100)] = 1
+    """starts of the least squares; more where modes veer"""
 
     def __post_init__(self) -> None:
         if self.shapes is not None and self.modes is not None:
@@ -52,10 +57,13 @@ class TuneTable:
 
 @dataclass(frozen=True, config=STRICT)
 class CalibrationTable:
-    """The data of `vanedamp calibrate` beside the case itself; `share` of the fatigue strength sets the excitation,
-    looked for in the volume groups `hot_spot` (left out: all)."""
+    """The data of `vanedamp calibrate` beside the case itself."""
 
     share: Annotated[Real, Field(gt=0, le=1)] = 0.7
+    """share of the fatigue strength that the stress reaches at resonance, which sets the excitation [-]"""
     hot_spot: list[str] | None = None
+    """volume groups in which the largest stress is sought (default: all)"""
     damping: DampingTable | None = None
+    """measured response, for the damping ratio"""
     tune: TuneTable | None = None
+    """measured frequencies, for moduli and supports"""

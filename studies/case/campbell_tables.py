@@ -36,15 +36,16 @@ Speeds = Annotated[
 
 @dataclass(frozen=True, config=STRICT)
 class CampbellTable:
-    """Speeds of a Campbell diagram, `speed` (rad/s) or `rpm`: an ascending list or a range, from zero or more.
-
-    engine_orders: excitation frequencies over the frequency of rotation; modes: how many are followed.
-    """
+    """A Campbell diagram."""
 
     speed: Speeds | None = None
+    """speeds, an ascending list or a range {start, stop, num}; or give `rpm` [rad/s]"""
     rpm: Speeds | None = None
+    """speeds in revolutions a minute [rpm]"""
     engine_orders: tuple[Positive, ...] = ()
+    """excitation frequencies over the frequency of rotation [-]"""
     modes: Annotated[Whole, Field(ge=1)] = 6
+    """number of modes that are followed"""
 
     def __post_init__(self) -> None:
         if (self.speed is None) == (self.rpm is None):

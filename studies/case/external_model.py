@@ -22,20 +22,23 @@ Name = Annotated[str, Field(min_length=1)]
 
 @dataclass(frozen=True, config=STRICT)
 class MatricesTable:
-    """Where the matrices are: names in one `file` (npz, OP4), or files of their own (Matrix Market, npy,
-    scipy's save_npz).
-
-    damping is a matrix too; or else damping_ratio is that of every mode. base_load: (n, 3) T^T M r. mass_scale: kg a
-    unit of mass, with seconds: 1e3 for matrices in t, N and mm. It multiplies the stiffness and the damping, too.
-    """
+    """Where the matrices are: names in one file, or files of their own (Matrix Market, npy, scipy's save_npz)."""
 
     mass: Name
+    """mass matrix: its name in `file`, or a file of its own"""
     stiffness: Name
+    """stiffness matrix"""
     file: Name | None = None
+    """file of several matrices by name (npz, OP4)"""
     damping: Name | None = None
+    """damping matrix; or give `damping_ratio`"""
     damping_ratio: Annotated[Real, Field(ge=0, lt=1)] | None = None
+    """modal damping of every mode, as a share of critical damping [-]"""
     base_load: Name | None = None
+    """(n, 3) matrix T^T M r of the loads by an acceleration of the base"""
     mass_scale: Annotated[Real, Field(gt=0)] = 1.0
+    """kilograms a unit of mass, with seconds: 1e3 for matrices in t, N and mm; multiplies stiffness and damping too
+    [kg]"""
 
     def __post_init__(self) -> None:
         if (self.damping is None) == (self.damping_ratio is None):
@@ -44,11 +47,14 @@ class MatricesTable:
 
 @dataclass(frozen=True, config=STRICT)
 class CoordinateTable:
-    """An interface coordinate: the index of a coordinate, from 0, or a row over all of them; and its direction."""
+    """An interface coordinate of the model."""
 
     coordinate: Annotated[Whole, Field(ge=0)] | None = None
+    """index of a coordinate of the matrices, from 0; or give `row`"""
     row: tuple[Real, ...] | None = None
+    """factors of all coordinates, whose sum it is [-]"""
     direction: Direction | None = None
+    """direction of its motion in space, of any length [-]"""
 
     def __post_init__(self) -> None:
         if (self.coordinate is None) == (self.row is None):
@@ -60,8 +66,11 @@ class External:
     """A reduced model of another code."""
 
     matrices: MatricesTable
+    """the matrices"""
     interface: Annotated[dict[str, CoordinateTable], Field(min_length=1)]
+    """interface coordinates, by their labels"""
     name: str = field(default="")
+    """name of the model (default: that of this file)"""
 
     @classmethod
     def load(cls, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:

@@ -12,19 +12,22 @@ from vanedamp.files.toml_input import STRICT, Direction, NonNegative, Positive, 
 
 @dataclass(frozen=True, config=STRICT)
 class RotationTable:
-    """Rotation about the `axis` (a direction) through `point` (m) at `speed` (rad/s) or `rpm`; neither: standstill.
-
-    max_speed or max_rpm: greatest speed that a reduced model is for, by default that speed. gyroscopic: whether modes
-    at the speed have the gyroscopic coupling, which makes them complex.
-    """
+    """Rotation about an axis."""
 
     axis: Direction
+    """direction of the axis of rotation, of any length [-]"""
     point: tuple[Real, Real, Real] = (0.0, 0.0, 0.0)
+    """a point of the axis [m]"""
     speed: NonNegative | None = None
+    """speed; or give `rpm` (default: standstill) [rad/s]"""
     rpm: NonNegative | None = None
+    """speed in revolutions a minute [rpm]"""
     max_speed: Positive | None = None
+    """greatest speed that a reduced model is for (default: the speed) [rad/s]"""
     max_rpm: Positive | None = None
+    """the same in revolutions a minute [rpm]"""
     gyroscopic: bool = False
+    """give modes the gyroscopic coupling, which makes them complex"""
 
     def __post_init__(self) -> None:
         for first, second in (("speed", "rpm"), ("max_speed", "max_rpm")):

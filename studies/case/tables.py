@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, GetJsonSchemaHandler, Tag
 from pydantic.dataclasses import dataclass
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from vanedamp.files.toml_input import (
     STRICT,
@@ -49,14 +51,14 @@ _SAME_MODULUS = 1e-3
 
 @dataclass(frozen=True, config=STRICT)
 class MeshFile:
-    """A mesh, and the polynomial degree of the displacements on it.
-
-    A gmsh file (.msh) or one of another program (.inp, .bdf ...); `scale` metres are its unit of length.
-    """
+    """A mesh from a file."""
 
     file: str
+    """mesh file, relative to the case's: gmsh (.msh), or another program's (.inp, .bdf ...)"""
     degree: Degree = 2
+    """polynomial degree of the displacements"""
     scale: Positive = 1.0
+    """metres a unit of length of the file: 1e-3 for millimetres [m]"""
 
     @property
     def foreign(self) -> bool:
@@ -64,13 +66,28 @@ class MeshFile:
         return not self.file.lower().endswith(".msh")
 
 
+class _Generated:
+    """Base of meshes by a generator, whose parameters are keys of [mesh] beside its own."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        made = handler(schema)
+        table = handler.resolve_ref_schema(made)
+        parameters = handler.resolve_ref_schema(table["properties"].pop("parameters"))
+        table["properties"] |= parameters["properties"]
+        table["required"] = [*parameters.get("required", ()), "generator"]
+        return made
+
+
 @dataclass(frozen=True, config=STRICT)
-class VaneClusterMesh:
+class VaneClusterMesh(_Generated):
     """The parametric vane cluster; in the file its parameters are keys of [mesh]."""
 
     generator: Literal["vane_cluster"]
+    """"vane_cluster": the parametric cluster"""
     parameters: VaneCluster
     degree: Degree = 2
+    """polynomial degree of the displacements"""
 
     def build(self, path: str | Path) -> Path:
         """Write the mesh. Raises what meshes.vane_cluster.build raises."""
@@ -78,12 +95,14 @@ class VaneClusterMesh:
 
 
 @dataclass(frozen=True, config=STRICT)
-class BlockMesh:
+class BlockMesh(_Generated):
     """A block for verification; in the file its parameters are keys of [mesh]."""
 
     generator: Literal["block"]
+    """"block": a rod, beam or plate for verification"""
     parameters: Block
     degree: Degree = 2
+    """polynomial degree of the displacements"""
 
     def build(self, path: str | Path) -> Path:
         """Write the mesh. Raises what meshes.benchmarks.build raises."""
@@ -130,16 +149,23 @@ Mesh = Annotated[
 
 @dataclass(frozen=True, config=STRICT)
 class MaterialTable:
-    """Isotropic material of a volume group: young (Pa), poisson, density (kg/m^3), damping_ratio of every mode,
-    fatigue_strength (Pa), expansion (1/K); young_at: [[temperature, modulus], ...], linear between them."""
+    """Isotropic material of a volume group; "default" is that of groups without a table of their own."""
 
     young: Positive
+    """Young's modulus [Pa]"""
     poisson: Annotated[Real, Field(gt=-1, lt=0.5)]
+    """Poisson's ratio [-]"""
     density: Positive
+    """density [kg/m^3]"""
     damping_ratio: Ratio | None = None
+    """modal damping of every mode, as a share of critical damping; overridden by that of [modes] [-]"""
     fatigue_strength: Positive | None = None
+    """fatigue strength, by which `vanedamp calibrate` sets the excitation [Pa]"""
     expansion: Annotated[Real, Field(gt=-_EXPANSION, lt=_EXPANSION)] = 0.0
+    """coefficient of thermal expansion, for [temperature] [1/K]"""
     young_at: tuple[tuple[Real, Positive], ...] = ()
+    """modulus over the temperature, [[temperature, modulus], ...], linear between them (default: `young` throughout) [K
+    or degree C, Pa]"""
 
     def __post_init__(self) -> None:
         temperatures = [temperature for temperature, _ in self.young_at]
@@ -152,6 +178,11 @@ class MaterialTable:
         from vanedamp.modal.elasticity import Material  # dolfinx is slow to load, and a bad file wants a quick answer
 
         return Material(self.young, self.poisson, self.density, self.expansion, self.young_at)
+
+
+#: facet groups with the components that are held
+_Components = dict[str, Annotated[str, Field(pattern="^[xyz]+$")]]
+_Clamped = _Components | list[str | _Components]
 
 
 def _components(clamped: Any) -> Any:
@@ -167,6 +198,9 @@ def _components(clamped: Any) -> Any:
     return merged
 
 
+_Axes = tuple[NonNegative, NonNegative, NonNegative]
+
+
 def _axes(stiffness: Any) -> Any:
     """Return one number for each of three axes, which a single one stands for."""
     return [stiffness] * 3 if isinstance(stiffness, int | float) else stiffness
@@ -174,11 +208,14 @@ def _axes(stiffness: Any) -> Any:
 
 @dataclass(frozen=True, config=STRICT)
 class ElasticTable:
-    """Springs over a facet group, N/m^3: `stiffness` (a number or [x, y, z]) or `normal` and `tangential`."""
+    """Springs spread over a facet group."""
 
-    stiffness: Annotated[tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(_axes)] = (0.0, 0.0, 0.0)
+    stiffness: Annotated[_Axes, BeforeValidator(_axes, json_schema_input_type=NonNegative | _Axes)] = (0.0, 0.0, 0.0)
+    """stiffness a unit of area, in all directions or [x, y, z] [N/m^3]"""
     normal: NonNegative = 0.0
+    """stiffness a unit of area across the facets [N/m^3]"""
     tangential: NonNegative = 0.0
+    """stiffness a unit of area along the facets [N/m^3]"""
 
     def __post_init__(self) -> None:
         if not any((*self.stiffness, self.normal, self.tangential)):
@@ -194,13 +231,15 @@ class ElasticTable:
 
 @dataclass(frozen=True, config=STRICT)
 class Support:
-    """Groups of facets, edges or points that are held: all components, or those named, as in {group = "y"}.
+    """What holds the structure."""
 
-    Springs are spread over facet groups.
-    """
-
-    clamped: Annotated[dict[str, str], BeforeValidator(_components)] = field(default_factory=dict)
+    clamped: Annotated[_Components, BeforeValidator(_components, json_schema_input_type=_Clamped)] = field(
+        default_factory=dict
+    )
+    """groups of facets, edges or points that are held: ["clamp"], single components as in [{clamp = "y"}] or
+    {clamp = "y"}, where "xyz" are all"""
     elastic: dict[str, ElasticTable] = field(default_factory=dict)
+    """springs, by the facet group that they are spread over"""
 
     def __post_init__(self) -> None:
         for group in self.elastic:
@@ -210,19 +249,27 @@ class Support:
 
 @dataclass(frozen=True, config=STRICT)
 class ModesTable:
-    """Which modes are computed (the first `count`, or all from `min_frequency` to `max_frequency` Hz) and which is the
-    first bending: the one with most effective mass along `direction`, or the one most like the first shape of the file
-    `shape`. `at` names the interface coordinate of the rigid model. Modes whose frequencies agree within
-    `pair_tolerance` (relative) are one multiple mode, turned so that one has all the motion of that coordinate."""
+    """Which modes are computed, and which of them is the first bending.
+
+    A multiple mode is turned so that one of its shapes has all the motion of the interface coordinate `at`.
+    """
 
     count: Annotated[Whole, Field(ge=1)] | None = None
+    """number of modes, the lowest; or give `max_frequency`"""
     max_frequency: Positive | None = None
+    """frequency up to which all modes are computed [Hz]"""
     min_frequency: NonNegative = 0.0
+    """frequency from which on modes are computed, with `max_frequency` [Hz]"""
     direction: Direction = (0.0, 1.0, 0.0)
+    """direction of the first bending, which is the mode with most effective mass along it [-]"""
     damping_ratio: Ratio | None = None
+    """modal damping of every mode, as a share of critical damping (default: the materials') [-]"""
     at: str | None = None
+    """interface coordinate of the rigid model (default: the only one, or "shroud")"""
     shape: str | None = None
+    """file of measured shapes, the first of which the first bending is most like, in place of `direction`"""
     pair_tolerance: Annotated[Real, Field(ge=0, le=0.1)] = 1e-3
+    """relative difference of frequencies up to which they are one multiple mode [-]"""
 
     def __post_init__(self) -> None:
         if self.count is not None and self.max_frequency is not None:
@@ -242,22 +289,26 @@ def _groups(facets: Any) -> Any:
 
 @dataclass(frozen=True, config=STRICT)
 class InterfaceTable:
-    """One interface coordinate: the displacement of a group along a direction, or its rotation about it.
+    """One interface coordinate, its table's name: the displacement of a group of the mesh along a direction, or its
+    rotation about it (rom.interface).
 
-    `facets` names a facet group, or else a group of edges or points (a node set), whose average is that of its nodes;
-    a list is taken as one group. The direction of a cavity's walls and floor is that from its left wall to its right
-    one; "normal" takes the facets' own (rom.interface.normal_direction), the name of a facet group its outward normal.
-
-    kind "patch" and "cavity" give three coordinates, of the motion in a plane, and "node" with a `normal` the first two
-    of them (rom.interface.plane_motion). `normal` is the direction across, out of the floor into the cavity, or a facet
-    group with that outward normal; by default the facets' own.
+    Kind "patch" and "cavity" give three coordinates, of the motion in a plane, and "node" with a `normal` the first two
+    of them (rom.interface.plane_motion).
     """
 
-    facets: Annotated[str | tuple[str, ...], BeforeValidator(_groups)]
+    facets: Annotated[str | Annotated[tuple[str, ...], Field(min_length=1)], BeforeValidator(_groups)]
+    """facet group, or several as one; or else a group of edges or points (a node set)"""
     direction: Annotated[Direction | str, Field(union_mode="left_to_right")]
+    """direction of the motion, that from the left wall of a cavity to its right one; "normal": the facets' own; or a
+    facet group, whose outward normal it is [-]"""
     kind: Literal["average", "rigid", "node", "full", "patch", "cavity"] = "average"
+    """"average": mean displacement; "rigid": moves as a rigid body; "node": that nearest to the centroid; "full": every
+    node is kept; "patch", "cavity": along, across and rotation in a plane"""
     motion: Literal["translation", "rotation"] = "translation"
+    """"translation" along the direction, or "rotation" about it"""
     normal: Annotated[Direction | str, Field(union_mode="left_to_right")] | None = None
+    """direction across, out of the floor into the cavity, or a facet group with that outward normal (default: the
+    facets' own) [-]"""
 
     def __post_init__(self) -> None:
         if self.kind in ("patch", "cavity") and self.motion == "rotation":
@@ -287,14 +338,23 @@ class Case:
     """Everything that modes and reduction of a structure need."""
 
     mesh: Mesh
+    """mesh from a file or a generator"""
     material: Annotated[dict[str, MaterialTable], Field(min_length=1)]
+    """materials, by volume group; "default" for all that have none of their own"""
     support: Support = field(default_factory=Support)
+    """what holds the structure (default: nothing)"""
     modes: ModesTable = field(default_factory=ModesTable)
+    """modes that are computed, and which is the first bending"""
     interface: dict[str, InterfaceTable] = field(default_factory=dict)
+    """interface coordinates, by their labels: where loads and contacts act on a reduced model"""
     calibration: CalibrationTable | None = None
+    """measurements of `vanedamp calibrate`"""
     rotation: RotationTable | None = None
+    """axis and speed of rotation"""
     campbell: CampbellTable | None = None
+    """speeds and engine orders of `vanedamp campbell`"""
     temperature: TemperatureTable | None = None
+    """temperature of the structure"""
 
     def __post_init__(self) -> None:
         given = {table.damping_ratio for table in self.material.values()} - {None}

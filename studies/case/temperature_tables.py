@@ -15,15 +15,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, config=STRICT)
 class TemperatureTable:
-    """Temperature of the structure, in K or throughout in degrees Celsius: `uniform`, or at the points of a `file`.
-
-    file: CSV with the columns x, y, z (m) and temperature. reference: temperature without thermal stress, at which
-    `young` is the modulus.
-    """
+    """Temperature of the structure, in K throughout or in degrees Celsius throughout."""
 
     reference: Real
+    """temperature without thermal stress, at which `young` is the modulus [K or degree C]"""
     uniform: Real | None = None
+    """temperature of the whole structure; or give `file` [K or degree C]"""
     file: str | None = None
+    """CSV file of temperatures, with the columns x, y, z (m) and temperature"""
 
     def __post_init__(self) -> None:
         if (self.uniform is None) == (self.file is None):

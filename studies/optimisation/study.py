@@ -23,7 +23,7 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_peaks
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.files.store import frozen
-from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml, validate
+from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 
 _MOST_FREQUENCIES = 10_000
 #: what the points of a band are, and their unit
@@ -36,20 +36,25 @@ def _bounds(value: Any) -> Any:
 
 
 _Values = Range | Annotated[tuple[Positive, ...], Field(min_length=1)]
-Bounds = Annotated[tuple[Positive, Positive], BeforeValidator(_bounds)]
+_Count = Annotated[Whole, Field(ge=1, le=32)]
+Bounds = Annotated[
+    tuple[Positive, Positive], BeforeValidator(_bounds, json_schema_input_type=Positive | tuple[Positive, Positive])
+]
 Counts = Annotated[
-    tuple[Annotated[Whole, Field(ge=1, le=32)], Annotated[Whole, Field(ge=1, le=32)]], BeforeValidator(_bounds)
+    tuple[_Count, _Count], BeforeValidator(_bounds, json_schema_input_type=_Count | tuple[_Count, _Count])
 ]
 
 
 @dataclass(frozen=True, config=STRICT)
 class Variables:
-    """The variables, each [lowest, highest] or one value: mass of all bodies over that of the structure, free travel
-    over the undamped maximum X, number of bodies."""
+    """The variables of a design, each [lowest, highest], or one value, which holds it."""
 
     mass_ratio: Bounds = (0.005, 0.05)
+    """mass of all bodies over that of the structure [-]"""
     gap_ratio: Bounds = (0.1, 1.5)
+    """free travel over X, the undamped maximum of the resonance [-]"""
     bodies: Counts = (1, 1)
+    """number of bodies"""
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -60,46 +65,60 @@ class Variables:
 
 @dataclass(frozen=True, config=STRICT)
 class Tolerances:
-    """Half widths of what the design cannot hold: shares of mass, gap and excitation; restitution, friction and
-    orientation (degrees) as they are."""
+    """Half widths of what the design cannot hold."""
 
     mass: Annotated[Real, Field(ge=0, lt=1)] = 0.0
+    """of the mass of a body, relative [-]"""
     gap: Annotated[Real, Field(ge=0, lt=1)] = 0.0
+    """of the gap, relative [-]"""
     excitation: Annotated[Real, Field(ge=0, lt=1)] = 0.0
+    """of the level of the excitation, relative [-]"""
     restitution: NonNegative = 0.0
+    """of the coefficient of restitution, as it is [-]"""
     friction: NonNegative = 0.0
+    """of the coefficient of friction, as it is [-]"""
     orientation_deg: NonNegative = 0.0
+    """of the angle of gravity [degree]"""
 
 
 @dataclass(frozen=True, config=STRICT)
 class Map:
-    """Points of the map along mass ratio and gap ratio."""
+    """The map of designs over mass ratio and gap ratio."""
 
     mass_ratio: Annotated[Whole, Field(ge=2, le=1000)] = 9
+    """points along the mass ratio"""
     gap_ratio: Annotated[Whole, Field(ge=2, le=1000)] = 12
+    """points along the gap ratio"""
 
 
 @dataclass(frozen=True, config=STRICT)
 class Optimise:
-    """The objective, and how it is minimised.
-
-    band: excitation frequencies, Hz; speeds, rad/s, or rpm in place of it: speeds of an engine order; measure: of a
-    run; over_band, over_tolerances: what counts of a band's and of the tolerances' values; samples: of the tolerances,
-    by Latin hypercube; evaluations: designs that each of the two searches may try.
-    """
+    """The objective, and how it is minimised."""
 
     band: _Values | None = None
+    """excitation frequencies, a rising list or a range {start, stop, num} [Hz]"""
     speeds: _Values | None = None
+    """speeds in place of the band, along an engine order [rad/s]"""
     rpm: _Values | None = None
+    """speeds in revolutions a minute in place of the band, along an engine order [rpm]"""
     variables: Variables = field(default_factory=Variables)
+    """what may be chosen"""
     tolerances: Tolerances = field(default_factory=Tolerances)
+    """what the design cannot hold (default: nothing)"""
     map: Map = field(default_factory=Map)
+    """map over mass ratio and gap ratio"""
     measure: Literal["amplitude_mean", "amplitude_max"] = "amplitude_mean"
+    """amplitude of a run that counts: mean of the peaks of its periods, or largest"""
     over_band: Literal["worst", "mean"] = "worst"
+    """what counts of the band's amplitudes"""
     over_tolerances: Literal["worst", "mean"] = "worst"
+    """what counts of the tolerances' amplitudes"""
     samples: Annotated[Whole, Field(ge=1, le=10_000)] = 12
+    """samples of the tolerances, by Latin hypercube"""
     evaluations: Annotated[Whole, Field(ge=5, le=100_000)] = 150
+    """designs that each of the two searches may try"""
     seed: Annotated[Whole, Field(ge=0)] = 1
+    """seed of searches and samples"""
 
     def __post_init__(self) -> None:
         if sum(getattr(self, name) is not None for name in _UNITS) != 1:
@@ -156,9 +175,12 @@ class Design(NamedTuple):
     bodies: int
 
 
-@dataclass(frozen=True, config=STRICT)
-class _File:
-    optimise: Optimise
+@dataclass(frozen=True, config=STRICT, repr=False)
+class StudyFile(Scene):
+    """A scene, and what is best for it."""
+
+    optimise: Optimise = field(kw_only=True)
+    """what is best, and which designs are tried"""
 
 
 class LinearCurves(NamedTuple):
@@ -201,13 +223,13 @@ class Study(NamedTuple):
         data = dict(tables)
         if "optimise" not in data:
             raise InputError(f"{path}: optimise: missing; say what is best in an [optimise] table (docs/sweeps.md)")
-        given = data.pop("optimise")
+        given = data["optimise"]
         if isinstance(given, dict) and not set(_UNITS) & set(given):
             raise InputError(
                 f"{path}: optimise.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
             )
-        table = validate(_File, {"optimise": given}, str(path)).optimise
-        scene = Scene.of(data, path)
+        file = StudyFile.of(data, path)
+        table, scene = file.optimise, Scene(**{item.name: getattr(file, item.name) for item in fields(Scene)})
         worst = table.over_band == "worst"
         try:
             band = table.frequencies(scene.excitation.engine_order)

@@ -22,16 +22,17 @@ _STEP_SECONDS = 1e-3
 
 
 class Options(SteppingOptions, PlanarOptions):
-    """steps_per_period: the least number; rtol: relative tolerance.
-
-    complete_chatter: whether impacts that follow each other ever faster end at once, in rest.
-    """
+    """Options of scipy's integrators."""
 
     method: Literal["solve_ivp"] = "solve_ivp"
+    """"solve_ivp": scipy's solve_ivp with events"""
     steps_per_period: Annotated[Whole, Field(ge=4, le=10_000_000)] = 32
+    """least number of steps in a period of the excitation"""
     penetration: Positive = 1e-3
     rtol: Annotated[Real, Field(ge=3e-14, lt=1)] = 1e-9
+    """relative tolerance of a step [-]"""
     complete_chatter: bool = True
+    """end impacts that follow each other ever faster at once, in rest"""
 
     @property
     def seconds_per_period(self) -> float:

@@ -15,17 +15,19 @@ from vanedamp.files.toml_input import STRICT, InputError, Positive
 
 @dataclass(frozen=True, config=STRICT)
 class Compliant(ContactLaw):
-    """Spring (`stiffness`, N/m) and dashpot while the gap is closed; the contact ends when its force vanishes.
+    """Spring and dashpot while the gap is closed; the contact ends when its force vanishes.
 
-    The dashpot gives an isolated collision of the pair's reduced mass the restitution asked for. With `residual` the
-    spring is in series with the residual flexibility of its wall, the part of the static one that a reduced model's
-    modes lack; without a `stiffness` it is that only.
+    The dashpot gives an isolated collision of the pair's reduced mass the restitution asked for. The residual
+    flexibility is the part of the wall's static one that a reduced model's modes lack.
     """
 
     rigid: ClassVar[bool] = False
     stiffness: Positive | None = None
+    """stiffness of the contact's spring; or residual = true, or both [N/m]"""
     residual: bool = False
+    """put the residual flexibility of the reduced model's wall in series with the spring"""
     law: Literal["compliant"] = field(default="compliant", kw_only=True)
+    """"compliant": spring and dashpot while the gap is closed"""
 
     def __post_init__(self) -> None:
         if self.stiffness is None and not self.residual:

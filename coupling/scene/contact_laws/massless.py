@@ -20,6 +20,7 @@ class Massless(ContactLaw):
 
     rigid: ClassVar[bool] = False
     law: Literal["massless"] = "massless"
+    """"massless": quasi-static contact on a boundary without mass"""
 
     @property
     def takes_residual_flexibility(self) -> bool:

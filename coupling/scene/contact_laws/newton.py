@@ -15,6 +15,7 @@ class Newton(ContactLaw):
     """Rigid contact: the speed of separation is `restitution` times that of approach, at the contact's own mass."""
 
     law: Literal["newton"] = "newton"
+    """"newton": rigid, by the ratio of speeds after and before an impact"""
 
     @property
     def title(self) -> str:

@@ -20,3 +20,4 @@ class Poisson(ContactLaw):
 
     two_phases: ClassVar[bool] = True
     law: Literal["poisson"] = "poisson"
+    """"poisson": rigid, by the ratio of impulses of expansion and compression"""

@@ -12,7 +12,7 @@ from vanedamp.files.toml_input import STRICT, InputError, Positive
 
 @dataclass(frozen=True, config=STRICT)
 class Viscoelastic(ContactLaw):
-    """Rigid contact with the restitution 1 - c v^(1/5) at a speed of approach v; c is `coefficient`, (s/m)^(1/5).
+    """Rigid contact with the restitution 1 - c v^(1/5) at a speed of approach v.
 
     The leading term of Hertz's contact of viscoelastic spheres (Kuwabara and Kono 1987; Brilliantov, Spahn, Hertzsch
     and Poeschel 1996), good for c v^(1/5) well below 1 (the next is 3/5 c^2 v^(2/5): Schwager and Poeschel 1998), and 0
@@ -20,7 +20,9 @@ class Viscoelastic(ContactLaw):
     """
 
     coefficient: Positive
+    """coefficient c of the restitution 1 - c v^(1/5) [(s/m)^(1/5)]"""
     law: Literal["viscoelastic"] = "viscoelastic"
+    """"viscoelastic": rigid, with a restitution that falls with the speed"""
 
     @staticmethod
     def restitution_at(speed: float, coefficient: float) -> float:

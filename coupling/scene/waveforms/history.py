@@ -18,14 +18,16 @@ _COLUMNS = ("time", "value")
 
 @dataclass(frozen=True, config=STRICT)
 class History(Waveform):
-    """A history in a CSV file with the columns time (s) and value, relative to the level; straight between its rows.
+    """A history from a file, straight between its rows, repeated for ever.
 
     The time from the first row to the last is the period. A value of the last row other than that of the first is a
     jump at the period's end.
     """
 
     file: str
+    """CSV file beside the scene, with the columns time (s) and value, relative to the level"""
     shape: Literal["history"] = "history"
+    """"history": a measured history"""
     timed: ClassVar[bool] = True
 
     def values(self, angle: np.ndarray) -> np.ndarray:

@@ -31,19 +31,21 @@ Order = Annotated[Whole, Field(gt=0, le=10_000)]
 
 @dataclass(frozen=True, config=STRICT)
 class Multisine(Waveform):
-    """Periodic noise: sines at the orders from the lowest to the highest of `orders`, multiples of the frequency.
-
-    spectrum: "flat", "pink" (amplitudes in proportion to 1/sqrt(order)), or the sines' amplitudes, relative to each
-    other. crest_factor: largest value over root mean square; default: that of random phases. seed: of these phases.
-    level: whether the level of the excitation is the root mean square of the signal or its largest value.
-    """
+    """Periodic noise: sines at the orders from the lowest to the highest, multiples of the frequency."""
 
     orders: tuple[Order, Order]
+    """lowest and highest order of the sines, multiples of the frequency"""
     spectrum: Literal["flat", "pink"] | tuple[NonNegative, ...] = "flat"
+    """"flat": equal amplitudes; "pink": in proportion to 1/sqrt(order); or a list of relative amplitudes, one for each
+    order [-]"""
     crest_factor: Positive | None = None
+    """largest value over root mean square (default: that of random phases) [-]"""
     seed: Annotated[Whole, Field(ge=0)] = 0
+    """seed of the random phases"""
     level: Literal["rms", "peak"] = "rms"
+    """what the level of the excitation is: "rms", the signal's root mean square; "peak", its largest value"""
     shape: Literal["multisine"] = "multisine"
+    """"multisine": periodic noise"""
 
     def __post_init__(self) -> None:
         lowest, highest = self.orders

@@ -1,0 +1,29 @@
+"""What a JSON Schema of an input file says about tables."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from jsonschema import Draft202012Validator
+
+from vanedamp.studies.file_kinds import KINDS
+
+
+@cache
+def validator(kind: str) -> Draft202012Validator:
+    """The validator of a kind of files, whose schema is one itself."""
+    schema = KINDS[kind].schema
+    Draft202012Validator.check_schema(schema)
+    return Draft202012Validator(schema)
+
+
+def faults(kind: str, tables: dict[str, Any]) -> list[str]:
+    """What is wrong with the tables of a file."""
+    return [f"{error.json_path}: {error.message}" for error in validator(kind).iter_errors(tables)]
+
+
+def kind_of(tables: dict[str, Any]) -> str:
+    """The kind of a file, from its tables."""
+    names = {"matrices": "external", "optimise": "study", "mesh": "case"}
+    return next((kind for table, kind in names.items() if table in tables), "scene")
