@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from textwrap import dedent
 from typing import NamedTuple
 
 import numpy as np
@@ -65,7 +66,7 @@ def examples_of(page: Path) -> list[Example]:
             found[-1] = found[-1]._replace(text=found[-1].text + "\n")
         else:
             inside = False
-    return found
+    return [example._replace(text=dedent(example.text)) for example in found]
 
 
 EXAMPLES = [example for page in PAGES for example in examples_of(page)]

@@ -102,7 +102,7 @@ class _Run(SphinxDirective):
         return block
 
     def output(self, text: str) -> list[nodes.Node]:
-        return [self.block(text, "none", "session-output")] if text else []
+        return [self.block(text, "text", "session-output")] if text else []
 
 
 class File(_Run):
