@@ -12,7 +12,6 @@ project_copyright = author
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx-mathjax-offline",
     "sphinx_copybutton",
@@ -20,12 +19,18 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     # ours, in _ext
     "docs._ext.commands",
+    "docs._ext.fields",
     "docs._ext.pages",
+    "docs._ext.python_api",
     "docs._ext.session",
     "docs._ext.toml_keys",
 ]
 exclude_patterns = ["_build", "_ext", "examples", "gallery"]
-nitpicky = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+maximum_signature_line_length = 100
+toc_object_entries_show_parents = "hide"
 highlight_language = "none"
 smartquotes = False
 
@@ -41,7 +46,7 @@ html_show_sourcelink = False
 html_theme_options = {
     "show_prev_next": True,
     "secondary_sidebar_items": ["page-toc"],
-    "header_links_before_dropdown": 7,
+    "header_links_before_dropdown": 5,
     "footer_start": ["copyright"],
     "footer_end": [],
 }

@@ -53,7 +53,6 @@ def test_results_open_in_h5py(swept):
     assert (eval(shape), unit) == (Sweep.load(swept / "sweep.h5").shape, "m")
 
 
-@pytest.mark.slow
 def test_program_of_mpi_is_that_of_the_sweeps():
     """The one that tests/test_docs.py runs."""
     assert program("supercomputer.md", "mpi4py") == program("sweeps.md", "mpi4py")

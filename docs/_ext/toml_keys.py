@@ -218,8 +218,9 @@ class Keys(Directive):
         env: BuildEnvironment = self.state.document.settings.env
         domain = env.domains["toml"]
         assert isinstance(domain, TomlDomain)
-        ids = [table.anchor()] if table.path else ["top-level"]
-        section = nodes.section(ids=ids, names=[f"{kind} {table.heading}"])
+        section = nodes.section(ids=self._ids(table), names=[f"{kind} {table.heading}"])
+        if table.path:
+            domain.note(f"{kind}.{table.path}", env.docname, section["ids"][0], "table")
         section += nodes.title("", table.heading)
         paragraphs = [" ".join(text.split()) for text in table.text.split("\n\n") if text]
         section += [nodes.paragraph("", "", *with_literals(text)) for text in paragraphs]
@@ -228,17 +229,18 @@ class Keys(Directive):
             name = nodes.literal(key.name, key.name, ids=self._ids(table, key.name))
             link = nodes.reference("", "", name, refuri=f"#{name['ids'][0]}", internal=True, classes=["key"])
             domain.note(f"{kind}.{table.dotted(key.name)}", env.docname, name["ids"][0])
-            value, default = ([nodes.literal(text, text)] if '"' in text else [nodes.Text(text)] for text in key[1:4:2])
+            value, default = (with_literals(re.sub(r'("[^"]*")', r"`\1`", text)) for text in (key.value, key.default))
             rows.append([[link], value, [nodes.Text(key.unit)], default, with_literals(key.meaning)])
         if rows:
             section += table_node(HEADER, rows, (16, 20, 8, 12, 44))
         return section
 
-    def _ids(self, table: Table, key: str) -> list[str]:
-        """Return the anchors of a key: that with the variant, and, of the first variant that has it, that without."""
+    def _ids(self, table: Table, key: str = "") -> list[str]:
+        """Return the anchors of a table or a key: that with the variant; of the first variant also that without."""
         taken = self.state.document.settings.env.temp_data.setdefault("toml_keys", set())
-        plain = table.dotted(key.strip('"')).replace(NAME, "name")
-        ids = list(dict.fromkeys([table.anchor(key.strip('"')), *([] if plain in taken else [plain])]))
+        name = key.strip('"')
+        plain = table._replace(variant="").anchor(name) or "top-level"
+        ids = list(dict.fromkeys([table.anchor(name) or plain, *([] if plain in taken else [plain])]))
         taken.update(ids)
         return ids
 
@@ -248,14 +250,14 @@ class TomlDomain(Domain):
 
     name = "toml"
     label = "TOML"
-    object_types = {"key": ObjType("key of a file", "key")}
+    object_types = {"key": ObjType("key", "key"), "table": ObjType("table", "key")}
     roles = {"key": XRefRole()}
     initial_data: dict[str, Any] = {"keys": []}
     data_version = 1
 
-    def note(self, name: str, docname: str, anchor: str) -> None:
-        """Remember a key."""
-        self.data["keys"].append((name, docname, anchor))
+    def note(self, name: str, docname: str, anchor: str, kind: str = "key") -> None:
+        """Remember a key, or a table."""
+        self.data["keys"].append((name, docname, anchor, kind))
 
     def clear_doc(self, docname: str) -> None:
         self.data["keys"] = [key for key in self.data["keys"] if key[1] != docname]
@@ -264,8 +266,8 @@ class TomlDomain(Domain):
         self.data["keys"] += [key for key in otherdata["keys"] if key[1] in docnames]
 
     def get_objects(self) -> Iterator[tuple[str, str, str, str, str, int]]:
-        for name, docname, anchor in self.data["keys"]:
-            yield name, name, "key", docname, anchor, 1
+        for name, docname, anchor, kind in self.data["keys"]:
+            yield name, name, kind, docname, anchor, 0  # important: before names of the same word in Python
 
     def resolve_xref(
         self, env: BuildEnvironment, fromdocname: str, builder: Any, typ: str, target: str, node: pending_xref,
@@ -273,7 +275,7 @@ class TomlDomain(Domain):
     ) -> nodes.reference | None:  # fmt: skip
         """Lead `damper.normal_load` and `case.mesh.file` to their keys; a key without its kind is first a scene's."""
         for wanted in (target, *(f"{kind}.{target}" for kind in KINDS)):
-            for name, docname, anchor in self.data["keys"]:
+            for name, docname, anchor, _ in self.data["keys"]:
                 if name == wanted:
                     return make_refnode(builder, fromdocname, docname, anchor, contnode, name)
         return None
