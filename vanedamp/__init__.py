@@ -38,12 +38,13 @@ if TYPE_CHECKING:
     from vanedamp.studies.case.tables import Case
     from vanedamp.studies.optimisation.search import optimise
     from vanedamp.studies.optimisation.study import Study
+    from vanedamp.studies.report.plot import plot
 
 __all__ = [
     "Branches", "Campbell", "Case", "InputError", "Interface", "InterfaceCoordinate", "Modes", "Patch", "Ramp",
     "ReducedModel", "Response", "RigidModel", "RingDown", "Scene", "Status", "Study", "Sweep", "SystemMatrices",
-    "VanedampError", "assemble", "campbell", "find_orbit", "optimise", "orbits", "ramp", "reduce", "rigid_model",
-    "ring_down", "simulate", "solve_modes", "steady_states", "sweep",
+    "VanedampError", "assemble", "campbell", "find_orbit", "optimise", "orbits", "plot", "ramp", "reduce",
+    "rigid_model", "ring_down", "simulate", "solve_modes", "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -72,6 +73,7 @@ _HOMES = {
     "find_orbit": "coupling.orbits.orbits",
     "optimise": "studies.optimisation.search",
     "orbits": "coupling.orbits.orbits",
+    "plot": "studies.report.plot",
     "ramp": "coupling.transients.ramp",
     "reduce": "rom.reduction",
     "rigid_model": "modal.rigid_model",

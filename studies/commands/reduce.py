@@ -35,7 +35,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--max-frequency", type=hertz, metavar="HZ",
-        help="up to which the error is estimated (default: 1.5 times the first natural frequency)",
+        help="up to which the error is estimated (default: 1.5 times the first bending)",
     )  # fmt: skip
     parser.add_argument(
         "--hot-spots", type=_spots, default=0, metavar="N",

@@ -20,6 +20,8 @@ ORDER = 80
 SUMMARY = "a run at every point of the scene's [sweep] grid"
 #: samples a period of the run at the peak
 _SAMPLES = 200
+#: curves whose headlines are printed
+_MOST_LINES = 12
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -121,8 +123,12 @@ def _run_peak(points: Grid, result: Sweep, path: str, source: str) -> None:
 
 
 def _print_summary(result: Sweep, responses: Sequence[ForcedResponse]) -> None:
-    """Print the headlines, and how many points are not ok."""
-    for response in responses:
+    """Print the headlines, best first, and how many points are not ok."""
+    from vanedamp.studies.report.forced_response import best_first
+
+    if len(responses) > _MOST_LINES:
+        print(f"the {_MOST_LINES} best of {len(responses)} curves; --json and the report have all:")
+    for response in best_first(responses)[:_MOST_LINES]:
         if not response.reference > 0:
             print(
                 f"{response.name}: nothing excites the structure, or a waveform without linear curves: there is no "

@@ -32,13 +32,13 @@ def check_run(scene: Scene, samples: int = 0) -> None:
                 f"{key}: {periods:.3g} periods need {_amount(needed)} for their {name}; at most {_amount(MOST_BYTES)}: "
                 'some thousand periods reach a steady state, and steady = "auto" ends with it'
             )
-    _check_time("time.periods", f"{periods:.3g} periods", _seconds(scene))
+    _check_time("time.periods", f"{periods:.3g} periods", run_seconds(scene))
 
 
 def check_sweep(scene: Scene, workers: int | None) -> None:
     """Refuse a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
     points, count = scene.points, workers or available_cores()
-    seconds = points * _seconds(scene) / count
+    seconds = sweep_seconds(scene, count)
     if points > MOST_POINTS:
         raise InputError(
             f"sweep: {points:.3g} points take {_duration(seconds)} on {count} workers and {_amount(_POINT * points)}; "
@@ -50,15 +50,29 @@ def check_sweep(scene: Scene, workers: int | None) -> None:
 
 def check_optimise(study: Study, workers: int | None) -> None:
     """Refuse an optimisation that takes a month. Raises InputError."""
-    table, count = study.table, workers or available_cores()
-    designs = table.map.mass_ratio * table.map.gap_ratio + table.evaluations * (2 + table.samples)
-    scenes = designs * table.count
+    scenes, count = scenes_of(study), workers or available_cores()
     check_run(study.scene)
-    _check_time("optimise", f"{scenes:.3g} scenes on {count} workers", scenes * _seconds(study.scene) / count)
+    _check_time("optimise", f"{scenes:.3g} scenes on {count} workers", scenes * run_seconds(study.scene) / count)
 
 
-def _seconds(scene: Scene) -> float:
-    """Return the processor time of a run."""
+def designs_of(study: Study) -> int:
+    """Return about how many designs an optimisation runs: of its map, and of both searches."""
+    table = study.table
+    return table.map.mass_ratio * table.map.gap_ratio + 2 * table.evaluations
+
+
+def scenes_of(study: Study) -> int:
+    """Return about how many scenes an optimisation runs: designs, and samples of the tolerances, over the band."""
+    return (designs_of(study) + study.table.evaluations * study.table.samples) * study.table.count
+
+
+def sweep_seconds(scene: Scene, workers: int) -> float:
+    """Return the time of a sweep, s."""
+    return scene.points * run_seconds(scene) / workers
+
+
+def run_seconds(scene: Scene) -> float:
+    """Return the processor time of a run, s, of one body on a rigid structure: richer scenes take more."""
     return _RUN + scene.time.simulated * scene.solver.seconds_per_period
 
 
