@@ -84,7 +84,10 @@ def pages() -> Iterator[tuple[str, str]]:
         for name in modules(part):
             text = f".. automodule:: {name}\n   :member-order: bysource\n"
             listed = members(import_module(name))
-            yield name, _titled(name) + text + (f"   :members: {', '.join(listed)}\n" if listed else "   :no-members:\n")
+            yield (
+                name,
+                _titled(name) + text + (f"   :members: {', '.join(listed)}\n" if listed else "   :no-members:\n"),
+            )
 
 
 def _titled(name: str) -> str:
@@ -121,7 +124,9 @@ def _block(block: str, known: set[str]) -> str:
     if _ALIGNED.fullmatch(lines[0]) and all(line[0] == " " or _ALIGNED.fullmatch(line) for line in lines):
         return "\n".join(_definition(*item) for item in _aligned(lines))
     if lines[0].startswith("- "):
-        return "\n".join(f"- {_inline(line[2:])}" if line.startswith("- ") else f"  {_inline(line.strip())}" for line in lines)
+        return "\n".join(
+            f"- {_inline(line[2:])}" if line.startswith("- ") else f"  {_inline(line.strip())}" for line in lines
+        )
     joined = " ".join(line.strip() for line in lines)
     before, items = _told(joined, known)
     if len(items) > 1:
