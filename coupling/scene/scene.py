@@ -84,6 +84,8 @@ _FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "wave
 
 
 def _several(axis: Any) -> Any:
+    if isinstance(axis, np.ndarray):
+        return axis.tolist()
     if not isinstance(axis, Mapping | list | tuple | Range):
         raise ValueError("a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}")
     return axis
