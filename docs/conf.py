@@ -22,6 +22,7 @@ extensions = [
     "docs._ext.fields",
     "docs._ext.pages",
     "docs._ext.python_api",
+    "docs._ext.session",
     "docs._ext.toml_keys",
 ]
 exclude_patterns = ["_build", "_ext", "examples", "gallery"]
@@ -56,6 +57,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "gallery",
     "gallery_dirs": "auto_gallery",
     "filename_pattern": r"\.py$",
+    "within_subsection_order": "FileNameSortKey",
     "image_scrapers": ("matplotlib",),
     "matplotlib_animations": True,
     "min_reported_time": 0,

@@ -31,10 +31,14 @@ _BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", 
 
 
 class FileKind(NamedTuple):
-    """A kind of input file: its name, and the place of its record, "module:class", loaded when it is wanted."""
+    """A kind of input file.
+
+    name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds.
+    """
 
     name: str
     place: str
+    tables: tuple[str, ...] = ()
 
     @property
     def record(self) -> Any:

@@ -6,12 +6,12 @@ import json
 import textwrap
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import tomlkit
 from tomlkit.container import Container
-from tomlkit.items import Float, Item, Table, Trivia
+from tomlkit.items import Array, Float, Item, Table, Trivia
 
 from vanedamp.files.reference import FileKind, key_in, options, table_at
 from vanedamp.files.store import replacing
@@ -19,15 +19,32 @@ from vanedamp.files.toml_input import plain
 
 #: widest line that a comment at its end may make; longer comments stand above
 _WIDTH = 120
+#: width of the lines of a long list
+_LINE = 96
 
 
-def write_commented(path: str | Path, data: Mapping[str, Any], kind: FileKind) -> None:
-    """Write tables as a commented TOML file, and the JSON Schema of its kind beside it. Raises StoreError."""
+def write_commented(
+    path: str | Path, data: Mapping[str, Any], kind: FileKind, notes: Mapping[str, str] | None = None
+) -> None:
+    """Write tables as a commented TOML file, and the JSON Schema of its kind beside it. Raises StoreError.
+
+    notes: as in `commented`.
+    """
     made = kind.schema
-    with replacing(Path(path).with_name(schema_name(kind.name))) as temporary:
-        temporary.write_text(json.dumps(made, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_schema(Path(path).with_name(schema_name(kind.name)), made)
     with replacing(path) as temporary:
-        temporary.write_text(commented(data, made, kind.name), encoding="utf-8")
+        temporary.write_text(commented(data, made, kind.name, notes), encoding="utf-8")
+
+
+def write_schema(path: str | Path, schema: Mapping[str, Any]) -> None:
+    """Write a JSON Schema to a file. Raises StoreError."""
+    with replacing(path) as temporary:
+        temporary.write_text(schema_text(schema), encoding="utf-8")
+
+
+def schema_text(schema: Mapping[str, Any]) -> str:
+    """Return a JSON Schema as text."""
+    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 
 def schema_name(kind: str) -> str:
@@ -37,75 +54,93 @@ def schema_name(kind: str) -> str:
 
 def toml(data: Mapping[str, Any]) -> str:
     """Return tables as TOML text without comments; values of None are left out."""
-    return _text(data, {})
+    return _Writer({}, {}).text(data)
 
 
-def commented(data: Mapping[str, Any], schema: dict[str, Any], kind: str) -> str:
+def commented(
+    data: Mapping[str, Any], schema: dict[str, Any], kind: str, notes: Mapping[str, str] | None = None
+) -> str:
     """Return tables as TOML text with the descriptions of their keys as comments, from the JSON Schema of their kind.
 
-    The first line names the schema for editors; values of None are left out.
+    The first line names the schema for editors; values of None are left out. notes: further comments at the
+    beginning of a table by its dotted name, of the file by "".
     """
-    return f"#:schema ./{schema_name(kind)}\n\n{_text(data, schema)}"
+    return f"#:schema ./{schema_name(kind)}\n\n{_Writer(schema, notes or {}).text(data)}"
 
 
-def _text(data: Mapping[str, Any], schema: dict[str, Any]) -> str:
-    document = tomlkit.document()
-    _fill(document, plain(data), schema, schema, set())
-    return tomlkit.dumps(document)
+class _Writer(NamedTuple):
+    """Makes a document of tables. schema: {} for no comments."""
+
+    schema: dict[str, Any]
+    notes: Mapping[str, str]
+
+    def text(self, data: Mapping[str, Any]) -> str:
+        document = tomlkit.document()
+        self.fill(document, plain(data), self.schema, set(), "")
+        return tomlkit.dumps(document)
+
+    def fill(
+        self, place: Container | Table, data: Mapping[str, Any], node: dict[str, Any], told: set[str], name: str
+    ) -> None:
+        """Add the keys of a table to a place in the document, values first, then tables.
+
+        told: keys that need no comment any more, since a table of the same list explains them; those of this one join
+        them. name: the dotted one of the table.
+        """
+        _comment(place, self.notes.get(name, ""))
+        if not name and name in self.notes:
+            place.add(tomlkit.nl())
+        table = table_at(self.schema, node, data)
+        alike = isinstance(table.get("additionalProperties"), dict)  # tables by names of the user's
+        told_inside: set[str] = set()
+        given = {key: (value, key_in(table, key)) for key, value in data.items() if value is not None}
+        tables = {key for key, (value, node) in given.items() if self.headed(value, node)}
+        for key in sorted(given, key=lambda key: key in tables):
+            value, node = given[key]
+            text = "" if key in told else node.get("description", "")
+            if key in tables:
+                inner = told_inside if alike else set()
+                place.add(key, self.tables(value, text, node, inner, f"{name}.{key}" if name else key))
+            else:
+                _add(place, key, _item(value), text)
+        told |= set(given)
+
+    def headed(self, value: Any, node: dict[str, Any]) -> bool:
+        """Return whether a value is a table with a heading, or a list of them."""
+        if isinstance(value, list) and value:
+            return all(isinstance(entry, Mapping) for entry in value)
+        return isinstance(value, Mapping) and not table_at(self.schema, node, value).get("x-inline", False)
+
+    def tables(self, value: Any, text: str, node: dict[str, Any], told: set[str], name: str) -> Item:
+        """Return a table or a list of them."""
+        if isinstance(value, Mapping):
+            return self.table(value, text, node, told, name)
+        items: dict[str, Any] = next((one["items"] for one in options(self.schema, node) if "items" in one), {})
+        tables = tomlkit.aot()
+        for entry in value:
+            tables.append(self.table(entry, "" if len(tables) else text, items, told, name))
+        return tables
+
+    def table(self, value: Mapping[str, Any], text: str, node: dict[str, Any], told: set[str], name: str) -> Table:
+        """Return a table with its heading, which one of tables only does not need."""
+        inner = bool(value) and all(isinstance(entry, Mapping) for entry in value.values())
+        table = tomlkit.table(is_super_table=inner and name not in self.notes)
+        if text:
+            table.comment(text)
+        self.fill(table, value, node, told, name)
+        return table
 
 
-def _fill(
-    place: Container | Table, data: Mapping[str, Any], schema: dict[str, Any], node: dict[str, Any], told: set[str]
-) -> None:
-    """Add the keys of a table to a place in the document, values first, then tables.
-
-    told: keys that need no comment any more, since a table of the same list explains them; those of this one join them.
-    """
-    table = table_at(schema, node, data)
-    given = {key: (value, key_in(table, key)) for key, value in data.items() if value is not None}
-    tables = {key for key, (value, node) in given.items() if _headed(value, schema, node)}
-    for key in sorted(given, key=lambda key: key in tables):
-        value, node = given[key]
-        text = "" if key in told else node.get("description", "")
-        if key in tables:
-            place.add(key, _tables(value, text, schema, node))
-        else:
-            _add(place, key, _item(value), text)
-    told |= set(given)
-
-
-def _headed(value: Any, schema: dict[str, Any], node: dict[str, Any]) -> bool:
-    """Return whether a value is a table with a heading, or a list of them."""
-    if isinstance(value, list) and value:
-        return all(isinstance(entry, Mapping) for entry in value)
-    return isinstance(value, Mapping) and not table_at(schema, node, value).get("x-inline", False)
-
-
-def _tables(value: Any, text: str, schema: dict[str, Any], node: dict[str, Any]) -> Item:
-    """Return a table or a list of them."""
-    if isinstance(value, Mapping):
-        return _table(value, text, schema, node, set())
-    items: dict[str, Any] = next((option["items"] for option in options(schema, node) if "items" in option), {})
-    tables, told = tomlkit.aot(), set[str]()
-    for entry in value:
-        tables.append(_table(entry, "" if len(tables) else text, schema, items, told))
-    return tables
-
-
-def _table(value: Mapping[str, Any], text: str, schema: dict[str, Any], node: dict[str, Any], told: set[str]) -> Table:
-    """Return a table with its heading, which one of tables only does not need."""
-    table = tomlkit.table(is_super_table=bool(value) and all(isinstance(entry, Mapping) for entry in value.values()))
-    if text:
-        table.comment(text)
-    _fill(table, value, schema, node, told)
-    return table
+def _comment(place: Container | Table, text: str) -> None:
+    """Add lines with a comment."""
+    for line in textwrap.wrap(text, _WIDTH - 2, break_on_hyphens=False):
+        place.add(tomlkit.comment(line))
 
 
 def _add(place: Container | Table, key: str, item: Item, text: str) -> None:
     """Add a value with its comment at the end of the line, or above where that is too long."""
     if text and len(f"{key} = {item.as_string()} # {text}") > _WIDTH:
-        for line in textwrap.wrap(text, _WIDTH - 2):
-            place.add(tomlkit.comment(line))
+        _comment(place, text)
     elif text:
         item.comment(text)
     place.add(key, item)
@@ -119,13 +154,27 @@ def _item(value: Any) -> Item:
             inline.append(key, _item(entry))
         return inline
     if isinstance(value, list):
-        array = tomlkit.array()
-        for entry in value:
-            array.append(_item(entry))
-        return array
+        return _array([_item(entry) for entry in value])
     if isinstance(value, float):
         return Float(value, Trivia(), _digits(value))
     return tomlkit.item(value)
+
+
+def _array(items: list[Item]) -> Array:
+    """Return a list, in several lines where it is long."""
+    array = tomlkit.array()
+    if sum(len(item.as_string()) + 2 for item in items) < _WIDTH:
+        array.extend(items)
+        return array
+    line: list[Item] = []
+    for item in items:
+        if sum(len(one.as_string()) + 2 for one in [*line, item]) > _LINE:
+            array.add_line(*line)
+            line = []
+        line.append(item)
+    array.add_line(*line)
+    array.add_line(indent="")
+    return array
 
 
 def _digits(value: float) -> str:

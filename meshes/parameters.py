@@ -25,9 +25,14 @@ def check_elements(count: float, name: str) -> None:
         raise ParameterError(f"{name}: about {count:.2g} elements; at most {MOST_ELEMENTS:.2g}")
 
 
+def expected_elements(size: float, volume: float) -> float:
+    """Return about how many tetrahedra of a size (m) gmsh puts into a volume (m^3)."""
+    return _PER_CUBE * volume / size / size / size
+
+
 def check_size(size: float, volume: float) -> None:
     """Raise ParameterError for an element size (m) so small that a volume (m^3) has too many elements."""
-    count = _PER_CUBE * volume / size / size / size
+    count = expected_elements(size, volume)
     if count > MOST_ELEMENTS:
         least = (_PER_CUBE * volume / MOST_ELEMENTS) ** (1 / 3)
         raise ParameterError(
@@ -119,9 +124,14 @@ class VaneCluster:
             self._check_cavities()
         if any(self.damper_size):
             self._check_damper()
+        check_size(self.element_size, self.volume)
+
+    @property
+    def volume(self) -> float:
+        """Volume of the shrouds without cavities, m^3, which is nearly that of the cluster."""
         sector = 0.5 * math.radians(self.sector_deg) * self.axial_length
-        inner = sector * (self.platform_radius**2 - self.inner_radius**2)
-        check_size(self.element_size, inner + sector * (self.outer_radius**2 - self.casing_radius**2))
+        inner = self.platform_radius**2 - self.inner_radius**2
+        return sector * (inner + self.outer_radius**2 - self.casing_radius**2)
 
     @property
     def sector_deg(self) -> float:

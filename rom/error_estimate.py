@@ -209,6 +209,8 @@ def choose(ladder: Sequence[Rung], tolerance: float, rigid: float) -> Choice:
         extra = chosen.size - chosen.modes
         what += f" and {extra} attachment mode{'s' * (extra > 1)}"
     sentence = f"{chosen.modes} {what}: estimated error {_percent(chosen.error)}, rigid model {_percent(rigid)}"
+    if rigid <= chosen.receptance:
+        sentence += " (one natural mode answers forces as well here; more are for higher frequencies and for impacts)"
     if not within.size:
         sentence += f"; none within the tolerance of {_percent(tolerance)}, keep more modes"
     return Choice(chosen, tolerance, rigid, tuple(ladder), sentence, bool(within.size))

@@ -72,7 +72,9 @@ prepare() {
 run() {
     local suite=$1 root=$home/$1
     prepare "$suite" "$root" || return 1
+    local begun=$SECONDS
     inside "$root" env DOLFINX="${suite#*-}" /vanedamp/scripts/setup.sh || { say "$suite: the set-up failed"; return 1; }
+    say "$suite: set up in $((SECONDS - begun)) s"
     inside "$root" bash -c 'cd /vanedamp && exec .venv/bin/python -m pytest -q "$@"' -- "${tests[@]}"
 }
 

@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
-from vanedamp.files.reference import FileKind
+from collections.abc import Mapping
+from typing import Any
 
+from vanedamp.files.reference import FileKind
+from vanedamp.files.toml_input import InputError
+
+#: in the order in which a file is recognised by its tables
 KINDS = {
     kind.name: kind
     for kind in (
-        FileKind("scene", "vanedamp.coupling.scene.scene:Scene"),
-        FileKind("case", "vanedamp.studies.case.tables:Case"),
-        FileKind("study", "vanedamp.studies.optimisation.study:StudyFile"),
-        FileKind("external", "vanedamp.studies.case.external_model:External"),
+        FileKind(
+            "pipeline",
+            "vanedamp.studies.pipeline.tables:PipelineFile",
+            ("calibrate", "modal", "reduce", "report", "folder"),
+        ),
+        FileKind("external", "vanedamp.studies.case.external_model:External", ("matrices",)),
+        FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
+        FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),
+        FileKind("scene", "vanedamp.coupling.scene.scene:Scene", ("structure", "excitation", "cavity", "damper")),
     )
 }
+
+
+def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:
+    """Return the kind of a file, which its tables tell. Raises InputError for a file of no kind."""
+    for kind in KINDS.values():
+        if not set(kind.tables).isdisjoint(tables):
+            return kind
+    known = "; ".join(f"[{'], ['.join(kind.tables)}] make a {kind.name}" for kind in reversed(KINDS.values()))
+    raise InputError(f"{source}: no kind of input file has these tables; {known}")

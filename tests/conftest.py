@@ -38,3 +38,18 @@ def cluster_modes(cluster):
     from vanedamp.modal.eigen import solve_modes
 
     return solve_modes(cluster, count=10)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Debian's chromium, without a window."""
+    import shutil
+
+    program = shutil.which("chromium")
+    if program is None:
+        pytest.skip("no chromium here")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as engine:
+        opened = engine.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield opened
+        opened.close()

@@ -16,7 +16,7 @@ from vanedamp.studies.paper.figure_file import FOLDER, Structure
 
 ROOT = Path(__file__).parent.parent
 PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
-SUFFIXES = {".py", ".toml", ".html", ".js", ".msh"}
+SUFFIXES = {".py", ".toml", ".html", ".js", ".css", ".msh"}
 
 
 def test_shipped_rigid_model_is_that_of_the_shipped_mesh(cluster_modes_file):

@@ -215,3 +215,16 @@ def test_command_chooses_modes_and_bases(tmp_path, monkeypatch, capsys):
     assert "2 modes: estimated error" in capsys.readouterr().out
     assert main(["reduce", "case.toml", "--basis", "guyan"]) == 2
     assert "basis: expected one of" in capsys.readouterr().err
+
+
+def test_the_error_is_estimated_beyond_the_mode_of_interest(tmp_path, monkeypatch, capsys):
+    """The bending about the stiff axis lies above the other one; it, not the first mode, is what the case is about."""
+    monkeypatch.chdir(tmp_path)
+    for axis, mode in (("[0, 0, 1]", 0), ("[0, 1, 0]", 1)):
+        (tmp_path / "case.toml").write_text(DAMPED_BLOCK.replace("direction = [0, 0, 1]", f"direction = {axis}"))
+        assert main(["modal", "case.toml", "--json", "-"]) == 0
+        modes = json.loads(capsys.readouterr().out)
+        assert (modes["first_bending"], modes["first_bending_number"]) == (mode, mode + 1)
+        assert main(["reduce", "case.toml", "--json", "-"]) == 0
+        reached = json.loads(capsys.readouterr().out)["estimate"]["frequencies_hz"][1]
+        assert reached == pytest.approx(1.5 * modes["frequency_hz"][mode], rel=1e-3)

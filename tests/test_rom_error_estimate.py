@@ -77,6 +77,8 @@ def test_choice_is_the_smallest_that_stays_within():
     assert choice.sentence == "4 modes: estimated error 4 %, rigid model 6 %"
     assert choice.met
     assert choice.to_json()["rigid"] == 0.06
+    # where a rigid model is no worse, the sentence says what the modes are for
+    assert ladder.choose(rungs, 0.05, rigid=0.04).sentence.endswith("for higher frequencies and for impacts)")
     missed = ladder.choose(rungs[:3], 0.01, rigid=0.06)
     assert not missed.met
     assert "none within the tolerance of 1 %" in missed.sentence

@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,7 +21,8 @@ from vanedamp.files.store import Variable, load, save, write_json
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import main
-from vanedamp.studies.report.mode_chart import sharp_edges, surface
+from vanedamp.studies.report.forced_response import forced_responses, linear_curves
+from vanedamp.studies.report.mode_chart import sharp_edges, surface, viewpoint
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
 from vanedamp.studies.report.sections import modes as modes_section
@@ -81,6 +83,11 @@ def charts(page):
     return found
 
 
+def names_of(traces):
+    """The responses to which the curves of a chart belong."""
+    return {name for trace in traces for name in trace["meta"]["curves"]}
+
+
 def decoded(value):
     if isinstance(value, dict) and "bdata" in value:
         return np.frombuffer(base64.b64decode(value["bdata"]), value["dtype"])
@@ -99,17 +106,23 @@ def test_curves_are_in_the_page(page, results):
         "rigid model (sweep_two), c1.gap = 400 µm": (two, (1,)),
     }
     traces = found["response-0"]
-    assert {trace["legendgroup"] for trace in traces} == set(expected)
+    assert names_of(traces) == set(expected)
     for name, (record, point) in expected.items():
         for title, measure in {"damped, maximum": "amplitude_max", "damped, mean of peaks": "amplitude_mean"}.items():
-            (trace,) = (t for t in traces if t["legendgroup"] == name and t["name"] == title)
+            (trace,) = (t for t in traces if t["meta"]["curves"] == [name] and t["name"] == title)
             np.testing.assert_allclose(trace["x"], FREQUENCIES)
             np.testing.assert_allclose(trace["y"], getattr(record, measure)[point] / 1e-3)
     # gaps do not change the linear curves: drawn once
     for title, measure in {"undamped": "amplitude_undamped", "bodies fixed": "amplitude_fixed"}.items():
         (trace,) = (t for t in traces if t["name"] == title)
-        np.testing.assert_allclose(trace["y"], getattr(one, measure) / 1e-3)
-    attached = next(t for t in found["mistuning-0"] if t["legendgroup"] == "rigid model (sweep_one)")
+        assert set(trace["meta"]["curves"]) == set(expected)
+        at = np.searchsorted(trace["x"], FREQUENCIES)
+        np.testing.assert_array_equal(trace["x"][at], FREQUENCIES)
+        np.testing.assert_allclose(trace["y"][at], getattr(one, measure) / 1e-3)
+        # between the points as well: the peak itself is there
+        assert trace["y"].max() == pytest.approx(float(one.peaks[f"{measure.split('_')[1]}_peak"]) / 1e-3, rel=1e-3)
+        assert len(trace["x"]) > 20 * len(FREQUENCIES)
+    attached = next(t for t in found["mistuning-0"] if t["meta"]["curves"] == ["rigid model (sweep_one)"])
     np.testing.assert_allclose(attached["y"], one.attached_mass_fraction)
     shares = [t for t in found["energy-0"] if t["stackgroup"] == "0"]
     np.testing.assert_allclose(np.sum([t["y"] for t in shares], axis=0), 100.0)
@@ -141,7 +154,7 @@ def test_study_has_its_claims_and_its_sweeps(page):
     assert "Half is &lt; enough" in page
     for verdict in ("shown", "not shown"):
         assert re.search(rf'class="verdict \w+">{verdict}<', page)
-    names = {trace["legendgroup"] for trace in charts(page)["response-1"]}
+    names = names_of(charts(page)["response-1"])
     assert names == {f"gaps, c1.gap = {gap} µm" for gap in (100, 200, 300, 400)}
 
 
@@ -224,6 +237,65 @@ def test_page_without_a_picture_says_so(results, tmp_path, monkeypatch):
     assert "Plotly" not in text
 
 
+GAPS = [1e-5, 5e-5, 1e-4, 2e-4, 3e-4, 4e-4, 5e-4, 6e-4, 7e-4, 8e-4, 1e-3, 2e-3]
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory):
+    """A sweep with a dozen curves, and its report."""
+    folder = tmp_path_factory.mktemp("many")
+    axes = {"cavity.c1.gap": GAPS, "excitation.frequency": FREQUENCIES}
+    sweep(validate(Scene, DATA | {"sweep": axes}, "x")).save(folder / "gaps.h5")
+    write_report(collect([folder / "gaps.h5"]), folder / "report.html")
+    return folder
+
+
+def test_the_best_curves_come_first_and_all_are_there(many):
+    page = (many / "report.html").read_text(encoding="utf-8")
+    record = Sweep.load(many / "gaps.h5")
+    ratios = [float(text) for text in re.findall(r"<td><b>([\d.]+|nan)</b></td>", page)]
+    mean = np.where(record.status == "ok", record.amplitude_mean, -np.inf)
+    # the widest gap is never steady: it comes last
+    best = mean.max(axis=1)[:-1] / float(record.peaks["undamped_peak"][0])
+    assert np.isnan(ratios[-1])
+    assert ratios[:-1] == pytest.approx(np.sort(best), abs=6e-4)
+    damped = [t for t in charts(page)["response-0"] if t["name"] == "damped, mean of peaks"]
+    assert len(damped) == len(GAPS)
+    drawn = [t.get("visible", True) for t in damped]
+    assert drawn == [True] * 8 + [False] * 4
+    assert np.nanmax(damped[0]["y"]) == pytest.approx(best.min())
+
+
+def test_curves_are_picked_and_sorted_in_the_page(many, browser):
+    page = browser.new_page()
+    complaints = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto((many / "report.html").as_uri())
+    page.wait_for_function("document.querySelectorAll('.js-plotly-plot .main-svg').length > 0")
+    drawn = "document.getElementById('response-0').data.filter(t => t.visible !== false).map(t => t.meta.curves).flat()"
+    last = page.locator(".curves tbody tr").last.locator("input")
+    name = last.get_attribute("value")
+    assert page.evaluate(f"({drawn}).filter(name => name === {json.dumps(name)}).length") == 2  # the linear curves
+    last.check()
+    assert page.evaluate(f"({drawn}).filter(name => name === {json.dumps(name)}).length") == 4
+    gaps = "[...document.querySelectorAll('.curves tbody input')].map(box => parseFloat(box.value.split('= ')[1]))"
+    heading = page.locator(".curves th button").first
+    heading.click()
+    assert page.evaluate(gaps) == pytest.approx([1e6 * gap for gap in GAPS])
+    heading.press("Enter")
+    assert page.evaluate(gaps) == pytest.approx([1e6 * gap for gap in GAPS[::-1]])
+    assert complaints == []
+
+
+def test_linear_curves_of_a_structure_that_is_no_longer_there_are_those_of_the_sweep(many):
+    record = Sweep.load(many / "gaps.h5")
+    (response, *_) = forced_responses(record)
+    fine = linear_curves(record, response)
+    assert len(fine.x) > len(response.x)
+    other = replace(record, scene=record.scene.replace({"structure.mass": 1.001}))
+    np.testing.assert_array_equal(linear_curves(other, response).x, response.x)
+
+
 def test_names_are_escaped(results, tmp_path):
     found = sweep(validate(Scene, DATA | {"sweep": {"excitation.frequency": FREQUENCIES[:2]}}, "x"))
     found.save(tmp_path / "a<b>.h5")
@@ -249,7 +321,7 @@ def test_files_of_the_same_name_are_told_apart(results, tmp_path):
         shutil.copy(results / "sweep_one.h5", tmp_path / folder / "sweep.h5")
     write_report(collect([tmp_path / "stiff", tmp_path / "soft"]), tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    names = {trace["legendgroup"] for trace in charts(page)["response-0"]}
+    names = names_of(charts(page)["response-0"])
     assert names == {"rigid model (stiff/sweep)", "rigid model (soft/sweep)"}
     assert {'id="from-stiff-sweep-h5"', 'id="from-soft-sweep-h5"'} <= set(re.findall(r'id="[\w-]+"', page))
 
@@ -268,3 +340,20 @@ def test_scenes_say_what_they_share_and_what_is_their_own(results, tmp_path):
         page = (tmp_path / "report.html").read_text(encoding="utf-8")
         assert told in page
         assert page.count("<td><code>damper[0].restitution</code></td><td>0.6</td>") == 1
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mode_is_seen_from_the_side_that_moves(axis, side):
+    """A plate that is held hides a plate that moves, unless one looks from the other side."""
+    other = 1 - axis
+    across, up = (part.ravel() for part in np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21)))
+    points = np.zeros((2, len(up), 3))
+    points[:, :, other], points[:, :, 2] = across, up
+    points[0, :, axis], points[1, :, axis] = -side, side
+    shape = np.zeros_like(points)
+    shape[1, :, other] = 1.0
+    view = viewpoint(points.reshape(-1, 3), shape.reshape(-1, 3))
+    assert np.linalg.norm(view) == pytest.approx(1.0)
+    assert side * view[axis] > 0.5
+    assert view[2] > 0

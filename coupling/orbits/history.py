@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.passage import PeriodMap
+from vanedamp.coupling.response.response import Event, Response
 from vanedamp.coupling.scene.scene import Time
 from vanedamp.files.store import frozen
 
@@ -18,6 +20,8 @@ SAMPLES = 400
 @dataclass(frozen=True, eq=False)
 class OrbitHistory:
     """The motion along an orbit, n samples from the start of its first excitation period to its end, both included.
+
+    Of a run: its last periods, without their end.
 
     time          (n,) s
     displacement  (n,) m at excitation.at; velocity: (n,) m/s
@@ -41,13 +45,26 @@ def orbit_history(period_map: PeriodMap, state: np.ndarray) -> OrbitHistory:
     scene, periods = period_map.scene, period_map.periods
     whole = replace(scene, time=Time(periods=periods, transient=0), sweep={}, orbit=None)
     response = simulate(whole, events=True, samples_per_period=SAMPLES, start=period_map.restart_of(state))
-    impacts = [event for event in response.event_list if event.kind == "impact"]
-    moments = np.array([event.time for event in impacts])
     # the orbit ends where it began
     time = np.append(response.time, periods / scene.frequency)
     displacement, slip = (
         np.concatenate([each, each[:1]]) for each in (response.displacement, response.body_displacement)
     )
+    return _history(time, displacement, slip, response.event_list)
+
+
+def late_history(response: Response, periods: int) -> OrbitHistory:
+    """Return the motion in the last periods of a run that kept samples and events; all of a shorter one."""
+    each = len(response.time) // max(response.periods, 1)
+    late = slice(max(len(response.time) - periods * each, 0), None)
+    time = response.time[late]
+    events = [event for event in response.event_list if len(time) and event.time >= time[0]]
+    return _history(time, response.displacement[late], response.body_displacement[late], events)
+
+
+def _history(time: np.ndarray, displacement: np.ndarray, slip: np.ndarray, events: Sequence[Event]) -> OrbitHistory:
+    impacts = [event for event in events if event.kind == "impact"]
+    moments = np.array([event.time for event in impacts])
     return OrbitHistory(
         time=frozen(time), displacement=frozen(displacement), velocity=frozen(_rate(time, displacement, moments)),
         slip=frozen(slip), slip_velocity=frozen(_rate(time, slip, moments)), impact_time=frozen(moments),

@@ -200,6 +200,8 @@ class Response(Displayed):
     """samples of bodies in the plane; None without any"""
     advice: dict[str, Any] | None = None
     """advice on the bodies whose shape was chosen automatically"""
+    coordinates: np.ndarray | None = None
+    """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
@@ -244,6 +246,8 @@ class Response(Displayed):
             variables["time"] = Variable(self.time, ("time",), "s")
             variables["displacement"] = Variable(self.displacement, ("time",), "m")
             variables["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
+        if self.coordinates is not None:
+            variables["coordinates"] = Variable(self.coordinates, ("time", "mode"), "kg^0.5 m")
         if self.in_plane is not None:
             variables |= self.in_plane.variables()
         if self.event_list:

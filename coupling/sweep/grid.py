@@ -150,7 +150,7 @@ def grid(scene: Scene) -> Grid:
         _check_method(made)
     assert first is not None
     along = _along(scene, axes) if linked else None
-    base = _with_range(points.base, axes)
+    base = base_scene(scene)
     points = Points(base)
     _check_speeds(points, axes)
     choices = choices_of(points.raw(values) for values in scene.sweep_points()[1]) if undecided else NOTHING
@@ -162,13 +162,15 @@ def grid(scene: Scene) -> Grid:
     return Grid(scene, axes, base, choices, start.estimate, advice, along, warnings)
 
 
-def _with_range(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> Scene:
-    """Return the scene whose level is that of one resonance for all of the swept frequencies."""
-    swept, hertz = resonance_axis(scene, axes)
-    if swept is None or not _ordered(axes[swept]) or scene.excitation.resonance_near is not None:
-        return scene
+def base_scene(scene: Scene) -> Scene:
+    """Return a scene without its sweep; its level is that of one resonance for all of the swept frequencies."""
+    axes = {path: axis_values(values) for path, values in scene.sweep.items()}
+    base = replace(scene, sweep={})
+    swept, hertz = resonance_axis(base, axes)
+    if swept is None or not _ordered(axes[swept]) or base.excitation.resonance_near is not None:
+        return base
     near = (float(min(axes[swept])) * hertz, float(max(axes[swept])) * hertz)
-    return replace(scene, excitation=replace(scene.excitation, resonance_near=near))
+    return replace(base, excitation=replace(base.excitation, resonance_near=near))
 
 
 def resonance_axis(scene: Scene, axes: Iterable[str]) -> tuple[str | None, float]:

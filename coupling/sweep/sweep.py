@@ -50,7 +50,7 @@ def sweep(
             kept.add(task, result, bool(rest))
             if progress is not None:
                 progress(finished.count, grid.size)
-    return _result(grid, finished, provenance)
+    return result_of(grid, finished, provenance)
 
 
 def run_list(
@@ -72,7 +72,8 @@ def run_list(
     return finished
 
 
-def _result(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Sweep:
+def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Sweep:
+    """Return the record of a grid whose points are all finished."""
     columns = {name: finished.values[:, place].reshape(grid.shape) for place, name in enumerate(COLUMNS)}
     of_bodies = np.reshape(finished.values[:, len(COLUMNS) :], (*grid.shape, len(IN_PLANE), -1))
     return Sweep(

@@ -26,7 +26,7 @@ from vanedamp.modal.matrices import SystemMatrices, unit_direction
 from vanedamp.modal.measurements import read_shapes
 from vanedamp.modal.mesh_import import convert
 from vanedamp.modal.multiple import rivals, turned
-from vanedamp.modal.participation import ParticipationError, effective_masses, first_bending
+from vanedamp.modal.participation import NOTABLE_SHARE, ParticipationError, effective_masses, first_bending
 from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.stress import HotSpot, hot_spot
@@ -49,6 +49,8 @@ from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 
 # a mode so near the first bending, relative, that moves its point with such a share of its compliance, is reported
 _NEAR, _NOTABLE = 0.02, 0.01
+#: modes that are computed unless the case says; frequency up to which a reduced model is judged, over the first bending
+_MODES, _REACH = 10, 1.5
 # modes at which the search for enough of them starts and gives up
 _START, _MOST = 16, 64
 
@@ -189,6 +191,7 @@ class ModalAnalysis:
             "movable_mass": self.structure.matrices.movable_mass.tolist(),
             "residual": self.modes.residuals.tolist(),
             "first_bending": self.first_bending,
+            "first_bending_number": None if self.first_bending is None else self.first_bending + 1,
             "rigid": None if self.rigid is None else asdict(self.rigid),
             "cavity": {label: asdict(motion) for label, motion in self.cavities.items()},
             "warnings": list(self.warnings),
@@ -296,7 +299,7 @@ def _cavities(
 def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) -> Modes:
     """Return the case's modes, multiple ones turned to the response coordinate, or else to the bending's direction."""
     table, size = case.modes, matrices.free.size
-    count = table.count or 10
+    count = table.count or _MODES
     # one more, so that the last of them is not half of a pair
     more = count + 1 if count < size else count
     modes = solve_modes(matrices, more, table.max_frequency, table.min_frequency)
@@ -412,7 +415,8 @@ def reduction(
     """Reduce the case's structure to its interface, with `modes` modes or (None) as many as a tolerance needs.
 
     The estimate of its error is in the model's provenance. It covers receptances of the whole interface up to
-    max_frequency, by default 1.5 times the first natural frequency. Craig-Bampton models have a block of quasi-static
+    max_frequency, by default 1.5 times the first bending (of most effective mass along the case's direction; of a free
+    structure its first elastic mode). Craig-Bampton models have a block of quasi-static
     modes. A structure that rotates is reduced for all speeds up to the greatest of its case, and the number of modes
     suits standstill and that speed. Raises LadderError when no model of up to _MOST modes meets the tolerance, and
     InputError for a structure that rotates with another basis, or up to no speed.
@@ -429,7 +433,7 @@ def reduction(
         else:
             bases = SpeedBases(rotating, coordinates, asked, factorize, 1 + BLOCKS)
             rich = [bases.model_at(speed) for speed in (0.0, greatest)]
-        grids = [_of_interest(model, max_frequency) for model in rich]
+        grids = [_of_interest(model, max_frequency, structure.case) for model in rich]
         rigid = max(float(rigid_errors(model, grid, at).max()) for model, grid in zip(rich, grids, strict=True))
         ladder = worst_rungs([basis_ladder(model, basis, grid) for model, grid in zip(rich, grids, strict=True)])
         choice = choose(ladder if modes is None else ladder[-1:], tolerance, rigid)
@@ -443,9 +447,28 @@ def reduction(
     if bases is None:
         model = basis_model(rich[0], basis, choice.chosen.modes)
     else:
-        of_interest = partial(_of_interest, max_frequency=max_frequency)
+        of_interest = partial(_of_interest, max_frequency=max_frequency, case=structure.case)
         model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, keep_recovery)
     return replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
+
+
+def reduced_case(
+    structure: Structure,
+    modes: int | None,
+    basis: str = "craig-bampton",
+    tolerance: float = 0.01,
+    max_frequency: float | None = None,
+    spots: int = 0,
+    recovery: bool = False,
+) -> ReducedModel:
+    """Return what `vanedamp reduce` writes: a reduction with the stresses at `spots` places of its first mode.
+
+    recovery: keep the basis, by which responses are shown on the mesh.
+    """
+    model = reduction(structure, modes, basis, tolerance, max_frequency, recovery or bool(spots))
+    if spots:
+        model = with_hot_spots(structure, model, spots)
+    return model if recovery else replace(model, recovery=None, residual_recovery=None, coordinates=None)
 
 
 def _greatest_speed(structure: Structure, basis: str) -> float:
@@ -469,6 +492,19 @@ def _greatest_speed(structure: Structure, basis: str) -> float:
     return table.greatest
 
 
-def _of_interest(model: ReducedModel, max_frequency: float | None) -> np.ndarray:
-    top = max_frequency or 1.5 * float(model.natural_frequencies_hz[model.rigid_modes])
+def _of_interest(model: ReducedModel, max_frequency: float | None, case: Case) -> np.ndarray:
+    """Return the frequencies over which the errors of models count, Hz: up to max_frequency, or beyond the mode of
+    interest."""
+    top = max_frequency or _REACH * float(model.natural_frequencies_hz[_mode_of_interest(model, case)])
     return frequency_grid(model, 0.05 * top if model.rigid_modes else 0.0, top)
+
+
+def _mode_of_interest(model: ReducedModel, case: Case) -> int:
+    """Return the index of the first bending among a model's elastic modes; the first of them where none is one."""
+    first, modes = model.rigid_modes, case.modes.count or _MODES
+    inertia = model.base_load @ unit_direction(case.modes.direction)
+    masses = (model.natural[1].T @ inertia) ** 2
+    elastic = masses[first : first + modes]
+    # symmetric structures have pairs whose masses differ by round-off only
+    bending = int(np.flatnonzero(elastic > (1.0 - 1e-6) * elastic.max())[0])
+    return first + bending if elastic[bending] >= NOTABLE_SHARE * masses.sum() else first

@@ -14,6 +14,7 @@ from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.files.store import csv_text
 
 COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#7e22ce", "#0e7490", "#a16207", "#be185d", "#475569")
+DASHES = ("solid", "dash", "dot", "dashdot")  # of bodies
 FONT = "system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif"
 AXIS: dict[str, Any] = {"showline": True, "linecolor": "#334155", "ticks": "outside", "gridcolor": "#e2e8f0"}
 

@@ -4,19 +4,34 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
-from vanedamp.coupling.sweep.grid import resonance_axis
+from vanedamp.coupling.sweep.grid import base_scene, resonance_axis
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
+from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_responses
+from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.studies.headline import Headline, format_value, headline, reference_of
+
+#: share by which a linear amplitude that is computed again may differ from the one that the sweep has kept
+_SAME = 1e-6
+#: points of linear curves along an engine order, each of which needs the modes at its speed
+_ALONG_ORDER = 201
+
+
+class LinearCurves(NamedTuple):
+    """Amplitudes without bodies and with the bodies fixed, m, each (k,), over ascending x (k,)."""
+
+    x: np.ndarray
+    undamped: np.ndarray
+    fixed: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +46,7 @@ class ForcedResponse:
                        bodies in the plane
     headline           figures and sentence of the curve
     hertz              frequency of a unit of the axis, Hz: of a speed along an engine order, 1 of a frequency; nan else
+    settings           values of the sweep's other axes by path
     source             the file it comes from
     """
 
@@ -49,7 +65,13 @@ class ForcedResponse:
     in_plane: Mapping[str, np.ndarray]
     headline: Headline
     hertz: float = math.nan
+    settings: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
+
+    @property
+    def linear(self) -> LinearCurves:
+        """The linear amplitudes at the points."""
+        return LinearCurves(self.x, self.undamped, self.fixed)
 
     @property
     def sentence(self) -> str:
@@ -89,15 +111,26 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
     for combination in itertools.product(*(range(len(values)) for values in others)):
         point: tuple[Any, ...] = (*combination[:along], order, *combination[along:])
         units = sweep.units()
-        values = [
-            setting(path, axis[index], units[path])
-            for path, axis, index in zip(labels, others, combination, strict=True)
-        ]
-        responses.append(_response(sweep, point, paths[along], ", ".join([name or model_name(sweep.scene), *values])))
+        settings = {path: axis[index] for path, axis, index in zip(labels, others, combination, strict=True)}
+        values = [setting(path, value, units[path]) for path, value in settings.items()]
+        title = ", ".join([name or model_name(sweep.scene), *values])
+        responses.append(response_along(sweep, point, paths[along], title, settings))
     return responses
 
 
-def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> ForcedResponse:
+def best_first(responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:
+    """Return responses by rising damped peak over the undamped one; those without any at the end."""
+    return sorted(responses, key=lambda response: np.nan_to_num(response.headline.peak_ratio, nan=math.inf))
+
+
+def response_along(
+    sweep: Sweep, point: tuple[Any, ...], axis: str, name: str, settings: Mapping[str, Any]
+) -> ForcedResponse:
+    """Return the forced response along an axis of a sweep, at settings of the others by their paths.
+
+    point: what is taken of each axis, in the axes' order: of `axis` the places in the order of the curve, of the others
+    one place.
+    """
     ok = sweep.status[point] == "ok"
     damped = {
         "damped_max": sweep.amplitude_max, "damped_mean": sweep.amplitude_mean, "impacts_per_period":
@@ -125,8 +158,35 @@ def _response(sweep: Sweep, point: tuple[Any, ...], axis: str, name: str) -> For
             axis == swept,
         ),
         hertz=hertz if axis == swept else math.nan,
+        settings=settings,
         **cut,
     )  # fmt: skip
+
+
+def linear_curves(sweep: Sweep, response: ForcedResponse) -> LinearCurves:
+    """Return the linear curves of a response so fine that they hide no peak; those at its points where that cannot be.
+
+    They are computed from the sweep's scene, and taken if they are what the sweep has kept at its points: a reduced
+    model may lie elsewhere by now, or be another one.
+    """
+    kept = response.linear
+    if not math.isfinite(response.hertz) or not np.isfinite(kept.undamped).all():
+        return kept
+    low, high = response.hertz * float(response.x[0]), response.hertz * float(response.x[-1])
+    try:
+        scene = base_scene(sweep.scene).replace({**response.settings, response.axis: response.x[0]})
+        if scene.excitation.engine_order is None:
+            between = np.concatenate([each.grid(low, high) for each in linear_responses(scene)])
+        else:
+            between = np.linspace(low, high, _ALONG_ORDER)
+        frequencies, places = np.unique(np.concatenate([response.hertz * response.x, between]), return_inverse=True)
+        undamped, fixed = linear_amplitudes(scene, frequencies)
+    except (VanedampError, OSError):
+        return kept
+    at = places[: len(response.x)]
+    if not np.allclose([undamped[at], fixed[at]], [kept.undamped, kept.fixed], rtol=_SAME, atol=0.0):
+        return kept
+    return LinearCurves(frozen(frequencies / response.hertz), frozen(undamped), frozen(fixed))
 
 
 def peaks_of(sweep: Sweep, point: tuple[Any, ...]) -> dict[str, Any]:

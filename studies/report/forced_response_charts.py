@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,50 +11,94 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.sweep.sweep import LOSSES
-from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
-from vanedamp.studies.report.forced_response import ForcedResponse
+from vanedamp.studies.report.charts import COLOURS, DASHES, axis_title, dressed
+from vanedamp.studies.report.forced_response import ForcedResponse, LinearCurves
 
 _LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626", "contact": "#2563eb"}
-_DASHES = ("solid", "dash", "dot", "dashdot")  # of bodies
-_PANELS = 3  # energy panels side by side
+_SHARED = "#475569"  # linear curves of several responses
+_PANELS, _PANEL_HEIGHT = 3, 260  # energy panels side by side; height of one, px
+_TITLE_WIDTH = 110  # characters of titles side by side
 
 
-def responses_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Draw undamped, fixed and damped (maximum and mean) amplitudes, relative to the undamped maximum."""
+def responses_figure(
+    responses: Sequence[ForcedResponse],
+    linear: Sequence[LinearCurves] | None = None,
+    shown: Collection[str] | None = None,
+) -> go.Figure:
+    """Draw undamped, fixed and damped (maximum and mean) amplitudes, relative to the undamped maximum.
+
+    linear: the linear curves of each, by default those at its points. shown: names of the responses that are drawn at
+    first; the others wait for `curves.js`, and the table beside the chart is its legend. Default: all, with a legend.
+    """
     figure = go.Figure()
-    linear: list[np.ndarray] = []
-    for response, colour in zip(responses, _cycle(responses), strict=True):
-        styles: list[tuple[str, str, dict[str, Any], str]] = [
-            ("undamped", "undamped", {"dash": "dot", "width": 1.6}, "lines"),
-            ("fixed", "bodies fixed", {"dash": "dash", "width": 1.6}, "lines"),
-            ("damped_max", "damped, maximum", {"width": 0.8}, "lines+markers"),
-            ("damped_mean", "damped, mean of peaks", {"width": 2.8}, "lines"),
-        ]
-        for curve, title, line, mode in styles:
-            values = getattr(response, curve)
-            if curve in ("undamped", "fixed"):
-                if any(np.array_equal(values, other) for other in linear):
-                    continue  # sweeps of gaps, friction ... share their linear curves
-                linear.append(values)
-            figure.add_scatter(
-                x=response.x, y=values / response.reference, name=title, mode=mode, line=line | {"color": colour},
-                marker={"size": 4}, legendgroup=response.name, legendgrouptitle_text=response.name,
-                customdata=values * 1e6,
-                hovertemplate=f"{response.name}, {title}: %{{y:.3f}} (%{{customdata:.3g}} µm)<extra></extra>",
-            )  # fmt: skip
+    colours = cycle(len(responses))
+    for curve, title, dash in (("undamped", "undamped", "dot"), ("fixed", "bodies fixed", "dash")):
+        for owners, response, curves in _distinct(responses, linear or [each.linear for each in responses], curve):
+            colour = _SHARED if len(owners) > 1 else colours[responses.index(response)]
+            group = "without loose bodies" if len(owners) > 1 else response.name
+            look: dict[str, Any] = {"mode": "lines", "line": {"dash": dash, "width": 1.6, "color": colour}}
+            _add_amplitude(figure, owners, shown, group, title, response, curves.x, getattr(curves, curve), look)
+    for response, colour in zip(responses, colours, strict=True):
+        for values, title, mode, width in (
+            (response.damped_max, "damped, maximum", "lines+markers", 0.8),
+            (response.damped_mean, "damped, mean of peaks", "lines", 2.8),
+        ):
+            look = {"mode": mode, "line": {"width": width, "color": colour}, "marker": {"size": 4}}
+            _add_amplitude(figure, [response.name], shown, response.name, title, response, response.x, values, look)
     figure.update_yaxes(title_text="amplitude / undamped maximum", rangemode="tozero")
     return _finish(figure, responses, height=560)
 
 
-def mistuning_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Draw attached mass fraction and impacts per period."""
+def _add_amplitude(
+    figure: go.Figure, owners: Sequence[str], shown: Collection[str] | None, group: str, title: str,
+    response: ForcedResponse, x: np.ndarray, values: np.ndarray, look: Mapping[str, Any],
+) -> None:  # fmt: skip
+    """Draw amplitudes (k,), m, over the undamped maximum of a response; `group` heads them in a legend."""
+    legend = {"legendgroup": group, "legendgrouptitle_text": group} if shown is None else {"showlegend": False}
+    _add(
+        figure, owners, shown, x=x, y=values / response.reference, name=title, customdata=values * 1e6,
+        hovertemplate=f"{group}, {title}: %{{y:.3f}} (%{{customdata:.3g}} µm)<extra></extra>", **legend, **look,
+    )  # fmt: skip
+
+
+def _distinct(
+    responses: Sequence[ForcedResponse], linear: Sequence[LinearCurves], curve: str
+) -> list[tuple[list[str], ForcedResponse, LinearCurves]]:
+    """Return the linear curves that differ: names of the responses that share one, the first of them, and the curve."""
+    found: list[tuple[list[str], ForcedResponse, LinearCurves]] = []
+    for response, curves in zip(responses, linear, strict=True):
+        for owners, first, other in found:
+            # sweeps of gaps, friction ... share their linear curves
+            if response.reference == first.reference and all(
+                np.array_equal(one, two)
+                for one, two in ((curves.x, other.x), (getattr(curves, curve), getattr(other, curve)))
+            ):
+                owners.append(response.name)
+                break
+        else:
+            found.append(([response.name], response, curves))
+    return found
+
+
+def _add(
+    figure: go.Figure, owners: Sequence[str], shown: Collection[str] | None, row: int | None = None,
+    col: int | None = None, **trace: Any,
+) -> None:  # fmt: skip
+    """Draw a curve that is seen while one of the responses that it belongs to is picked."""
+    visible = shown is None or not set(shown).isdisjoint(owners)
+    figure.add_scatter(meta={"curves": list(owners)}, visible=visible, row=row, col=col, **trace)
+
+
+def mistuning_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | None = None) -> go.Figure:
+    """Draw attached mass fraction and impacts per period; shown: as of `responses_figure`."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
-    for response, colour in zip(responses, _cycle(responses), strict=True):
+    for response, colour in zip(responses, cycle(len(responses)), strict=True):
         curves = (response.attached_mass_fraction, response.impacts_per_period)
         for row, values in enumerate(curves, start=1):
-            figure.add_scatter(
-                x=response.x, y=values, name=response.name, mode="lines+markers", marker={"size": 4},
-                line={"color": colour, "width": 1.6}, legendgroup=response.name, showlegend=row == 1, row=row, col=1,
+            _add(
+                figure, [response.name], shown, row, 1, x=response.x, y=values, name=response.name,
+                mode="lines+markers", marker={"size": 4}, line={"color": colour, "width": 1.6},
+                legendgroup=response.name, showlegend=shown is None and row == 1,
             )  # fmt: skip
     figure.add_hline(y=1, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
     figure.update_yaxes(title_text="attached mass fraction", row=1, col=1)
@@ -66,9 +110,14 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
     """Draw where the energy goes: stacked shares of the losses, one panel a response."""
     columns = min(len(responses), _PANELS)
     rows = -(-len(responses) // columns)
+    # a name is as wide as a panel at most: its settings stand below each other
+    titles = ["<br>".join(_wrapped(response.name, _TITLE_WIDTH // columns)) for response in responses]
+    lines = max(title.count("<br>") for title in titles) + 1
+    above, below = 20 + 16 * lines, 60
+    height = rows * (_PANEL_HEIGHT + above + below)
     figure = make_subplots(
-        rows=rows, cols=columns, shared_yaxes=True, subplot_titles=[response.name for response in responses],
-        horizontal_spacing=0.04, vertical_spacing=0.25 / rows,
+        rows=rows, cols=columns, shared_yaxes=True, subplot_titles=titles, horizontal_spacing=0.04,
+        vertical_spacing=(above + below) / (height - above - below) if rows > 1 else 0.0,
     )  # fmt: skip
     for number, response in enumerate(responses):
         for index, loss in enumerate(LOSSES):
@@ -83,25 +132,39 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
     figure.update_yaxes(range=[0, 100])
     figure.update_annotations(font_size=12)
     figure.update_yaxes(title_text="share of the energy lost, %", col=1)
-    _finish(figure, responses, height=400 * rows)
+    _finish(figure, responses, height=height)
+    figure.update_layout(margin_t=above, margin_b=below)
     return figure.update_xaxes(title_font_size=11) if columns == _PANELS else figure
 
 
-def plane_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Draw largest tilt, share of the time off the floor and what small tilts neglect, of each body in the plane."""
+def _wrapped(name: str, width: int) -> list[str]:
+    """Return a name in lines of a width, broken after commas."""
+    lines = [""]
+    for part in name.split(", "):
+        longer = f"{lines[-1]}, {part}" if lines[-1] else part
+        lines = [*lines[:-1], longer] if len(longer) <= width or not lines[-1] else [*lines, part]
+    return lines
+
+
+def plane_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | None = None) -> go.Figure:
+    """Draw largest tilt, share of the time off the floor and what small tilts neglect, of each body in the plane.
+
+    shown: as of `responses_figure`.
+    """
     figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05)
-    for response, colour in zip(responses, _cycle(responses), strict=True):
+    for response, colour in zip(responses, cycle(len(responses)), strict=True):
         for body, name in bodies_in_plane(response):
-            dash = _DASHES[body % len(_DASHES)]
+            dash = DASHES[body % len(DASHES)]
             panels = (
                 (1e3 * response.in_plane["tilt_max"], "%{y:.4g} mrad"), (response.in_plane["lift_share"], "%{y:.3f}"),
                 (100 * response.in_plane["linearisation"], "%{y:.2g} %"),
             )  # fmt: skip
-            for row, (values, shown) in enumerate(panels, start=1):
-                figure.add_scatter(
-                    x=response.x, y=values[:, body], name=name, mode="lines+markers", marker={"size": 4},
-                    line={"color": colour, "width": 1.6, "dash": dash}, legendgroup=name, showlegend=row == 1,
-                    hovertemplate=f"{name}: {shown}<extra></extra>", row=row, col=1,
+            for row, (values, figures) in enumerate(panels, start=1):
+                _add(
+                    figure, [response.name], shown, row, 1, x=response.x, y=values[:, body], name=name,
+                    mode="lines+markers", marker={"size": 4}, line={"color": colour, "width": 1.6, "dash": dash},
+                    legendgroup=name, showlegend=shown is None and row == 1,
+                    hovertemplate=f"{name}: {figures}<extra></extra>",
                 )  # fmt: skip
     figure.update_yaxes(rangemode="tozero")
     for row, title in enumerate(("largest tilt, mrad", "time off the floor", "neglected, %"), start=1):
@@ -118,8 +181,9 @@ def bodies_in_plane(response: ForcedResponse) -> list[tuple[int, str]]:
     return [(body, f"{response.name}, body {body + 1}" if several else response.name) for body in extended]
 
 
-def _cycle(responses: Sequence[ForcedResponse]) -> list[str]:
-    return [COLOURS[index % len(COLOURS)] for index in range(len(responses))]
+def cycle(count: int) -> list[str]:
+    """Return the colours of a number of curves in their order."""
+    return [COLOURS[index % len(COLOURS)] for index in range(count)]
 
 
 def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int) -> go.Figure:

@@ -18,7 +18,10 @@ from vanedamp.studies.report.charts import axis_title, dressed
 from vanedamp.studies.report.forced_response import for_people, setting
 
 _FEWEST = 4  # values of the second axis that make a map
-_MOST_PANELS = 6
+#: panels that are drawn
+MOST_PANELS = 24
+#: panels in two columns, of more there are three; heights of a panel and of the space between two, px
+_IN_TWO, _TALL, _LOW, _BETWEEN = 6, 440, 320, 120
 
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
@@ -65,12 +68,13 @@ Panel = tuple[str, np.ndarray, np.ndarray, np.ndarray]
 def panels_figure(sweep: Sweep, drawn: list[Panel], two: tuple[str, str] | None, **heatmap: Any) -> go.Figure:
     """Draw the first panels of a map as heat maps with some options."""
     assert two is not None
-    drawn = drawn[:_MOST_PANELS]
-    columns = min(len(drawn), 2)
+    drawn = drawn[:MOST_PANELS]
+    columns = min(len(drawn), 2 if len(drawn) <= _IN_TWO else 3)
     rows = -(-len(drawn) // columns)
+    tall = _TALL if columns < 3 else _LOW
     figure = make_subplots(
         rows=rows, cols=columns, subplot_titles=[name for name, _, _, _ in drawn], shared_xaxes="all",
-        shared_yaxes="all", horizontal_spacing=0.05, vertical_spacing=0.28 / rows,
+        shared_yaxes="all", horizontal_spacing=0.05, vertical_spacing=_BETWEEN / (rows * tall),
     )  # fmt: skip
     across, up = two
     units = sweep.units()
@@ -81,7 +85,7 @@ def panels_figure(sweep: Sweep, drawn: list[Panel], two: tuple[str, str] | None,
         )
     figure.update_xaxes(title_text=axis_title(across, wide_units), showticklabels=True)
     figure.update_yaxes(title_text=axis_title(up, high_units), col=1)
-    return dressed(figure, height=440 * rows)
+    return dressed(figure, height=tall * rows)
 
 
 def panel_rows(drawn: list[Panel]) -> Iterator[list[object]]:

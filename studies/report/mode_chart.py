@@ -13,6 +13,9 @@ from vanedamp.studies.report.charts import FONT
 #: surfaces with more triangles than this are shown as pictures: turning them would be no pleasure
 MOST_TRIANGLES = 60_000
 _MOST_MODES = 12
+_DISTANCE = 2.3  # of the eye, in sizes of the scene
+#: views from which the best is taken, degrees; cells of a coarse screen across the structure
+_AZIMUTHS, _ELEVATION, _SCREEN = (25.0, 70.0, 115.0, 160.0, 205.0, 250.0, 295.0, 340.0), 18.0, 24
 _EXAGGERATION = 0.06  # largest displacement, as a share of the structure's size
 # cells by their number of nodes: faces by corners, as VTK counts them
 _TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
@@ -64,6 +67,32 @@ def small_surface(values: Mapping[str, np.ndarray]) -> Surface | None:
     return Surface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * MOST_TRIANGLES else None
 
 
+def viewpoint(points: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """Return the direction (3,), of unit length, from which a mode's shape (n, 3) at points (n, 3) is best seen.
+
+    Of directions around z, a little above the horizon, that from which most of the motion is in sight, and across the
+    view: nothing that stands still hides it.
+    """
+    angles = np.radians(_AZIMUTHS)
+    level, above = np.cos(np.radians(_ELEVATION)), np.sin(np.radians(_ELEVATION))
+    views = np.column_stack([level * np.cos(angles), level * np.sin(angles), np.full(len(angles), above)])
+    scores = [_in_sight(points, shape, view) for view in views]
+    # of views as good as each other, the first, whatever the last bit says
+    best = int(np.flatnonzero(np.array(scores) >= 0.99 * max(scores))[0])
+    return np.asarray(views[best])
+
+
+def _in_sight(points: np.ndarray, shape: np.ndarray, view: np.ndarray) -> float:
+    """Return how much motion across a view is to be seen: squares over the nearest points of a coarse screen."""
+    right = np.array([-view[1], view[0], 0.0]) / np.hypot(view[0], view[1])
+    across = np.column_stack([right, np.cross(view, right)])
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    cell = np.floor(points @ across * (_SCREEN / size)).astype(int)
+    order = np.argsort(-(points @ view), kind="stable")
+    nearest = order[np.unique(cell[order], axis=0, return_index=True)[1]]
+    return float(np.sum((shape[nearest] @ across) ** 2))
+
+
 def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.Figure:
     """Draw the modes of a record of `vanedamp modal`, one at a time, beginning with `mode`."""
     nodes, triangles = of
@@ -79,6 +108,7 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
         {"label": name, "method": "update", "args": [{"visible": [True, *(index == other for other in chosen)]}]}
         for index, name in zip(chosen, names, strict=True)
     ]
+    eye = dict(zip("xyz", (_DISTANCE * viewpoint(points, shapes[list(chosen).index(mode)])).tolist(), strict=True))
     axis = {"gridcolor": "#e2e8f0", "backgroundcolor": "#fff", "nticks": 5}
     figure.update_layout(
         height=560, autosize=True, font={"family": FONT, "size": 13}, margin={"l": 0, "r": 0, "t": 48, "b": 0},
@@ -86,7 +116,7 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
         updatemenus=[{"buttons": menu, "active": mode, "x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}],
         scene={
             "aspectmode": "data", "xaxis": axis | {"title": "x, m"}, "yaxis": axis | {"title": "y, m"},
-            "zaxis": axis | {"title": "z, m"}, "camera": {"eye": {"x": 2.0, "y": 0.95, "z": 0.75}},
+            "zaxis": axis | {"title": "z, m"}, "camera": {"eye": eye},
         },
     )  # fmt: skip
     return figure

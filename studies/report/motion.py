@@ -115,6 +115,11 @@ class Motion:
         return any(body.shape == "slider" for cavity in self.cavities for body in cavity.bodies)
 
     @property
+    def has_extent(self) -> bool:
+        """Whether there are bodies with a size."""
+        return any(body.shape != "slider" for cavity in self.cavities for body in cavity.bodies)
+
+    @property
     def first(self) -> int:
         """The frame to begin with: the first with a hit, or else with a closed contact."""
         light = np.max([contact.light for cavity in self.cavities for contact in cavity.contacts], axis=0)

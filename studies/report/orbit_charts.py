@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.orbits.history import OrbitHistory
-from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
 
 _STRUCTURE, _IMPACT = "#0f172a", "#d55e00"
 _ROW = 330  # pixels
@@ -25,61 +25,88 @@ def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
         subplot_titles=[title for name in histories for title in (name, "", "")[: 2 + bodies]],
     )  # fmt: skip
     for row, history in enumerate(histories.values(), start=1):
-        _add_structure(figure, history, row)
-        for body in range(history.slip.shape[1]):
-            _add_body(figure, history, body, row)
-        figure.update_xaxes(title_text="time, ms", row=row, col=1)
-        figure.update_yaxes(title_text="displacement, µm", row=row, col=1)
-        planes = (("structure", history.displacement), ("in the cavity", history.slip))
-        for col, (what, values) in enumerate(planes[: 1 + bodies], start=2):
-            reach = 1.06e6 * np.abs(values).max(initial=1e-12)  # bodies move from wall to wall: show the frame apart
-            figure.update_xaxes(title_text=f"{what}, µm", range=[-reach, reach], row=row, col=col)
-            figure.update_yaxes(title_text="mm/s", row=row, col=col)
+        _add_times(figure, history, row)
+        add_planes(figure, history, row, col=2)
+        starts = (history.displacement[:1], history.velocity[:1], history.slip[:1], history.slip_velocity[:1])
+        add_starts(figure, starts, "start of the period", row, col=2, size=8)
     figure.update_annotations(font_size=13)
     return dressed(figure, height=_ROW * rows + 60).update_layout(
         legend={"orientation": "h", "y": 1.0 + 40 / (_ROW * rows), "yanchor": "bottom"}, margin_t=90
     )
 
 
-def _add_structure(figure: go.Figure, history: OrbitHistory, row: int) -> None:
-    line = {"color": _STRUCTURE, "width": 1.6}
+def add_planes(figure: go.Figure, history: OrbitHistory, row: int, col: int) -> None:
+    """Draw the phase plane of the structure into a column of a row, and that of the bodies into the next."""
+    _add_plane(figure, "structure", _STRUCTURE, history.displacement, history.velocity, row, col)
+    planes = [("structure", history.displacement)]
+    for body in range(history.slip.shape[1]):
+        rate = history.slip_velocity[:, body]
+        _add_plane(figure, _named(body), _colour(body), history.slip[:, body], rate, row, col + 1, _dash(body))
+        planes = [planes[0], ("in the cavity", history.slip)]
+    for place, (what, values) in enumerate(planes, start=col):
+        reach = 1.06e6 * np.abs(values).max(initial=1e-12)  # bodies move from wall to wall: show the frame apart
+        figure.update_xaxes(title_text=f"{what}, µm", range=[-reach, reach], row=row, col=place)
+        figure.update_yaxes(title_text="mm/s", row=row, col=place)
+
+
+def add_starts(figure: go.Figure, states: Sequence[np.ndarray], name: str, row: int, col: int, size: int) -> None:
+    """Mark the states at starts of periods in the phase planes of `add_planes`.
+
+    states: displacement and velocity (n,) of the structure, slip and its velocity (n, bodies); size: of a mark, pixels.
+    """
+    displacement, velocity, slip, rate = states
     figure.add_scatter(
-        x=1e3 * history.time, y=1e6 * history.displacement, name="structure", legendgroup="structure", mode="lines",
-        line=line, showlegend=row == 1, hovertemplate="%{x:.6g} ms: %{y:.5g} µm", row=row, col=1,
+        x=1e6 * displacement, y=1e3 * velocity, name=name, mode="markers", marker={"color": _STRUCTURE, "size": size},
+        showlegend=row == 1, legendgroup="start", hoverinfo="skip", row=row, col=col,
     )  # fmt: skip
-    figure.add_scatter(
-        x=1e6 * history.displacement, y=1e3 * history.velocity, name="structure", legendgroup="structure", mode="lines",
-        line=line, showlegend=False, hovertemplate="%{x:.5g} µm, %{y:.5g} mm/s", row=row, col=2,
-    )  # fmt: skip
+    for body in range(slip.shape[1]):
+        figure.add_scatter(
+            x=1e6 * slip[:, body], y=1e3 * rate[:, body], mode="markers",
+            marker={"color": _colour(body), "size": size}, showlegend=False, legendgroup=_named(body), hoverinfo="skip",
+            row=row, col=col + 1,
+        )  # fmt: skip
+
+
+def _add_times(figure: go.Figure, history: OrbitHistory, row: int) -> None:
+    curves = [("structure", _STRUCTURE, "solid", history.displacement)]
+    curves += [
+        (_named(body), _colour(body), _dash(body), history.slip[:, body]) for body in range(history.slip.shape[1])
+    ]
+    for name, colour, dash, values in curves:
+        figure.add_scatter(
+            x=1e3 * history.time, y=1e6 * values, name=name, legendgroup=name, mode="lines",
+            line={"color": colour, "width": 1.5, "dash": dash}, showlegend=row == 1,
+            hovertemplate="%{x:.6g} ms: %{y:.5g} µm", row=row, col=1,
+        )  # fmt: skip
     at = np.interp(history.impact_time, history.time, history.displacement)
     figure.add_scatter(
         x=1e3 * history.impact_time, y=1e6 * at, name="impacts", legendgroup="impacts", mode="markers",
         marker={"color": _IMPACT, "symbol": "x", "size": 7}, showlegend=row == 1,
         hovertemplate="impact, %{x:.6g} ms: %{y:.5g} µm", row=row, col=1,
     )  # fmt: skip
+
+
+def _add_plane(
+    figure: go.Figure, name: str, colour: str, place: np.ndarray, rate: np.ndarray, row: int, col: int,
+    dash: str = "solid",
+) -> None:  # fmt: skip
     figure.add_scatter(
-        x=1e6 * history.displacement[:1], y=1e3 * history.velocity[:1], name="start of the period", mode="markers",
-        marker={"color": _STRUCTURE, "size": 8}, showlegend=row == 1, legendgroup="start", hoverinfo="skip", row=row,
-        col=2,
+        x=1e6 * place, y=1e3 * rate, name=name, legendgroup=name, mode="lines",
+        line={"color": colour, "width": 1.4, "dash": dash}, showlegend=False,
+        hovertemplate="%{x:.5g} µm, %{y:.5g} mm/s", row=row, col=col,
     )  # fmt: skip
 
 
-def _add_body(figure: go.Figure, history: OrbitHistory, body: int, row: int) -> None:
-    name, colour = f"body {body + 1} in its cavity", COLOURS[body % len(COLOURS)]
-    slip, rate = history.slip[:, body], history.slip_velocity[:, body]
-    curves = (
-        (1, 1e3 * history.time, 1e6 * slip, "%{x:.6g} ms: %{y:.5g} µm"),
-        (3, 1e6 * slip, 1e3 * rate, "%{x:.5g} µm, %{y:.5g} mm/s"),
-    )
-    for col, x, y, shown in curves:
-        figure.add_scatter(
-            x=x, y=y, name=name, legendgroup=name, mode="lines", line={"color": colour, "width": 1.4},
-            showlegend=row == 1 and col == 1, hovertemplate=shown, row=row, col=col,
-        )  # fmt: skip
-    figure.add_scatter(
-        x=1e6 * slip[:1], y=1e3 * rate[:1], mode="markers", marker={"color": colour, "size": 8}, showlegend=False,
-        legendgroup=name, hoverinfo="skip", row=row, col=3,
-    )  # fmt: skip
+def _named(body: int) -> str:
+    return f"body {body + 1} in its cavity"
+
+
+def _colour(body: int) -> str:
+    return COLOURS[body % len(COLOURS)]
+
+
+def _dash(body: int) -> str:
+    return DASHES[body % len(DASHES)]
 
 
 def orbits_header(histories: Mapping[str, OrbitHistory]) -> list[str]:

@@ -83,6 +83,7 @@ def write_report(results: Results, path: str | Path) -> None:
     scenes = {names[file]: _flat(result.scene) for file, result in by_file.items() if result.scene is not None}
     html = page.environment.get_template("report.html").render(
         plotly=plotly.offline.get_plotlyjs() if page.charts else None,
+        curves=(_FOLDER / "curves.js").read_text(encoding="utf-8") if page.charts["response"] else None,
         player=(_FOLDER / "motion.js").read_text(encoding="utf-8") if page.charts["motion"] else None,
         blocks=blocks,
         provenance=_provenance(results),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vanedamp.files.store import load, replacing
+from vanedamp.studies.report.mode_chart import viewpoint
 from vanedamp.studies.workers import run_module
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ def _render(modes_file: str, mode: int, picture: str) -> None:
     plotter.add_mesh(moved, scalars=title, scalar_bar_args=bar, **look)
     plotter.add_text(title, position=(0.33, 0.09), viewport=True, font_size=14, color="black")
     plotter.add_axes(color="black", line_width=4)
-    plotter.view_vector((1.0, 0.45, 0.35), viewup=(0.0, 0.0, 1.0))
+    plotter.view_vector(viewpoint(values["coordinates"], shape), viewup=(0.0, 0.0, 1.0))
     plotter.camera.zoom(1.2)
     # the colour bar takes the lower edge
     plotter.camera.SetWindowCenter(0.0, -0.08)

@@ -12,11 +12,11 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from vanedamp.coupling.response.response import PlanarSamples
+from vanedamp.coupling.response.response import PlanarSamples, Response
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import frozen, load
 from vanedamp.files.toml_input import validate
-from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
 from vanedamp.studies.report.motion import Motion, motion_of
 from vanedamp.studies.report.plane_history import ImpactsAtPlace, hits_in_plane, impacts_by_place, samples_in_plane
 
@@ -73,6 +73,24 @@ class History:
             scene=validate(Scene, provenance["scene"], str(path)) if "scene" in provenance else None,
         )
 
+    @classmethod
+    def of(cls, response: Response, scene: Scene | None = None) -> History:
+        """Return the history of a run that kept samples and events."""
+        impacts = [event for event in response.event_list if event.kind == "impact"]
+        return cls(
+            time=frozen(response.time),
+            displacement=frozen(response.displacement),
+            bodies=frozen(response.body_displacement),
+            impacts=frozen([event.time for event in impacts]),
+            struck=frozen([-1 if event.side == "stop" else event.damper for event in impacts], int),
+            plane=response.in_plane,
+            hits=[(event.time, (event.damper, event.side, event.corner)) for event in impacts],
+            by_place=[],
+            measures=response.to_json(),
+            provenance={},
+            scene=scene,
+        )
+
     @property
     def period(self) -> float:
         """s"""
@@ -125,7 +143,7 @@ def history_figure(history: History) -> go.Figure:
     for stop in _stops(history.scene):
         figure.add_hline(y=1e6 * stop, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
     for body in range(history.bodies.shape[1]):
-        colour = COLOURS[body % len(COLOURS)]
+        colour, dash = COLOURS[body % len(COLOURS)], DASHES[body % len(DASHES)]
         mine = history.struck == body
         figure.add_scatter(
             x=1e3 * history.impacts[mine], y=1e6 * at[mine], name=f"impacts of body {body + 1}", mode="markers",
@@ -133,12 +151,13 @@ def history_figure(history: History) -> go.Figure:
         )  # fmt: skip
         figure.add_scatter(
             x=milliseconds, y=1e6 * history.bodies[:, body], name=f"body {body + 1} in its cavity",
-            line={"color": colour, "width": 1.2}, hovertemplate="%{y:.4g} µm", row=2, col=1,
+            line={"color": colour, "width": 1.2, "dash": dash}, hovertemplate="%{y:.4g} µm", row=2, col=1,
         )  # fmt: skip
         for row, (_, values, unit) in enumerate(panels, start=3):
             if np.isfinite(values[:, body]).any():
                 figure.add_scatter(
-                    x=milliseconds, y=values[:, body], line={"color": colour, "width": 1.2}, showlegend=False,
+                    x=milliseconds, y=values[:, body], showlegend=False,
+                    line={"color": colour, "width": 1.2, "dash": dash},
                     hovertemplate=f"body {body + 1}: %{{y:.4g}} {unit}<extra></extra>", row=row, col=1,
                 )  # fmt: skip
     for wall in _walls(history.scene) if rows > 1 else ():

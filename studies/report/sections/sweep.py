@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,29 +23,36 @@ from vanedamp.studies.report.coexistence_charts import (
     count_figure,
     state_rows,
 )
-from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, model_name
+from vanedamp.studies.report.forced_response import (
+    ForcedResponse,
+    best_first,
+    forced_responses,
+    linear_curves,
+    model_name,
+)
 from vanedamp.studies.report.forced_response_charts import (
     bodies_in_plane,
+    cycle,
     energy_figure,
     mistuning_figure,
     plane_figure,
     responses_figure,
 )
-from vanedamp.studies.report.map_chart import map_axes, map_figure, map_rows, panel_rows
+from vanedamp.studies.report.map_chart import MOST_PANELS, map_axes, map_figure, map_panels, map_rows, panel_rows
 from vanedamp.studies.report.page import Page, format_setting
 from vanedamp.studies.report.results import Result
 
 ORDER = 10
 KIND = "sweep"
-#: curves of a section's charts, and of one sweep that a map shows as a whole; of more, evenly chosen ones are drawn
-_MOST_CURVES, _MOST_BESIDE_MAP = 12, 5
+#: curves of a page, of more the best; drawn at first, of which the reader picks others; panels of the energy
+_MOST_CURVES, _DRAWN, _MOST_PANELS = 240, 8, 6
 #: steady states in the table below basins
 _MOST_STATES = 24
-#: figure and measures of each chart of responses
-_CHARTS = {
-    "response": (responses_figure, ("undamped", "fixed", "damped_max", "damped_mean")),
-    "mistuning": (mistuning_figure, ("attached_mass_fraction", "impacts_per_period")),
-    "energy": (energy_figure, LOSSES),
+#: measures of each chart of responses
+_COLUMNS = {
+    "response": ("undamped", "fixed", "damped_max", "damped_mean"),
+    "mistuning": ("attached_mass_fraction", "impacts_per_period"),
+    "energy": LOSSES,
 }
 
 
@@ -60,7 +67,7 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
     """Return groups of responses that share an axis, maps, where runs end, and what is to be said about the bodies."""
     sweeps = {file: result.record for file, result in results.items()}
     return {
-        "groups": [_group(group, page) for group in _by_axis(_responses(sweeps, page))],
+        "groups": [_group(group, sweeps, page) for group in _by_axis(_responses(sweeps, page))],
         "maps": [_map(file, sweep, page) for file, sweep in sweeps.items() if map_axes(sweep)],
         "ends": [_ends(file, sweep, page) for file, sweep in sweeps.items() if basin_axes(sweep) or count_axes(sweep)],
         "notes": list(dict.fromkeys(filter(None, map(_body_note, sweeps.values())))),
@@ -94,17 +101,8 @@ def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
             name = stem.removeprefix(page.study).strip("_").replace("_", " ") or model
         else:
             name = model if models.count(model) == 1 else f"{model} ({stem})"
-        responses += _curves(file, sweep, name, max(1, _MOST_CURVES // len(sweeps)))
+        responses += [replace(response, source=file) for response in forced_responses(sweep, name)]
     return responses
-
-
-def _curves(file: str, sweep: Sweep, name: str, most: int) -> list[ForcedResponse]:
-    responses = [replace(response, source=file) for response in forced_responses(sweep, name)]
-    if map_axes(sweep) or basin_axes(sweep):
-        most = min(most, _MOST_BESIDE_MAP)
-    if len(responses) <= most:
-        return responses
-    return [responses[index] for index in np.linspace(0, len(responses) - 1, most).round().astype(int)]
 
 
 def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
@@ -113,17 +111,37 @@ def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
     return [[response for response in responses if response.axis == axis] for axis in axes]
 
 
-def _group(responses: Sequence[ForcedResponse], page: Page) -> dict[str, Any]:
+def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], page: Page) -> dict[str, Any]:
+    """Return charts and table of the responses along one axis, best first; those of a study keep their order."""
+    every = len(responses)
+    places = {response.name: place for place, response in enumerate(responses)}
+    if page.study is None:
+        responses = best_first(responses)[:_MOST_CURVES]
+    shown = [response.name for response in responses[: every if page.study is not None else _DRAWN]]
+    linear = [linear_curves(sweeps[response.source], response) for response in responses]
+    panels = responses if page.study is not None else responses[:_MOST_PANELS]
+    figures = {
+        "response": responses_figure(responses, linear, shown),
+        "mistuning": mistuning_figure(responses, shown),
+        "energy": energy_figure(panels),
+    }
     axis, sources = responses[0].axis, [response.source for response in responses]
     charts: dict[str, Chart | None] = {
-        kind: page.chart(kind, figure(responses), ("response", axis, *columns), _table(responses, columns), sources)
-        for kind, (figure, columns) in _CHARTS.items()
+        kind: page.chart(kind, figure, ("response", axis, *_COLUMNS[kind]), _table(responses, _COLUMNS[kind]), sources)
+        for kind, figure in figures.items()
     }
-    charts["plane"] = _plane_chart(responses, page)
-    return charts | {"axis": axis, "units": responses[0].units, "rows": [_key_figures(r) for r in responses]}
+    charts["plane"] = _plane_chart(responses, shown, page)
+    rows = [
+        _key_figures(response) | {"shown": response.name in shown, "place": places[response.name], "colour": colour}
+        for response, colour in zip(responses, cycle(len(responses)), strict=True)
+    ]
+    return charts | {
+        "axis": axis, "units": responses[0].units, "rows": rows, "every": every, "panels": len(panels),
+        "picks": len(rows) > 1,
+    }  # fmt: skip
 
 
-def _plane_chart(responses: Sequence[ForcedResponse], page: Page) -> Chart | None:
+def _plane_chart(responses: Sequence[ForcedResponse], shown: Collection[str], page: Page) -> Chart | None:
     """Return tilt and lift of the bodies in the plane; None without any."""
     planar = [response for response in responses if bodies_in_plane(response)]
     if not planar:
@@ -135,7 +153,7 @@ def _plane_chart(responses: Sequence[ForcedResponse], page: Page) -> Chart | Non
         for at, x in enumerate(response.x.tolist())
     )
     header = ("response", planar[0].axis, "body", *planar[0].in_plane)
-    return page.chart("plane", plane_figure(planar), header, rows, [response.source for response in planar])
+    return page.chart("plane", plane_figure(planar, shown), header, rows, [response.source for response in planar])
 
 
 def _table(responses: Sequence[ForcedResponse], columns: Sequence[str]) -> Iterator[list[Any]]:
@@ -169,6 +187,7 @@ def _ends(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
     return shown
 
 
-def _map(file: str, sweep: Sweep, page: Page) -> Chart:
-    header = ("panel", *(map_axes(sweep) or ()), "relative_amplitude")
-    return page.chart("map", map_figure(sweep), header, map_rows(sweep), [file])
+def _map(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
+    header, panels = ("panel", *(map_axes(sweep) or ()), "relative_amplitude"), len(map_panels(sweep))
+    chart = page.chart("map", map_figure(sweep), header, map_rows(sweep), [file])
+    return {"chart": chart, "panels": panels, "drawn": min(panels, MOST_PANELS)}

@@ -1,0 +1,70 @@
+"""`vanedamp check`: what an input file means, without running it."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from vanedamp.studies.commands.support.arguments import add_input, add_json
+
+if TYPE_CHECKING:
+    from vanedamp.studies.commands.support.facts import Fact
+
+ORDER = 4
+SUMMARY = "say what an input file means, without running it"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a file of any kind."""
+    add_input(parser, "FILE.toml")
+    add_json(parser)
+
+
+def run(arguments: Namespace) -> None:
+    """Print the facts."""
+    from importlib import import_module
+
+    from vanedamp.files.toml_input import read_toml
+    from vanedamp.studies.commands.support import facts
+    from vanedamp.studies.commands.support.messages import write_result
+    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.file_kinds import kind_of
+
+    check_outputs(arguments)
+    tables = read_toml(arguments.input)
+    kind = kind_of(tables, arguments.input)
+    found = import_module(f"{facts.__name__}.{kind.name}").facts(arguments.input)
+    left = facts.defaults(kind, tables)
+    write_result(arguments.json, {"kind": kind.name} | {fact.key: fact.value for fact in found} | {"defaults": left})
+    if arguments.json != "-":
+        commands = ", ".join(found[0].value) or "nothing as it is"
+        print(f"{arguments.input}: a {kind.name}, for vanedamp {commands}")
+        _print(found[1:])
+        if left:
+            print("left at their defaults: " + ", ".join(f"{key} = {_word(value)}" for key, value in left.items()))
+
+
+def _print(facts: Iterable[Fact]) -> None:
+    for key, value, unit, text in facts:
+        if key == "warnings":
+            for warning in value:
+                print(f"warning: {warning}")
+        elif _known(value):
+            print(f"  {key:21} {f'{_word(value)} {unit}':26} {text}".rstrip())
+
+
+def _known(value: Any) -> bool:
+    """Whether there is something to print of a value."""
+    return any(map(_known, value)) if isinstance(value, list) else value not in ({}, None)
+
+
+def _word(value: Any) -> str:
+    """Return a value as it stands in a line."""
+    if isinstance(value, dict):
+        return "; ".join(f"{key}: {_word(entry)}" for key, entry in value.items())
+    if isinstance(value, list):
+        return ", ".join(map(_word, value))
+    if value is None:
+        return "unknown"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

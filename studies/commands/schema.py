@@ -1,0 +1,34 @@
+"""`vanedamp schema`: the JSON Schema of a kind of input file, by which editors complete and check keys."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from vanedamp.studies.commands.support.arguments import add_output
+
+ORDER = 5
+SUMMARY = "JSON Schema of a kind of input file, for editors"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Take a kind of files, and the schema file."""
+    from vanedamp.studies.file_kinds import KINDS
+
+    parser.add_argument("kind", metavar="KIND", choices=sorted(KINDS), help=", ".join(sorted(KINDS)))
+    add_output(parser, "FILE.json")
+
+
+def run(arguments: Namespace) -> None:
+    """Print the schema, or write it."""
+    from vanedamp.files.toml_output import schema_text, write_schema
+    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.file_kinds import KINDS
+
+    check_outputs(arguments)
+    schema = KINDS[arguments.kind].schema
+    if arguments.output is None:
+        print(schema_text(schema), end="")
+        return
+    write_schema(arguments.output, schema)
+    print(f"{arguments.output}: for files beside it that begin with #:schema ./{Path(arguments.output).name}")

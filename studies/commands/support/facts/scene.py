@@ -1,0 +1,155 @@
+"""What a scene means: natural frequencies, amplitudes without bodies, onsets of slips and impacts, expected cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import eigh
+
+from vanedamp.coupling.model_order.choices import leaves_open
+from vanedamp.coupling.model_order.selection import warnings_of
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Prescribed, Rom
+from vanedamp.coupling.sweep.grid import grid
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.linear_response import glued_mass, linear_amplitudes, linear_responses
+from vanedamp.coupling.system.modal_basis import basis_of
+from vanedamp.coupling.system.onset import onsets
+from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
+from vanedamp.coupling.system.transient import left_over, timed
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.commands.support.budget import run_seconds, sweep_seconds
+from vanedamp.studies.commands.support.facts import Fact
+from vanedamp.studies.commands.support.outputs import Outputs
+from vanedamp.studies.commands.support.scenes import load_any_scene
+from vanedamp.studies.workers import available_cores
+
+#: natural frequencies that are listed
+_LISTED = 10
+#: commands of the tables that a scene may have
+_COMMANDS = {"sweep": "sweep", "orbit": "orbits", "ramp": "ramp", "ring_down": "ringdown"}
+
+
+def facts(path: str | Path) -> list[Fact]:
+    """Return what the scene in a file means. Raises InputError, as its commands do."""
+    scene = load_any_scene(str(path), Outputs(()))
+    commands = [name for table, name in _COMMANDS.items() if getattr(scene, table)]
+    found = facts_of(scene)
+    if scene.moved:
+        commands.insert(0, "run")
+    elif not scene.ring_down:
+        found[-1].value.append("excitation: nothing moves the structure, so that `vanedamp run` refuses it")
+    return [Fact("commands", commands), *found]
+
+
+def facts_of(scene: Scene) -> list[Fact]:
+    """Return what a scene means, warnings last. Raises InputError for one that cannot run."""
+    warnings: list[str] = []
+    whole = scene
+    if scene.sweep and not leaves_open(scene):
+        scene = grid(scene).base
+    scene = replace(scene, sweep={})
+    if leaves_open(scene):
+        warnings.append('modes or shape = "auto" is chosen by the run: figures here are of all modes, and of sliders')
+        scene = _closed(scene)
+    else:
+        warnings += warnings_of(scene)
+    found = [*_of_structure(scene), *_of_level(scene, warnings), *_of_bodies(scene), *_of_cost(scene, whole)]
+    return [*found, Fact("warnings", warnings)]
+
+
+def _closed(scene: Scene) -> Scene:
+    """Return the scene with all modes, and bodies of open shape as sliders."""
+    bodies = tuple(
+        replace(body, shape="slider", length=None, height=None, inertia=None, lift=0.0, tilt=0.0, lift_velocity=0.0,
+                tilt_rate=0.0, tolerance=None) if body.shape == "auto" else body
+        for body in scene.damper
+    )  # fmt: skip
+    structure = scene.structure
+    if isinstance(structure, Rom) and structure.modes == "auto":
+        structure = replace(structure, modes=None)
+    return replace(scene, structure=structure, damper=bodies)
+
+
+def _of_structure(scene: Scene) -> Iterator[Fact]:
+    basis = basis_of(scene)
+    yield Fact("model", scene.structure.model)
+    if isinstance(scene.structure, Prescribed):
+        return
+    omega = np.sqrt(basis.stiffness[:_LISTED])
+    ratios = np.divide(np.diag(basis.damping)[:_LISTED], 2 * omega, out=np.zeros_like(omega), where=omega > 0)
+    yield Fact("modes", len(basis.stiffness))
+    yield Fact("natural_frequency_hz", (omega / (2 * np.pi)).tolist(), "Hz", "without bodies")
+    yield Fact("damping_ratio", ratios.tolist(), "", "of these modes")
+
+
+def _of_level(scene: Scene, warnings: list[str]) -> Iterator[Fact]:
+    """Yield the excitation, and the linear amplitudes of the response."""
+    yield Fact("frequency_hz", scene.frequency, "Hz", "of the excitation")
+    if scene.excitation.signal is not None:
+        warnings.append("excitation.waveform: is no sum of sines, of which the amplitudes here would be")
+        return
+    undamped, fixed = linear_amplitudes(scene, np.array([scene.frequency]))
+    resonance = _resonance(scene)
+    if not isinstance(scene.structure, Prescribed):
+        name, unit = ("load_factor", "") if scene.excitation.distributed else ("force", "N")
+        yield Fact(name, excitation_force(scene), unit)
+        static = linear_responses(scene)[0].amplitude(np.zeros(1))
+        yield Fact("static_amplitude", float(static[0]), "m", "under the same load at rest")
+    if resonance is not None:
+        at_top = linear_amplitudes(scene, np.array([resonance.frequency]))[0]
+        yield Fact("resonance_hz", resonance.frequency, "Hz", f"mode {resonance.mode + 1}, without bodies")
+        yield Fact("resonance_amplitude", float(at_top[0]), "m", "X, there")
+        yield Fact("modal_mass", resonance.mass, "kg", "of that mode at the response")
+    yield Fact("amplitude_undamped", float(undamped[0]), "m", "at the excitation's frequency, without bodies")
+    yield Fact("amplitude_fixed", float(fixed[0]), "m", "there, with all bodies glued in")
+
+
+def _resonance(scene: Scene) -> Resonance | None:
+    """Return the resonance that the excitation is near; None without damping, or without modes."""
+    if isinstance(scene.structure, Prescribed):
+        return None
+    try:
+        return chosen_resonance(scene)
+    except InputError:  # that of a structure without damping has no height
+        return None
+
+
+def _of_bodies(scene: Scene) -> Iterator[Fact]:
+    if not scene.damper:
+        return
+    resonance, masses = _resonance(scene), [damper.mass for damper in scene.damper]
+    if resonance is not None:
+        system = assemble(scene)
+        squares = eigh(np.diag(system.of_structure.stiffness), glued_mass(system), eigvals_only=True)
+        yield Fact("mass_ratio", sum(masses) / resonance.mass, "", "of all bodies to the modal mass")
+        yield Fact("fixed_hz", float(np.sqrt(squares[resonance.mode]) / (2 * np.pi)), "Hz", "with all bodies glued in")
+        if scene.excitation.signal is None:
+            amplitude = float(linear_amplitudes(scene, np.array([resonance.frequency]))[0][0])
+            ratios = [cavity.gap / amplitude for cavity in scene.cavity] if amplitude else []
+            yield Fact("gap_ratio", ratios, "", "gap over X, of each cavity")
+    found = onsets(scene)
+    slips = [None if one is None else one.slip for one in found]
+    impacts = [None if one is None else one.impact for one in found]
+    yield Fact("slip_onset", slips, "m", "largest amplitude at which each body sticks")
+    yield Fact(
+        "impact_onset", impacts, "m", "largest amplitude without impacts of each body; a transient may hit before"
+    )
+
+
+def _of_cost(scene: Scene, whole: Scene) -> Iterator[Fact]:
+    """Yield the length of a run, and the time that it and the sweep of the whole scene take by the estimate."""
+    lasting = timed(scene)
+    yield Fact("periods", lasting.time.simulated, "", "at most" if lasting.time.steady else "")
+    if not lasting.time.steady:
+        yield Fact("transient", lasting.time.dropped, "", "of these are not evaluated")
+        yield Fact("transient_left", left_over(lasting, lasting.time.dropped), "", "of the linear transient, after it")
+    yield Fact("run_seconds", run_seconds(lasting), "s", "of processor time at least")
+    if whole.sweep:
+        cores = available_cores()
+        cost = sweep_seconds(replace(whole, time=lasting.time), cores)
+        yield Fact("sweep_points", whole.points)
+        yield Fact("sweep_seconds", cost, "s", f"at least, on {cores} cores")

@@ -1,0 +1,129 @@
+"""The picture of a forced response under way, and its key figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import plotly.graph_objects as go
+
+from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.studies.explore.curves import Linear
+from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
+from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses
+
+_FREE, _FIXED, _MEAN, _MAXIMUM = COLOURS[7], COLOURS[2], COLOURS[0], COLOURS[1]
+_HEIGHT = 480
+
+
+def response_figure(sweep: Sweep, linear: Linear, marks: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the picture of damped and linear amplitudes, relative to the undamped maximum, as plotly's plain data.
+
+    Points of the damped curve carry their frequency (Hz); open markers are points that are not ok. marks: kept as the
+    figure's `meta`. Plain, since plotly's own objects take longer than the runs of a coarse curve.
+    """
+    (response,) = forced_responses(sweep)
+    reference = response.reference
+    lines = [
+        {
+            "x": linear.frequencies, "y": np.where(np.isfinite(values), values / reference, np.nan), "name": name,
+            "mode": "lines", "line": {"color": colour, "dash": dash, "width": 1.8}, "hoverinfo": "skip",
+        }
+        for values, name, dash, colour in (
+            (linear.undamped, "undamped", "dot", _FREE), (linear.fixed, "bodies fixed", "dash", _FIXED),
+        )
+    ]  # fmt: skip
+    points = [
+        {
+            "x": response.x, "y": values / reference, "name": name, "mode": "lines+markers", "line": line,
+            "marker": {"size": size, "symbol": [f"{symbol}{_open(state)}" for state in sweep.status]},
+            "customdata": response.x, "text": [_hover(*point) for point in zip(values, sweep.status, strict=True)],
+            "hovertemplate": f"{name}: %{{y:.3f}}, %{{text}}, at %{{x:.6g}} Hz<extra></extra>",
+        }
+        for values, name, line, symbol, size in (
+            (sweep.amplitude_max, "damped, maximum", {"color": _MAXIMUM, "width": 0.9}, "diamond", 5),
+            (sweep.amplitude_mean, "damped, mean of peaks", {"color": _MEAN, "width": 2.6}, "circle", 7),
+        )
+    ]  # fmt: skip
+    return {"data": lines + points, "layout": _layout() | {"meta": dict(marks)}}
+
+
+@cache
+def _layout() -> dict[str, Any]:
+    figure = dressed(go.Figure(), _HEIGHT)
+    figure.update_xaxes(title_text=axis_title(FREQUENCY, "Hz"))
+    figure.update_yaxes(title_text="amplitude / undamped maximum", rangemode="tozero")
+    figure.update_layout(
+        legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0}, hovermode="closest", uirevision="kept",
+        margin={"t": 30, "r": 12, "l": 60, "b": 50}, plot_bgcolor="white", template="none",
+    )  # fmt: skip
+    layout: dict[str, Any] = figure.to_plotly_json()["layout"]
+    return layout
+
+
+def _open(status: str) -> str:
+    return "" if status == "ok" else "-open"
+
+
+def _hover(value: float, status: str) -> str:
+    return f"{value * 1e6:.4g} µm" + ("" if status == "ok" else f"; not ok: {status}")
+
+
+class Figure(NamedTuple):
+    """A key figure: a name and its value as text."""
+
+    name: str
+    value: str
+
+
+def key_figures(sweep: Sweep) -> list[Figure]:
+    """Return the key figures of a curve for people, those of the headline that `vanedamp sweep` prints."""
+    (response,) = forced_responses(sweep)
+    headline = response.headline
+    return [
+        Figure("undamped maximum X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at)),
+        Figure("bodies fixed, maximum", _at(_micro(headline.fixed_peak), headline.fixed_peak_at)),
+        Figure("damped peak (mean)", _at(_micro(headline.damped_peak), headline.damped_peak_at)),
+        Figure("damped peak / X", _ratio(headline.peak_ratio)),
+        Figure("most reduced in the band", _most_reduced(response)),
+        Figure("onset of the bodies", "none in the band" if headline.onset is None else f"{headline.onset:.6g} Hz"),
+        Figure("attached mass fraction", _ratio(headline.attached_mass_fraction)),
+    ]
+
+
+def remarks(sweep: Sweep, complete: bool) -> list[str]:
+    """Return what keeps the figures of a curve from being taken as they are."""
+    (response,) = forced_responses(sweep)
+    found = [*sweep.provenance.get("warnings", ())]
+    if complete:
+        found += response.headline.remarks
+    bad = sorted({status for status in sweep.status.ravel() if status != "ok"})
+    return [*found, f"not ok (open markers, none where a run broke): {', '.join(bad)}"] if bad else found
+
+
+def _most_reduced(response: ForcedResponse) -> str:
+    """Return the frequency at which the damped mean is the least share of the undamped amplitude."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(response.undamped > 0, response.damped_mean / response.undamped, np.nan)
+    if not np.isfinite(share).any():
+        return "-"
+    best = int(np.nanargmin(share))
+    return _at(f"to {share[best]:.3f} of undamped", response.x[best])
+
+
+def _at(text: str, frequency: Any) -> str:
+    return text if frequency is None or text == "-" else f"{text} at {frequency:.6g} Hz"
+
+
+def _micro(height: float) -> str:
+    if height == math.inf:
+        return "unbounded"
+    return f"{height * 1e6:.4g} µm" if math.isfinite(height) else "-"
+
+
+def _ratio(value: float) -> str:
+    return f"{value:.3f}" if math.isfinite(value) else "-"

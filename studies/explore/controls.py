@@ -1,0 +1,236 @@
+"""What can be moved in a scene, and the scene with its values moved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rigid
+from vanedamp.files.toml_input import InputError
+
+#: bodies of a cavity, beyond which a curve would take minutes
+MOST_BODIES = 12
+#: keys of a body that may differ between bodies which are equal otherwise
+_OWN = ("cavity", "position", "velocity")
+
+
+@dataclass(frozen=True)
+class Control:
+    """A number of a scene that is moved: a slider and a field.
+
+    name            identifier in the page
+    label, unit     for people; "" of a ratio
+    factor          of the scene's SI unit in a unit shown
+    value           where it starts, in the unit shown
+    low, high, log  ends of the slider, in the unit shown, and whether it is even in the logarithm
+    whole           whether only whole numbers make sense
+    changes         of a scene, by their dotted paths, for a number in SI units
+    """
+
+    name: str
+    label: str
+    unit: str
+    factor: float
+    value: float
+    low: float
+    high: float
+    log: bool
+    changes: Callable[[Scene, float], dict[str, Any]]
+    whole: bool = False
+
+    @property
+    def text(self) -> str:
+        """The value where it starts, as the field shows it."""
+        return f"{self.value:.4g}"
+
+    def parse(self, text: str) -> float:
+        """Return the number in a field, in SI units. Raises InputError."""
+        return number_in(text, self.label, self.unit, self.whole) * self.factor
+
+
+def number_in(text: str, label: str, unit: str = "", whole: bool = False) -> float:
+    """Return the finite number in a field. Raises InputError, naming the field by its label."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number) or (whole and number != int(number)):
+        kind = "a whole number" if whole else f"a number in {unit}" if unit else "a number"
+        raise InputError(f"{label}: expected {kind}, not {text if len(text) <= 20 else text[:20] + '…'!r}")
+    return number
+
+
+def moved(scene: Scene, controls: Sequence[Control], texts: Mapping[str, str]) -> Scene:
+    """Return the scene with the fields' numbers, by the controls' names; those that were not touched stay as they are.
+
+    Raises InputError, naming the control.
+    """
+    for control in controls:
+        text = texts.get(control.name, control.text)
+        if text == control.text:
+            continue
+        number = control.parse(text)
+        try:
+            scene = scene.replace(control.changes(scene, number))
+        except InputError as error:
+            raise InputError(f"{control.label}: {str(error).removeprefix('scene: ')}") from None
+    return scene
+
+
+def controls_of(scene: Scene) -> list[Control]:
+    """Return the controls that make sense for a scene, in the order in which they are applied."""
+    return [
+        *_bodies(scene),
+        *_listed("cavity", scene.cavity, (_GAP,), _gap_changes),
+        *(_listed("cavity", scene.cavity, (_PLAY,), _changes) if _extended(scene) else ()),
+        *_listed("damper", scene.damper, _MEASURES_OF_DAMPER, _changes),
+        *_damping(scene),
+        *_level(scene),
+        *_orientation(scene),
+    ]
+
+
+@dataclass(frozen=True)
+class _Measure:
+    """A key of a cavity or a body: how it is shown, and the slider's range as multiples of its value or as numbers."""
+
+    key: str
+    label: str
+    unit: str
+    factor: float
+    around: float | None = None
+    low: float = 0.0
+    high: float = 1.0
+
+
+_GAP = _Measure("gap", "gap", "µm", 1e-6, around=20.0)
+_PLAY = _Measure("play", "play", "µm", 1e-6, around=10.0)
+_MEASURES_OF_DAMPER = (
+    _Measure("mass", "mass of a body", "g", 1e-3, around=10.0),
+    _Measure("friction", "friction", "", 1.0, high=1.0),
+    _Measure("restitution", "restitution", "", 1.0),
+)
+_LEVELS = (
+    _Measure("resonance_amplitude", "level: undamped resonance", "µm", 1e-6, around=20.0),
+    _Measure("force", "level: force", "N", 1.0, around=20.0),
+    _Measure("base_acceleration", "level: base acceleration", "m/s²", 1.0, around=20.0),
+    _Measure("load_factor", "level: factor of the loads", "", 1.0, around=20.0),
+)
+_DAMPINGS = (
+    _Measure("damping_ratio", "damping ratio of the structure", "%", 1e-2, around=10.0),
+    _Measure("damping", "damping of the structure", "N s/m", 1.0, around=10.0),
+)
+
+
+def _control(measure: _Measure, name: str, label: str, value: float, changes: Any) -> Control:
+    shown = value / measure.factor
+    low, high = measure.low, max(measure.high, shown)
+    if measure.around is not None and shown > 0.0:
+        low, high = (float(f"{end:.3g}") for end in (shown / measure.around, shown * measure.around))
+    elif measure.around is not None:
+        high = max(1.0, shown)
+    log = measure.around is not None and shown > 0.0
+    return Control(name, label, measure.unit, measure.factor, shown, low, high, log, changes)
+
+
+def _listed(table: str, entries: Sequence[Any], measures: Sequence[_Measure], changes: Any) -> Iterator[Control]:
+    """Yield one control of a key that all entries share, or one of each where they differ."""
+    for measure in measures:
+        values = [getattr(entry, measure.key) for entry in entries]
+        if not values or None in values:
+            continue
+        if len(set(values)) == 1:
+            paths = (f"{table}.{measure.key}",)
+            yield _control(measure, measure.key, measure.label, values[0], _setter(changes, paths))
+            continue
+        for index, (entry, value) in enumerate(zip(entries, values, strict=True)):
+            title = getattr(entry, "name", index + 1)
+            paths = (f"{table}.{index}.{measure.key}",)
+            yield _control(
+                measure, f"{measure.key}-{index}", f"{measure.label} {title}", value, _setter(changes, paths)
+            )
+
+
+def _setter(changes: Any, paths: tuple[str, ...]) -> Callable[[Scene, float], dict[str, Any]]:
+    return lambda scene, number: changes(scene, paths, number)
+
+
+def _changes(scene: Scene, paths: tuple[str, ...], number: float) -> dict[str, Any]:
+    return dict.fromkeys(paths, number)
+
+
+def _gap_changes(scene: Scene, paths: tuple[str, ...], number: float) -> dict[str, Any]:
+    """Return the changes of a gap: bodies keep their place as a share of the free travel."""
+    values = _changes(scene, paths, number)
+    step = paths[0].split(".")[1]
+    gaps = {cavity.name: cavity.gap for k, cavity in enumerate(scene.cavity) if step in ("gap", str(k))}
+    for index, damper in enumerate(scene.damper):
+        if damper.cavity in gaps and damper.position:
+            values[f"damper.{index}.position"] = damper.position * (number / gaps[damper.cavity])
+    return values
+
+
+def _extended(scene: Scene) -> bool:
+    return any(damper.shape != "slider" for damper in scene.damper)
+
+
+def _bodies(scene: Scene) -> Iterator[Control]:
+    """Yield the number of bodies in each cavity, where all are alike."""
+    data = scene.to_dict()["damper"] if scene.damper else []
+    alike = [{key: value for key, value in body.items() if key not in _OWN} for body in data]
+    counts = {len(list(bodies)) for _, bodies in groupby(damper.cavity for damper in scene.damper)}
+    homes = {damper.cavity for damper in scene.damper}
+    if (
+        not data
+        or any(body != alike[0] for body in alike)
+        or len(counts) != 1
+        or homes != {cavity.name for cavity in scene.cavity}
+    ):
+        return
+    count = counts.pop()
+    label = "number of bodies" if len(homes) == 1 else "bodies in each cavity"
+    yield Control("bodies", label, "", 1.0, count, 1, max(8, count), False, _body_changes, whole=True)
+
+
+def _body_changes(scene: Scene, number: float) -> dict[str, Any]:
+    """Return the changes to `number` equal bodies in each cavity, spread evenly over its free travel."""
+    count = int(number)
+    if not 1 <= count <= MOST_BODIES:
+        raise InputError(f"expected 1 to {MOST_BODIES}, not {number:g}")
+    body = scene.to_dict()["damper"][0] | {"velocity": 0.0}
+    rows = [
+        body | {"cavity": cavity.name, "position": ((place + 0.5) / count - 0.5) * cavity.gap}
+        for cavity in scene.cavity
+        for place in range(count)
+    ]
+    return {"damper": rows}
+
+
+def _damping(scene: Scene) -> Iterator[Control]:
+    if not isinstance(scene.structure, Rigid):
+        return  # a reduced model holds its own
+    yield from _given("structure", scene.structure, _DAMPINGS)
+
+
+def _level(scene: Scene) -> Iterator[Control]:
+    yield from _given("excitation", scene.excitation, _LEVELS)
+
+
+def _given(table: str, record: Any, measures: Sequence[_Measure]) -> Iterator[Control]:
+    """Yield the control of the one of these keys that a table gives."""
+    for measure in measures:
+        value = getattr(record, measure.key)
+        if value is not None:
+            setter = _setter(_changes, (f"{table}.{measure.key}",))
+            yield _control(measure, measure.key, measure.label, value, setter)
+
+
+def _orientation(scene: Scene) -> Iterator[Control]:
+    if scene.damper and scene.gravity.acceleration > 0.0 and scene.gravity.direction is None and not scene.speed:
+        angle, setter = scene.gravity.orientation_deg, _setter(_changes, ("gravity.orientation_deg",))
+        low, high = min(-90.0, angle), max(90.0, angle)
+        yield Control("orientation", "orientation of gravity", "°", 1.0, angle, low, high, False, setter)

@@ -1,0 +1,263 @@
+"""The page: its parts, and what they do."""
+
+from __future__ import annotations
+
+import math
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dash import ClientsideFunction, Dash, Input, Output, State, dcc, html, no_update
+from dash.exceptions import PreventUpdate
+
+from vanedamp.coupling.scene.scene import Scene, relative
+from vanedamp.coupling.scene.short_form import short_form
+from vanedamp.files.errors import VanedampError
+from vanedamp.files.toml_input import validate
+from vanedamp.files.toml_output import commented, write_commented
+from vanedamp.studies.explore import point
+from vanedamp.studies.explore.chart import Figure, key_figures, remarks, response_figure
+from vanedamp.studies.explore.controls import Control, controls_of, moved, number_in
+from vanedamp.studies.explore.curves import EVALUATED, Band, Curve, Curves, Submit, ends_of, explorable, seen
+from vanedamp.studies.file_kinds import KINDS
+
+#: steps of a slider, and the longest that a request waits for the next form of a curve, s
+_STEPS, _PATIENCE = 200, 0.5
+#: said while there is no point of a curve yet
+_FIRST = "computing; the first time that it runs, the engine is compiled, which takes a minute or two"
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """A scene to explore: its source, what moves in it, the texts of its band's fields, the file it is written to."""
+
+    scene: Scene
+    source: str
+    controls: list[Control]
+    band: Mapping[str, str]
+    output: Path | None = None
+
+    @classmethod
+    def of(cls, scene: Scene, source: str, output: Path | None = None) -> Exploration:
+        """Return the exploration of a scene. Raises InputError where no curve can be drawn."""
+        plain = explorable(scene)
+        low, high = ("" if end is None else f"{end:.12g}" for end in ends_of(scene))
+        exploration = cls(
+            plain, source, controls_of(plain), {"low": low, "high": high, "evaluated": str(EVALUATED)}, output
+        )
+        exploration.seen(exploration.texts)
+        return exploration
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """The texts of all fields, by their names, as the page begins."""
+        return {control.name: control.text for control in self.controls} | dict(self.band)
+
+    def seen(self, texts: Mapping[str, str]) -> Scene:
+        """Return the scene that the texts of the fields ask for, with its [sweep]. Raises InputError."""
+        return seen(moved(self.scene, self.controls, texts), _band(texts))
+
+
+def _band(texts: Mapping[str, str]) -> Band:
+    """Return the band in its fields; a frequency that is left out is found. Raises InputError."""
+    low, high = (
+        number_in(texts[name], label, "Hz") if texts[name].strip() else None
+        for name, label in (("low", "frequencies from"), ("high", "frequencies to"))
+    )
+    return Band(low, high, int(number_in(texts["evaluated"], "periods evaluated", whole=True)))
+
+
+def layout(exploration: Exploration) -> html.Main:
+    """Return a page of its own: each tab of the browser has one."""
+    source, output = exploration.source, exploration.output
+    place = f" and as {output}" if output else ""
+    names = list(exploration.texts)
+    return html.Main(
+        [
+            dcc.Store(id="tab", data=uuid.uuid4().hex), dcc.Store(id="names", data=names),
+            dcc.Store(id="wanted"), dcc.Store(id="request"), dcc.Store(id="answer"),
+            dcc.Store(id="scene"), dcc.Store(id="sweep"),
+            dcc.Interval(id="clock", interval=3000), dcc.Download(id="file"),
+            html.Section(
+                [
+                    html.H2(source),
+                    *(_control(control) for control in exploration.controls),
+                    html.Div(
+                        [
+                            "frequencies", _field("low", "lowest frequency, Hz", exploration.band["low"], "auto"),
+                            "to", _field("high", "highest frequency, Hz", exploration.band["high"], "auto"), "Hz",
+                        ],
+                        className="row",
+                    ),
+                    html.Div(
+                        [
+                            "periods evaluated",
+                            _field("evaluated", "periods evaluated", exploration.band["evaluated"], ""),
+                        ],
+                        className="row",
+                    ),
+                    html.Div(
+                        [
+                            html.Button("write scene", id="write", title=f"save the TOML file of what is seen{place}"),
+                            html.Span(id="written", role="status"),
+                        ],
+                        className="row",
+                    ),
+                ],
+                **_named("controls"),
+            ),
+            html.Section(
+                [
+                    html.Div(
+                        dcc.Graph(
+                            id="curve", figure={"layout": {"height": 480}},
+                            config={
+                                "displaylogo": False, "responsive": True,
+                                "modeBarButtons": [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
+                            },
+                        ),
+                        id="frame",
+                    ),
+                    html.P("computing", id="message", className="message", role="status"),
+                    html.Div(id="figures"),
+                ],
+                **_named("forced response"),
+            ),
+            html.Section(point.panel(), className="wide", **_named("motion at a point")),
+        ]
+    )  # fmt: skip
+
+
+def register(app: Dash, exploration: Exploration, submit: Submit) -> None:
+    """Let the sliders move the curve; submit: runs a call in the page's worker processes."""
+    curves = Curves(submit)
+    for control in exploration.controls:
+        app.clientside_callback(
+            ClientsideFunction("explore", "agree"),
+            Output(f"slider-{control.name}", "value"), Output(f"number-{control.name}", "value"),
+            Input(f"slider-{control.name}", "value"), Input(f"number-{control.name}", "value"),
+            State(f"control-{control.name}", "data"), prevent_initial_call=True,
+        )  # fmt: skip
+    app.clientside_callback(
+        ClientsideFunction("explore", "gather"),
+        Output("wanted", "data"), *(Input(f"number-{name}", "value") for name in exploration.texts),
+        State("names", "data"),
+    )  # fmt: skip
+    app.clientside_callback(
+        ClientsideFunction("explore", "pump"),
+        Input("wanted", "data"), Input("answer", "data"), Input("clock", "n_intervals"), State("tab", "data"),
+    )  # fmt: skip
+
+    @app.callback(
+        Output("curve", "figure"), Output("figures", "children"), Output("scene", "data"), Output("sweep", "data"),
+        Output("message", "children"), Output("message", "className"), Output("frame", "className"),
+        Output("answer", "data"),
+        Input("request", "data"), prevent_initial_call=True,
+    )  # fmt: skip
+    def draw(request: dict[str, Any]) -> tuple[Any, ...]:
+        return _draw(exploration, curves, request)
+
+    @app.callback(
+        Output("file", "data"), Output("written", "children"),
+        Input("write", "n_clicks"), State("scene", "data"), State("sweep", "data"), prevent_initial_call=True,
+    )  # fmt: skip
+    def write(_clicks: int, scene: dict[str, Any] | None, sweep: dict[str, Any]) -> tuple[Any, ...]:
+        if scene is None:
+            return no_update, "no curve yet"
+        return _write(exploration, validate(Scene, scene | {"sweep": sweep}, "scene"))
+
+    point.register(app, submit)
+
+
+def _draw(exploration: Exploration, curves: Curves, request: dict[str, Any]) -> tuple[Any, ...]:
+    """Return what changes in the page for a request: {tab, serial, version, values, have}, the points it has."""
+    reply = {"serial": request["serial"], "version": request["version"], "have": 0, "complete": True}
+    try:
+        curve = curves.take(request["tab"], request["version"], lambda: exploration.seen(request["values"]))
+    except VanedampError as error:
+        return (*[no_update] * 4, str(error), "message bad", "old", reply)
+    if curve is None:
+        raise PreventUpdate
+    have = request["have"]
+    curve.wait(curve.coarse if have < curve.coarse else curve.size, _PATIENCE)
+    if not curve.wanted:
+        raise PreventUpdate
+    reply |= {"have": curve.done, "complete": curve.done == curve.size}
+    if curve.done == have:
+        said = _FIRST if have == 0 else no_update
+        return (*[no_update] * 4, said, no_update, no_update, reply)
+    figure, figures, text = _drawn(curve, request["version"])
+    data: Any = no_update
+    table: Any = no_update
+    if not have:  # further forms of the curve are of the same scene
+        data = curve.scene.to_dict()
+        table, data["sweep"] = data["sweep"], {}
+    return figure, figures, data, table, text, "message", "", reply
+
+
+def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
+    """Return figure, key figures and a line on what there is of a curve so far."""
+    sweep = curve.sweep()
+    count, complete = len(sweep.status), len(sweep.status) == curve.size
+    figures = html.Div(
+        [
+            html.Dl([part for figure in key_figures(sweep) for part in _term(figure)]),
+            html.Ul([html.Li(remark) for remark in remarks(sweep, complete)], className="remarks"),
+        ]
+    )
+    text = f"{count} frequencies" if complete else f"{count} of {curve.size} frequencies so far"
+    figure = response_figure(sweep, curve.linear, {"version": version, "points": count, "complete": complete})
+    return figure, figures, text
+
+
+def _term(figure: Figure) -> list[Any]:
+    return [html.Dt(figure.name), html.Dd(figure.value)]
+
+
+def _write(exploration: Exploration, scene: Scene) -> tuple[Any, str]:
+    """Return the file for the browser, and what to say; writes the file of the command line, too."""
+    said = "saved by the browser"
+    if exploration.output is not None:
+        replaced = ", in place of the file that was there" if exploration.output.exists() else ""
+        try:
+            write_commented(exploration.output, relative(short_form(scene), exploration.output), KINDS["scene"])
+            said = f"{exploration.output} written{replaced}; {said}"
+        except (OSError, VanedampError) as error:
+            said = f"{exploration.output} cannot be written ({error}); {said}"
+    text = commented(relative(short_form(scene), None), KINDS["scene"].schema, "scene")
+    return {"content": text, "filename": "scene.toml", "type": "application/toml"}, said
+
+
+def _control(control: Control) -> html.Div:
+    """Return slider and field of a control."""
+    name, unit = control.name, f", {control.unit}" if control.unit else ""
+    low, high, place = ((math.log10(x) if control.log else x) for x in (control.low, control.high, control.value))
+    step = 1 if control.whole else (high - low) / _STEPS
+    data = {"name": name, "log": control.log, "whole": control.whole, "low": low, "high": high, "unit": control.unit}
+    return html.Div(
+        [
+            html.Label(control.label, htmlFor=f"slider-{name}"),
+            dcc.Input(id=f"slider-{name}", type="range", min=low, max=high, step=step, value=place),
+            html.Div(
+                [_field(name, f"{control.label}{unit}", control.text, ""), html.Span(control.unit)], className="field"
+            ),
+            dcc.Store(id=f"control-{name}", data=data),
+        ],
+        className="control",
+    )  # fmt: skip
+
+
+def _named(name: str) -> dict[str, Any]:
+    """Return what tells a part of the page to who cannot see it."""
+    return {"aria-label": name}
+
+
+def _field(name: str, label: str, text: str, empty: str) -> html.Div:
+    """Return a field for a number, with a label for who cannot see its surroundings."""
+    field = dcc.Input(
+        id=f"number-{name}", type="text", inputMode="numeric", value=text, debounce=0.4, placeholder=empty,
+        autoComplete="off",
+    )  # fmt: skip
+    return html.Div([html.Label(label, htmlFor=f"number-{name}", className="hidden"), field])

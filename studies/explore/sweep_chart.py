@@ -1,0 +1,230 @@
+"""Curves of a sweep: one at chosen values of its axes before all others, and the best design."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.sweep.grid import base_scene, resonance_axis
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.steady_states import is_start
+from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
+from vanedamp.studies.report.forced_response import (
+    ForcedResponse,
+    for_people,
+    linear_curves,
+    response_along,
+    setting,
+)
+
+#: curves behind the chosen one at most; of more, evenly chosen ones are drawn
+_MOST_BEHIND = 60
+#: of runs to the end of time whose figures may still change
+_UNSURE = (Status.NOT_STEADY, Status.UNCERTAIN)
+_CHOSEN, _BEST, _LINEAR = COLOURS[0], COLOURS[1], "#0f172a"
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best design of a sweep: the one whose highest amplitude is the lowest, however its runs begin.
+
+    places    a place on every axis: of the frequency and of the starts those of its highest amplitude
+    amplitude highest mean of the periods' peaks, m
+    relative  over the undamped maximum; nan where there is none
+    designs   number of designs, and how many of them are left out: with points that are not ok
+    left_out
+    """
+
+    places: Mapping[str, int]
+    amplitude: float
+    relative: float
+    designs: int
+    left_out: int
+
+
+def abscissas(sweep: Sweep) -> list[str]:
+    """Return the axes along which curves are drawn: those of several numbers, the frequency or speed first."""
+    swept = resonance_axis(sweep.scene, sweep.axes)[0]
+    several = [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and len(values) > 1]
+    return sorted(several, key=lambda path: (path != swept, is_start(path))) or list(sweep.axes)[:1]
+
+
+def best_design(sweep: Sweep) -> Best | None:
+    """Return the best design of a sweep; None if every design has points that are not ok."""
+    swept = resonance_axis(sweep.scene, sweep.axes)[0]
+    paths = list(sweep.axes)
+    over = tuple(k for k, path in enumerate(paths) if path == swept or is_start(path))
+    ok = sweep.status == "ok"
+    complete = ok.all(axis=over)
+    if not complete.any():
+        return None
+    peak = np.where(ok, sweep.amplitude_mean, 0.0).max(axis=over)
+    relative = peak / _undamped_maximum(sweep, swept, over)
+    # designs that share their undamped maximum rank by either figure
+    figure = relative if np.isfinite(relative[complete]).all() else peak
+    chosen = np.unravel_index(np.argmin(np.where(complete, figure, np.inf)), complete.shape)
+    places = dict(zip([path for k, path in enumerate(paths) if k not in over], map(int, chosen), strict=True))
+    runs = sweep.amplitude_mean[tuple(places.get(path, slice(None)) for path in paths)]
+    highest = np.unravel_index(np.argmax(runs), runs.shape)
+    places |= dict(zip([paths[k] for k in over], map(int, highest), strict=True))
+    return Best(
+        places, float(peak[chosen]), float(relative[chosen]), complete.size, complete.size - int(complete.sum())
+    )
+
+
+def _undamped_maximum(sweep: Sweep, swept: str | None, over: tuple[int, ...]) -> np.ndarray:
+    """Return the undamped maximum of each design, m; nan where there is none."""
+    if swept is None or "undamped_peak" not in sweep.peaks:
+        top = sweep.amplitude_undamped.max(axis=over)
+    else:
+        at = list(sweep.axes).index(swept)
+        top = np.expand_dims(sweep.peaks["undamped_peak"], at).max(axis=over)
+    return np.where(np.isfinite(top) & (top > 0.0), top, np.nan)
+
+
+def best_sentence(sweep: Sweep, best: Best | None) -> str:
+    """Return the best design for people."""
+    if best is None:
+        return "No design is complete: each has points that are not ok."
+    swept, units = resonance_axis(sweep.scene, sweep.axes)[0], sweep.units()
+    design = ", ".join(
+        setting(path, values[best.places[path]], units[path])
+        for path, values in sweep.axes.items()
+        if path != swept and not is_start(path)
+    )
+    highest = "highest mean amplitude" if swept or any(map(is_start, sweep.axes)) else "mean amplitude"
+    text = f"Best of {best.designs} designs: {design or 'the only one'}, {highest} {1e6 * best.amplitude:.4g} µm"
+    if np.isfinite(best.relative):
+        text += f", {best.relative:.3f} of the undamped {'maximum' if swept else 'amplitude'}"
+    if swept is not None:
+        text += f", at {setting(swept, sweep.axes[swept][best.places[swept]], units[swept])}"
+    if best.left_out:
+        verb = "is" if best.left_out == 1 else "are"
+        text += f"; {best.left_out} of {best.designs} designs {verb} left out, with points that are not ok"
+    return text + "."
+
+
+def chosen_curve(sweep: Sweep, along: str, places: Mapping[str, int]) -> ForcedResponse:
+    """Return the curve along an axis at places on the others."""
+    units = sweep.units()
+    settings = {path: axis.tolist()[places[path]] for path, axis in sweep.axes.items() if path != along}
+    values = [setting(path, value, units[path]) for path, value in settings.items() if len(sweep.axes[path]) > 1]
+    return response_along(sweep, _point(sweep, along, places), along, ", ".join(values) or "damped", settings)
+
+
+def curve_figure(sweep: Sweep, along: str, places: Mapping[str, int]) -> go.Figure:
+    """Draw the curve along an axis of a sweep at places on the others, with its linear curves, before all others."""
+    response = chosen_curve(sweep, along, places)
+    factor, unit = for_people(response.units)
+    text = response.x.dtype.kind not in "if"
+    x = response.x if text else factor * response.x
+    figure = go.Figure()
+    behind = _others(sweep, along, places)
+    if len(behind):
+        gap = [None]
+        figure.add_scatter(
+            x=[value for _ in behind for value in [*x.tolist(), *gap]],
+            y=[value for curve in behind for value in [*(1e6 * curve).tolist(), *gap]],
+            mode="lines", line={"color": "#94a3b8", "width": 1}, opacity=0.35, hoverinfo="skip",
+            name="other values",
+        )  # fmt: skip
+    linear = linear_curves(sweep, response)
+    between = linear.x if text else factor * linear.x
+    curves: list[tuple[str, np.ndarray, np.ndarray, dict[str, Any], str]] = [
+        ("undamped", between, linear.undamped, {"dash": "dot", "width": 1.8, "color": _LINEAR}, "lines"),
+        ("bodies fixed", between, linear.fixed, {"dash": "dash", "width": 1.8, "color": _LINEAR}, "lines"),
+        ("damped, maximum", x, response.damped_max, {"width": 0.8, "color": _CHOSEN}, "lines"),
+        ("damped, mean of peaks", x, response.damped_mean, {"width": 2.8, "color": _CHOSEN}, "lines+markers"),
+    ]
+    for title, at, values, line, mode in curves:
+        if np.isfinite(values).any():
+            figure.add_scatter(
+                x=at, y=1e6 * np.where(np.isfinite(values), values, np.nan), name=title, mode=mode, line=line,
+                marker={"size": 5}, hovertemplate=f"{title}: %{{y:.4g}} µm<extra></extra>",
+                customdata=response.x.tolist() if at is x else None,
+            )  # fmt: skip
+    _add_troubles(figure, sweep, along, places, x)
+    _add_best(figure, sweep, along, places, factor)
+    figure.update_xaxes(title_text=axis_title(along, unit, response.hertz), hoverformat=".6g")
+    figure.update_yaxes(title_text="amplitude, µm", rangemode="tozero")
+    figure.update_layout(hovermode="x unified", uirevision=along)
+    return dressed(figure, height=520)
+
+
+def _others(sweep: Sweep, along: str, places: Mapping[str, int]) -> np.ndarray:
+    """Return the other curves along an axis (curves, n), m, nan at points that are not ok; the chosen one left out."""
+    at = list(sweep.axes).index(along)
+    values = np.where(sweep.status == "ok", sweep.amplitude_mean, np.nan)
+    order = np.argsort(sweep.axes[along], kind="stable")
+    curves = np.moveaxis(values, at, -1)[..., order]
+    shape = curves.shape[:-1]
+    mine = np.ravel_multi_index([places[path] for path in sweep.axes if path != along], shape) if shape else 0
+    others = np.delete(np.arange(int(np.prod(shape))), mine)
+    if len(others) > _MOST_BEHIND:
+        others = others[np.linspace(0, len(others) - 1, _MOST_BEHIND).round().astype(int)]
+    rows: np.ndarray = curves.reshape(-1, len(order))[others]
+    return rows
+
+
+def _add_troubles(figure: go.Figure, sweep: Sweep, along: str, places: Mapping[str, int], x: np.ndarray) -> None:
+    """Mark the points that are not ok with their status: at their amplitude if they ran to the end, else at zero."""
+    point = _point(sweep, along, places)
+    states, means = sweep.status[point], sweep.amplitude_mean[point]
+    bad, ended = states != "ok", np.isin(states, _UNSURE) & np.isfinite(means)
+    if bad.any():
+        figure.add_scatter(
+            x=x[bad], y=1e6 * np.where(ended, means, 0.0)[bad], mode="markers", name="not ok",
+            text=states[bad], customdata=sweep.axes[along][point[list(sweep.axes).index(along)]][bad].tolist(),
+            marker={"symbol": np.where(ended, "circle-open", "x-thin-open")[bad], "size": 8, "color": "#7f1d1d"},
+            hovertemplate="%{text}: %{y:.4g} µm<extra></extra>", cliponaxis=False,
+        )  # fmt: skip
+
+
+def _point(sweep: Sweep, along: str, places: Mapping[str, int]) -> tuple[Any, ...]:
+    order = np.argsort(sweep.axes[along], kind="stable")
+    return tuple(order if path == along else places[path] for path in sweep.axes)
+
+
+def status_sentence(sweep: Sweep, along: str, places: Mapping[str, int]) -> str:
+    """Return how many points of a curve are ok, and the status of the others, for people."""
+    states = sweep.status[_point(sweep, along, places)].tolist()
+    good = states.count("ok")
+    troubles = ", ".join(f"{count} {state}" for state, count in Counter(states).items() if state != "ok")
+    return f"{good} of {len(states)} points are ok" + (f"; left out: {troubles}." if troubles else ".")
+
+
+def _add_best(figure: go.Figure, sweep: Sweep, along: str, places: Mapping[str, int], factor: float) -> None:
+    """Mark the highest point of the best design, and draw its curve where it is not the chosen one."""
+    best = best_design(sweep)
+    if best is None or sweep.axes[along].dtype.kind not in "if":
+        return
+    if any(best.places[path] != places[path] for path in sweep.axes if path != along):
+        curve = chosen_curve(sweep, along, best.places)
+        figure.add_scatter(
+            x=factor * curve.x, y=1e6 * curve.damped_mean, mode="lines", name="best design",
+            line={"color": _BEST, "width": 1.6, "dash": "longdashdot"}, hoverinfo="skip",
+        )  # fmt: skip
+    figure.add_scatter(
+        x=[factor * sweep.axes[along][best.places[along]]], y=[1e6 * best.amplitude], mode="markers",
+        name="highest point of the best", marker={"symbol": "star", "size": 14, "color": _BEST},
+        hovertemplate="best design: %{y:.4g} µm<extra></extra>",
+    )  # fmt: skip
+
+
+def start_places(sweep: Sweep) -> dict[str, int]:
+    """Return the places with which to begin: those of the best design, or the first on every axis."""
+    best = best_design(sweep)
+    return dict.fromkeys(sweep.axes, 0) if best is None else dict(best.places)
+
+
+def scene_of_curve(sweep: Sweep, along: str, places: Mapping[str, int]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the scene of a curve as data, without its sweep, and the [sweep] over its axis. Raises InputError."""
+    settings = {path: axis.tolist()[places[path]] for path, axis in sweep.axes.items() if path != along}
+    data = base_scene(sweep.scene).replace(settings).to_dict()
+    return data, {along: sweep.axes[along].tolist()}

@@ -1,0 +1,163 @@
+"""Files to start from: a scene, a case and a study that work as they are, with what their keys mean."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.resonance import chosen_resonance
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.rom.reduced import NORMAL, ReducedModel
+from vanedamp.studies.paper.figure_file import Structure
+
+#: share of the structure's mass that the body has, and of the undamped amplitude that its gap has
+_MASS_RATIO, _GAP_RATIO = 0.02, 0.5
+#: share of the natural frequency at which a run shows the body at work, and the ends of a sweep and of a study's band
+_RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)
+
+_SCENE_NOTE = """\
+A structure with one loose body in a cavity. `vanedamp run {file}` runs it at one frequency, `vanedamp sweep {file}`
+over the values in [sweep], `vanedamp check {file}` says what it means. SI units; every key: `vanedamp schema scene`."""
+_STUDY_NOTE = """\
+Which body reduces a resonance most? `vanedamp optimise {file}` varies mass, gap and number of bodies of this scene;
+`vanedamp check {file}` says how long that takes. SI units; every key: `vanedamp schema study`."""
+_CASE_NOTE = """\
+The parametric vane cluster. `vanedamp modal {file}` computes its modes, `vanedamp reduce {file}` a model for scenes,
+`vanedamp check {file}` says what it means. SI units; every key: `vanedamp schema case`."""
+_STRUCTURE_NOTE = """\
+In place of these keys a reduced model: model = "rom" and file = "rom.h5", with interface labels at excitation.at and
+cavity.floor (`vanedamp new scene --rom rom.h5` writes such a scene)."""
+_MESH_NOTE = """\
+A mesh of your own, in place of all keys of this table: file = "cluster.msh" (gmsh; or .inp, .bdf of other programs),
+and scale = 1e-3 where it is in millimetres. The names below are those of its groups: volumes in [material], facets in
+[support] and [interface]."""
+_INTERFACE_NOTE = "The response, and the force."
+_CAVITY_NOTE = """\
+The floor of the cavity, as the bodies feel it: `floor` of [[cavity]] in a scene. Its direction is that from the left
+wall to the right one. For bodies with extent: facets = ["c1_left", "c1_right", "c1_floor", "c1_roof"], kind = "cavity",
+direction = "c1_left", normal = "c1_floor"."""
+
+
+class Template(NamedTuple):
+    """Tables of a file, and further comments by tables, as files.toml_output takes them."""
+
+    data: dict[str, Any]
+    notes: dict[str, str]
+
+
+def scene_template(file: Path, rom: Path | None = None) -> Template:
+    """Return a scene for a file: of the shipped rigid model, or of a reduced model. Raises InputError for its file."""
+    data = _scene(file, rom)
+    notes = {"": _SCENE_NOTE.format(file=file.name)} | ({"structure": _STRUCTURE_NOTE} if rom is None else {})
+    return Template(data, notes)
+
+
+def study_template(file: Path, rom: Path | None = None) -> Template:
+    """Return a study for a file, on the same scene. Raises InputError for the file of a reduced model."""
+    data = _scene(file, rom)
+    del data["sweep"]
+    low, high = (_rounded(share / _RUN * data["excitation"]["frequency"]) for share in _BAND)
+    data["time"] = {"periods": 500, "transient": 400}
+    data["optimise"] = {
+        "band": {"start": low, "stop": high, "num": 12}, "samples": 4, "evaluations": 10,
+        "variables": {"mass_ratio": [0.005, 0.05], "gap_ratio": [0.1, 2.0], "bodies": [1, 2]},
+        "tolerances": {"gap": 0.1, "excitation": 0.2}, "map": {"mass_ratio": 4, "gap_ratio": 5},
+    }  # fmt: skip
+    return Template(data, {"": _STUDY_NOTE.format(file=file.name)})
+
+
+def case_template(file: Path) -> Template:
+    """Return a case for a file: the parametric cluster with one cavity."""
+    tangential = [0, 1, 0]
+    data = {
+        "mesh": {"generator": "vane_cluster", "airfoils": 4, "cavities": 1, "element_size": 2.6e-3, "degree": 2},
+        "material": {
+            "default": {
+                "young": 2.0e11, "poisson": 0.3, "density": 8190.0, "damping_ratio": 0.002, "fatigue_strength": 4.0e8
+            }
+        },
+        "support": {"clamped": ["clamp"]},
+        "modes": {"count": 10, "direction": tangential, "at": "shroud"},
+        "interface": {
+            "shroud": {"facets": "shroud", "direction": tangential},
+            "c1_floor": {"facets": "c1_floor", "direction": tangential},
+        },
+    }  # fmt: skip
+    notes = {"": _CASE_NOTE.format(file=file.name), "mesh": _MESH_NOTE, "interface.shroud": _INTERFACE_NOTE}
+    return Template(data, notes | {"interface.c1_floor": _CAVITY_NOTE})
+
+
+def _scene(file: Path, rom: Path | None) -> dict[str, Any]:
+    """Return a scene whose gap and mass are those of a good damper, by the resonance of its structure."""
+    shipped = Structure.shipped()
+    amplitude = _rounded(shipped.amplitude, 2)
+    if rom is None:
+        structure = {
+            "model": "rigid", "mass": _rounded(shipped.mass), "stiffness": _rounded(shipped.stiffness),
+            "damping_ratio": shipped.damping_ratio,
+        }  # fmt: skip
+        place: dict[str, Any] = {}
+        cavities, near = [{"name": "c1"}], [shipped.frequency] * 2
+    else:
+        structure, place, cavities, near = _on_model(rom)
+    excitation = place | {"frequency": near[0], "resonance_amplitude": amplitude}
+    moving: dict[str, Any] = {"structure": structure, "excitation": excitation | {"resonance_near": near}}
+    moving["cavity"] = [cavity | {"gap": amplitude} for cavity in cavities]
+    resonance = chosen_resonance(validate(Scene, moving, str(rom or file)))
+    if rom is not None:
+        structure["file"] = _beside(rom, file.parent)
+    mass, gap = _rounded(_MASS_RATIO * resonance.mass / len(cavities)), _rounded(_GAP_RATIO * amplitude)
+    frequencies = [_rounded(share * resonance.frequency) for share in (_RUN, *_SWEEP)]
+    return {
+        "structure": structure,
+        "excitation": excitation | {"frequency": frequencies[0]},
+        "cavity": [cavity | {"gap": gap} for cavity in cavities],
+        "damper": [
+            {"cavity": cavity["name"], "mass": mass, "friction": 0.4, "restitution": 0.7} for cavity in cavities
+        ],
+        "gravity": {"acceleration": 9.81, "orientation_deg": 0.0},
+        "time": {"periods": 1500, "transient": 1000},
+        "sweep": {
+            "cavity.gap": [gap, _rounded(gap / 5)],
+            "excitation.frequency": {"start": frequencies[1], "stop": frequencies[2], "num": 61},
+        },
+    }
+
+
+def _on_model(rom: Path) -> tuple[dict[str, Any], dict[str, Any], list[dict[str, Any]], list[float]]:
+    """Return structure, place of the force, cavities and range of the natural frequencies (Hz) of a reduced model.
+
+    The force is at the label "shroud" or the first one; a cavity is where labels NAME_floor, NAME_left and NAME_right
+    are, or a label NAME with its motion across, or else at the force.
+    """
+    model = ReducedModel.load(rom)
+    arms = np.zeros(len(model.interface)) if model.arms is None else model.arms
+    labels = [label for label, arm in zip(model.interface, arms, strict=True) if not arm and not label.endswith(NORMAL)]
+    if not labels:
+        raise InputError(f"{rom}: its interface has no displacement that a body could slide on")
+    at = "shroud" if "shroud" in labels else labels[0]
+    floors = {label.removesuffix("_floor"): label for label in labels if label.endswith("_floor")}
+    floors = floors or {label: label for label in labels if label + NORMAL in model.interface} or {"c1": at}
+    cavities = [
+        {"name": name, "floor": floor}
+        | {side: f"{name}_{side}" for side in ("left", "right") if f"{name}_{side}" in labels}
+        for name, floor in floors.items()
+    ]
+    frequencies = model.natural_frequencies_hz[model.rigid_modes :]
+    if not frequencies.size:
+        raise InputError(f"{rom}: has rigid motions only; there is no resonance to reduce")
+    structure = {"model": "rom", "file": str(rom.resolve())}
+    return structure, {"at": at}, cavities, [float(frequencies[0]), float(frequencies[-1])]
+
+
+def _beside(file: Path, folder: Path) -> str:
+    """Return the name of a file as one in a folder says it."""
+    file, folder = file.resolve(), folder.resolve()
+    return str(file.relative_to(folder) if file.is_relative_to(folder) else file)
+
+
+def _rounded(value: float, digits: int = 4) -> float:
+    return float(f"{value:.{digits}g}")
