@@ -7,7 +7,7 @@ and the search finds it under the kind of file: `scene.damper.normal_load`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from typing import Any, ClassVar, NamedTuple
 
 from docutils import nodes
@@ -89,10 +89,10 @@ def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[T
         heading = brackets.format(path) + "".join(f' {key} = "{value}"' for key, value in told.items())
         others = one.get("additionalProperties")
         own = isinstance(others, dict) and not _own_tables(schema, others)
-        if one.get("properties") or own:
+        if "properties" in one or own:
             free = (_key(schema, NAME, {"description": text} | others, False),) if own else ()
             said = "" if own else one.get("description", text)
-            yield Table(path, heading, "".join(told.values()), said, _keys(schema, one) + free)
+            yield Table(path, heading, "".join(told.values()), said, _keys(schema, one, told) + free)
         yield from _inner(schema, one, path, text)
 
 
@@ -118,10 +118,10 @@ def _distinguishing(table: Schema, among: list[Schema]) -> dict[str, str]:
     return {key: here[key] for key in list(here)[:1]}
 
 
-def _keys(schema: Schema, table: Schema) -> tuple[Key, ...]:
-    """Return the keys of a table that are no tables themselves."""
-    required, fixed = table.get("required", ()), constants(table)
-    nodes = sorted(table.get("properties", {}).items(), key=lambda item: item[0] not in fixed)
+def _keys(schema: Schema, table: Schema, first: Container[str] = ()) -> tuple[Key, ...]:
+    """Return the keys of a table that are no tables themselves, some of them first."""
+    required = table.get("required", ())
+    nodes = sorted(table.get("properties", {}).items(), key=lambda item: item[0] not in first)
     return tuple(_key(schema, name, node, name in required) for name, node in nodes if not _own_tables(schema, node))
 
 
