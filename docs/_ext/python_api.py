@@ -200,14 +200,19 @@ def written_signature(
     return stringify_signature(found.replace(parameters=kept), show_return_annotation=False), returns
 
 
-def link_public(_app: Sphinx, doctree: nodes.document) -> None:
-    """Lead the types of signatures to the classes of that name in `vanedamp`."""
+def link_types(_app: Sphinx, doctree: nodes.document) -> None:
+    """Lead the types of signatures, which are written short, to the classes that they name in their module."""
     for node in doctree.findall(pending_xref):
+        if node.get("refdomain") != "py" or not _in_signature(node):
+            continue
         name = node["reftarget"]
-        if node.get("refdomain") == "py" and _in_signature(node) and name in vanedamp.__all__:
-            public = getattr(vanedamp, name)
-            if getattr(sys.modules.get(node.get("py:module") or ""), name, public) is public:
-                node["reftarget"] = f"vanedamp.{name}"
+        public = getattr(vanedamp, name) if name in vanedamp.__all__ else None
+        value = getattr(sys.modules.get(node.get("py:module") or ""), name, public)
+        node.attributes.pop("refspecific", None)  # no search for the name in other modules
+        if value is public is not None:
+            node["reftarget"] = f"vanedamp.{name}"
+        elif inspect.isclass(value):
+            node["reftarget"] = f"{value.__module__}.{value.__qualname__}"
 
 
 def leave_type(_app: Sphinx, _env: Any, node: pending_xref, content: nodes.TextElement) -> nodes.Node | None:
@@ -231,6 +236,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("autodoc-process-docstring", process)
     app.connect("autodoc-process-signature", written_signature)
     app.connect("autodoc-skip-member", skip)
-    app.connect("doctree-read", link_public)
+    app.connect("doctree-read", link_types)
     app.connect("missing-reference", leave_type)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
