@@ -148,13 +148,16 @@ def test_the_whole_way_from_another_programs_file(forks, expected, tmp_path, mon
     path = forks["tetra10"][ending]
     names = NUMBERS if ending == "bdf" else {name: name for name in NUMBERS}
     (tmp_path / "case.toml").write_text(CASE.format(file=path, **names))
+    assert main(["check", "case.toml"]) == 0
+    assert names["floor"] in capfd.readouterr().out
     assert main(["modal", "case.toml", "-o", "modes.h5"]) == 0
     assert f"{expected['tetra10'][0]:.2f}" in capfd.readouterr().out
     (tmp_path / "case.toml").write_text(CASE.format(file=path, **names | {"floor": "flor"}))
-    assert main(["modal", "case.toml"]) == BAD_INPUT
-    told = capfd.readouterr().err
-    assert "no set or surface 'flor'; there are: " in told
-    assert told.count("\n") == 1
+    for command in ("check", "modal"):
+        assert main([command, "case.toml"]) == BAD_INPUT
+        told = capfd.readouterr().err
+        assert "no set or surface 'flor'; there are: " in told
+        assert told.count("\n") == 1
 
 
 # corners of Abaqus' faces, from 1 as in its manual
