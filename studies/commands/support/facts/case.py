@@ -36,7 +36,8 @@ def _of_mesh(case: Case) -> Iterator[Fact]:
         yield Fact("mesh", mesh.file, "", f"{Path(mesh.file).stat().st_size / 1e6:.3g} MB")
         if mesh.foreign:
             groups, nodes = group_names(mesh.file, set(case.material) - {"default"}, case.facet_groups)
-            yield Fact("groups", {"volumes": groups[3], "facets": groups[2], "edges": groups[1], "points": groups[0]})
+            kinds = {"volumes": groups[3], "facets": groups[2], "edges": groups[1], "points": groups[0]}
+            yield Fact("groups", {kind: names for kind, names in kinds.items() if names})
             yield Fact("nodes", nodes, "", "of the mesh; degree 2 adds those between two")
         else:
             header = read_header(mesh.file)
