@@ -31,7 +31,7 @@ _CORNERS = {"tetra": 4, "hexahedron": 8}
 _VOLUMES = {"tetra": ("tetra", 4), "tetra10": ("tetra10", 10), "hexahedron": ("hexahedron", 8)}
 _VOLUMES |= dict.fromkeys(("hexahedron20", "hexahedron27"), ("hexahedron", 8))
 _READERS = {".inp": abaqus.read, ".cdb": ansys.read, ".unv": universal_file.read}
-_READERS |= dict.fromkeys((".bdf", ".nas", ".fem"), nastran.read)
+_READERS |= dict.fromkeys((".bdf", ".nas", ".fem", ".dat"), nastran.read)
 # gmsh's elements by dimension from 0
 _GMSH = {"tetra": (15, 1, 2, 4), "tetra10": (15, 8, 9, 11), "hexahedron": (15, 1, 3, 5)}
 # gmsh's order of a quadratic tetrahedron; it is its own inverse
@@ -305,8 +305,12 @@ def _write(
                 gmsh.model.mesh.addElementsByType(entity, _GMSH[source.kind][dimension], [], nodes[members].ravel())
                 if name:
                     gmsh.model.addPhysicalGroup(dimension, [entity], name=name)
-        gmsh.option.setNumber("Mesh.SaveAll", 1)
-        return msh.write(output)
+        before = gmsh.option.getNumber("Mesh.SaveAll")
+        gmsh.option.setNumber("Mesh.SaveAll", 1)  # cells without a group, too
+        try:
+            return msh.write(output)
+        finally:
+            gmsh.option.setNumber("Mesh.SaveAll", before)
 
 
 def _all(members: Iterable[np.ndarray]) -> np.ndarray:
