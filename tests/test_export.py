@@ -245,6 +245,20 @@ def test_all_variables_in_a_mat_file(results, kind):
         assert float(cavity["gap"][0, 0][0, 0]) == pytest.approx(2e-6 if kind == "response" else 2e-4)
 
 
+def test_statuses_of_a_large_sweep_in_a_mat_file(results, tmp_path, monkeypatch):
+    """Numbers in a list of words, since a million cells take minutes."""
+    from scipy.io import loadmat
+
+    from vanedamp.studies.export.formats import matlab
+
+    monkeypatch.setattr(matlab, "_MOST_CELLS", 3)
+    vd.export(results / "sweep.h5", tmp_path / "sweep.mat")
+    data, sweep = loadmat(tmp_path / "sweep.mat"), vd.Sweep.load(results / "sweep.h5")
+    for name in ("status", "classification"):
+        words = np.array([str(text[0]) for text in data[f"{name}_names"].ravel()])
+        assert words[data[name].astype(int) - 1].tolist() == getattr(sweep, name).tolist()
+
+
 def test_sweep_as_a_tidy_table(results):
     pandas = pytest.importorskip("pandas")
     sweep = vd.Sweep.load(results / "sweep.h5")
@@ -530,6 +544,27 @@ def test_another_model_than_that_of_the_run(results, tmp_path, monkeypatch, caps
     assert main(["modal", "case.toml", "-o", "modes.h5"]) == 0
     assert main(arguments) == BAD_INPUT
     assert "is not the mesh of" in capsys.readouterr().err
+
+
+def test_names_of_any_language(tmp_path):
+    """Cavities keep their names where the format has letters for them."""
+    pyuff, pandas = pytest.importorskip("pyuff"), pytest.importorskip("pandas")
+    from scipy.io import loadmat
+
+    text = changed(
+        SCENE, ('[[cavity]]\nname = "c1"', '[[cavity]]\nname = "Käfig 空"'), ('cavity = "c1"', 'cavity = "Käfig 空"')
+    )
+    (tmp_path / "scene.toml").write_text(text + '"cavity.Käfig 空.gap" = [1e-4, 2e-4]\n', encoding="utf-8")
+    sweep = vd.sweep(vd.Scene.load(tmp_path / "scene.toml"))
+    for ending in ("csv", "mat", "uff"):
+        vd.export(sweep, tmp_path / f"sweep.{ending}")
+    table = pandas.read_csv(tmp_path / "sweep.csv")
+    assert table["cavity.Käfig 空.gap [m]"].nunique() == 2
+    data = loadmat(tmp_path / "sweep.mat")
+    assert [str(path[0]) for path in data["about"]["axes"][0, 0].ravel()] == list(sweep.axes)
+    assert np.array_equal(data["cavity_K_fig___gap"].ravel(), sweep.axes["cavity.Käfig 空.gap"])
+    curves = [one for one in pyuff.UFF(str(tmp_path / "sweep.uff")).read_sets() if one["type"] == 58]
+    assert {one["id2"].strip() for one in curves} == {"cavity.K?fig ?.gap = 0.0001", "cavity.K?fig ?.gap = 0.0002"}
 
 
 def test_results_in_memory(results, tmp_path):

@@ -21,6 +21,8 @@ ENDINGS = (".mat",)
 OPTIONS: tuple[Option, ...] = ()
 #: bytes of a variable, and letters of a name, that version 5 holds
 _MOST_BYTES, _MOST_LETTERS = 2**31 - 1, 63
+#: texts of a variable that are cells; of more, which would take minutes to read and write, numbers in a list of words
+_MOST_CELLS = 10_000
 _RESERVED = {"case", "catch", "end", "function", "otherwise", "parfor", "persistent", "spmd", "switch"}
 
 
@@ -36,7 +38,17 @@ def write(record: Record, path: Path) -> None:
                 "MATLAB's h5read"
             )
     dimensions = {name: _cells(list(item.dims)) for name, item in record.variables.items()}
-    data = {name: _array(np.asarray(item.values)) for name, item in record.variables.items()}
+    data: dict[str, Any] = {}
+    for name, item in record.variables.items():
+        values = np.asarray(item.values)
+        if values.dtype.kind not in "UO":
+            data[name] = values
+        elif values.size <= _MOST_CELLS:
+            data[name] = _texts(values)
+        else:
+            words, places = np.unique(values.astype(str), return_inverse=True)
+            data[name] = 1.0 + places.reshape(values.shape)
+            data[f"{name}_names"] = _texts(words)
     data |= {
         "units": _struct({name: item.units for name, item in record.variables.items()}),
         "dimensions": {_name(name): cells for name, cells in dimensions.items()},
@@ -57,14 +69,12 @@ def _scene_of(provenance: Any) -> Any:
     return provenance.get("scene") if isinstance(provenance, Mapping) else None
 
 
-def _array(values: np.ndarray) -> Any:
-    """Return an array as MATLAB has it: texts as cells, numbers as they are."""
-    if values.dtype.kind in "UO":
-        cells = np.empty(values.shape, dtype=object)
-        for place, text in np.ndenumerate(values):
-            cells[place] = str(text)
-        return cells
-    return values
+def _texts(values: np.ndarray) -> np.ndarray:
+    """Return texts as MATLAB has them: cells."""
+    cells = np.empty(values.shape, dtype=object)
+    for place, text in np.ndenumerate(values):
+        cells[place] = str(text)
+    return cells
 
 
 def _struct(data: Mapping[str, Any]) -> dict[str, Any]:
