@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -281,8 +282,6 @@ def test_sweep_as_a_tidy_table(results):
 def test_points_without_figures_keep_their_status(results, tmp_path):
     """A run that broke has empty fields and says why."""
     pandas = pytest.importorskip("pandas")
-    from dataclasses import replace
-
     sweep = vd.Sweep.load(results / "sweep.h5")
     status, mean = sweep.status.copy(), sweep.amplitude_mean.copy()
     status[0, 1], mean[0, 1] = "error: broken, oh", np.nan
@@ -341,6 +340,21 @@ def test_reduced_models_come_back(results, kind, coordinates, capsys):
     if kind == "op4":
         load_of = [np.abs(one.natural[1].T @ one.base_load) for one in (model, back)]
         np.testing.assert_allclose(load_of[1], load_of[0], atol=1e-9 * load_of[0].max())
+
+
+def test_a_reduced_model_comes_back_from_matlab(results, tmp_path):
+    """Bit by bit; a massless boundary, of which the matrices know nothing, is refused."""
+    words = ("-o", str(tmp_path / "rom.mat"), "--description", str(tmp_path / "external.toml"))
+    assert main(["export", str(results / "rom.h5"), *words]) == 0
+    assert main(["import", str(tmp_path / "external.toml"), "-o", str(tmp_path / "back.h5")]) == 0
+    model, back = ReducedModel.load(results / "rom.h5"), ReducedModel.load(tmp_path / "back.h5")
+    for name in ("mass", "stiffness", "selection", "base_load", "directions"):
+        assert np.array_equal(getattr(back, name), getattr(model, name))
+    assert back.damping_ratio == model.damping_ratio
+    massless = random_reduced(5, modes=4)
+    massless = replace(massless, residual_flexibility=1e-7 * np.eye(2))
+    with pytest.raises(vd.InputError, match=r"take \.op4"):
+        vd.export(massless, tmp_path / "rom.mat", description=tmp_path / "external.toml")
 
 
 def test_matrices_read_by_other_programs(results):

@@ -12,13 +12,14 @@ import numpy as np
 
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
+from vanedamp.rom.external import plain_matrices
 from vanedamp.studies.export.export import ANY
-from vanedamp.studies.export.options import Option
 from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.reduced_matrices import DESCRIPTION, describe
 
 SUMMARY = "all variables with units, dimensions and the scene: MATLAB, Octave"
 ENDINGS = (".mat",)
-OPTIONS: tuple[Option, ...] = ()
+OPTIONS = (DESCRIPTION,)
 #: bytes of a variable, and letters of a name, that version 5 holds
 _MOST_BYTES, _MOST_LETTERS = 2**31 - 1, 63
 #: texts of a variable that are cells; of more, which would take minutes to read and write, numbers in a list of words
@@ -62,7 +63,21 @@ def write(record: Record, path: Path) -> None:
         savemat(temporary, dict(_unique(data.items())), long_field_names=True, oned_as="column", do_compression=True)
 
 
-WRITERS = {ANY: write}
+def reduced_model(record: Record, path: Path, description: str | None = None) -> None:
+    """Write a reduced model; description: the file by which `vanedamp import` reads it back."""
+    model = record.reduced_model()
+    if description is not None and model.residual_flexibility is not None:
+        raise InputError(
+            "--description: the matrices of a .mat have no massless boundary, whose flexibility stands beside them; "
+            "take .op4"
+        )
+    write(record, path)
+    if description is not None:
+        names = {name: name for name in ("mass", "stiffness", "damping", "base_load")}
+        describe(model, plain_matrices(model), names, path, description)
+
+
+WRITERS = {ANY: write, "reduced-model": reduced_model}
 
 
 def _scene_of(provenance: Any) -> Any:
