@@ -7,28 +7,32 @@ is said in the case, in global axes.
 
 from __future__ import annotations
 
-import importlib
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from vanedamp.modal.frames import Frame, rotation, through
+from vanedamp.modal.labelled_mesh import KINDS, LINES, SHELLS, SOLIDS, LabelledMesh, text_lines
 from vanedamp.modal.msh import MeshError
 
-# number of nodes -> meshio's name
-_SOLIDS = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 6: "wedge", 15: "wedge15"}
-_SURFACES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
-_LINES = {2: "line", 3: "line3"}
 _ELEMENTS = (
-    (re.compile(r"C3D(\d+)[A-Z]*"), _SOLIDS),
-    (re.compile(r"(?:S|DS|STRI|M3D|SFM3D|CPS|CPE|CAX)(\d)[A-Z0-9]*"), _SURFACES),
-    # gmsh writes the edges of a mesh as trusses
-    (re.compile(r"T[23]D(\d)"), _LINES),
+    (re.compile(r"C3D(\d+)[A-Z]*"), SOLIDS),
+    (re.compile(r"(?:S|DS|STRI|M3D|SFM3D|CPS|CPE|CAX)(\d)[A-Z0-9]*"), SHELLS),
+    # gmsh and others write the edges of a mesh as trusses or beams
+    (re.compile(r"T[23]D(\d)"), LINES),
+    (re.compile(r"B[23](\d)[A-Z]*"), {1: "line", 2: "line3", 3: "line"}),
 )
+# the corners of the faces S1, S2 ...
+_TETRAHEDRON: list[tuple[int, ...]] = [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)]
+_BRICK: list[tuple[int, ...]] = [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]
+_FACES = {"tetra": _TETRAHEDRON, "tetra10": _TETRAHEDRON, "hexahedron": _BRICK, "hexahedron20": _BRICK}
+# closed by *END ...
+_SCOPES = ("PART", "ASSEMBLY", "INSTANCE")
 _REFUSED = {
     "makes or moves nodes or elements; write them out": (
         "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYMMETRIC MODEL GENERATION", "IMPERFECTION", "PARAMETER",
@@ -38,6 +42,9 @@ _REFUSED = {
         "TIE", "MPC", "EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING",
         "EMBEDDED ELEMENT", "SHELL TO SOLID COUPLING", "CYCLIC SYMMETRY MODEL", "FASTENER", "SPRING",
         "CONNECTOR SECTION",
+    ),
+    "gives beams a stiffness, which is not imported; mesh them as solids, or remove the keyword": (
+        "BEAM SECTION", "BEAM GENERAL SECTION", "FRAME SECTION",
     ),
     "adds mass, which is not imported; mesh it, or remove the keyword": (
         "MASS", "ROTARY INERTIA", "NONSTRUCTURAL MASS",
@@ -69,16 +76,16 @@ class _Card(NamedTuple):
         return rows
 
 
+_Member = TypeVar("_Member")
+
+
 @dataclass
 class _Deck:
-    """The part of a deck read so far: nodes and elements by label, in the order of the file."""
+    """The part of a deck read so far."""
 
-    nodes: dict[int, np.ndarray] = field(default_factory=dict)
-    elements: dict[int, tuple[int, int]] = field(default_factory=dict)  # label -> block, place in it
-    blocks: list[tuple[str, list[list[int]]]] = field(default_factory=list)
-    node_sets: dict[str, list[int]] = field(default_factory=dict)
-    element_sets: dict[str, list[int]] = field(default_factory=dict)
+    mesh: LabelledMesh = field(default_factory=LabelledMesh)
     scope: str = ""
+    opened: list[_Card] = field(default_factory=list)
     meshed: str | None = None
     instances: int = 0
     frame: Frame = field(default_factory=Frame)
@@ -88,40 +95,27 @@ class _Deck:
         keyword = card.keyword
         if keyword in _WHY:
             raise card.error(_WHY[keyword])
-        if keyword in ("PART", "ASSEMBLY", "INSTANCE"):
+        if keyword in _SCOPES:
             self.scope, self.frame = keyword, Frame()
-        if keyword in ("END PART", "END INSTANCE"):
+            self.opened.append(card)
+        if keyword.startswith("END ") and keyword.removeprefix("END ") in _SCOPES:
             self.scope, self.frame = "ASSEMBLY" if keyword == "END INSTANCE" else "", Frame()
+            if not self.opened or self.opened.pop().keyword != keyword.removeprefix("END "):
+                raise card.error(f"closes no *{keyword.removeprefix('END ')}")
         if keyword in ("NODE", "ELEMENT"):
             self._check_scope(card)
         follow = {
             "NODE": self._node, "ELEMENT": self._element, "NSET": self._node_set, "ELSET": self._element_set,
-            "SYSTEM": self._system, "INSTANCE": self._instance, "PART": self._part,
+            "SURFACE": self._surface, "SYSTEM": self._system, "INSTANCE": self._instance, "PART": self._part,
         }.get(keyword)  # fmt: skip
         if follow is not None:
             follow(card)
 
-    def mesh(self) -> Any:
-        """Return the mesh as a meshio.Mesh."""
-        meshio = importlib.import_module("meshio")
-        place = {label: index for index, label in enumerate(self.nodes)}
-        sizes = [len(rows) for _, rows in self.blocks]
-        cell_sets = {}
-        for name, labels in self.element_sets.items():
-            members: list[list[int]] = [[] for _ in sizes]
-            for label in dict.fromkeys(labels):
-                block, index = self.elements[label]
-                members[block].append(index)
-            cell_sets[name] = [np.array(part, dtype=int) for part in members]
-        return meshio.Mesh(
-            points=np.array(list(self.nodes.values())).reshape(-1, 3),
-            cells=[(kind, np.array([[place[node] for node in row] for row in rows])) for kind, rows in self.blocks],
-            point_sets={
-                name: np.array([place[label] for label in dict.fromkeys(labels)], dtype=int)
-                for name, labels in self.node_sets.items()
-            },
-            cell_sets=cell_sets,
-        )
+    def check_closed(self) -> None:
+        """Raise MeshError for a part or an assembly without an end: the deck is cut short."""
+        if self.opened:
+            card = self.opened[-1]
+            raise card.error(f"is not closed by *END {card.keyword}: the file is cut short; write it again")
 
     def _check_scope(self, card: _Card) -> None:
         """Refuse a second part: labels are unique within one part only."""
@@ -130,7 +124,7 @@ class _Deck:
         self.meshed = self.scope
 
     def _part(self, card: _Card) -> None:
-        if self.nodes:
+        if self.mesh.nodes:
             raise card.error("after the first one with nodes; write one part with all of the mesh")
 
     def _node(self, card: _Card) -> None:
@@ -149,21 +143,21 @@ class _Deck:
             return
         places = self.frame.to_global(frame.to_global(np.array(points)))
         for (line, _), label, place in zip(card.data, labels, places, strict=True):
-            if label in self.nodes and not np.array_equal(self.nodes[label], place):
+            if label in self.mesh.nodes and not np.array_equal(self.mesh.nodes[label], place):
                 raise card.error(f"{label}: the node is given twice, at different places", line)
-            self.nodes[label] = place
-        self._add(self.node_sets, card.parameters.get("NSET"), labels)
+            self.mesh.nodes[label] = place
+        self._add(self.mesh.node_sets, card.parameters.get("NSET"), labels)
 
     def _element(self, card: _Card) -> None:
         given = card.parameters.get("TYPE", "").upper()
         matches = ((pattern.fullmatch(given), kinds) for pattern, kinds in _ELEMENTS)
-        kind, width = next(((kinds[int(m[1])], int(m[1])) for m, kinds in matches if m and int(m[1]) in kinds), ("", 0))
+        kind = next((kinds[int(m[1])] for m, kinds in matches if m and int(m[1]) in kinds), "")
         if not kind:
             raise card.error(f"TYPE={given}: expected solids (C3D4, C3D10, C3D8, C3D20), or shells as their skin")
+        width = next(nodes for kinds in (SOLIDS, SHELLS, LINES) for nodes, own in kinds.items() if own == kind)
         words = [(line, word) for line, row in card.data for word in row if word]
         if len(words) % (width + 1):
             raise card.error(f"TYPE={given}: expected a label and {width} nodes an element")
-        rows: list[list[int]] = []
         labels = []
         for start in range(0, len(words), width + 1):
             line = words[start][0]
@@ -171,30 +165,75 @@ class _Deck:
                 label, *nodes = (int(word) for _, word in words[start : start + width + 1])
             except ValueError as error:
                 raise card.error(f"expected whole numbers ({error})", line) from error
-            missing = [node for node in nodes if node not in self.nodes]
+            missing = [node for node in nodes if node not in self.mesh.nodes]
             if missing:
                 raise card.error(f"{label}: node {missing[0]} is not given before it", line)
-            if label in self.elements:
+            if label in self.mesh.elements:
                 raise card.error(f"{label}: the element is given twice", line)
-            self.elements[label] = (len(self.blocks), len(rows))
+            # the middle node of a line is its second one
+            self.mesh.elements[label] = (kind, [nodes[0], nodes[2], nodes[1]] if kind == "line3" else nodes)
             labels.append(label)
-            rows.append(nodes)
-        if rows:
-            self.blocks.append((kind, rows))
-            self._add(self.element_sets, card.parameters.get("ELSET"), labels)
+        self._add(self.mesh.element_sets, card.parameters.get("ELSET"), labels)
 
     def _node_set(self, card: _Card) -> None:
-        named = card.parameters.get("ELSET")
+        mesh, named = self.mesh, card.parameters.get("ELSET")
         if named is None:
-            labels = self._members(card, self.nodes, self.node_sets)
+            labels = self._members(card, mesh.nodes, mesh.node_sets)
         else:
-            elements = [self.elements[label] for label in self._known(card, self.element_sets, named)]
-            labels = [node for block, index in elements for node in self.blocks[block][1][index]]
-        self._add(self.node_sets, card.parameters.get("NSET"), labels)
+            labels = [node for label in self._known(card, mesh.element_sets, named) for node in mesh.elements[label][1]]
+        self._add(mesh.node_sets, card.parameters.get("NSET"), labels)
 
     def _element_set(self, card: _Card) -> None:
-        members = self._members(card, self.elements, self.element_sets)
-        self._add(self.element_sets, card.parameters.get("ELSET"), members)
+        members = self._members(card, self.mesh.elements, self.mesh.element_sets)
+        self._add(self.mesh.element_sets, card.parameters.get("ELSET"), members)
+
+    def _surface(self, card: _Card) -> None:
+        """Take in faces of elements, by their numbers or all that are free; or the nodes of a node-based surface."""
+        mesh, name, kind = self.mesh, card.parameters.get("NAME"), card.parameters.get("TYPE", "ELEMENT").upper()
+        if not name or kind not in ("ELEMENT", "NODE"):
+            return
+        if card.parameters.get("COMBINE", "UNION").upper() != "UNION" or "CROP" in card.parameters:
+            raise card.error(f"NAME={name}: expected the faces of elements, or COMBINE=UNION of other surfaces")
+        if kind == "NODE":
+            first = [(line, words[:1]) for line, words in card.data]
+            labels = self._members(card._replace(data=first), mesh.nodes, mesh.node_sets)
+            self._add(mesh.node_sets, name, labels)
+            return
+        own = mesh.face_sets.setdefault(_spelling(mesh.face_sets, name), [])
+        for line, words in card.data:
+            if "COMBINE" in card.parameters:
+                own.extend(
+                    face for other in filter(None, words) for face in self._known(card, mesh.face_sets, other, line)
+                )
+                continue
+            one = card._replace(data=[(line, words[:1])])
+            members = self._members(one, mesh.elements, mesh.element_sets) if words[0] else list(mesh.elements)
+            face = words[1].upper() if len(words) > 1 else ""
+            own.extend([self._face(one, label, face) for label in members] if face else self._free(set(members)))
+
+    def _face(self, card: _Card, label: int, face: str) -> tuple[int, ...]:
+        """Return the corners of a face of an element: S1, S2 ... of a solid, SPOS or SNEG of a shell."""
+        kind, nodes = self.mesh.elements[label]
+        faces = {f"S{number}": places for number, places in enumerate(_FACES.get(kind, []), 1)}
+        if kind in SHELLS.values():
+            faces = dict.fromkeys(("SPOS", "SNEG"), tuple(range(KINDS[kind][1])))
+        if face not in faces:
+            raise card.error(
+                f"NAME={card.parameters['NAME']}: element {label} ({kind}) has no face {face}; it has "
+                f"{', '.join(faces) or 'none'}",
+                card.data[0][0],
+            )
+        return tuple(nodes[place] for place in faces[face])
+
+    def _free(self, members: set[int]) -> Iterator[tuple[int, ...]]:
+        """Yield the faces of these elements that no other element has."""
+        faces = [
+            (label, tuple(nodes[corner] for corner in face))
+            for label, (kind, nodes) in self.mesh.elements.items()
+            for face in _FACES.get(kind, ())
+        ]
+        counts = Counter(tuple(sorted(face)) for _, face in faces)
+        yield from (face for label, face in faces if label in members and counts[tuple(sorted(face))] == 1)
 
     def _members(self, card: _Card, known: dict[int, Any], sets: dict[str, list[int]]) -> list[int]:
         labels: list[int] = []
@@ -217,7 +256,7 @@ class _Deck:
                 raise card.error(f"names {label}, which is not given before it")
         return [label for label in labels if label in known]
 
-    def _known(self, card: _Card, sets: dict[str, list[int]], name: str, line: int | None = None) -> list[int]:
+    def _known(self, card: _Card, sets: dict[str, list[_Member]], name: str, line: int | None = None) -> list[_Member]:
         own = _spelling(sets, name)
         if own not in sets:
             raise card.error(f"names the set {name!r}, which is not given before it", line)
@@ -251,9 +290,9 @@ class _Deck:
         rows = [row for _, row in card.numbers()]
         if not rows:
             return
-        if not self.nodes:
+        if not self.mesh.nodes:
             raise card.error("moves nodes of its own; write them in global coordinates")
-        places = np.array(list(self.nodes.values())) + (rows[0] + [0.0] * 3)[:3]
+        places = np.array(list(self.mesh.nodes.values())) + (rows[0] + [0.0] * 3)[:3]
         if len(rows) > 1:
             if len(rows[1]) != 7:
                 raise card.error("expected two points of the axis and an angle in its second line")
@@ -262,32 +301,35 @@ class _Deck:
                 places = start + (places - start) @ rotation(end - start, rows[1][6]).T
             except ValueError as error:
                 raise card.error(f"gives no rotation: {error}") from error
-        self.nodes = dict(zip(self.nodes, places, strict=True))
+        self.mesh.nodes = dict(zip(self.mesh.nodes, places, strict=True))
 
 
-def read(path: Path) -> Any:
-    """Return the mesh of a deck as a meshio.Mesh with its sets. Raises MeshError with file and line."""
+def read(path: Path) -> LabelledMesh:
+    """Return the mesh of a deck with its sets. Raises MeshError with file and line."""
     deck = _Deck()
     for card in _cards(path):
         deck.read(card)
-    return deck.mesh()
+    deck.check_closed()
+    return deck.mesh
 
 
-def _spelling(sets: dict[str, list[int]], name: str) -> str:
+def _spelling(sets: Mapping[str, object], name: str) -> str:
     """Return the name as it was first written: Abaqus ignores case."""
     return next((known for known in sets if known.upper() == name.upper()), name)
 
 
-def _cards(path: Path) -> Iterator[_Card]:
+def _cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[_Card]:
+    """Yield the keywords of a deck and of those that it includes; within: the files that include this one."""
     card: _Card | None = None
-    lines = enumerate(path.read_text(errors="replace").splitlines(), start=1)
+    within = (*within, path.resolve())
+    lines = enumerate(text_lines(path), start=1)
     for number, line in lines:
         text = line.strip()
         if not text or text.startswith("**"):
             continue
         if text.startswith("*"):
             if card is not None:
-                yield from _finished(card)
+                yield from _finished(card, within)
             while text.endswith(","):
                 text += next(lines, (0, ""))[1].strip() or "*"
             keyword, *words = (word.strip() for word in text.rstrip("*").split(","))
@@ -297,22 +339,24 @@ def _cards(path: Path) -> Iterator[_Card]:
         elif card is not None:
             card.data.append((number, _words(text)))
     if card is not None:
-        yield from _finished(card)
+        yield from _finished(card, within)
 
 
-def _finished(card: _Card) -> Iterator[_Card]:
+def _finished(card: _Card, within: tuple[Path, ...]) -> Iterator[_Card]:
     """Yield the card with the data of the file that it names; of *INCLUDE, the cards of that file."""
     name = card.parameters.get("INPUT")
-    if name is None or card.keyword not in ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET"):
+    if name is None or card.keyword not in ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"):
         yield card
         return
     file = card.file.parent / name
     if not file.is_file():
         raise card.error(f"INPUT={name}: no such file beside the deck")
     if card.keyword == "INCLUDE":
-        yield from _cards(file)
+        if file.resolve() in within:
+            raise card.error(f"INPUT={name}: the file includes itself")
+        yield from _cards(file, within)
         return
-    lines = enumerate(file.read_text(errors="replace").splitlines(), start=1)
+    lines = enumerate(text_lines(file), start=1)
     data = [(number, _words(line)) for number, line in lines if line.strip() and not line.startswith("*")]
     yield card._replace(file=file, data=data)
 

@@ -1,4 +1,4 @@
-"""System matrices from and for other codes: Matrix Market or scipy's .npz, with nodes and sets as CSV.
+"""System matrices from and for other codes: Matrix Market, scipy's .npz, MATLAB or CSV, with nodes and sets as CSV.
 
 A folder holds stiffness.mtx, mass.mtx, nodes.csv (node, x, y, z), sets.csv (set, node, weight) and fixed.csv (node,
 components); the degrees of freedom are x, y, z of the nodes in the order of nodes.csv.
@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import io, sparse
 
+from vanedamp.files.matrix_input import read_mat, read_table
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.algebra import symmetric_part
 from vanedamp.modal.matrices import MatricesError, Patch, SystemMatrices
@@ -22,6 +24,10 @@ from vanedamp.modal.matrices import MatricesError, Patch, SystemMatrices
 #: files that `write_folder` writes
 FILES = ("stiffness.mtx", "mass.mtx", "nodes.csv", "sets.csv", "fixed.csv")
 _COMPONENTS = "xyz"
+_LETTERS = {"stiffness": "K", "mass": "M"}
+_READERS: dict[str, Callable[[str], Any]] = {
+    ".npz": sparse.load_npz, ".mtx": io.mmread, ".mat": read_mat, ".csv": read_table,
+}  # fmt: skip
 
 
 def read_matrices(
@@ -36,7 +42,8 @@ def read_matrices(
 ) -> SystemMatrices:
     """Read the matrices of another code.
 
-    stiffness, mass  .mtx (Matrix Market, symmetric or general) or .npz (scipy.sparse.save_npz), N/m and kg
+    stiffness, mass  .mtx (Matrix Market, symmetric or general), .npz (scipy.sparse.save_npz), .csv (dense) or .mat,
+                     N/m and kg; of a .mat with several matrices those named stiffness and mass, or K and M
     nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels
     sets             CSV: set, node and perhaps weight (area, m^2); every set becomes a patch
     fixed            sets that are held, with their components: {"root": "xyz"}
@@ -124,7 +131,7 @@ def _system(
     provenance = {"stiffness": os.path.basename(stiffness), "mass": os.path.basename(mass)}
     loaded = {}
     for name, path in (("stiffness", stiffness), ("mass", mass)):
-        loaded[name] = matrix = _matrix(Path(path))
+        loaded[name] = matrix = _matrix(Path(path), name)
         if matrix.shape != (coordinates.size, coordinates.size):
             raise MatricesError(
                 f"{path}: shape {matrix.shape} for {len(coordinates)} nodes; expected "
@@ -136,20 +143,38 @@ def _system(
     )  # fmt: skip
 
 
-def _matrix(path: Path) -> sparse.csr_array:
+def _matrix(path: Path, name: str) -> sparse.csr_array:
     if not path.is_file():
         raise MatricesError(f"{path}: no such matrix file")
-    if path.suffix not in (".mtx", ".npz"):
-        raise MatricesError(f"{path}: expected a matrix as .mtx (Matrix Market) or .npz (scipy.sparse.save_npz)")
+    if path.suffix not in _READERS:
+        raise MatricesError(
+            f"{path}: expected a matrix as .mtx (Matrix Market), .npz (scipy.sparse.save_npz), .mat (MATLAB) or .csv"
+        )
     try:
-        return sparse.csr_array(io.mmread(str(path)) if path.suffix == ".mtx" else sparse.load_npz(path))
+        found = _READERS[path.suffix](str(path))
+        return sparse.csr_array(_named(path, name, found) if isinstance(found, dict) else found)
+    except MatricesError:
+        raise
     except Exception as error:  # the readers raise what they stumble over
         raise MatricesError(f"{path}: not a readable matrix ({error})") from error
 
 
+def _named(path: Path, name: str, found: Mapping[str, Any]) -> Any:
+    """Return the only matrix of a file, or the one of that name or letter."""
+    names = [own for own in found if len(found) == 1 or own.lower() == name] or [
+        own for own in found if own == _LETTERS[name]
+    ]
+    if len(names) != 1:
+        raise MatricesError(
+            f"{path}: expected one matrix, or one named {name} or {_LETTERS[name]}; there are: "
+            f"{', '.join(found) or 'none'}"
+        )
+    return found[names[0]]
+
+
 def _either(home: Path, name: str) -> Path:
-    npz = home / f"{name}.npz"
-    return npz if npz.is_file() else home / f"{name}.mtx"
+    """Return the file of a matrix in a folder; .mtx where there is none."""
+    return next((file for ending in _READERS if (file := home / f"{name}{ending}").is_file()), home / f"{name}.mtx")
 
 
 def _nodes(path: Path) -> tuple[dict[int, int], np.ndarray]:

@@ -1,25 +1,23 @@
-"""Meshes of other programs (Abaqus and CalculiX .inp, Nastran .bdf, and others that meshio reads) as gmsh files.
+"""Meshes of other programs as gmsh files: Abaqus, CalculiX, Nastran, Ansys, universal files, MED and others.
 
-Sets of volume elements become volume groups. Facet groups are the boundary facets whose nodes are all in a node set, or
-those that shell elements of a set cover. A node set without such a facet becomes a group of its nodes, and of the
-element edges whose nodes are all in it. meshio is an optional dependency.
+Sets of volume elements become volume groups. Facet groups are the boundary facets whose nodes are all in a node set,
+those that shell elements of a set cover, or faces that a surface names. A node set without such a facet becomes a group
+of its nodes, and of the element edges whose nodes are all in it; sets of line and of point elements become groups of
+edges and of points.
 """
 
 from __future__ import annotations
 
-import contextlib
-import importlib
-import io
 import os
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from vanedamp.files.store import replacing
-from vanedamp.modal import abaqus, nastran
+from vanedamp.modal import abaqus, ansys, msh, nastran, other_formats, universal_file
+from vanedamp.modal import gmsh_on_demand as gmsh
+from vanedamp.modal.labelled_mesh import KINDS, LabelledMesh
 from vanedamp.modal.msh import MeshError, same_rows
 
 # corners of the faces of a cell, and of a quadratic one the nodes between them (VTK's order)
@@ -29,25 +27,33 @@ _FACES: dict[str, list[tuple[int, ...]]] = {
 }
 _BETWEEN = {frozenset(pair): 4 + index for index, pair in enumerate([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])}
 _CORNERS = {"tetra": 4, "hexahedron": 8}
-# a dolfinx geometry knows no 20-node brick; its edges are taken straight
-_VOLUMES = {"tetra": "tetra", "tetra10": "tetra10", "hexahedron": "hexahedron", "hexahedron20": "hexahedron"}
-_SHELLS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
-# meshio ignores keywords of these files that change the mesh
-_READERS = {".inp": abaqus.read, ".bdf": nastran.read, ".nas": nastran.read, ".fem": nastran.read}
-_FACET_KINDS = {"tetra": "triangle", "tetra10": "triangle6", "hexahedron": "quad"}
+# kind -> that of the cells and number of their nodes: a dolfinx geometry knows no 20-node brick, its edges are straight
+_VOLUMES = {"tetra": ("tetra", 4), "tetra10": ("tetra10", 10), "hexahedron": ("hexahedron", 8)}
+_VOLUMES |= dict.fromkeys(("hexahedron20", "hexahedron27"), ("hexahedron", 8))
+_READERS = {".inp": abaqus.read, ".cdb": ansys.read, ".unv": universal_file.read}
+_READERS |= dict.fromkeys((".bdf", ".nas", ".fem"), nastran.read)
+# gmsh's elements by dimension from 0
+_GMSH = {"tetra": (15, 1, 2, 4), "tetra10": (15, 8, 9, 11), "hexahedron": (15, 1, 3, 5)}
+# gmsh's order of a quadratic tetrahedron; it is its own inverse
+_SWAPPED = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
 @dataclass(frozen=True, eq=False)
 class _Source:
-    """A mesh as read: volume cells of one kind, shells, and named sets of them and of nodes."""
+    """A mesh as read: volume cells of one kind, and named sets of them and of nodes, by index.
+
+    covers  dimension -> name -> corners (sorted) of the shells, lines and points of a set, of faces of a surface
+    absent  name -> the first member of a set that the mesh does not have
+    """
 
     path: Path
     points: np.ndarray
     kind: str
     cells: np.ndarray
     cell_sets: dict[str, np.ndarray]
-    shell_sets: dict[str, set[tuple[int, ...]]]
+    covers: dict[int, dict[str, set[tuple[int, ...]]]]
     node_sets: dict[str, np.ndarray]
+    absent: dict[str, str]
 
 
 def convert(
@@ -57,102 +63,92 @@ def convert(
     facets: Collection[str] | None = None,
     scale: float = 1.0,
 ) -> Path:
-    """Write the mesh of another program as a gmsh file (2.2). Returns its path.
+    """Write the mesh of another program as a gmsh file (4.1). Returns its path.
 
     volumes  sets of volume elements that become volume groups; left out: all
-    facets   sets of nodes or of shells that become groups of facets, or else of edges and points; left out: all
+    facets   sets of nodes, of shells, lines and points, and surfaces, that become groups of facets, or else of edges
+             and points; left out: all
     scale    metres a unit of length of the file: 1e-3 for millimetres
 
     Groups must not overlap: name the sets that are wanted where others overlap them. 20-node bricks become 8-node ones
-    with straight edges (the displacements have a degree of their own). Nastran's sets are the property numbers.
-    Raises MeshError.
+    with straight edges (the displacements have a degree of their own). Raises MeshError.
     """
-    source = _read(Path(path))
-    surface = _boundary(source)
+    source = _source(Path(path), _read(Path(path)))
+    surface, edges = _boundary(source), _edges(source)
     groups = {2: _facet_groups(source, surface, facets), 3: _volume_groups(source, volumes)}
-    edges = _edges(source)
-    groups[1], groups[0] = _node_groups(source, edges, groups[2], facets)
+    groups[1], groups[0] = _lower_groups(source, edges, groups[2], facets)
     for dimension, what in ((2, "facet"), (3, "volume")):
         _check_disjoint(source.path, what, groups[dimension])
-    _write(
-        source,
-        {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]},
-        groups,
-        scale,
-        output,
-    )
-    return Path(output)
+    entities = {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]}
+    return _write(source, entities, groups, scale, output)
 
 
-def _read(path: Path) -> _Source:
-    try:
-        meshio = importlib.import_module("meshio")
-    except ImportError as error:
-        raise MeshError(f"{path}: meshes of other programs need meshio: pip install meshio") from error
+def _read(path: Path) -> LabelledMesh:
     if not path.is_file():
         raise MeshError(f"{path}: no such mesh file")
-    said = io.StringIO()  # meshio says why and ends the program
-    try:
-        with contextlib.redirect_stderr(said):
-            mesh = _READERS.get(path.suffix.lower(), meshio.read)(path)
-    except MeshError:
-        raise
-    except (Exception, SystemExit) as error:  # its readers raise what they stumble over
-        why = said.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__} {error}"
-        raise MeshError(f"{path}: this mesh cannot be read ({' '.join(why.split())})") from error
-    points = np.asarray(mesh.points, dtype=float)
+    return _READERS.get(path.suffix.lower(), other_formats.read)(path)
+
+
+def _source(path: Path, mesh: LabelledMesh) -> _Source:
+    """Return the mesh by indices, with its volume elements of one kind."""
+    if not mesh.nodes:
+        raise MeshError(f"{path}: holds no nodes: empty, or not of the format of {path.suffix}")
+    points = mesh.coordinates(mesh.nodes)
+    labels = np.array(list(mesh.nodes), dtype=int)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
-        raise MeshError(f"{path}: the coordinates of node {bad[0] + 1} (in the file's order) are not finite")
-    sets = {name: [np.asarray(part, dtype=int) for part in parts] for name, parts in mesh.cell_sets.items()}
-    sets |= _property_sets(mesh)
-    volume = [index for index, block in enumerate(mesh.cells) if block.type in _VOLUMES]
-    solids = {block.type for block in mesh.cells if block.dim == 3}
-    if len(solids) != 1 or not volume:
+        raise MeshError(f"{path}: the coordinates of node {labels[bad[0]]} are not finite")
+    place = dict(zip(mesh.nodes, range(len(mesh.nodes)), strict=True))
+    volumes = {label: kind for label, (kind, _) in mesh.elements.items() if KINDS.get(kind, (3, 0))[0] == 3}
+    for label, (_, nodes) in mesh.elements.items():
+        missing = [node for node in nodes if node not in place]
+        if missing:
+            raise MeshError(f"{path}: element {label}: there is no node {missing[0]}")
+    solids = set(volumes.values())
+    if len(solids) != 1 or not solids <= set(_VOLUMES):
         found = ", ".join(sorted(solids)) or "none"
         raise MeshError(f"{path}: volume elements: {found}; expected one kind, tetrahedra or hexahedra")
-    given = mesh.cells[volume[0]].type
-    kind = _VOLUMES[given]
-    width = 10 if kind == "tetra10" else _CORNERS[kind]
-    starts = np.cumsum([0, *(len(mesh.cells[index].data) for index in volume)])
-    cells = np.concatenate([np.asarray(mesh.cells[index].data)[:, :width] for index in volume])
+    kind, width = _VOLUMES[solids.pop()]
+    cells = np.array([[place[node] for node in mesh.elements[label][1][:width]] for label in volumes])
     pair = same_rows(np.sort(cells[:, : _CORNERS[kind.removesuffix("10")]], axis=1))
     if pair is not None:
-        raise MeshError(
-            f"{path}: volume elements {pair[0] + 1} and {pair[1] + 1} (in the file's order) have the same nodes; "
-            "remove one of them"
-        )
-    members = {
-        name: np.concatenate([start + parts[index] for index, start in zip(volume, starts, strict=False)])
-        for name, parts in sets.items()
-    }
+        first, second = (list(volumes)[index] for index in pair)
+        raise MeshError(f"{path}: volume elements {first} and {second} have the same nodes; remove one of them")
+    order = dict(zip(volumes, range(len(volumes)), strict=True))
+    absent: dict[str, str] = {}
+    for what, known, sets in (("node", place, mesh.node_sets), ("element", mesh.elements, mesh.element_sets)):
+        for name, members in sets.items():
+            lost = [label for label in members if label not in known]
+            absent |= {name: f"{what} {lost[0]}"} if lost else {}
+    covers: dict[int, dict[str, set[tuple[int, ...]]]] = {0: {}, 1: {}, 2: {}}
+    for name, members in mesh.element_sets.items():
+        for label in members:
+            element, nodes = mesh.elements.get(label, ("", []))
+            dimension, corners = KINDS.get(element, (3, 0))
+            if dimension < 3:
+                key = tuple(sorted(place[node] for node in nodes[:corners]))
+                covers[dimension].setdefault(name, set()).add(key)
+    for name, faces in mesh.face_sets.items():
+        covers[2].setdefault(name, set()).update(tuple(sorted(place[node] for node in face)) for face in faces)
     return _Source(
         path=path,
         points=points,
         kind=kind,
         cells=cells,
-        cell_sets=_kept(members),
-        shell_sets=_shell_sets(mesh, sets),
-        node_sets=_kept({name: np.asarray(nodes, dtype=int) for name, nodes in mesh.point_sets.items()}),
+        cell_sets=_indexed(mesh.element_sets, order),
+        covers=covers,
+        node_sets=_indexed(mesh.node_sets, place),
+        absent=absent,
     )
 
 
-def _shell_sets(mesh: Any, sets: dict[str, list[np.ndarray]]) -> dict[str, set[tuple[int, ...]]]:
-    """Return sets of shells, each shell as its sorted corners."""
-    found: dict[str, set[tuple[int, ...]]] = {}
-    for index, block in enumerate(mesh.cells):
-        for name, parts in sets.items():
-            if block.type in _SHELLS and parts[index].size:
-                found.setdefault(name, set()).update(_keys(block.data[parts[index]], _SHELLS[block.type]))
-    return found
-
-
-def _property_sets(mesh: Any) -> dict[str, list[np.ndarray]]:
-    """Return Nastran's property numbers as sets."""
-    references = mesh.cell_data.get("nastran:ref", [])
-    blocks = [np.asarray(block, dtype=int) for block in references]
-    numbers = sorted({number for block in blocks for number in block.tolist()})
-    return {str(number): [np.flatnonzero(block == number) for block in blocks] for number in numbers}
+def _indexed(sets: dict[str, list[int]], place: dict[int, int]) -> dict[str, np.ndarray]:
+    """Return the sets with members that are there, as sorted indices."""
+    found = {
+        name: np.unique(np.array([place[label] for label in labels if label in place], dtype=int))
+        for name, labels in sets.items()
+    }
+    return _kept(found)
 
 
 def _kept(sets: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -178,20 +174,22 @@ def _boundary(source: _Source) -> np.ndarray:
 
 def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] | None) -> dict[str, np.ndarray]:
     """Return facet groups: name -> indices into the surface."""
-    keys = _keys(surface, len(_FACES[source.kind.removesuffix("10")][0]))
+    keys = {key: index for index, key in enumerate(_keys(surface, len(_FACES[source.kind.removesuffix("10")][0])))}
     groups: dict[str, np.ndarray] = {}
     for name, nodes in source.node_sets.items():
         inside = np.zeros(len(source.points), dtype=bool)
         inside[nodes] = True
         groups[name] = np.flatnonzero(inside[surface].all(axis=1))
-    for name, shells in source.shell_sets.items():
-        covered = np.array([index for index, key in enumerate(keys) if key in shells], dtype=int)
-        groups[name] = np.union1d(groups.get(name, covered), covered)
-    found = _wanted(source.path, groups, wanted, "set of nodes or shells")
-    for name in sorted(set(wanted or ()) - set(found)):
-        if name not in source.node_sets:
-            raise MeshError(f"{source.path}: no facets of the mesh lie in {name!r}: its shells cover no outer facet")
-    return found
+    for name, faces in source.covers[2].items():
+        covered = np.array([keys[face] for face in faces if face in keys], dtype=int)
+        if name in (wanted or ()) and covered.size < len(faces):
+            raise MeshError(
+                f"{source.path}: {len(faces) - covered.size} of the {len(faces)} faces of {name!r} are no outer facets "
+                "of the volume elements; take them out of the set"
+            )
+        groups[name] = np.unique(covered)  # which says more than a node set of that name
+    lower = {name: np.empty(0, dtype=int) for dimension in (0, 1) for name in source.covers[dimension]}
+    return _wanted(source, lower | groups, wanted, "set or surface")
 
 
 def _edges(source: _Source) -> np.ndarray:
@@ -205,36 +203,48 @@ def _edges(source: _Source) -> np.ndarray:
     return np.asarray(edges[np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True)[1]])
 
 
-def _node_groups(
+def _lower_groups(
     source: _Source, edges: np.ndarray, facets: dict[str, np.ndarray], wanted: Collection[str] | None
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return node sets that are no facet groups: name -> indices into the edges, name -> corners of elements."""
+    """Return sets that are no facet groups: name -> indices into the edges, name -> corners of elements."""
     corners = np.unique(source.cells[:, : _CORNERS[source.kind.removesuffix("10")]])
-    lines, points = {}, {}
-    for name, nodes in source.node_sets.items():
-        if name in facets or (wanted is not None and name not in wanted):
+    keys = {key: index for index, key in enumerate(_keys(edges, 2))}
+    lines: dict[str, np.ndarray] = {}
+    points: dict[str, np.ndarray] = {}
+    groups = source.node_sets | source.covers[1] | source.covers[0]
+    for name in groups:
+        if name in facets or name not in (groups.keys() - source.absent.keys() if wanted is None else wanted):
             continue
         inside = np.zeros(len(source.points), dtype=bool)
-        inside[nodes] = True
-        lines[name], points[name] = np.flatnonzero(inside[edges].all(axis=1)), corners[inside[corners]]
-        if wanted is not None and not points[name].size:
-            raise MeshError(f"{source.path}: the node set {name!r} holds no corner of a volume element")
+        pairs, single = source.covers[1].get(name, set()), source.covers[0].get(name, set())
+        inside[[] if pairs or single else source.node_sets[name]] = True
+        given = [keys[pair] for pair in pairs if pair in keys]
+        lines[name] = np.union1d(np.flatnonzero(inside[edges].all(axis=1)), np.array(given, dtype=int))
+        inside[[node for (node,) in single]] = True
+        points[name] = corners[inside[corners]]
+        if wanted is None:
+            continue
+        if len(given) < len(pairs):
+            raise MeshError(f"{source.path}: the set {name!r} holds a line that is no edge of a volume element")
+        if not points[name].size and not lines[name].size:
+            raise MeshError(f"{source.path}: the set {name!r} holds no corner of a volume element")
     return _kept(lines), _kept(points)
 
 
 def _volume_groups(source: _Source, wanted: Collection[str] | None) -> dict[str, np.ndarray]:
-    return _wanted(source.path, source.cell_sets, wanted, "set of volume elements")
+    return _wanted(source, source.cell_sets, wanted, "set of volume elements")
 
 
 def _wanted(
-    path: Path, groups: dict[str, np.ndarray], wanted: Collection[str] | None, kind: str
+    source: _Source, groups: dict[str, np.ndarray], wanted: Collection[str] | None, kind: str
 ) -> dict[str, np.ndarray]:
-    if wanted is None:
-        return _kept(groups)
-    for name in sorted(wanted):
+    for name in sorted(wanted or ()):
         if name not in groups:
-            raise MeshError(f"{path}: no {kind} {name!r}; there are: {', '.join(sorted(groups)) or 'none'}")
-    return _kept({name: groups[name] for name in groups if name in wanted})
+            raise MeshError(f"{source.path}: no {kind} {name!r}; there are: {', '.join(sorted(groups)) or 'none'}")
+        if name in source.absent:
+            raise MeshError(f"{source.path}: the set {name!r} names {source.absent[name]}, which is not in the mesh")
+    taken = groups.keys() - source.absent.keys() if wanted is None else wanted
+    return _kept({name: groups[name] for name in groups if name in taken})
 
 
 def _check_disjoint(path: Path, what: str, groups: dict[str, np.ndarray]) -> None:
@@ -255,44 +265,26 @@ def _write(
     groups: dict[int, dict[str, np.ndarray]],
     scale: float,
     output: str | os.PathLike[str],
-) -> None:
+) -> Path:
     """Write the gmsh file; entities: nodes of cells, facets, edges and points by dimension, which groups number."""
-    meshio = importlib.import_module("meshio")
-    kinds = {
-        3: source.kind,
-        2: _FACET_KINDS[source.kind],
-        1: "line3" if source.kind == "tetra10" else "line",
-        0: "vertex",
-    }
-    names = {(d, name): number for d, own in groups.items() for number, name in enumerate(own, 1)}
     rest = np.setdiff1d(np.arange(len(source.cells)), _all(groups[3].values()))
-    blocks: list[tuple[str, np.ndarray, int, int]] = []
-    for dimension in (3, 2, 1, 0):
-        for name, members in groups[dimension].items():
-            number = names[dimension, name]
-            blocks.append((kinds[dimension], entities[dimension][members], number, number))
-    if rest.size:  # without a physical group
-        blocks.append((source.kind, source.cells[rest], 0, len(groups[3]) + 1))
     used = np.unique(source.cells)
-    place = np.zeros(len(source.points), dtype=int)
-    place[used] = np.arange(used.size)
-    tags = {"gmsh:physical": 2, "gmsh:geometrical": 3}
-    mesh = meshio.Mesh(
-        points=scale * source.points[used],
-        cells=[(kind, place[cells]) for kind, cells, _, _ in blocks],
-        cell_data={t: [np.full(len(b[1]), b[i], dtype=np.int32) for b in blocks] for t, i in tags.items()},
-    )
-    with replacing(output) as temporary:
-        meshio.write(temporary, mesh, file_format="gmsh22", binary=True)
-        _name(Path(temporary), names)
-
-
-def _name(path: Path, names: dict[tuple[int, str], int]) -> None:
-    """Give the groups of a gmsh file their names; meshio would lose one of an edge and a point group of one name."""
-    lines = [f'{dimension} {tag} "{name}"' for (dimension, name), tag in names.items()]
-    section = "\n".join(["$PhysicalNames", str(len(lines)), *lines, "$EndPhysicalNames", ""]).encode()
-    head, end, rest = path.read_bytes().partition(b"$EndMeshFormat\n")
-    path.write_bytes(head + end + section + rest)
+    number = np.zeros(len(source.points), dtype=int)
+    number[used] = np.arange(1, used.size + 1)
+    volumes = groups[3] | ({"": rest} if rest.size else {})
+    with msh.session(str(source.path)):
+        for dimension, named in ((3, volumes), *((lower, groups[lower]) for lower in (2, 1, 0))):
+            nodes = number[entities[dimension]]
+            nodes = nodes[:, _SWAPPED] if (dimension, source.kind) == (3, "tetra10") else nodes
+            for name, members in named.items():
+                entity = gmsh.model.addDiscreteEntity(dimension)
+                if dimension == 3 and entity == 1:
+                    gmsh.model.mesh.addNodes(3, entity, number[used], (scale * source.points[used]).ravel())
+                gmsh.model.mesh.addElementsByType(entity, _GMSH[source.kind][dimension], [], nodes[members].ravel())
+                if name:
+                    gmsh.model.addPhysicalGroup(dimension, [entity], name=name)
+        gmsh.option.setNumber("Mesh.SaveAll", 1)
+        return msh.write(output)
 
 
 def _all(members: Iterable[np.ndarray]) -> np.ndarray:

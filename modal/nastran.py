@@ -1,38 +1,58 @@
-"""Bulk data of Nastran (.bdf and the like), with the coordinate systems of the grid points, which meshio ignores.
+"""Nastran files (.bdf, .nas, .fem): grid points in global coordinates, elements, properties and sets.
 
-The systems of displacements (CD) and of material axes say nothing about the mesh: supports and materials are the
-case's, in global axes.
+A property number is a set of elements of that name. A SET of the case control, a SET1, a SET3 or OptiStruct's SET holds
+numbers: `set 7 grids` are the grid points among them, `set 7 elements` the elements. The systems of displacements (CD)
+and of material axes say nothing about the mesh: supports and materials are the case's, in global axes.
 """
 
 from __future__ import annotations
 
-import importlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from vanedamp.modal.frames import Frame, through
+from vanedamp.modal.labelled_mesh import LINES, SHELLS, SOLIDS, LabelledMesh, text_lines
 from vanedamp.modal.msh import MeshError
 
 _KINDS = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
+# number of corners, and of all nodes where those between the corners are given
+_ELEMENTS = {
+    "CTETRA": (4, 10), "CHEXA": (8, 20), "CPENTA": (6, 15), "CPYRAM": (5, 13), "CPYRA": (5, 13),
+    "CTRIA3": (3, 3), "CTRIAR": (3, 3), "CTRIA6": (3, 6), "CQUAD4": (4, 4), "CQUADR": (4, 4), "CQUAD8": (4, 8),
+    "CBAR": (2, 2),
+}  # fmt: skip
 _REFUSED = {
     "joins or stiffens grid points, which is not imported; join the meshes, or remove it": (
-        r"RBE\d|RBAR|RROD|RSPLINE|RJOINT|RTRPLT|MPC|MPCADD|CELAS\d|CBUSH\w*|CBAR|CBEAM|CBEND|CROD|CONROD|CTUBE|CWELD|CSEAM"
-        r"|CFAST|CGAP|GENEL|DMIG"
+        r"RBE\d|RBAR|RROD|RSPLINE|RJOINT|RTRPLT|MPC|MPCADD|CELAS\d|CBUSH\w*|CBEAM|CBEND|CROD|CONROD|CTUBE|CWELD|CSEAM"
+        r"|CFAST|CGAP|GENEL|DMIG|CDAMP\d|CVISC"
     ),
     "adds mass, which is not imported; mesh it, or remove it": r"CONM\d|CMASS\d|NSM\w*",
-    "is not followed; write one file": "INCLUDE",
+    "is an element that is not known; expected solids (CTETRA, CHEXA), or shells as their skin": (
+        r"CIHEX\d|CTRIAX\d?|CQUADX\d?|CTQUAD|CTTRIA|CPLST[NS]\d|CSHEAR|CRAC[23]D|CHAC\w+|CFLUID\d|CSUPER|CGEN"
+    ),
+    "repeats the entry before it; write it out": r"=.*",
     "is a coordinate system that is not known; write CORD1 or CORD2, or global coordinates": r"CORD3\w+|GRIDB",
 }
 
 
+# the name of a set of the case control, as a card
+_COMMAND = "SET ="
+
+
 class _Card(NamedTuple):
+    """An entry of the bulk data, or a set of the case control, with the fields after its name."""
+
+    file: Path
     line: int
     name: str
     fields: list[str]
+
+    def error(self, message: str) -> MeshError:
+        return MeshError(f"{self.file}: line {self.line}: {self.name}{message}")
 
     def number(self, place: int) -> float:
         """Return a real field, such as 1.5, 1.5+3 or 1.5D3; empty: zero."""
@@ -45,46 +65,121 @@ class _Card(NamedTuple):
         return int(word or 0)
 
 
-def read(path: Path) -> Any:
-    """Return the mesh as a meshio.Mesh, its points in global coordinates. Raises MeshError with file and line."""
-    cards = list(_cards(path))
+def read(path: Path) -> LabelledMesh:
+    """Return the mesh of a file, its nodes in global coordinates. Raises MeshError with file and line."""
+    commands, cards = _entries(path)
+    # bars without a property are lines of a mesh, as gmsh writes them
+    bars = any(card.name in ("PBAR", "PBARL") for card in cards)
     for card in cards:
-        for why, names in _REFUSED.items():
-            if re.fullmatch(names, card.name):
-                raise MeshError(f"{path}: line {card.line}: {card.name} {why}")
-    systems = _Systems(path, cards)
-    _check_elements(path, cards, systems)
-    mesh = importlib.import_module("meshio").read(path)
-    if systems.named:
-        mesh.points = np.array([systems.place(int(label)) for label in mesh.points_id]).reshape(-1, 3)
+        for why, refused in _REFUSED.items():
+            if re.fullmatch(refused, "CBEAM" if bars and card.name == "CBAR" else card.name):
+                raise card.error(f" {why}")
+    systems = _Systems(cards)
+    mesh = LabelledMesh({label: systems.place(label) for label in systems.grids})
+    for card in cards:
+        if card.name in _ELEMENTS:
+            _take_element(mesh, card)
+    for card in commands + cards:
+        _take_set(mesh, card)
     return mesh
 
 
-def _check_elements(path: Path, cards: list[_Card], systems: _Systems) -> None:
-    """Refuse elements of one number, and nodes that are not there."""
-    seen: set[int] = set()
-    for card in cards:
-        if not re.fullmatch(r"C(TETRA|HEXA|PENTA|PYRAM?|TRIA\w+|QUAD\w+)", card.name):
+def _take_element(mesh: LabelledMesh, card: _Card) -> None:
+    corners, most = _ELEMENTS[card.name]
+    try:
+        label, reference = card.whole(1), card.whole(2)
+        nodes = [card.whole(place) for place in range(3, 3 + most)]
+    except ValueError as error:
+        raise card.error(f": expected whole numbers ({error})") from error
+    kinds = {2: LINES, 3: SHELLS}.get(corners, SHELLS if card.name.startswith("CQUAD") else SOLIDS)
+    if not all(nodes):
+        if any(nodes[corners:]) and kinds is SOLIDS:
+            raise card.error(f": element {label} has some of the nodes between its corners; give all of them, or none")
+        nodes = nodes[:corners]
+    missing = [node for node in nodes if node not in mesh.nodes]
+    if missing:
+        raise card.error(f": there is no grid point {missing[0]}")
+    if label in mesh.elements:
+        raise card.error(f": element {label} is given twice")
+    if len(nodes) == 20:  # the nodes of the upright edges come before those of the upper face
+        nodes = nodes[:12] + nodes[16:] + nodes[12:16]
+    mesh.elements[label] = (kinds[len(nodes)], nodes)
+    mesh.element_sets.setdefault(str(reference or label), []).append(label)
+
+
+class _Numbers(NamedTuple):
+    """Numbers of a set: those named, ranges, and those taken out of the ranges."""
+
+    named: list[int]
+    ranges: list[range]
+    without: set[int]
+
+    def of(self, labels: Iterable[int]) -> list[int]:
+        """Return those named and the labels in the ranges; of a range Nastran takes those that exist."""
+        inside = (n for n in labels if n not in self.without and any(n in span for span in self.ranges))
+        return list(dict.fromkeys([*self.named, *inside]))
+
+
+def _take_set(mesh: LabelledMesh, card: _Card) -> None:
+    """Take in a set as grid points and as elements, where some of either have its numbers."""
+    kind, words = "", [word.upper() for word in card.fields if word]
+    if card.name in ("SET3", "SET") and len(words) > 1:
+        kind = words.pop(1)
+    elif card.name not in ("SET1", _COMMAND):
+        return
+    try:
+        label, numbers = words[0], _numbers([word for word in words[1:] if word != "LIST"])
+    except (ValueError, IndexError) as error:
+        if card.name == _COMMAND:  # of real numbers or names: no set of a mesh
+            return
+        raise card.error(": expected a number, and numbers with THRU and EXCEPT") from error
+    found = {"grids": numbers.of(mesh.nodes), "elements": numbers.of(mesh.elements)}
+    if kind == "PROP":
+        references = [name for name in mesh.element_sets if name.isdecimal()]
+        chosen = {str(number) for number in numbers.of(int(name) for name in references)}
+        found["elements"] = [label for name in references if name in chosen for label in mesh.element_sets[name]]
+    for what, there, sets, kinds in (
+        ("grids", mesh.nodes, mesh.node_sets, ("GRID", "")),
+        ("elements", mesh.elements, mesh.element_sets, ("ELEM", "PROP", "")),
+    ):
+        name = f"set {label} {what}"
+        if kind not in kinds or not any(number in there for number in found[what]):
             continue
-        try:
-            label = card.whole(1)
-            nodes = [int(word) for word in card.fields[2:] if word.isdecimal()]
-        except ValueError as error:
-            raise MeshError(f"{path}: line {card.line}: {card.name}: {error}") from error
-        if label in seen:
-            raise MeshError(f"{path}: line {card.line}: {card.name}: element {label} is given twice")
-        seen.add(label)
-        if not card.name.startswith(("CTRIA", "CQUAD")):  # theirs end in angles and thicknesses
-            missing = [node for node in nodes if node not in systems.grids]
-            if missing:
-                raise MeshError(f"{path}: line {card.line}: {card.name}: there is no grid point {missing[0]}")
+        if sets.setdefault(name, found[what]) != found[what]:
+            raise card.error(f": set {label} is given twice, with other members")
+
+
+def _numbers(words: list[str]) -> _Numbers:
+    """Return the numbers of 1, 3 THRU 9 EXCEPT 5, 6, 20. Raises ValueError or IndexError."""
+    numbers, place, excepted = _Numbers([], [], set()), 0, False
+    while place < len(words):
+        if words[place] == "ALL":
+            numbers.ranges.append(range(1, 2**31))
+            place += 1
+            continue
+        if words[place] == "EXCEPT":
+            excepted, place = True, place + 1
+        first = last = int(words[place])
+        step, place = 1, place + 1
+        spans = words[place : place + 1] == ["THRU"]
+        if spans:
+            last, place = int(words[place + 1]), place + 2
+        if words[place : place + 1] == ["BY"]:
+            step, place = int(words[place + 1]), place + 2
+        excepted = excepted and last < numbers.ranges[-1].stop
+        if excepted:
+            numbers.without.update(range(first, last + 1, step))
+        elif spans:
+            numbers.ranges.append(range(first, last + 1, step))
+        else:
+            numbers.named.append(first)
+    return numbers
 
 
 class _Systems:
     """Coordinate systems and grid points, resolved as they are asked for: each may stand on others."""
 
-    def __init__(self, path: Path, cards: list[_Card]) -> None:
-        self.path = path
+    def __init__(self, cards: list[_Card]) -> None:
         self.frames: dict[int, Frame] = {0: Frame()}
         self.places: dict[int, np.ndarray] = {}
         self.pending: list[int] = []
@@ -105,13 +200,8 @@ class _Systems:
                     for start in (0, 4) if second else (0,):
                         self.given[card.whole(start + 1)] = (card, start)
             except ValueError as error:
-                raise self._error(card, str(error)) from error
+                raise card.error(f": {error}") from error
         self.default = default
-
-    @property
-    def named(self) -> bool:
-        """True if any grid point is given in a coordinate system that the file defines."""
-        return bool(self.default) or any(len(card.fields) > 1 and card.fields[1] for card in self.grids.values())
 
     def place(self, label: int) -> np.ndarray:
         """Return the global coordinates (3,) of a grid point."""
@@ -121,7 +211,7 @@ class _Systems:
                 own = np.array([[card.number(place) for place in (3, 4, 5)]])
                 system = card.whole(2) if len(card.fields) > 1 and card.fields[1] else self.default
             except ValueError as error:
-                raise self._error(card, str(error)) from error
+                raise card.error(f": {error}") from error
             self.places[label] = self.frame(system, card).to_global(own)[0]
         return self.places[label]
 
@@ -130,9 +220,9 @@ class _Systems:
         if label in self.frames:
             return self.frames[label]
         if label not in self.given:
-            raise self._error(asked, f"the coordinate system {label} is not given")
+            raise asked.error(f": the coordinate system {label} is not given")
         if label in self.pending:
-            raise self._error(asked, f"the coordinate system {label} stands on itself")
+            raise asked.error(f": the coordinate system {label} stands on itself")
         self.pending.append(label)
         card, start = self.given[label]
         try:
@@ -149,35 +239,51 @@ class _Systems:
         except MeshError:
             raise
         except ValueError as error:
-            raise self._error(card, str(error)) from error
+            raise card.error(f": {error}") from error
         self.frames[label] = Frame(points[0], np.array([x, y, z]), _KINDS[card.name[5]])
         return self.frames[label]
 
-    def _error(self, card: _Card, message: str) -> MeshError:
-        return MeshError(f"{self.path}: line {card.line}: {card.name}: {message}")
+
+def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
+    """Return the sets of the case control, and the entries of the bulk data: free, small and large fields."""
+    lines = list(_lines(path))
+    begin = next((place for place, line in enumerate(lines) if line[2].strip().upper().startswith("BEGIN")), -1)
+    end = next((place for place, line in enumerate(lines) if line[2].strip().upper().startswith("ENDDATA")), None)
+    if end is None:
+        raise MeshError(f"{path}: no ENDDATA: the file is cut short; write it again")
+    commands, head = [], iter(lines[: max(begin, 0)])
+    for file, number, text in head:
+        while text.endswith(","):
+            text += next(head, (file, number, ""))[2].strip() or " "
+        found = re.fullmatch(r"\s*SET\s+(\d+)\s*=(.*)", text, re.IGNORECASE)
+        if found:
+            commands.append(_Card(file, number, _COMMAND, [found[1], *found[2].replace(",", " ").split()]))
+    cards: list[_Card] = []
+    for file, number, text in lines[begin + 1 : end]:
+        name, fields = _fields(text)
+        if not name.startswith(("+", "*")) and name:
+            cards.append(_Card(file, number, name.rstrip("*_"), fields))  # meshio writes CTETRA_
+        elif cards:
+            cards[-1].fields.extend(fields)
+    return commands, cards
 
 
-def _cards(path: Path) -> Iterator[_Card]:
-    """Yield the entries of the bulk data with their continuations: free, small and large fields."""
-    card: _Card | None = None
-    bulk = False
-    for number, line in enumerate(path.read_text(errors="replace").splitlines(), start=1):
+def _lines(path: Path, within: tuple[Path, ...] = ()) -> Iterator[tuple[Path, int, str]]:
+    """Yield file, number and text of the lines that say something, of included files in their place."""
+    within = (*within, path.resolve())
+    for number, line in enumerate(text_lines(path), start=1):
         text = line.split("$")[0].expandtabs(8).rstrip()
-        if not bulk:
-            bulk = text.strip().upper().startswith("BEGIN")
-            continue
         if not text.strip():
             continue
-        name, fields = _fields(text)
-        if name.startswith(("+", "*")) or not name:
-            if card is not None:
-                card.fields.extend(fields)
+        found = re.fullmatch(r"INCLUDE\s+(['\"]?)(.+)\1", text.strip(), re.IGNORECASE)
+        if found is None:
+            yield path, number, text
             continue
-        if card is not None:
-            yield card
-        card = None if name == "ENDDATA" else _Card(number, name.rstrip("*"), fields)
-    if card is not None:
-        yield card
+        file = path.parent / found[2]
+        if not file.is_file() or file.resolve() in within:
+            why = "the file includes itself" if file.is_file() else "no such file beside the deck"
+            raise MeshError(f"{path}: line {number}: INCLUDE {found[2]}: {why}")
+        yield from _lines(file, within)
 
 
 def _fields(text: str) -> tuple[str, list[str]]:

@@ -7,6 +7,7 @@ additional static flexibility becomes the model's residual flexibility, a massle
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +17,13 @@ import numpy as np
 from scipy import io, linalg, sparse
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.matrix_input import read_mat, read_table
 from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom import checks
 from vanedamp.rom.reduced import ReducedModel
 
 #: endings of files that hold several matrices by name, and of those that hold one
-NAMED, SINGLE = (".npz", ".op4"), (".mtx", ".npy")
+NAMED, SINGLE = (".npz", ".mat", ".op4"), (".mtx", ".npy", ".csv")
 # of the largest entry or eigenvalue: other codes write 5 to 9 digits, of which the last are not symmetric
 _ASYMMETRY = 1e-6
 _INDEFINITE = 1e-6
@@ -48,10 +50,10 @@ class Findings:
 
 
 def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Read the dense matrices of an .npz or .op4 file by lower-case name; that of .mtx, .npy or scipy's save_npz is "".
+    """Read the dense matrices of an .npz, .mat or .op4 file by lower-case name; where those clash, by their own names.
 
-    Entries of a file that are no numbers are left out. Raises ExternalError for a missing, damaged or unknown file,
-    and for OP4 without the package pyyeti.
+    That of .mtx, .npy, .csv or scipy's save_npz is "". Entries of a file that are no numbers are left out. Raises
+    ExternalError for a missing, damaged or unknown file, and for OP4 without the package pyyeti.
     """
     file = Path(path)
     if file.suffix not in NAMED + SINGLE:
@@ -64,8 +66,10 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
         raise
     except Exception as error:  # every format has exceptions of its own
         raise ExternalError(f"{path}: cannot be read ({error})") from error
-    dense = {name.lower(): np.asarray(_dense(matrix)) for name, matrix in found.items()}
-    return {name: matrix for name, matrix in dense.items() if matrix.dtype.kind in "biufc"}
+    dense = {name: np.asarray(_dense(matrix)) for name, matrix in found.items()}
+    dense = {name: matrix for name, matrix in dense.items() if matrix.dtype.kind in "biufc"}
+    counts = Counter(name.lower() for name in dense)
+    return {name if counts[name.lower()] > 1 else name.lower(): matrix for name, matrix in dense.items()}
 
 
 def external_model(
@@ -178,7 +182,9 @@ def _op4(path: str) -> dict[str, Any]:
 
 _READERS = {
     ".npz": _npz,
+    ".mat": read_mat,
     ".op4": _op4,
+    ".csv": lambda path: {"": read_table(path)},
     ".mtx": lambda path: {"": io.mmread(path)},
     ".npy": lambda path: {"": np.load(path, allow_pickle=False)},
 }

@@ -18,6 +18,8 @@ KINDS = ("average", "rigid", "node", "full")
 MOTIONS = ("translation", "rotation")
 # of the largest singular value: below it a functional, or a rigid motion of a patch, is a combination of the others
 _DEPENDENT = 1e-10
+# the same of the constraints between rigid patches: an edge that is straight within that share of its length is a hinge
+_STRAIGHT = 1e-5
 # a mean normal shorter than this is that of a surface which faces everywhere, or that of several which face apart
 _FLAT, _ONE_WAY = 0.5, 0.9
 # sine of the least angle between the directions along and across that span a plane
@@ -37,9 +39,10 @@ class InterfaceCoordinate:
     direction  three numbers, scaled to length one
     kind       "average": mean displacement over the area; the patch deforms freely, a load on it is a constant
                traction. "rigid": the patch moves as a rigid body, which stiffens the structure, and this is the
-               translation of its centroid. "node": the node nearest to the centroid. "full": the mean displacement of
-               a patch of which every node is a boundary coordinate; the reduction keeps the lowest characteristic
-               constraint modes of these (Castanier, Tan and Pierre 2001)
+               translation of its centroid; such patches with a common edge are hinged along it, and at supports a
+               patch makes the motions that these leave to it. "node": the node nearest to the centroid. "full": the
+               mean displacement of a patch of which every node is a boundary coordinate; the reduction keeps the
+               lowest characteristic constraint modes of these (Castanier, Tan and Pierre 2001)
     motion     "translation", or "rotation": the small rotation about the direction through the centroid, rad
     point      where the rigid motion of an average patch is taken, m; None: at its centroid, where it is the mean
 
@@ -196,8 +199,8 @@ class Interface(Displayed):
     def on_patches(cls, matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> Interface:
         """Return the interface of these coordinates.
 
-        Raises InterfaceError for labels that occur twice, rigid patches that touch the supports or each other, and
-        coordinates that cannot move or depend on others; modal.matrices.MatricesError for an unknown patch.
+        Raises InterfaceError for labels that occur twice, and coordinates that cannot move or depend on others;
+        modal.matrices.MatricesError for an unknown patch.
         """
         labels = [coordinate.label for coordinate in coordinates]
         if not labels:
@@ -206,8 +209,8 @@ class Interface(Displayed):
         if twice:
             raise InterfaceError(f"{twice[0]}: this label occurs twice; interface labels must be unique")
         vectors = np.column_stack([_functional(matrices, coordinate) for coordinate in coordinates])
-        motions = _motions(matrices, {item.facets: item.label for item in coordinates if item.kind == "rigid"})
-        _check_independent(labels, motions.T @ vectors)
+        motions = _motions(matrices, list(dict.fromkeys(item.facets for item in coordinates if item.kind == "rigid")))
+        _check_independent(coordinates, vectors, motions.T @ vectors)
         normals = np.array([_normal(matrices, coordinate.facets) for coordinate in coordinates])
         positions = np.array([_position(matrices, coordinate) for coordinate in coordinates])
         arms = np.array([_arm(matrices, coordinate) for coordinate in coordinates])
@@ -295,27 +298,51 @@ def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordina
     return dofs
 
 
-def _motions(matrices: SystemMatrices, rigid: dict[str | tuple[str, ...], str]) -> sparse.csr_array:
-    """Return columns for the free DOFs outside rigid patches, then up to six for every rigid patch."""
+def _motions(matrices: SystemMatrices, rigid: Sequence[str | tuple[str, ...]]) -> sparse.csr_array:
+    """Return columns for the free DOFs outside rigid patches, then those of the motions that the patches can make.
+
+    A patch alone makes up to six. Patches with common nodes make those in which these move with both, such as the
+    rotation about a common edge; a patch with nodes at the supports those in which the supports stay at rest.
+    """
     free = np.zeros(matrices.size, dtype=bool)
     free[matrices.free] = True
-    blocks = []
-    for facets, label in rigid.items():
+    rest, count, blocks = free.copy(), np.zeros(matrices.size), []
+    for facets in rigid:
         patch = matrices.patch(facets)
         dofs = (3 * patch.nodes[:, None] + np.arange(3)).ravel()
-        if not np.all(free[dofs]):
-            raise InterfaceError(
-                f"{label}: the rigid patch {facets!r} touches the supports or another rigid patch; "
-                'take kind "average", or rigid patches without common nodes'
-            )
-        free[dofs] = False
+        rest[dofs] = False
+        count[dofs] += 1.0
         basis = rigid_basis(matrices.coordinates[patch.nodes] - _centroid(matrices, patch))
         columns = np.tile(np.arange(basis.shape[1]), len(dofs))
         shape = (matrices.size, basis.shape[1])
         blocks.append(sparse.csr_array((basis.ravel(), (np.repeat(dofs, basis.shape[1]), columns)), shape=shape))
-    rest = np.flatnonzero(free)
-    identity = sparse.csr_array((np.ones(rest.size), (rest, np.arange(rest.size))), shape=(matrices.size, rest.size))
+    if np.any(count > 1.0) or np.any(count[~free]):
+        blocks = [_joined(blocks, count, free)]
+    others = np.flatnonzero(rest)
+    identity = sparse.csr_array((np.ones(others.size), (others, np.arange(others.size))), (matrices.size, others.size))
     return sparse.csr_array(sparse.hstack([identity, *blocks]))
+
+
+def _joined(blocks: Sequence[sparse.csr_array], count: np.ndarray, free: np.ndarray) -> sparse.csr_array:
+    """Return the motions of rigid patches in which common nodes move with all of theirs, and supports not at all.
+
+    blocks  (N, n_i) the rigid motions of each patch
+    count   (N,) in how many patches a DOF is; free: (N,) whether it can move
+    """
+    every = sparse.csr_array(sparse.hstack(blocks))
+    mean = sparse.csr_array(sparse.diags(free / np.maximum(count, 1.0)) @ every)
+    tied = np.flatnonzero((count > 1.0) | (~free & (count > 0.0)))
+    # every patch's motion of a tied DOF is the mean of the patches', zero at supports
+    gaps, start = [], 0
+    for block in blocks:
+        own = np.zeros((tied.size, every.shape[1]))
+        own[:, start : start + block.shape[1]] = block[tied].toarray()
+        inside = own.any(axis=1)
+        gaps.append(own[inside] - mean[tied[inside]].toarray())
+        start += block.shape[1]
+    _, singular, right = np.linalg.svd(np.linalg.qr(np.concatenate(gaps), mode="r"))
+    left = right[np.count_nonzero(singular > _STRAIGHT * singular[0]) :].T
+    return sparse.csr_array(mean @ left)
 
 
 def rigid_motions(offsets: np.ndarray) -> np.ndarray:
@@ -342,12 +369,19 @@ def _centroid(matrices: SystemMatrices, patch: Patch) -> np.ndarray:
     return patch.weights @ matrices.coordinates[patch.nodes] / patch.area
 
 
-def _check_independent(labels: list[str], vectors: np.ndarray) -> None:
-    lengths = np.linalg.norm(vectors, axis=0)
-    for label, length in zip(labels, lengths, strict=True):
-        if length == 0.0:
-            raise InterfaceError(f"{label}: cannot move, it lies on the supports")
-    _, singular, right = np.linalg.svd(vectors / lengths, full_matrices=False)
+def _check_independent(coordinates: Sequence[InterfaceCoordinate], vectors: np.ndarray, restricted: np.ndarray) -> None:
+    lengths = np.linalg.norm(restricted, axis=0)
+    for item, length, whole in zip(coordinates, lengths, np.linalg.norm(vectors, axis=0), strict=True):
+        if length <= _DEPENDENT * whole:
+            raise InterfaceError(f"{item.label}: cannot move, it lies on the supports")
+    _, singular, right = np.linalg.svd(restricted / lengths, full_matrices=False)
     if singular[-1] < _DEPENDENT * singular[0]:
-        involved = [label for label, share in zip(labels, right[-1], strict=True) if abs(share) > 1e-6]
-        raise InterfaceError(f"{', '.join(involved)}: linearly dependent displacements; drop one of them")
+        involved = [item for item, share in zip(coordinates, right[-1], strict=True) if abs(share) > 1e-6]
+        rigid = {str(item.facets): None for item in involved if item.kind == "rigid"}
+        hint = (
+            f', or take kind "average": the rigid patches {", ".join(rigid)} move as one where they have common nodes'
+            if len(rigid) > 1
+            else ""
+        )
+        labels = ", ".join(item.label for item in involved)
+        raise InterfaceError(f"{labels}: linearly dependent displacements; drop one of them{hint}")

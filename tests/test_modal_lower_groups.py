@@ -164,7 +164,7 @@ def test_a_case_takes_edges_and_points(path, tmp_path, monkeypatch, capfd):
 @pytest.mark.parametrize("order", [1, 2])
 def test_node_sets_of_another_program(tmp_path, order):
     """Sets without a facet, in millimetres: the same frequencies as with gmsh's groups, from points and edges."""
-    meshio = pytest.importorskip("meshio")
+    meshlane = pytest.importorskip("meshlane")
     path = beam(tmp_path / "beam.msh", order)
     with session("export"):
         gmsh.merge(str(path))
@@ -180,7 +180,7 @@ def test_node_sets_of_another_program(tmp_path, order):
     middle = np.isclose(z, HEIGHT / 2)
     sets = {"left": middle & np.isclose(x, 0.0), "right": middle & np.isclose(x, LENGTH)}
     sets |= {"anchor": sets["left"] & np.isclose(y, 0.0), "root": np.isclose(x, 0.0)}
-    meshio.Mesh(1e3 * points, [(kind, cells)], point_sets={n: np.flatnonzero(s) for n, s in sets.items()}).write(
+    meshlane.Mesh(1e3 * points, [(kind, cells)], point_sets={n: np.flatnonzero(s) for n, s in sets.items()}).write(
         tmp_path / "beam.inp"
     )
     again = Solid(convert(tmp_path / "beam.inp", tmp_path / "again.msh", scale=1e-3), {"default": SOFT})

@@ -54,6 +54,25 @@ def test_npz_with_labels_of_its_own_and_held_sets(folder, tmp_path):
     assert solve_modes(again, 3).frequencies_hz == pytest.approx(solve_modes(given, 3).frequencies_hz, rel=1e-9)
 
 
+@pytest.mark.parametrize("ending", ["mat", "csv"])
+def test_matrices_of_matlab_and_dense_tables(folder, tmp_path, ending):
+    given = truss()
+    files = [tmp_path / f"{name}.{ending}" for name in ("stiffness", "mass")]
+    if ending == "mat":
+        files = [tmp_path / "truss.mat"] * 2
+        io.savemat(files[0], {"K": sparse.csc_matrix(given.stiffness), "M": given.mass.toarray(), "omega": 3.0})
+    else:
+        for file, matrix in zip(files, (given.stiffness, given.mass), strict=True):
+            np.savetxt(file, matrix.toarray(), delimiter=",", fmt="%.17g")
+    again = read_matrices(*files, folder / "nodes.csv", folder / "sets.csv", {"held": "xyz"})
+    assert abs(again.stiffness - given.stiffness).max() <= 1e-15 * abs(given.stiffness).max()
+    assert abs(again.mass - given.mass).max() <= 1e-15 * abs(given.mass).max()
+    if ending == "mat":
+        io.savemat(files[0], {"A": np.eye(2), "B": np.eye(2)})
+        with pytest.raises(MatricesError, match="expected one matrix, or one named stiffness or K; there are: A, B"):
+            read_matrices(*files, folder / "nodes.csv")
+
+
 def lower_triangle(folder):
     io.mmwrite(str(folder / "stiffness.mtx"), sparse.tril(truss().stiffness), symmetry="general")
 

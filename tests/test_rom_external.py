@@ -40,6 +40,12 @@ def write(folder, kind, model):
     elif kind == "op4":
         op4 = pytest.importorskip("pyyeti.nastran.op4")
         op4.write(str(folder / "rom.op4"), own)
+    elif kind == "mat":
+        io.savemat(folder / "rom.mat", own | {"KRED": sparse.csc_matrix(model.stiffness), "kred": "a text"})
+    elif kind == "csv":
+        for name, matrix in own.items():
+            np.savetxt(folder / f"{name}.csv", matrix, delimiter=";", header="dense", fmt="%.17g")
+        return 'mass = "MRED.csv"\nstiffness = "KRED.csv"\ndamping = "CRED.csv"'
     else:
         for name, matrix in own.items():
             io.mmwrite(folder / f"{name}.mtx", sparse.coo_matrix(matrix), symmetry="symmetric", precision=17)
@@ -47,7 +53,7 @@ def write(folder, kind, model):
     return f'file = "rom.{kind}"\nmass = "MRED"\nstiffness = "KRED"\ndamping = "CRED"'
 
 
-@pytest.mark.parametrize("kind", ["npz", "op4", "mtx"])
+@pytest.mark.parametrize("kind", ["npz", "op4", "mtx", "mat", "csv"])
 def test_every_format_by_the_command(model, kind, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "external.toml").write_text(TOML.format(matrices=write(tmp_path, kind, model)))
@@ -113,8 +119,14 @@ def test_text_files_of_few_digits_pass():
 def test_bad_files(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "broken.npz").write_bytes(b"nothing")
-    for name, message in (("none.npz", "no such file"), ("a.csv", "ending in"), ("broken.npz", "cannot be read")):
+    for name, message in (
+        ("none.npz", "no such file"),
+        ("a.txt", "ending in"),
+        ("a.csv", "holds no numbers"),
+        ("broken.npz", "cannot be read"),
+    ):
         (tmp_path / "a.csv").write_text("")
+        (tmp_path / "a.txt").write_text("")
         with pytest.raises(ExternalError, match=message):
             read_matrices(tmp_path / name)
     np.savez(tmp_path / "m.npz", M=np.eye(7), K=np.eye(7))

@@ -1,11 +1,13 @@
 """Interface coordinates: the functionals they stand for, rigid patches, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg
 
 from tests.tools.small_structures import truss
-from vanedamp.modal.matrices import MatricesError
+from vanedamp.modal.matrices import MatricesError, Patch
 from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, rigid_motions
 
 Y = (0.0, 1.0, 0.0)
@@ -78,6 +80,99 @@ def test_rigid_patch_of_a_single_node_is_no_constraint():
     )
 
 
+def plates():
+    """Fifteen points of two plates with a common edge, a third beside, all joined by springs, none held."""
+    structure = truss(nodes=15, held=0)
+    grid = [(x, y, 0.0) for y in (0.0, 1.0) for x in (0.0, 0.5, 1.0)]
+    upright = [(x, 0.0, z) for z in (0.5, 1.0) for x in (0.0, 0.5, 1.0)]
+    points = np.array(grid + upright + [(0.0, 2.0, 1.0), (1.0, 2.0, 1.0), (0.5, 2.0, 2.0)])
+    patches = {
+        "floor": range(6), "wall": [0, 1, 2, *range(6, 12)], "corner": [0, 12], "apart": [12, 13, 14],
+        "angle": [0, 1, 3, 12],
+    }  # fmt: skip
+    patches = {name: Patch(np.array(nodes), np.ones(len(nodes))) for name, nodes in patches.items()}
+    return replace(structure, coordinates=points, patches=patches, fixed=np.empty(0, dtype=int))
+
+
+def strain_of(displacements, points):
+    """The largest change of a distance between points, to first order."""
+    apart, moved = points[:, None] - points, displacements[:, None] - displacements
+    return np.abs(np.einsum("ijk,ijk->ij", apart, moved)).max()
+
+
+@pytest.mark.parametrize(
+    ("rigid", "motions"),
+    [
+        (["floor"], 6),
+        (["floor", "wall"], 6 + 6 - 5),  # a hinge
+        (["floor", "apart"], 6 + 6),
+        (["floor", "corner"], 6 + 5 - 3),  # a bar on a ball joint; it does not turn about itself
+        (["floor", "angle"], 6),  # three points that are not on a line: one body
+        (["floor", "wall", "angle"], 7),
+    ],
+)
+def test_rigid_patches_with_common_nodes_are_hinged(rigid, motions):
+    structure = plates()
+    coordinates = [InterfaceCoordinate(rigid[0], rigid[0], Y, "rigid")]
+    coordinates += [InterfaceCoordinate(name, name, (0.1, 0.3, 1.0), "rigid") for name in rigid[1:]]
+    interface = Interface.on_patches(structure, coordinates)
+    nodes = np.unique(np.concatenate([structure.patches[name].nodes for name in rigid]))
+    assert interface.motions.shape[1] == motions + 3 * (15 - nodes.size)
+    shapes = interface.motions.toarray().reshape(15, 3, -1)
+    assert np.linalg.matrix_rank(interface.motions.toarray()) == interface.motions.shape[1]
+    for name in rigid:
+        own = structure.patches[name].nodes
+        for shape in np.moveaxis(shapes[own], 2, 0):
+            # the entries are up to one; round-off of a few operations
+            assert strain_of(shape, structure.coordinates[own]) < 1e-12
+
+
+def test_hinged_plates_are_softer_than_one_body_and_stiffer_than_none():
+    structure = plates()
+    structure = replace(structure, patches=structure.patches | {"both": Patch(np.arange(12), np.ones(12))})
+    given = [["floor", "wall"], ["both"]]
+    frequencies = [linalg.eigvalsh(structure.stiffness.toarray(), structure.mass.toarray())]
+    for names in given:
+        coordinates = [InterfaceCoordinate(name, name, Y, "rigid") for name in names]
+        stiffness, mass, _ = Interface.on_patches(structure, coordinates).restrict(structure)
+        frequencies.append(linalg.eigvalsh(stiffness.toarray(), mass.toarray()))
+    free, hinged, one = (values[6:12] for values in frequencies)
+    assert np.all(free <= hinged * (1 + 1e-10))
+    assert np.all(hinged <= one * (1 + 1e-10))
+    assert hinged[0] < 0.999 * one[0]
+
+
+def test_a_rigid_patch_turns_about_its_support():
+    """The edge of the floor is held: one rotation is left, which moves the centroid up."""
+    structure = plates()
+    structure = replace(structure, fixed=np.arange(9))
+    interface = Interface.on_patches(structure, [InterfaceCoordinate("z", "floor", (0, 0, 1), "rigid")])
+    assert interface.motions.shape[1] == 3 * 9 + 1
+    turned = interface.motions.toarray()[:, -1].reshape(15, 3)
+    assert turned[:6] / turned[5, 2] == pytest.approx(np.array([[0, 0, 0]] * 3 + [[0, 0, 1]] * 3), abs=1e-12)
+    with pytest.raises(InterfaceError, match="y: cannot move, it lies on the supports"):
+        Interface.on_patches(structure, [InterfaceCoordinate("y", "floor", Y, "rigid")])
+
+
+def test_edges_of_text_files_are_hinges_and_what_moves_as_one_is_told():
+    structure = plates()
+    bent = structure.coordinates.copy()
+    bent[1, 2] += 1e-7
+    coordinates = [InterfaceCoordinate(name, name, Y, "rigid") for name in ("floor", "wall")]
+    for points, columns in ((bent, 7 + 9), (bent + 1e-2 * np.eye(15, 3, -1), 6 + 9)):
+        moved = replace(structure, coordinates=points)
+        assert Interface.on_patches(moved, coordinates[:1]).motions.shape[1] == 6 + 27
+        assert Interface.on_patches(moved, [coordinates[0], coordinates[1]]).motions.shape[1] == columns
+    three = [
+        InterfaceCoordinate("floor", "floor", (1, 0, 0), "rigid"),
+        InterfaceCoordinate("angle", "angle", Y, "rigid"),
+    ]
+    three += [InterfaceCoordinate(f"floor.{i}", "floor", row, "rigid") for i, row in enumerate(np.eye(3)[1:])]
+    three += [InterfaceCoordinate(f"turn.{i}", "floor", row, "rigid", "rotation") for i, row in enumerate(np.eye(3))]
+    with pytest.raises(InterfaceError, match=r"linearly dependent displacements; .*the rigid patches angle, floor"):
+        Interface.on_patches(structure, three)
+
+
 @pytest.mark.parametrize(
     ("coordinates", "message"),
     [
@@ -86,7 +181,7 @@ def test_rigid_patch_of_a_single_node_is_no_constraint():
         ([("one", "a", Y), ("other", "b", Y), ("two", "a", (0, -2, 0))], "^one, two: linearly dependent"),
         ([("x", "c", (1, 0, 0)), ("y", "c", Y), ("xy", "c", (1, 1, 0), "node")], "^x, y, xy: linearly dependent"),
         ([("wall", "held", Y)], "wall: cannot move, it lies on the supports"),
-        ([("wall", "held", Y, "rigid")], "wall: the rigid patch 'held' touches the supports"),
+        ([("wall", "held", Y, "rigid")], "wall: cannot move, it lies on the supports"),
     ],
 )
 def test_refuses_what_the_structure_does_not_have(coordinates, message):

@@ -150,16 +150,15 @@ def test_two_tetrahedra_pass(folder, name, text, capfd):
         ),
         ("m.msh", MESH, "$MeshFormat", "$MESHFORMAT", "not a gmsh mesh (a .msh file starts with $MeshFormat)"),
         ("m.inp", DECK, "2,2,3,4,5", "1,2,3,4,5", "line 9: *ELEMENT 1: the element is given twice"),
-        ("m.inp", DECK, "2,2,3,4,5", "2,2,3,4,5\n3,5,4,3,2", "volume elements 2 and 3 (in the file's order)"),
-        ("m.bdf", BULK, "GRID,5,,.1", "GRID,5,,nan", "the coordinates of node 5 (in the file's order) are not finite"),
+        ("m.inp", DECK, "2,2,3,4,5", "2,2,3,4,5\n3,5,4,3,2", "volume elements 2 and 3 have the same nodes"),
+        ("m.bdf", BULK, "GRID,5,,.1", "GRID,5,,nan", "the coordinates of node 5 are not finite"),
         ("m.bdf", BULK, "CTETRA,2", "CTETRA,1", "line 8: CTETRA: element 1 is given twice"),
         ("m.bdf", BULK, "2,3,4,5", "2,3,4,9", "line 8: CTETRA: there is no grid point 9"),
         ("m.bdf", BULK, "GRID,5", "GRID,4,,0.,0.,.2\nGRID,5", "line 6: GRID: grid point 4 is given twice"),
-        ("m.bdf", BULK, "ENDDATA\n", "", "this mesh cannot be read (Error: Couldn't read file"),
+        ("m.bdf", BULK, "ENDDATA\n", "", "no ENDDATA: the file is cut short"),
     ],
 )  # fmt: skip
 def test_meshes_that_are_refused(folder, name, text, old, new, told, capfd):
-    pytest.importorskip("meshio")
     assert text.count(old) == 1
     error = refused(case_of(folder, name, text.replace(old, new)), capfd)
     assert f"case.toml: {name}: " in error

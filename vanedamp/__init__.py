@@ -36,12 +36,13 @@ if TYPE_CHECKING:
     from vanedamp.rom.reduction import reduce
     from vanedamp.studies.case.tables import Case
     from vanedamp.studies.pipeline.pipeline import pipeline
+    from vanedamp.studies.report.plot import plot
 
 __all__ = [
     "Branches", "Campbell", "Case", "InputError", "Interface", "Modes", "Ramp", "ReducedModel", "Response",
     "RigidModel", "RingDown", "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "campbell", "find_orbit",
-    "orbits", "pipeline", "ramp", "reduce", "rigid_model", "ring_down", "simulate", "solve_modes", "steady_states",
-    "sweep",
+    "orbits", "pipeline", "plot", "ramp", "reduce", "rigid_model", "ring_down", "simulate", "solve_modes",
+    "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -66,6 +67,7 @@ _HOMES = {
     "find_orbit": "coupling.orbits.orbits",
     "orbits": "coupling.orbits.orbits",
     "pipeline": "studies.pipeline.pipeline",
+    "plot": "studies.report.plot",
     "ramp": "coupling.transients.ramp",
     "reduce": "rom.reduction",
     "rigid_model": "modal.rigid_model",

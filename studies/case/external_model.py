@@ -22,14 +22,14 @@ Name = Annotated[str, Field(min_length=1)]
 
 @dataclass(frozen=True, config=STRICT)
 class MatricesTable:
-    """Where the matrices are: names in one file, or files of their own (Matrix Market, npy, scipy's save_npz)."""
+    """Where the matrices are: names in one file, or files of their own (CSV, Matrix Market, npy, scipy's save_npz)."""
 
     mass: Name
     """mass matrix: its name in `file`, or a file of its own"""
     stiffness: Name
     """stiffness matrix"""
     file: Name | None = None
-    """file of several matrices by name (npz, OP4)"""
+    """file of several matrices by name (npz, MATLAB, OP4)"""
     damping: Name | None = None
     """damping matrix; or give `damping_ratio`"""
     damping_ratio: Annotated[Real, Field(ge=0, lt=1)] | None = None
@@ -126,8 +126,9 @@ def _doubts(model: ReducedModel) -> tuple[str, ...]:
 
 
 def _matrix(key: str, name: str, in_file: dict[str, np.ndarray], folder: Path) -> np.ndarray:
-    if name.lower() in in_file:
-        return in_file[name.lower()]
+    for spelling in (name, name.lower()):
+        if spelling in in_file:
+            return in_file[spelling]
     if "" in in_file:
         raise InputError("matrices.file: holds one matrix without a name; name the file as mass or stiffness instead")
     if in_file and not Path(name).suffix:
@@ -136,6 +137,6 @@ def _matrix(key: str, name: str, in_file: dict[str, np.ndarray], folder: Path) -
     if "" not in own:
         raise InputError(
             f"{key}: {name!r} is the name of a matrix, or of a file of several: name the file in matrices.file and the "
-            "matrix here; or here a file of one matrix (.mtx, .npy, scipy's save_npz)"
+            "matrix here; or here a file of one matrix (.csv, .mtx, .npy, scipy's save_npz)"
         )
     return own[""]

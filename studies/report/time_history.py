@@ -74,7 +74,7 @@ class History:
         )
 
     @classmethod
-    def of(cls, response: Response, scene: Scene) -> History:
+    def of(cls, response: Response, scene: Scene | None = None) -> History:
         """Return the history of a run that kept samples and events."""
         impacts = [event for event in response.event_list if event.kind == "impact"]
         return cls(

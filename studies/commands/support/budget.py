@@ -56,23 +56,23 @@ def check_optimise(study: Study, workers: int | None) -> None:
 
 
 def designs_of(study: Study) -> int:
-    """Return the designs that an optimisation may run: of its map, and of both searches."""
+    """Return about how many designs an optimisation runs: of its map, and of both searches."""
     table = study.table
     return table.map.mass_ratio * table.map.gap_ratio + 2 * table.evaluations
 
 
 def scenes_of(study: Study) -> int:
-    """Return the scenes that an optimisation may run: its designs, and samples of the tolerances, over the band."""
+    """Return about how many scenes an optimisation runs: designs, and samples of the tolerances, over the band."""
     return (designs_of(study) + study.table.evaluations * study.table.samples) * study.table.count
 
 
 def sweep_seconds(scene: Scene, workers: int) -> float:
-    """Return the time of a sweep."""
+    """Return the time of a sweep, s."""
     return scene.points * run_seconds(scene) / workers
 
 
 def run_seconds(scene: Scene) -> float:
-    """Return the processor time of a run."""
+    """Return the processor time of a run, s, of one body on a rigid structure: richer scenes take more."""
     return _RUN + scene.time.simulated * scene.solver.seconds_per_period
 
 

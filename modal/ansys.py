@@ -1,0 +1,245 @@
+"""Ansys archives (.cdb, written by CDWRITE): nodes, elements and components.
+
+Read are the blocks NBLOCK, EBLOCK and CMBLOCK and the types of elements (ET, ETBLOCK). Source: Ansys Mechanical APDL,
+guide to interfacing, coded database file commands; element reference for the nodes of degenerate shapes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.modal.labelled_mesh import SHELLS, SOLIDS, LabelledMesh, text_lines
+from vanedamp.modal.msh import MeshError
+
+_SOLIDS = (
+    5,
+    45,
+    62,
+    64,
+    65,
+    70,
+    72,
+    73,
+    87,
+    90,
+    92,
+    95,
+    96,
+    98,
+    162,
+    164,
+    168,
+    185,
+    186,
+    187,
+    190,
+    226,
+    227,
+    278,
+    279,
+    285,
+)
+_SKINS = (25, 28, 41, 42, 43, 63, 77, 82, 91, 93, 99, 131, 132, 151, 152, 153, 154, 157, 181, 182, 183, 200, 223, 281)
+# an element without stiffness, and its first options that make it a line or a solid
+_MESH, _MESH_LINES, _MESH_SOLIDS = 200, (0, 1, 2, 3), (8, 9, 10, 11)
+# nodes of a brick whose corners fall together: corners first, then those between them
+_SHAPES = {
+    "tetra10": [0, 1, 2, 4, 8, 9, 11, 16, 17, 18],
+    "pyramid13": [0, 1, 2, 3, 4, 8, 9, 10, 11, 16, 17, 18, 19],
+    "wedge15": [0, 1, 2, 4, 5, 6, 8, 9, 11, 12, 13, 15, 16, 17, 18],
+    "hexahedron20": list(range(20)),
+}
+_CORNERS = {"tetra10": 4, "pyramid13": 5, "wedge15": 6, "hexahedron20": 8}
+_REFUSED = {
+    "makes or changes nodes or elements one by one; write blocks with CDWRITE,DB": (
+        r"N|EN|E|EMORE|NGEN|NFILL|EGEN|NMODIF|EMODIF|NSCALE|NSYM|ESYM|NUMMRG"
+    ),
+    "joins nodes, which is not imported; join the meshes, or remove it": (
+        r"CE|CEBLOCK|CP|CPBLOCK|CPINTF|CEINTF|CERIG|RBE3"
+    ),
+}
+
+
+class _Line(NamedTuple):
+    path: Path
+    number: int
+    text: str
+
+    @property
+    def words(self) -> list[str]:
+        """The name of the command, in capitals, and its arguments."""
+        name, *words = (word.strip() for word in self.text.split("!")[0].split(","))
+        return [name.upper(), *words]
+
+    def error(self, message: str) -> MeshError:
+        return MeshError(f"{self.path}: line {self.number}: {message}")
+
+    def whole(self, words: list[str]) -> list[int]:
+        try:
+            return [int(word) for word in words]
+        except ValueError as error:
+            raise self.error(f"{self.text.split(',')[0].strip()}: expected whole numbers ({error})") from error
+
+
+def read(path: Path) -> LabelledMesh:
+    """Return the mesh of an archive with its components; `material 3` are the elements of a material's number.
+
+    Raises MeshError with file and line.
+    """
+    mesh = LabelledMesh()
+    kinds: dict[int, tuple[int, int | None]] = {}  # of a type: its element, and its first option where that is given
+    lines = iter([_Line(path, number, text) for number, text in enumerate(text_lines(path), 1)])
+    for line in lines:
+        name, *words = line.words
+        for why, refused in _REFUSED.items():
+            if re.fullmatch(refused, name) and "-1" not in words:  # the end of a block of nodes
+                raise line.error(f"{name} {why}")
+        if name == "ET" and len(words) > 1:
+            label, kind = line.whole([words[0], re.sub(r"^[A-Za-z]+", "", words[1])])
+            kinds[label] = (kind, None)
+        elif name == "ETBLOCK":
+            kinds |= {row[0]: (row[1], row[2] if len(row) > 2 else None) for _, row, _ in _rows(line, lines)}
+        elif name in ("KEYOPT", "KEYOP") and len(words) > 2:
+            label, place, option = line.whole(words[:3])
+            if place == 1 and label in kinds:
+                kinds[label] = (kinds[label][0], option)
+        elif name == "NBLOCK":
+            _take_nodes(mesh, line, lines)
+        elif name == "EBLOCK":
+            _take_elements(mesh, kinds, line, lines)
+        elif name == "CMBLOCK":
+            _take_component(mesh, line, lines)
+    if not mesh.nodes:
+        raise MeshError(f"{path}: no nodes in an NBLOCK: not an archive of Ansys; write it with CDWRITE,DB,file,cdb")
+    return mesh
+
+
+def _take_nodes(mesh: LabelledMesh, head: _Line, lines: Iterator[_Line]) -> None:
+    start = len(mesh.nodes)
+    for line, row, place in _rows(head, lines):
+        label = row[0]
+        if label in mesh.nodes:
+            raise line.error(f"node {label} is given twice")
+        mesh.nodes[label] = np.array([*place, 0.0, 0.0, 0.0][:3])  # zeros at the end are left out
+    _check_count(head, 4, len(mesh.nodes) - start, "nodes")
+
+
+def _take_elements(
+    mesh: LabelledMesh, kinds: dict[int, tuple[int, int | None]], head: _Line, lines: Iterator[_Line]
+) -> None:
+    if head.words[2:3] not in (["SOLID"], ["solid"]) or "COMPACT" in head.text.upper():
+        raise head.error("EBLOCK: expected the format 19,SOLID; write it with CDWRITE,DB")
+    start, rows = len(mesh.elements), _rows(head, lines)
+    for line, row, _ in rows:
+        if len(row) < 12:
+            raise line.error(f"EBLOCK: {len(row)} numbers; expected ten, the element and its nodes")
+        material, (given, option), count, label, nodes = row[0], kinds.get(row[1], (0, None)), row[8], row[10], row[11:]
+        while len(nodes) < count:
+            more = next(rows, None)
+            if more is None:
+                raise line.error(f"element {label}: expected {count} nodes, not {len(nodes)}")
+            nodes += more[1]
+        missing = [node for node in nodes if node and node not in mesh.nodes]
+        if missing:
+            raise line.error(f"element {label}: there is no node {missing[0]}")
+        if label in mesh.elements:
+            raise line.error(f"element {label} is given twice")
+        if given in _SOLIDS or (given == _MESH and option in _MESH_SOLIDS):
+            mesh.elements[label] = _solid(line, label, nodes)
+        elif given in _SKINS:
+            most = 2 if given == _MESH and option in _MESH_LINES else 3 if count in (3, 6) else 4
+            corners = list(dict.fromkeys(nodes[:most]))
+            mesh.elements[label] = (SHELLS.get(len(corners), "line"), corners)
+        else:
+            raise line.error(
+                f"element {label} is of the type {given or 'that no ET gives'}; expected solids (185, 186, 187 ...), "
+                "or shells as their skin (154, 181, 200, 281 ...); remove those that join nodes or add mass"
+            )
+        mesh.element_sets.setdefault(f"material {material}", []).append(label)
+    _check_count(head, 4, len(mesh.elements) - start, "elements")
+
+
+def _solid(line: _Line, label: int, nodes: list[int]) -> tuple[str, list[int]]:
+    """Return kind and nodes of a solid: the corners of a brick fall together in other shapes."""
+    if len(nodes) in (8, 20):
+        shape, folded = "hexahedron20", nodes[2] == nodes[3]
+        if len(set(nodes[4:8])) == 1:
+            shape = "tetra10" if folded else "pyramid13"
+        elif folded and nodes[6] == nodes[7]:
+            shape = "wedge15"
+        places = _SHAPES[shape]
+        nodes = [nodes[place] for place in (places if len(nodes) == 20 else places[: _CORNERS[shape]])]
+    corners = {10: 4, 13: 5, 15: 6, 20: 8}.get(len(nodes), len(nodes))
+    if not any(nodes[corners:]):
+        nodes = nodes[:corners]
+    if not all(nodes) or len(nodes) not in SOLIDS or len(set(nodes)) < len(nodes):
+        raise line.error(
+            f"element {label}: expected a solid with all of its nodes, or without those between its corners"
+        )
+    return SOLIDS[len(nodes)], nodes
+
+
+def _take_component(mesh: LabelledMesh, head: _Line, lines: Iterator[_Line]) -> None:
+    if len(head.words) < 4:
+        raise head.error("CMBLOCK: expected a name, NODE or ELEM, and how many numbers follow")
+    name, entity, (wanted,) = head.words[1], head.words[2].upper(), head.whole(head.words[3:4])
+    numbers: list[int] = []
+    rows = _rows(head, lines)
+    while len(numbers) < wanted:
+        more = next(rows, None)
+        if more is None:
+            raise head.error(f"CMBLOCK {name} announces {wanted} numbers and has {len(numbers)}: damaged")
+        numbers += more[1]
+    members: list[int] = []
+    for number in numbers:
+        if number < 0 and not members:
+            raise head.error(f"CMBLOCK {name}: a range without its first number")
+        members.extend([number] if number >= 0 else range(members[-1] + 1, 1 - number))
+    for start, sets in (("NODE", mesh.node_sets), ("ELEM", mesh.element_sets)):
+        if entity.startswith(start):
+            sets[name] = members
+
+
+def _rows(head: _Line, lines: Iterator[_Line]) -> Iterator[tuple[_Line, list[int], list[float]]]:
+    """Yield the lines of a block by its format, with their whole and real numbers, to the end that some blocks have."""
+    cut = head.error(f"{head.words[0]}: the file ends within this block: it is cut short; write it again")
+    layout = next(lines, None)
+    if layout is None:
+        raise cut
+    widths: dict[str, list[int]] = {"i": [], "e": []}
+    for count, letter, width in re.findall(r"(\d*)([a-z])(\d+)", layout.text.lower().replace("g", "e")):
+        widths.get(letter, []).extend([int(width)] * int(count or 1))
+    if not widths["i"]:
+        raise layout.error(f"{head.words[0]}: expected a format such as (19i10), not {layout.text.strip()!r}")
+    ends = np.cumsum([0, *widths["i"], *widths["e"]]).tolist()
+    for line in lines:
+        text = line.text.rstrip()
+        if text.strip() == "-1" or text.upper().startswith("N,"):
+            return
+        if not text:
+            continue
+        fields = [text[start:stop] for start, stop in itertools.pairwise(ends) if start < len(text)]
+        split = len(widths["i"])
+        try:
+            whole, reals = [int(word) for word in fields[:split]], [float(word) for word in fields[split:]]
+        except ValueError as error:
+            raise line.error(
+                f"{head.words[0]}: expected numbers by the format {layout.text.strip()} ({error})"
+            ) from error
+        if len(text) not in ends[1:] and len(text) < ends[-1]:
+            raise line.error(f"{head.words[0]}: the last number is cut short")
+        yield line, whole, reals
+    raise cut
+
+
+def _check_count(head: _Line, place: int, count: int, what: str) -> None:
+    """Raise MeshError for a block that has not as many entries as its head announces, where it does."""
+    announced = head.words[place : place + 1]
+    if announced and announced[0].isdecimal() and int(announced[0]) != count:
+        raise head.error(f"{head.words[0]} announces {announced[0]} {what} and has {count}: damaged; write it again")

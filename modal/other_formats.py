@@ -1,0 +1,50 @@
+"""Meshes in MED, and in the formats that the optional package meshlane reads."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+from pathlib import Path
+from textwrap import shorten
+
+import numpy as np
+
+from vanedamp.modal.labelled_mesh import LabelledMesh
+from vanedamp.modal.msh import MeshError
+
+
+def read(path: Path) -> LabelledMesh:
+    """Return the mesh of a file with its groups, labels counted from 1. Raises MeshError in one line."""
+    try:
+        meshlane = importlib.import_module("meshlane")
+    except ImportError as error:
+        raise MeshError(f"{path}: MED and other formats need meshlane: pip install meshlane") from error
+    said = io.StringIO()  # it prints why, and may end the program
+    try:
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
+            mesh = meshlane.read(path)
+    except (Exception, SystemExit) as error:  # its readers raise what they stumble over
+        why = " ".join(f"{said.getvalue()} {error}".split()) or type(error).__name__
+        raise MeshError(
+            f"{path}: cannot be read as {path.suffix or 'a mesh without an ending'}: damaged, or of another format "
+            f"({shorten(why, 120)}); expected .msh, .inp, .bdf, .nas, .fem, .cdb, .unv, .med, "
+            "or another that meshlane reads"
+        ) from error
+    starts = np.cumsum([1, *(len(block.data) for block in mesh.cells)])
+    labelled = LabelledMesh(
+        nodes=dict(enumerate(np.pad(np.asarray(mesh.points, dtype=float), ((0, 0), (0, 3 - mesh.points.shape[1]))), 1)),
+        node_sets={name.strip(): (1 + np.asarray(nodes)).tolist() for name, nodes in mesh.point_sets.items()},
+    )
+    for start, block in zip(starts, mesh.cells, strict=False):
+        rows = [(block.type, [1 + int(node) for node in row]) for row in block.data]
+        labelled.elements |= dict(enumerate(rows, int(start)))
+    references = [np.asarray(block, dtype=int) for block in mesh.cell_data.get("medit:ref", [])]
+    numbered = {
+        str(number): [np.flatnonzero(block == number) for block in references]
+        for number in sorted({number for block in references for number in block.tolist()})
+    }
+    for name, parts in (numbered | mesh.cell_sets).items():
+        members = [start + np.asarray(part, dtype=int) for start, part in zip(starts, parts, strict=False)]
+        labelled.element_sets[name.strip()] = np.concatenate(members).tolist()
+    return labelled

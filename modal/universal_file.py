@@ -1,0 +1,163 @@
+"""Universal files (.unv) of I-deas, Salome and gmsh: nodes, elements and permanent groups.
+
+Read are the datasets 2411, 781 and 15 (nodes), 2412 and 780 (elements), and those of groups. Sources: SDRC, I-deas
+universal file datasets; Salome's SMESH, UNV drivers (groups of one pair or of two quadruples of numbers).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.modal.labelled_mesh import LabelledMesh, text_lines
+from vanedamp.modal.msh import MeshError
+
+_NODES, _ELEMENTS, _SYSTEMS = (2411, 781, 15), (2412, 780), (2420,)
+# numbers that each member of a group has
+_GROUPS = dict.fromkeys((2417, 2429, 2430, 2432), 2) | dict.fromkeys((2435, 2452, 2467, 2477), 4)
+_NODE, _ELEMENT = 7, 8
+_BEAMS = (11, 21, 22, 23, 24)
+# descriptor of a finite element -> kind
+_KINDS = dict.fromkeys((11, 21, 22), "line") | dict.fromkeys((23, 24), "line3")
+_KINDS |= dict.fromkeys((41, 51, 61, 71, 74, 81, 91), "triangle") | dict.fromkeys((42, 52, 62, 72, 82, 92), "triangle6")
+_KINDS |= dict.fromkeys((44, 54, 64, 84, 94), "quad") | dict.fromkeys((45, 55, 65, 75, 85, 95), "quad8")
+_KINDS |= {111: "tetra", 118: "tetra10", 112: "wedge", 113: "wedge15", 115: "hexahedron", 116: "hexahedron20"}
+# where the nodes, which go around the faces, stand in VTK's order
+_PLACES = {
+    "line3": [0, 2, 1],
+    "triangle6": [0, 2, 4, 1, 3, 5],
+    "quad8": [0, 2, 4, 6, 1, 3, 5, 7],
+    "tetra10": [0, 2, 4, 9, 1, 3, 5, 6, 7, 8],
+    "hexahedron20": [0, 2, 4, 6, 12, 14, 16, 18, 1, 3, 5, 7, 13, 15, 17, 19, 8, 9, 10, 11],
+}
+
+
+class _Line(NamedTuple):
+    path: Path
+    number: int
+    text: str
+
+    def error(self, message: str) -> MeshError:
+        return MeshError(f"{self.path}: line {self.number}: {message}")
+
+    def whole(self, at_least: int = 0) -> list[int]:
+        """Return the whole numbers of the line."""
+        try:
+            numbers = [int(word) for word in self.text.split()]
+        except ValueError as error:
+            raise self.error(f"expected whole numbers ({error})") from error
+        if len(numbers) < at_least:
+            raise self.error(f"expected {at_least} whole numbers, not {len(numbers)}")
+        return numbers
+
+    def place(self) -> np.ndarray:
+        """Return the last three numbers of the line, such as 1.5D+03."""
+        try:
+            x, y, z = (float(word.upper().replace("D", "E")) for word in self.text.split()[-3:])
+        except ValueError as error:
+            raise self.error(f"expected three coordinates ({error})") from error
+        return np.array([x, y, z])
+
+
+def read(path: Path) -> LabelledMesh:
+    """Return the mesh of a file with its groups. Raises MeshError with file and line."""
+    mesh, moved, named = LabelledMesh(), set(), []
+    for number, lines in _datasets(path):
+        rows = iter(lines)
+        try:
+            if number in _NODES:
+                named += [(_take_node(mesh, head, rows if number != 15 else None), head) for head in rows]
+            elif number in _ELEMENTS:
+                for head in rows:
+                    _take_element(mesh, head, rows)
+            elif number in _GROUPS:
+                for head in rows:
+                    if head.text.strip():  # Salome leaves a line of an empty group blank
+                        _take_group(mesh, head, rows, _GROUPS[number])
+            elif number in _SYSTEMS:
+                moved |= _moved_systems(rows)
+        except StopIteration:
+            raise lines[-1].error(
+                f"dataset {number} ends within an entry: the file is damaged; write it again"
+            ) from None
+    for system, head in named:
+        if system in moved:
+            raise head.error(f"the node is given in coordinate system {system}; write global coordinates")
+    return mesh
+
+
+def _datasets(path: Path) -> Iterator[tuple[int, list[_Line]]]:
+    """Yield number and lines of the datasets, which stand between lines of -1."""
+    start, lines = None, [_Line(path, number, text) for number, text in enumerate(text_lines(path), 1)]
+    for place, line in enumerate(lines):
+        if line.text.strip() != "-1":
+            continue
+        if start is None:
+            start = place + 1
+            continue
+        head = lines[start].text.split()
+        if place > start and head and head[0].isdecimal():
+            yield int(head[0]), lines[start + 1 : place]
+        start = None
+    if start is not None:
+        name = "".join(line.text.strip() for line in lines[start : start + 1])
+        raise MeshError(f"{path}: the last dataset {name} is not closed by -1: the file is cut short; write it again")
+
+
+def _take_node(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line] | None) -> int:
+    """Take in a node, whose coordinates are on its line or the next one. Returns its coordinate system."""
+    label, system = (int(word) for word in head.text.split()[:2]) if rows is None else head.whole(2)[:2]
+    place = (head if rows is None else next(rows)).place()
+    if label in mesh.nodes and not np.array_equal(mesh.nodes[label], place):
+        raise head.error(f"node {label} is given twice, at different places")
+    mesh.nodes[label] = place
+    return system
+
+
+def _take_element(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line]) -> None:
+    label, descriptor, *_, width = head.whole(6)
+    kind = _KINDS.get(descriptor)
+    if kind is None:
+        raise head.error(
+            f"element {label}: a finite element {descriptor} is not imported; expected solids (111, 115, 116, 118), or "
+            "shells as their skin"
+        )
+    if descriptor in _BEAMS:
+        next(rows)  # their sections
+    nodes: list[int] = []
+    while len(nodes) < width:
+        nodes += next(rows).whole(1)
+    if label in mesh.elements:
+        raise head.error(f"element {label} is given twice")
+    places = _PLACES.get(kind, range(width))
+    if kind != "wedge15" and len(nodes) != len(places):
+        raise head.error(f"element {label}: {len(nodes)} nodes; a finite element {descriptor} has {len(places)}")
+    mesh.elements[label] = (kind, [nodes[place] for place in places])
+
+
+def _take_group(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line], width: int) -> None:
+    number, *_, count = head.whole(2)
+    name = next(rows).text.strip() or str(number)
+    members: list[int] = []
+    while len(members) < width * count:
+        members += next(rows).whole(width)
+    for code, sets in ((_NODE, mesh.node_sets), (_ELEMENT, mesh.element_sets)):
+        labels = [label for kind, label in zip(members[::width], members[1::width], strict=True) if kind == code]
+        if labels:
+            sets.setdefault(name, []).extend(labels)
+
+
+def _moved_systems(rows: Iterator[_Line]) -> set[int]:
+    """Return the coordinate systems of a part that are not the global rectangular one."""
+    next(rows), next(rows)  # number and name of the part
+    moved = set()
+    for head in rows:
+        label, kind = head.whole(2)[:2]
+        next(rows)
+        axes = np.array([next(rows).place() for _ in range(4)])
+        if kind or not np.allclose(axes, np.eye(4, 3)):
+            moved.add(label)
+    return moved

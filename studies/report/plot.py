@@ -1,0 +1,95 @@
+"""The figure of a result, for notebooks: the chart of the report that shows most of it."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+import plotly.graph_objects as go
+
+from vanedamp.coupling.orbits.branch import Branches
+from vanedamp.coupling.response.response import Response
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.transients.ramp_record import Ramp
+from vanedamp.coupling.transients.ring_down_record import RingDown
+from vanedamp.files.toml_input import InputError
+from vanedamp.modal.campbell import Campbell
+from vanedamp.studies.report.branch_charts import branches_figure
+from vanedamp.studies.report.campbell_chart import campbell_figure
+from vanedamp.studies.report.forced_response import best_first, forced_responses, linear_curves
+from vanedamp.studies.report.forced_response_charts import responses_figure
+from vanedamp.studies.report.mode_chart import mode_figure, small_surface
+from vanedamp.studies.report.ramp_charts import ramp_figure
+from vanedamp.studies.report.results import collect
+from vanedamp.studies.report.ring_down_chart import ring_down_figure
+from vanedamp.studies.report.time_history import History, history_figure
+
+#: curves of a sweep that one figure can show, of more the best
+_MOST_CURVES = 8
+
+
+@singledispatch
+def plot(result: Any, scene: Scene | None = None) -> go.Figure:
+    """Return an interactive figure (plotly) of a result: a record, or the HDF5 file that a command wrote.
+
+    A Sweep gives its forced responses, the best of many; a Response its time history (with the walls of its cavities if
+    its scene is given); Branches, Ramp, RingDown and Campbell their diagrams; a file of `vanedamp modal` its modes.
+    Raises InputError for anything else, and for a response without samples.
+    """
+    raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
+
+
+@plot.register
+def _(result: Sweep, scene: Scene | None = None) -> go.Figure:
+    responses = best_first(forced_responses(result))[:_MOST_CURVES]
+    return responses_figure(responses, [linear_curves(result, response) for response in responses])
+
+
+@plot.register
+def _(result: Response, scene: Scene | None = None) -> go.Figure:
+    return plot(History.of(result, scene))
+
+
+@plot.register
+def _(result: History, scene: Scene | None = None) -> go.Figure:
+    if not len(result.time):
+        raise InputError("plot: the run kept no samples; simulate(scene, events=True, samples_per_period=200)")
+    return history_figure(result.late())
+
+
+@plot.register
+def _(result: Branches, scene: Scene | None = None) -> go.Figure:
+    return branches_figure(result, {})
+
+
+@plot.register
+def _(result: Ramp, scene: Scene | None = None) -> go.Figure:
+    return ramp_figure(result, {})
+
+
+@plot.register
+def _(result: RingDown, scene: Scene | None = None) -> go.Figure:
+    return ring_down_figure(result)
+
+
+@plot.register
+def _(result: Campbell, scene: Scene | None = None) -> go.Figure:
+    return campbell_figure(result)
+
+
+@plot.register(str)
+@plot.register(Path)
+def _(result: str | Path, scene: Scene | None = None) -> go.Figure:
+    found = collect([result])
+    if len(found.files) > 1:
+        raise InputError(f"{result}: holds several results; name one file")
+    ((file, entry),) = found.by_file.items()
+    if file not in found.kinds["modes"]:
+        return plot(entry.record)
+    values, attributes = entry.record
+    surface = small_surface(values)
+    if surface is None:
+        raise InputError(f"{file}: the surface of this mesh is too large for a figure; take vanedamp modal --vtk")
+    return mode_figure(values, surface, int(attributes.get("first_bending", 0)))

@@ -1,0 +1,72 @@
+"""The figure of a result in a notebook: that of the report, from the record or from its file."""
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+import vanedamp as vd
+from tests.tools.input_files import DAMPED_BLOCK
+from tests.tools.processes import ROOT
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.studies.cli import main
+
+RESONANCE = 100.0 / (2 * np.pi)
+DATA = {
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
+    "excitation": {"frequency": RESONANCE, "resonance_amplitude": 1e-3},
+    "cavity": [{"name": "c1", "gap": 2e-4}],
+    "damper": [{"cavity": "c1", "mass": 0.05, "friction": 0.1, "restitution": 0.6}],
+    "time": {"periods": 20, "transient": 10},
+}
+
+
+def test_sweep_shows_its_best_curves(tmp_path):
+    gaps = np.linspace(1e-4, 1e-3, 10).tolist()
+    axes = {"cavity.c1.gap": gaps, "excitation.frequency": [0.99 * RESONANCE, RESONANCE, 1.01 * RESONANCE]}
+    sweep = vd.sweep(validate(vd.Scene, DATA | {"sweep": axes}, "x"))
+    figure = vd.plot(sweep)
+    damped = [trace for trace in figure.data if trace.name == "damped, mean of peaks"]
+    assert len(damped) == 8
+    peaks = np.sort(np.where(sweep.status == "ok", sweep.amplitude_mean, -np.inf).max(axis=1))
+    shown = [np.nanmax(trace.y) * float(sweep.peaks["undamped_peak"][0]) for trace in damped]
+    np.testing.assert_allclose(shown, peaks[np.isfinite(peaks)][:8])
+    sweep.save(tmp_path / "sweep.h5")
+    assert len(vd.plot(tmp_path / "sweep.h5").data) == len(figure.data)
+
+
+def test_run_shows_its_history():
+    scene = validate(vd.Scene, DATA, "x")
+    response = vd.simulate(scene, events=True, samples_per_period=20)
+    structure = vd.plot(response).data[0]
+    np.testing.assert_allclose(structure.y, 1e6 * response.displacement)
+    assert len(vd.plot(response, scene).layout.shapes) > len(vd.plot(response).layout.shapes)  # the walls
+    with pytest.raises(InputError, match="plot: the run kept no samples; simulate"):
+        vd.plot(vd.simulate(scene))
+
+
+#: the examples, made shorter
+SHORTER = {
+    "ramp": {"ramp.rate": [5000.0], "ramp.both": False, "time.periods": 30, "time.transient": 20},
+    "ring_down": {},
+    "orbits": {"orbit.to": 2301.0, "orbit.switch": False},
+}
+
+
+@pytest.mark.parametrize("name", SHORTER)
+def test_other_records_show_their_diagrams(name):
+    scene = vd.Scene.load(ROOT / "docs" / "examples" / f"{name}.toml").replace(SHORTER[name])
+    assert isinstance(vd.plot(getattr(vd, name)(scene)), go.Figure)
+
+
+def test_modes_are_shown_from_their_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
+    assert main(["modal", "case.toml", "-o", "modes.h5"]) == 0
+    assert [trace.type for trace in vd.plot("modes.h5").data].count("mesh3d") == 4
+
+
+def test_what_has_no_figure_is_told():
+    with pytest.raises(InputError, match="plot: there is no figure of a int; pass a result, or its file"):
+        vd.plot(3)
+    with pytest.raises(InputError, match="no such file"):
+        vd.plot("nothing.h5")
