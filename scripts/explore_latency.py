@@ -5,12 +5,15 @@ Needs playwright and a chromium: .venv/bin/python scripts/explore_latency.py [SC
 
 from __future__ import annotations
 
+import contextlib
+import os
 import shutil
 import signal
 import statistics
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 from playwright.sync_api import Page, expect, sync_playwright
 
@@ -45,11 +48,25 @@ def main() -> None:
             page.goto(server.stdout.readline().strip())
             settle(page)
             time.sleep(1.0)
+            spent = processor_time(server.pid)
             moves(page)
+            used = (processor_time(server.pid) - spent) / MOVES
+            print(f"processor time of server and workers: {1e3 * used:.0f} ms a move")
             drag(page)
             browser.close()
         finally:
             server.send_signal(signal.SIGINT)
+
+
+def processor_time(parent: int) -> float:
+    """Return the processor time of a process and its children so far, s (Linux)."""
+    total = 0
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = file.read_text().rpartition(")")[2].split()
+            if str(parent) in (file.parent.name, fields[1]):
+                total += int(fields[11]) + int(fields[12])
+    return total / os.sysconf("SC_CLK_TCK")
 
 
 def settle(page: Page) -> None:
@@ -64,12 +81,13 @@ def moves(page: Page) -> None:
     for count in range(MOVES):
         before = page.evaluate("window.seen.drawn.length")
         slider.press("ArrowRight" if count % 2 else "ArrowLeft")
-        while not (shown := page.evaluate(f"window.seen.drawn.slice({before})")) or not shown[-1][2]:
-            time.sleep(0.01)
+        shown: list[tuple[float, int, bool]] = []
+        while not (shown and shown[-1][2]):  # seldom: looking costs time, too
+            time.sleep(0.8)
+            shown = page.evaluate(f"window.seen.drawn.slice({before})")
         begun = page.evaluate("window.seen.moves.at(-1)")
         coarse.append(shown[0][0] - begun)
         fine.append(next(at for at, _, complete in shown if complete) - begun)
-        time.sleep(0.1)
     for name, values in (("first form of the curve", coarse), ("60 frequencies", fine)):
         print(f"{name}: median {statistics.median(values):.0f} ms, longest {max(values):.0f} ms of {MOVES} moves")
 
@@ -94,7 +112,7 @@ def drag(page: Page) -> None:
     place, drawn = box["y"] + box["height"] / 2, page.evaluate("window.seen.drawn.length")
     page.mouse.move(box["x"] + box["width"] / 2, place)
     page.mouse.down()
-    begun = before = page.evaluate("window.seen.moves.length")
+    before = page.evaluate("window.seen.moves.length")
     started, count = time.perf_counter(), 0
     while time.perf_counter() - started < DRAG:
         share = abs((count % 100) / 50 - 1)
@@ -106,7 +124,7 @@ def drag(page: Page) -> None:
     last = page.evaluate("window.seen.moves.at(-1)")
     left = len(waiting)
     while not page.evaluate(f"window.seen.drawn.length > {curves} && window.seen.drawn.at(-1)[2]"):
-        time.sleep(0.01)
+        time.sleep(0.2)
     time.sleep(1.0)
     shown = page.evaluate("window.seen.drawn")
     print(
@@ -114,7 +132,7 @@ def drag(page: Page) -> None:
         f"requests at a time, {left} left at its end, {len(shown) - curves} curves after it; fine curve "
         f"{shown[-1][0] - last:.0f} ms after the last event"
     )
-    assert begun == before and not waiting
+    assert not waiting
 
 
 if __name__ == "__main__":

@@ -71,6 +71,12 @@ prepare_apt() {
     [ -x $python ] || apt_get install -y --no-install-recommends python3
 }
 
+# A browser for the tests of `vanedamp explore`, which are skipped without one.
+install_browser() {
+    installed chromium || apt_get install -y --no-install-recommends chromium 2>/dev/null ||
+        say "no chromium to install here; the tests in a browser are skipped"
+}
+
 # Whether dolfinx is PyPI's wheel or apt's.
 choose_dolfinx() {
     case ${DOLFINX:-} in
@@ -121,12 +127,13 @@ flock --nonblock 9 || { say "waiting for another set-up to end" && flock 9; }
 up_to_date && exit 0
 
 install_system_packages
+install_browser
 finished || $python -m venv --clear $([ $dolfinx = wheel ] || echo --system-site-packages) $venv
 rm -f $stamp
 say "installing Python packages into $venv"
 pip() { $venv/bin/pip install --quiet --disable-pip-version-check "$@"; }
 if [ $dolfinx = wheel ]; then
-    pip --constraint requirements.txt -e ".[fem,exchange,nastran,cluster,peers,dev]"
+    pip --constraint requirements.txt -e ".[fem,explore,exchange,nastran,cluster,peers,docs,dev]"
 else
     # --no-deps: requirements.txt is complete, and dependencies that apt provides under other names stay apt's
     pip --no-deps -r requirements.txt

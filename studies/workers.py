@@ -24,8 +24,9 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class WorkerPool(Executor):
     """A process pool that starts again after the death of a worker, which breaks a pool of the standard library."""
 
-    def __init__(self, count: int) -> None:
-        self._max_workers = count
+    def __init__(self, count: int, niceness: int = 0) -> None:
+        """Take the number of processes, and by how much they stand back behind others (os.nice)."""
+        self._max_workers, self._niceness = count, niceness
         self._pool = self._new()
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
@@ -53,11 +54,15 @@ class WorkerPool(Executor):
         # fresh processes: a fork of one that holds MPI or threads is not safe
         context = multiprocessing.get_context("spawn")
         with uninterrupted_children():  # a semaphore that was made and not noted yet is warned of at the end
-            return ProcessPoolExecutor(self._max_workers, mp_context=context, initializer=_end_with_parent)
+            return ProcessPoolExecutor(
+                self._max_workers, mp_context=context, initializer=_begin, initargs=(self._niceness,)
+            )
 
 
-def _end_with_parent() -> None:
-    """End this worker with its parent: it would wait for work for ever."""
+def _begin(niceness: int) -> None:
+    """Stand back behind other processes, and end this worker with its parent: it would wait for work for ever."""
+    if niceness and hasattr(os, "nice"):
+        os.nice(niceness)
     parent = multiprocessing.parent_process()
     assert parent is not None
 

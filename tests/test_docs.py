@@ -6,12 +6,14 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from textwrap import dedent
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 import tomli_w
 
+from docs._ext.pages import language
 from tests.tools.input_files import CLUSTER, SCENE, changed
 from tests.tools.processes import RANKS, ROOT, environment
 from tests.tools.schemas import faults, kind_of
@@ -28,8 +30,12 @@ from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.paper.figure_file import PaperFigure, Structure
 from vanedamp.studies.pipeline.tables import PipelineFile
 
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-SHELL = ("vanedamp", "mpirun", "cd", "make", ".venv/bin/python", ".venv/bin/pip")
+DOCS = ROOT / "docs"
+FOLDERS = (".", "tutorial", "howto", "reference")
+PAGES = [
+    ROOT / "README.md", ROOT / "CONTRIBUTING.md",
+    *(page for folder in FOLDERS for page in sorted((DOCS / folder).glob("*.md"))),
+]  # fmt: skip
 
 
 class Example(NamedTuple):
@@ -41,12 +47,7 @@ class Example(NamedTuple):
 
     @property
     def language(self) -> str:
-        first = self.text.split()[0]
-        if re.match(r"\[+[\w.]+\]", self.text):
-            return "toml"
-        if first in ("from", "import"):
-            return "python"
-        return "shell" if first in SHELL else "text"
+        return language(self.text)
 
     def __str__(self) -> str:
         return f"{self.page}:{self.line}"
@@ -66,7 +67,7 @@ def examples_of(page: Path) -> list[Example]:
             found[-1] = found[-1]._replace(text=found[-1].text + "\n")
         else:
             inside = False
-    return found
+    return [example._replace(text=dedent(example.text)) for example in found]
 
 
 EXAMPLES = [example for page in PAGES for example in examples_of(page)]

@@ -15,7 +15,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.explore.point import PointRuns, chosen_frequency, frequencies_of
+from vanedamp.studies.explore.point import PointRuns, chosen_value, values_of
 from vanedamp.studies.explore.point_view import PointView, point_view, run_in_full, scene_at, view_of
 from vanedamp.studies.explore.sweep_chart import (
     abscissas,
@@ -23,6 +23,7 @@ from vanedamp.studies.explore.sweep_chart import (
     best_sentence,
     chosen_curve,
     curve_figure,
+    scene_of_curve,
     start_places,
     status_sentence,
 )
@@ -212,9 +213,10 @@ def test_prescribed_motion_and_engine_order_are_shown():
     assert "50 Hz" in point_view(table, 50.0).summary
     order = SCENE | {"excitation": {"engine_order": 4, "force": 5.0}, "rotation": {"rpm": 100.0}}
     order["cavity"] = [cavity | {"radius": 0.3} for cavity in SCENE["cavity"]]
-    scene = scene_at(order, 2405.0)
-    assert scene.frequency == pytest.approx(2405.0, rel=1e-12)
-    assert "2405 Hz" in view_of(scene, run_in_full(scene)).summary
+    order["sweep"] = {"rotation.rpm": [30000.0, 36000.0]}
+    scene = scene_at(order, 36000.0)
+    assert scene.frequency == pytest.approx(2400.0, rel=1e-12)
+    assert "2400 Hz" in view_of(scene, run_in_full(scene)).summary
 
 
 def test_run_that_is_not_ok_says_so():
@@ -229,7 +231,7 @@ def test_run_that_is_not_ok_says_so():
     ("data", "frequency", "told"),
     [
         (SCENE, -3.0, "frequency"),
-        (SCENE, np.inf, "frequency"),
+        (SCENE | {"sweep": {"cavity.c1.gap": [1e-5, 2e-5]}}, -1e-5, "gap"),
         (SCENE | {"damper": [BODY | {"cavity": "c9"}]}, 2400.0, "no cavity 'c9'"),
         (SCENE | {"time": {"periods": 1_000_000}}, 2400.0, "time.periods"),
     ],
@@ -255,13 +257,12 @@ def test_run_is_looked_at_until_it_is_done():
 
     runs = PointRuns(submit)
     key = runs.begin(SCENE, 2400.0)
-    assert "2400 Hz: running for 0 s" in runs.look(key)
+    assert "frequency = 2400 Hz: running for 0 s" in runs.look(key)
     futures[0].set_result(PointView("done"))
     assert runs.look(key).summary == "done"
     assert runs.look(key).summary == "done"  # a page that was slow asks again
     later = runs.begin(SCENE, 2410.0, former=key)
     assert "not known" in runs.look(key).summary
-    assert runs.scene_of(later) == SCENE
     other = runs.begin(SCENE, 2420.0)  # of another tab
     assert futures[1].cancel()
     assert "ended abruptly" in runs.look(later).summary
@@ -280,20 +281,20 @@ def test_frequencies_are_chosen_by_click_field_and_neighbour():
             {"customdata": {"dtype": "f8", "bdata": "AAAAAADQokAAAAAAACqkQA=="}},
         ]
     }  # fmt: skip
-    assert frequencies_of(figure).tolist() == [2380.0, 2400.0, 2408.0, 2581.0]
+    assert values_of(figure).tolist() == [2380.0, 2400.0, 2408.0, 2581.0]
     click = {"points": [{"customdata": 2400.0}]}
-    assert chosen_frequency("curve", click, 1.0, figure) == 2400.0
-    assert chosen_frequency("curve", {"points": [{"customdata": [2400.0]}]}, None, figure) == 2400.0
-    assert chosen_frequency("point-frequency", click, 2390.5, figure) == 2390.5
-    assert chosen_frequency("point-higher", click, 2400.0, figure) == 2408.0
-    assert chosen_frequency("point-lower", click, 2390.0, figure) == 2380.0
-    assert chosen_frequency("point-lower", click, 10.0, figure) == 2380.0
-    assert chosen_frequency("point-higher", click, 1e6, figure) == 2581.0
-    for nonsense in (None, "abc", -1, 0, [], float("nan")):
-        assert chosen_frequency("point-show", click, nonsense, figure) is None
+    assert chosen_value("curve", click, 1.0, figure) == 2400.0
+    assert chosen_value("curve", {"points": [{"customdata": [2400.0]}]}, None, figure) == 2400.0
+    assert chosen_value("point-value", click, 2390.5, figure) == 2390.5
+    assert chosen_value("point-higher", click, 2400.0, figure) == 2408.0
+    assert chosen_value("point-lower", click, 2390.0, figure) == 2380.0
+    assert chosen_value("point-lower", click, 10.0, figure) == 2380.0
+    assert chosen_value("point-higher", click, 1e6, figure) == 2581.0
+    for nonsense in (None, "abc", [], float("nan"), float("inf")):
+        assert chosen_value("point-show", click, nonsense, figure) is None
     for nothing in ({}, None, {"points": []}, {"points": [{}]}):
-        assert chosen_frequency("curve", nothing, 5.0, figure) is None
-    assert chosen_frequency("point-higher", None, 7.0, {}) == 7.0
+        assert chosen_value("curve", nothing, 5.0, figure) is None
+    assert chosen_value("point-higher", None, 7.0, {}) == 7.0
 
 
 @pytest.fixture(scope="module")
@@ -333,6 +334,19 @@ def test_any_axis_is_the_abscissa_and_numbers_rise(grid):
     assert places_of(grid, [7, None, 0], ids) == {}
 
 
+@pytest.mark.parametrize("along", ["excitation.frequency", "cavity.c1.gap", "damper.restitution"])
+def test_points_of_a_sweep_run_again(grid, along):
+    """Whatever the abscissa is, a point carries its value, and its run has the sweep's amplitude."""
+    places = {"cavity.c1.gap": 2, "excitation.frequency": 4, "damper.restitution": 1}
+    figure = {trace.name: trace for trace in curve_figure(grid, along, places).data}
+    value = figure["damped, mean of peaks"].customdata[1]
+    scene, axis = json.loads(json.dumps(scene_of_curve(grid, along, places)))
+    assert value in axis[along]
+    place = tuple(axis[along].index(value) if path == along else at for path, at in places.items())
+    response = run_in_full(scene_at(scene | {"sweep": axis}, value))
+    assert response.amplitude_mean == pytest.approx(grid.amplitude_mean[place], rel=1e-12)
+
+
 def test_best_design_has_the_lowest_peak(grid):
     peaks = grid.amplitude_mean.max(axis=1)
     gap, restitution = np.unravel_index(np.argmin(peaks), peaks.shape)
@@ -358,7 +372,7 @@ def test_designs_with_points_that_are_not_ok_are_no_best(grid):
         troubled, "excitation.frequency", best.places
     )
     figure = {trace.name: trace for trace in curve_figure(troubled, "excitation.frequency", best.places).data}
-    assert figure["not ok"].customdata.tolist() == ["event_budget"]
+    assert figure["not ok"].text.tolist() == ["event_budget"]
     assert figure["not ok"].x.tolist() == [2400.0]
     assert np.isnan(figure["damped, mean of peaks"].y[2])
     status[:] = "error: gone"

@@ -84,6 +84,8 @@ _FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "wave
 
 
 def _several(axis: Any) -> Any:
+    if isinstance(axis, np.ndarray):
+        return axis.tolist()
     if not isinstance(axis, Mapping | list | tuple | Range):
         raise ValueError("a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}")
     return axis
@@ -435,12 +437,15 @@ def _named_files(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
             yield table, place[-1]
 
 
-def relative(data: dict[str, Any], path: str | Path) -> dict[str, Any]:
-    """Name the files of a scene as one that lies at `path` does: those in its folder or below relative to it."""
-    folder = Path(path).resolve().parent
+def relative(data: dict[str, Any], path: str | Path | None) -> dict[str, Any]:
+    """Name the files of a scene as one that lies at `path` does: those in its folder or below relative to it.
+
+    Without a path they have their whole path.
+    """
+    folder = None if path is None else Path(path).resolve().parent
     for table, key in _named_files(data):
         file = Path(table[key]).resolve()
-        table[key] = str(file.relative_to(folder) if file.is_relative_to(folder) else file)
+        table[key] = str(file.relative_to(folder) if folder and file.is_relative_to(folder) else file)
     return data
 
 

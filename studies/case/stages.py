@@ -459,12 +459,16 @@ def reduced_case(
     tolerance: float = 0.01,
     max_frequency: float | None = None,
     spots: int = 0,
+    recovery: bool = False,
 ) -> ReducedModel:
-    """Return what `vanedamp reduce` writes: a reduction with the stresses at `spots` places of its first mode."""
-    model = reduction(structure, modes, basis, tolerance, max_frequency, keep_recovery=bool(spots))
-    if not spots:
-        return model
-    return replace(with_hot_spots(structure, model, spots), recovery=None, residual_recovery=None, coordinates=None)
+    """Return what `vanedamp reduce` writes: a reduction with the stresses at `spots` places of its first mode.
+
+    recovery: keep the basis, by which responses are shown on the mesh.
+    """
+    model = reduction(structure, modes, basis, tolerance, max_frequency, recovery or bool(spots))
+    if spots:
+        model = with_hot_spots(structure, model, spots)
+    return model if recovery else replace(model, recovery=None, residual_recovery=None, coordinates=None)
 
 
 def _greatest_speed(structure: Structure, basis: str) -> float:

@@ -20,8 +20,8 @@ SUMMARY = "sliders, and a forced response that follows them, in the browser"
 def add_arguments(parser: ArgumentParser) -> None:
     """Take a scene, sweeps or a folder of them, and the address."""
     parser.add_argument(
-        "input", nargs="?", metavar="SCENE.toml|SWEEP.h5|DIR",
-        help="a scene, a sweep's file or a folder of such; default: the rigid model of the shipped cluster",
+        "inputs", nargs="*", metavar="SCENE.toml|SWEEP.h5|DIR",
+        help="a scene, or files of sweeps and folders of such; default: the rigid model of the shipped cluster",
     )  # fmt: skip
     add_output(parser, "SCENE.toml")
     parser.add_argument("--port", type=count, default=0, metavar="N", help="port of 127.0.0.1 (default: a free one)")
@@ -39,9 +39,12 @@ def run(arguments: Namespace) -> None:
     from vanedamp.studies.explore.server import serve
     from vanedamp.studies.workers import available_cores
 
-    source = None if arguments.input is None else Path(arguments.input)
-    sweeps = {} if source is None or source.suffix == ".toml" else _sweeps(source)
-    exploration = None if sweeps else _exploration(source, arguments.output, outputs)
+    sources = [Path(source) for source in arguments.inputs]
+    scenes = [source for source in sources if source.suffix == ".toml"]
+    if scenes and len(sources) > 1:
+        raise InputError(f"{scenes[0]}: a scene is explored on a page of its own; name nothing beside it")
+    sweeps = _sweeps(sources) if sources and not scenes else {}
+    exploration = None if sweeps else _exploration(scenes[0] if scenes else None, arguments.output, outputs)
     if sweeps and arguments.output:
         raise InputError("--output: a scene is written from the page of a scene; leave it out, or name a scene")
     if exploration is not None and exploration.output is not None and exploration.output.exists():
@@ -63,13 +66,13 @@ def _exploration(source: Path | None, output: str | None, outputs: Outputs) -> E
     return Exploration.of(scene, name, None if output is None else Path(output))
 
 
-def _sweeps(source: Path) -> dict[str, Sweep]:
-    """Return the sweeps in a file or a folder, by their short names. Raises InputError where there is none."""
+def _sweeps(sources: list[Path]) -> dict[str, Sweep]:
+    """Return the sweeps in files and folders, by their short names. Raises InputError where there is none."""
     from vanedamp.files.toml_input import InputError
-    from vanedamp.studies.report.results import collect, short_names
+    from vanedamp.studies.explore.sweep_files import open_sweeps
 
-    found = collect([source]).kinds.get("sweep", {})
-    if not found:
-        raise InputError(f"{source}: holds no sweep; `vanedamp sweep SCENE.toml -o SWEEP.h5` writes one")
-    names = short_names(found)
-    return {names[file]: result.record for file, result in found.items()}
+    sweeps = open_sweeps(sources)
+    if not sweeps:
+        named = ", ".join(map(str, sources))
+        raise InputError(f"{named}: holds no sweep; `vanedamp sweep SCENE.toml -o SWEEP.h5` writes one")
+    return sweeps

@@ -41,6 +41,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--hot-spots", type=_spots, default=0, metavar="N",
         help="keep the stresses at the N most stressed places of the first mode as outputs",
     )  # fmt: skip
+    parser.add_argument(
+        "--recovery", action="store_true",
+        help="keep the basis, so that `vanedamp export` can show responses on the mesh",
+    )  # fmt: skip
 
 
 def run(arguments: Namespace) -> None:
@@ -60,8 +64,9 @@ def run(arguments: Namespace) -> None:
     started = time.perf_counter()
     structure = assemble(case)
     model = reduced_case(
-        structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, arguments.hot_spots
-    )
+        structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, arguments.hot_spots,
+        arguments.recovery,
+    )  # fmt: skip
     estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
     if arguments.output:
         model.save(arguments.output)

@@ -59,7 +59,7 @@ def _layout() -> dict[str, Any]:
     figure.update_yaxes(title_text="amplitude / undamped maximum", rangemode="tozero")
     figure.update_layout(
         legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0}, hovermode="closest", uirevision="kept",
-        margin={"t": 30, "r": 12, "l": 60, "b": 50},
+        margin={"t": 30, "r": 12, "l": 60, "b": 50}, plot_bgcolor="white", template="none",
     )  # fmt: skip
     layout: dict[str, Any] = figure.to_plotly_json()["layout"]
     return layout
@@ -102,7 +102,7 @@ def remarks(sweep: Sweep, complete: bool) -> list[str]:
     if complete:
         found += response.headline.remarks
     bad = sorted({status for status in sweep.status.ravel() if status != "ok"})
-    return [*found, f"open markers: {', '.join(bad)}"] if bad else found
+    return [*found, f"not ok (open markers, none where a run broke): {', '.join(bad)}"] if bad else found
 
 
 def _most_reduced(response: ForcedResponse) -> str:

@@ -49,14 +49,19 @@ class Control:
 
     def parse(self, text: str) -> float:
         """Return the number in a field, in SI units. Raises InputError."""
-        try:
-            number = float(text)
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number) or (self.whole and number != int(number)):
-            kind = "a whole number" if self.whole else f"a number in {self.unit}" if self.unit else "a number"
-            raise InputError(f"{self.label}: expected {kind}, not {_shown(text)}")
-        return number * self.factor
+        return number_in(text, self.label, self.unit, self.whole) * self.factor
+
+
+def number_in(text: str, label: str, unit: str = "", whole: bool = False) -> float:
+    """Return the finite number in a field. Raises InputError, naming the field by its label."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number) or (whole and number != int(number)):
+        kind = "a whole number" if whole else f"a number in {unit}" if unit else "a number"
+        raise InputError(f"{label}: expected {kind}, not {text if len(text) <= 20 else text[:20] + '…'!r}")
+    return number
 
 
 def moved(scene: Scene, controls: Sequence[Control], texts: Mapping[str, str]) -> Scene:
@@ -195,7 +200,7 @@ def _body_changes(scene: Scene, number: float) -> dict[str, Any]:
     """Return the changes to `number` equal bodies in each cavity, spread evenly over its free travel."""
     count = int(number)
     if not 1 <= count <= MOST_BODIES:
-        raise InputError(f"expected 1 to {MOST_BODIES}, not {count}")
+        raise InputError(f"expected 1 to {MOST_BODIES}, not {number:g}")
     body = scene.to_dict()["damper"][0] | {"velocity": 0.0}
     rows = [
         body | {"cavity": cavity.name, "position": ((place + 0.5) / count - 0.5) * cavity.gap}
@@ -229,7 +234,3 @@ def _orientation(scene: Scene) -> Iterator[Control]:
         angle, setter = scene.gravity.orientation_deg, _setter(_changes, ("gravity.orientation_deg",))
         low, high = min(-90.0, angle), max(90.0, angle)
         yield Control("orientation", "orientation of gravity", "°", 1.0, angle, low, high, False, setter)
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= 20 else text[:20] + "…")

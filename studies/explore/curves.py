@@ -76,7 +76,7 @@ def seen(scene: Scene, band: Band) -> Scene:
         raise InputError("excitation: nothing moves the structure; give a level above zero")
     low, high = _ends(scene, band)
     if not 1 <= band.evaluated <= _MOST_PERIODS:
-        raise InputError(f"periods evaluated: expected 1 to {_MOST_PERIODS}, not {band.evaluated}")
+        raise InputError(f"periods evaluated: expected 1 to {_MOST_PERIODS}, not {band.evaluated:g}")
     at_end, lengths = scene.replace({FREQUENCY: high}), range(_SHORTEST, _LONGEST, 10)
     enough = bisect_left(lengths, True, key=lambda n: left_over(at_end, n) <= Time().tolerance)
     transient = _SHORTEST + 10 * enough

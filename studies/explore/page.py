@@ -12,18 +12,21 @@ from typing import Any
 from dash import ClientsideFunction, Dash, Input, Output, State, dcc, html, no_update
 from dash.exceptions import PreventUpdate
 
-from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.scene import Scene, relative
+from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.toml_input import InputError, validate
-from vanedamp.files.toml_output import toml
+from vanedamp.files.toml_input import validate
+from vanedamp.files.toml_output import commented, write_commented
 from vanedamp.studies.explore import point
 from vanedamp.studies.explore.chart import Figure, key_figures, remarks, response_figure
-from vanedamp.studies.explore.controls import Control, controls_of, moved
+from vanedamp.studies.explore.controls import Control, controls_of, moved, number_in
 from vanedamp.studies.explore.curves import EVALUATED, Band, Curve, Curves, Submit, ends_of, explorable, seen
+from vanedamp.studies.file_kinds import KINDS
 
 #: steps of a slider, and the longest that a request waits for the next form of a curve, s
 _STEPS, _PATIENCE = 200, 0.5
-_BAND = ("low", "high", "evaluated")
+#: said while there is no point of a curve yet
+_FIRST = "computing; the first time that it runs, the engine is compiled, which takes a minute or two"
 
 
 @dataclass(frozen=True)
@@ -58,23 +61,12 @@ class Exploration:
 
 
 def _band(texts: Mapping[str, str]) -> Band:
-    numbers: list[float | None] = []
-    for name, label in zip(_BAND, ("from", "to", "periods evaluated"), strict=True):
-        text = texts[name].strip()
-        if not text and name != "evaluated":
-            numbers.append(None)
-            continue
-        try:
-            number = float(text)
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number) or (name == "evaluated" and number != int(number)):
-            kind = "a whole number" if name == "evaluated" else "a frequency in Hz, or nothing"
-            raise InputError(f"{label}: expected {kind}, not {text[:20]!r}")
-        numbers.append(number)
-    low, high, evaluated = numbers
-    assert evaluated is not None
-    return Band(low, high, int(evaluated))
+    """Return the band in its fields; a frequency that is left out is found. Raises InputError."""
+    low, high = (
+        number_in(texts[name], label, "Hz") if texts[name].strip() else None
+        for name, label in (("low", "frequencies from"), ("high", "frequencies to"))
+    )
+    return Band(low, high, int(number_in(texts["evaluated"], "periods evaluated", whole=True)))
 
 
 def layout(exploration: Exploration) -> html.Main:
@@ -94,7 +86,7 @@ def layout(exploration: Exploration) -> html.Main:
                     *(_control(control) for control in exploration.controls),
                     html.Div(
                         [
-                            "frequencies from", _field("low", "lowest frequency, Hz", exploration.band["low"], "auto"),
+                            "frequencies", _field("low", "lowest frequency, Hz", exploration.band["low"], "auto"),
                             "to", _field("high", "highest frequency, Hz", exploration.band["high"], "auto"), "Hz",
                         ],
                         className="row",
@@ -194,15 +186,21 @@ def _draw(exploration: Exploration, curves: Curves, request: dict[str, Any]) -> 
         raise PreventUpdate
     reply |= {"have": curve.done, "complete": curve.done == curve.size}
     if curve.done == have:
-        return (*[no_update] * 7, reply)
-    return (*_drawn(curve, request["version"]), reply)
+        said = _FIRST if have == 0 else no_update
+        return (*[no_update] * 4, said, no_update, no_update, reply)
+    figure, figures, text = _drawn(curve, request["version"])
+    data: Any = no_update
+    table: Any = no_update
+    if not have:  # further forms of the curve are of the same scene
+        data = curve.scene.to_dict()
+        table, data["sweep"] = data["sweep"], {}
+    return figure, figures, data, table, text, "message", "", reply
 
 
-def _drawn(curve: Curve, version: int) -> tuple[Any, ...]:
+def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
+    """Return figure, key figures and a line on what there is of a curve so far."""
     sweep = curve.sweep()
     count, complete = len(sweep.status), len(sweep.status) == curve.size
-    data = curve.scene.to_dict()
-    table = data.pop("sweep")
     figures = html.Div(
         [
             html.Dl([part for figure in key_figures(sweep) for part in _term(figure)]),
@@ -211,16 +209,11 @@ def _drawn(curve: Curve, version: int) -> tuple[Any, ...]:
     )
     text = f"{count} frequencies" if complete else f"{count} of {curve.size} frequencies so far"
     figure = response_figure(sweep, curve.linear, {"version": version, "points": count, "complete": complete})
-    return figure, figures, data | {"sweep": {}}, table, text, "message", ""
+    return figure, figures, text
 
 
 def _term(figure: Figure) -> list[Any]:
     return [html.Dt(figure.name), html.Dd(figure.value)]
-
-
-def scene_text(scene: Scene) -> str:
-    """Return the TOML file of a scene."""
-    return toml(scene.to_dict())
 
 
 def _write(exploration: Exploration, scene: Scene) -> tuple[Any, str]:
@@ -229,11 +222,12 @@ def _write(exploration: Exploration, scene: Scene) -> tuple[Any, str]:
     if exploration.output is not None:
         replaced = ", in place of the file that was there" if exploration.output.exists() else ""
         try:
-            scene.save(exploration.output)
+            write_commented(exploration.output, relative(short_form(scene), exploration.output), KINDS["scene"])
             said = f"{exploration.output} written{replaced}; {said}"
-        except OSError as error:
-            said = f"{exploration.output} cannot be written ({error.strerror}); {said}"
-    return {"content": scene_text(scene), "filename": "scene.toml", "type": "application/toml"}, said
+        except (OSError, VanedampError) as error:
+            said = f"{exploration.output} cannot be written ({error}); {said}"
+    text = commented(relative(short_form(scene), None), KINDS["scene"].schema, "scene")
+    return {"content": text, "filename": "scene.toml", "type": "application/toml"}, said
 
 
 def _control(control: Control) -> html.Div:

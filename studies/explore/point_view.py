@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -11,7 +10,7 @@ import plotly.graph_objects as go
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.response.response import Response, Status
-from vanedamp.coupling.scene.rotation import speed_of
+from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.sweep.grid import base_scene
@@ -38,25 +37,19 @@ class PointView(NamedTuple):
     motion: str = ""
 
 
-def scene_at(data: Mapping[str, Any], frequency: float) -> Scene:
-    """Return a scene given as data at an excitation frequency, Hz: a point of the curve that its [sweep] says.
-
-    Raises InputError.
-    """
-    if not (math.isfinite(frequency) and frequency > 0.0):
-        raise InputError(f"frequency: {frequency:g} Hz; take a number above 0")
-    excitation = dict(data["excitation"])
-    changes: dict[str, Any] = {"excitation": excitation}
-    if "engine_order" in excitation:
-        changes["rotation"] = {"speed": speed_of(excitation["engine_order"], frequency)}
-    else:
-        excitation["frequency"] = frequency
-    return base_scene(validate(Scene, {**data, **changes}, "scene"))
+def axis_of(data: Mapping[str, Any]) -> str:
+    """Return the axis along which the curve of a scene runs, given as data: that of its [sweep], or the frequency."""
+    return next(iter(data.get("sweep") or ()), FREQUENCY)
 
 
-def point_view(data: Mapping[str, Any], frequency: float) -> PointView:
-    """Run a scene given as data at an excitation frequency, Hz, from the scene's start. Raises InputError."""
-    scene = scene_at(data, frequency)
+def scene_at(data: Mapping[str, Any], value: float) -> Scene:
+    """Return a scene given as data, with the axis of its curve in [sweep], at a value (SI) on it. Raises InputError."""
+    return base_scene(validate(Scene, data, "scene")).replace({axis_of(data): value})
+
+
+def point_view(data: Mapping[str, Any], value: float) -> PointView:
+    """Run a scene given as data at a value (SI) on the axis of its curve, from the scene's start. Raises InputError."""
+    scene = scene_at(data, value)
     return view_of(scene, run_in_full(scene))
 
 

@@ -25,6 +25,8 @@ from vanedamp.studies.report.motion_page import script_source
 from vanedamp.studies.workers import WorkerPool
 
 HOST = "127.0.0.1"
+#: of the workers: the browser draws on the same cores, and first
+_NICENESS = 5
 _INDEX = """<!DOCTYPE html>
 <html lang="en">
 <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}</head>
@@ -42,14 +44,14 @@ def explore_app(exploration: page.Exploration | None, sweeps: Mapping[str, Sweep
     def layout() -> html.Div:
         parts = [] if exploration is None else [page.layout(exploration)]
         if sweeps:
-            parts.append(html.Main(html.Section(sweep_files.panel(dict(sweeps)), className="wide")))
+            parts.append(html.Main(html.Section(sweep_files.panel(sweeps), className="wide")))
         return html.Div([html.Header([html.H1("vanedamp explore"), html.P(_guide(exploration))]), *parts])
 
     app.layout = layout
     if exploration is not None:
         page.register(app, exploration, submit)
     if sweeps:
-        sweep_files.register(app, dict(sweeps))
+        sweep_files.register(app, sweeps, submit)
     return app
 
 
@@ -112,7 +114,7 @@ def serve(
     except (OSError, OverflowError) as error:
         raise InputError(f"--port: {port} is not to be had ({error}); leave it out for a free one") from None
     token = secrets.token_urlsafe(24)
-    with listening, WorkerPool(count) as pool:
+    with listening, WorkerPool(count, _NICENESS) as pool:
         for _ in range(count):
             pool.submit(warm_up)
         port = listening.getsockname()[1]

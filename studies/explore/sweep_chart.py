@@ -11,7 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.sweep.grid import resonance_axis
+from vanedamp.coupling.sweep.grid import base_scene, resonance_axis
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import is_start
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
@@ -69,10 +69,10 @@ def best_design(sweep: Sweep) -> Best | None:
     # designs that share their undamped maximum rank by either figure
     figure = relative if np.isfinite(relative[complete]).all() else peak
     chosen = np.unravel_index(np.argmin(np.where(complete, figure, np.inf)), complete.shape)
-    rest = iter(int(place) for place in chosen)
-    cut = tuple(slice(None) if k in over else next(rest) for k in range(len(paths)))
-    worst = iter(np.unravel_index(np.argmax(sweep.amplitude_mean[cut]), sweep.amplitude_mean[cut].shape))
-    places = {path: int(next(worst)) if k in over else cut[k] for k, path in enumerate(paths)}
+    places = dict(zip([path for k, path in enumerate(paths) if k not in over], map(int, chosen), strict=True))
+    runs = sweep.amplitude_mean[tuple(places.get(path, slice(None)) for path in paths)]
+    highest = np.unravel_index(np.argmax(runs), runs.shape)
+    places |= dict(zip([paths[k] for k in over], map(int, highest), strict=True))
     return Best(
         places, float(peak[chosen]), float(relative[chosen]), complete.size, complete.size - int(complete.sum())
     )
@@ -147,6 +147,7 @@ def curve_figure(sweep: Sweep, along: str, places: Mapping[str, int]) -> go.Figu
             figure.add_scatter(
                 x=at, y=1e6 * np.where(np.isfinite(values), values, np.nan), name=title, mode=mode, line=line,
                 marker={"size": 5}, hovertemplate=f"{title}: %{{y:.4g}} µm<extra></extra>",
+                customdata=response.x.tolist() if at is x else None,
             )  # fmt: skip
     _add_troubles(figure, sweep, along, places, x)
     _add_best(figure, sweep, along, places, factor)
@@ -178,9 +179,10 @@ def _add_troubles(figure: go.Figure, sweep: Sweep, along: str, places: Mapping[s
     bad, ended = states != "ok", np.isin(states, _UNSURE) & np.isfinite(means)
     if bad.any():
         figure.add_scatter(
-            x=x[bad], y=1e6 * np.where(ended, means, 0.0)[bad], mode="markers", name="not ok", customdata=states[bad],
+            x=x[bad], y=1e6 * np.where(ended, means, 0.0)[bad], mode="markers", name="not ok",
+            text=states[bad], customdata=sweep.axes[along][point[list(sweep.axes).index(along)]][bad].tolist(),
             marker={"symbol": np.where(ended, "circle-open", "x-thin-open")[bad], "size": 8, "color": "#7f1d1d"},
-            hovertemplate="%{customdata}: %{y:.4g} µm<extra></extra>", cliponaxis=False,
+            hovertemplate="%{text}: %{y:.4g} µm<extra></extra>", cliponaxis=False,
         )  # fmt: skip
 
 
@@ -219,3 +221,10 @@ def start_places(sweep: Sweep) -> dict[str, int]:
     """Return the places with which to begin: those of the best design, or the first on every axis."""
     best = best_design(sweep)
     return dict.fromkeys(sweep.axes, 0) if best is None else dict(best.places)
+
+
+def scene_of_curve(sweep: Sweep, along: str, places: Mapping[str, int]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the scene of a curve as data, without its sweep, and the [sweep] over its axis. Raises InputError."""
+    settings = {path: axis.tolist()[places[path]] for path, axis in sweep.axes.items() if path != along}
+    data = base_scene(sweep.scene).replace(settings).to_dict()
+    return data, {along: sweep.axes[along].tolist()}

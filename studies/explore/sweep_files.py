@@ -10,16 +10,20 @@ import numpy as np
 from dash import ALL, Dash, Input, Output, State, ctx, dcc, html, no_update
 
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.studies.explore.point import GRAPH
+from vanedamp.files.errors import VanedampError
+from vanedamp.studies.explore import point
+from vanedamp.studies.explore.curves import Submit
 from vanedamp.studies.explore.sweep_chart import (
     abscissas,
     best_design,
     best_sentence,
     chosen_curve,
     curve_figure,
+    scene_of_curve,
     start_places,
     status_sentence,
 )
+from vanedamp.studies.report.charts import axis_title
 from vanedamp.studies.report.forced_response import quantity
 from vanedamp.studies.report.results import collect, short_names
 
@@ -42,23 +46,27 @@ def panel(sweeps: Mapping[str, Sweep]) -> html.Div:
         html.Div(
             [
                 html.Label("file", htmlFor="sweep-file"),
-                dcc.Dropdown(names, names[0] if names else None, id="sweep-file", clearable=False),
                 html.Label("curve along", htmlFor="sweep-along"),
+                dcc.Dropdown(names, names[0] if names else None, id="sweep-file", clearable=False),
                 dcc.Dropdown([], id="sweep-along", clearable=False),
             ],
-            className="sweep-choice",
+            className="choice",
         ),
         html.Div(id="sweep-axes"),
         html.P(id="sweep-best", role="status"),
         html.Button("Show the best design", id="sweep-to-best", type="button"),
-        dcc.Graph(id="sweep-curve", config=GRAPH),
-        html.P(id="sweep-status", className="note"),
+        dcc.Graph(id="sweep-curve", config=point.GRAPH),
+        html.P(id="sweep-status"),
+        point.panel("sweep-"),
+        dcc.Store(id="sweep-scene"),
+        dcc.Store(id="sweep-sweep"),
     ]
     return html.Div(children, id="sweeps", style={} if names else {"display": "none"})
 
 
-def register(app: Dash, sweeps: Mapping[str, Sweep]) -> None:
-    """Follow the sliders over the axes of the sweeps."""
+def register(app: Dash, sweeps: Mapping[str, Sweep], submit: Submit) -> None:
+    """Follow the sliders over the axes of the sweeps; submit: runs a call in the page's worker processes."""
+    point.register(app, submit, "sweep-")
 
     @app.callback(
         Output("sweep-along", "options"),
@@ -90,6 +98,9 @@ def register(app: Dash, sweeps: Mapping[str, Sweep]) -> None:
     @app.callback(
         Output("sweep-curve", "figure"),
         Output("sweep-status", "children"),
+        Output("sweep-scene", "data"),
+        Output("sweep-sweep", "data"),
+        Output("sweep-point-label", "children"),
         Output({"type": "sweep-value", "path": ALL}, "children"),
         Input({"type": "sweep-axis", "path": ALL}, "value"),
         Input("sweep-along", "value"),
@@ -97,16 +108,21 @@ def register(app: Dash, sweeps: Mapping[str, Sweep]) -> None:
         State("sweep-file", "value"),
     )
     def draw(values: list[Any], along: Any, ids: list[Any], name: Any) -> tuple[Any, ...]:
-        unchanged = [no_update] * len(ctx.outputs_list[2])
+        unchanged = [no_update] * len(ctx.outputs_list[5])
         sweep = sweeps.get(name)
         places = {} if sweep is None else places_of(sweep, values, ids)
         if sweep is None or set(places) != set(sweep.axes) - {along}:  # controls of another file are on their way
-            return no_update, no_update, unchanged
+            return *[no_update] * 5, unchanged
         shown = {path: _value(sweep, path, place) for path, place in places.items()}
         curve = chosen_curve(sweep, along, places)
         said = f"{curve.sentence}. {status_sentence(sweep, along, places)}"
-        labels = [shown[output["id"]["path"]] for output in ctx.outputs_list[2]]
-        return curve_figure(sweep, along, places), " ".join([said, *_warnings(sweep)]), labels
+        labels = [shown[output["id"]["path"]] for output in ctx.outputs_list[5]]
+        title = f"at {axis_title(along, sweep.units()[along])}"
+        try:
+            scene: tuple[Any, Any] = scene_of_curve(sweep, along, places)
+        except VanedampError:  # of a point that is no scene, whose status says so
+            scene = (None, None)
+        return curve_figure(sweep, along, places), " ".join([said, *_remarks(sweep)]), *scene, title, labels
 
     @app.callback(
         Output({"type": "sweep-axis", "path": ALL}, "value"),
@@ -144,8 +160,12 @@ def _at(sweep: Sweep, path: str, place: int) -> int:
     return int(np.flatnonzero(_rising(sweep, path) == place)[0])
 
 
-def _warnings(sweep: Sweep) -> list[str]:
-    return [f"Warning: {warning}." for warning in sweep.provenance.get("warnings", ())]
+def _remarks(sweep: Sweep) -> list[str]:
+    """Return what is to be read before figures are used."""
+    remarks = [f"Warning: {warning}." for warning in sweep.provenance.get("warnings", ())]
+    if sweep.scene.continuation.direction != "independent":
+        remarks.append("Runs of this sweep begin where their neighbours end; a motion at a point begins as the scene.")
+    return remarks
 
 
 def _value(sweep: Sweep, path: str, place: int) -> str:
@@ -158,7 +178,7 @@ def _control(sweep: Sweep, path: str, place: int) -> html.Div:
     name, value, last = {"type": "sweep-axis", "path": path}, _at(sweep, path, place), len(shown) - 1
     if sweep.axes[path].dtype.kind in "if":
         marked = range(len(shown)) if len(shown) <= _MOST_MARKS else (0, last)
-        control = dcc.Slider(
+        control: Any = dcc.Slider(
             0, last, 1, value=value, id=name, marks={k: shown[k] for k in marked}, included=False, disabled=not last,
             updatemode="drag", allow_direct_input=False,
         )  # fmt: skip
@@ -167,4 +187,4 @@ def _control(sweep: Sweep, path: str, place: int) -> html.Div:
             [{"label": text, "value": k} for k, text in enumerate(shown)], value, id=name, clearable=False
         )
     title = [html.Span(f"{path} = "), html.Strong(shown[value], id={"type": "sweep-value", "path": path})]
-    return html.Div([html.Label(title), control], className="sweep-axis")
+    return html.Div([html.Label(title), control], className="axis")

@@ -7,7 +7,9 @@ generous: whoever meets one has most likely slipped by some powers of ten.
 from __future__ import annotations
 
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
+from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.workers import available_cores
 
@@ -25,6 +27,7 @@ def check_run(scene: Scene, samples: int = 0) -> None:
     """Refuse a run whose records fill the memory, or that takes a month. Raises InputError."""
     periods, channels = scene.time.simulated, 2 * (1 + len(scene.damper) + len(scene.friction_damper))
     channels += _IN_PLANE * len(scene.damper) if scene.planar else 0
+    channels += _modes(scene) if samples else 0
     sampled = _SAMPLE * samples * channels * periods
     for key, name, needed in (("time.periods", "periods", _RECORD * periods), ("--samples", "samples", sampled)):
         if needed > MOST_BYTES:
@@ -53,6 +56,14 @@ def check_optimise(study: Study, workers: int | None) -> None:
     scenes, count = scenes_of(study), workers or available_cores()
     check_run(study.scene)
     _check_time("optimise", f"{scenes:.3g} scenes on {count} workers", scenes * run_seconds(study.scene) / count)
+
+
+def _modes(scene: Scene) -> int:
+    """Return the number of modal coordinates that samples have: at most those of the model's file."""
+    if not isinstance(scene.structure, Rom):
+        return 0
+    modes = scene.structure.modes
+    return modes if isinstance(modes, int) else ReducedModel.load(scene.structure.file).size
 
 
 def designs_of(study: Study) -> int:

@@ -29,6 +29,12 @@ window.dash_clientside = window.dash_clientside || {};
       return [wished, quiet()];
     },
 
+    // whether a motion that was asked for is that of the scene seen now
+    stale: function (scene, sweep, asked) {
+      const now = scene && JSON.stringify({ scene: scene, sweep: sweep });
+      return !asked || !now || JSON.stringify(asked) === now ? "" : "The scene has changed since: Show runs it as it is now.";
+    },
+
     // all fields, each change with a number of its own
     gather: function () {
       const texts = Array.from(arguments);
