@@ -145,19 +145,19 @@ def test_nonsense_is_said_in_one_line_and_the_curve_stays():
     exploration = page.Exploration.of(scene(), "scene.toml")
     curves = Curves(at_once)
     drawn = draw(exploration, curves, 1)
-    assert drawn[4:7] == (f"{POINTS} frequencies", "message", "")
+    assert (drawn.message, drawn.tone, drawn.frame) == (f"{POINTS} frequencies", "message", "")
     for version, (name, text, said) in enumerate(NONSENSE, start=2):
         old = draw(exploration, curves, version, **{name: text})
-        assert old[4].startswith(said) and "\n" not in old[4] and len(old[4]) < 200
-        assert old[5:7] == ("message bad", "old")
-        assert old[:4] == (page.no_update,) * 4  # figure, figures, scene and sweep
-        assert old[7] == {"serial": version, "version": version, "have": 0, "complete": True}
-    assert draw(exploration, curves, 99)[4:7] == drawn[4:7]
+        assert old.message.startswith(said) and "\n" not in old.message and len(old.message) < 200
+        assert (old.tone, old.frame) == ("message bad", "old")
+        assert (old.figure, old.figures, old.scene, old.sweep) == (page.no_update,) * 4
+        assert old.answer == {"serial": version, "version": version, "have": 0, "complete": True}
+    assert draw(exploration, curves, 99).message == drawn.message
 
 
 def draw(exploration, curves, version, have=0, **changed_texts):
     request = {"tab": "t", "serial": version, "version": version, "values": exploration.texts | changed_texts}
-    return page._draw(exploration, curves, request | {"have": have})
+    return page.changes(exploration, curves, request | {"have": have})
 
 
 @pytest.mark.parametrize(
