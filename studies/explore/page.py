@@ -129,8 +129,8 @@ def layout(exploration: Exploration) -> html.Main:
     )  # fmt: skip
 
 
-def register(app: Dash, exploration: Exploration, submit: Submit) -> None:
-    """Let the sliders move the curve; submit: runs a call in the page's worker processes."""
+def register(app: Dash, exploration: Exploration, submit: Submit, apart: Submit) -> None:
+    """Let the sliders move the curve; submit: runs a call in a worker process, apart: in one that waits for points."""
     curves = Curves(submit)
     for control in exploration.controls:
         app.clientside_callback(
@@ -167,7 +167,7 @@ def register(app: Dash, exploration: Exploration, submit: Submit) -> None:
             return no_update, "no curve yet"
         return _write(exploration, validate(Scene, scene | {"sweep": sweep}, "scene"))
 
-    point.register(app, submit)
+    point.register(app, apart)
 
 
 class Changes(NamedTuple):
