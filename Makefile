@@ -6,7 +6,7 @@ PYTHON = .venv/bin/python
 TESTS = OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-arithmetic test-versions check bench
+.PHONY: help setup demo test test-all test-arithmetic test-versions check bench docs
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -39,3 +39,6 @@ check: setup ## ruff, mypy, import contracts
 
 bench: setup ## speed and accuracy of the engine, measured here; figures in out/bench
 	$(PYTHON) -m vanedamp bench engine -o out/bench
+
+docs: setup ## the documentation site, a folder of files: docs/_build/html/index.html
+	$(PYTHON) -m sphinx -q -W --keep-going -n docs docs/_build/html

@@ -28,6 +28,8 @@ from vanedamp.files.errors import VanedampError
 
 SCHEMA_VERSION = 1
 
+#: name of a dimension without a coordinate in netCDF-4
+_NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable."
 #: where links stand for the files that processes have open
 _OPEN_FILES = Path("/proc")
 
@@ -179,8 +181,7 @@ def save(
             if dimension not in file:
                 # a dimension without coordinate, marked as netCDF-4 marks it
                 file.create_dataset(dimension, data=np.zeros(length, np.float32))
-                label = f"This is a netCDF dimension but not a netCDF variable.{length:10d}"
-                file[dimension].make_scale(label)
+                file[dimension].make_scale(f"{_NO_COORDINATE}{length:10d}")
             else:
                 file[dimension].make_scale(dimension)
         for name, variable in variables.items():
@@ -212,29 +213,56 @@ def clear_leftovers(path: str | os.PathLike[str]) -> None:
 
 def load(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Read a record: (variables by name as arrays, attributes). Raises StoreError with the file and the reason."""
-    if not Path(path).is_file():
-        raise StoreError(f"{path}: no such file")
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        raise StoreError(f"{path}: not a readable HDF5 file ({error})") from error
-    try:
-        return _record(path, kind, file)
-    except (OSError, RuntimeError) as error:  # opened, and yet damaged
-        raise StoreError(f"{path}: not a readable HDF5 file ({error})") from error
-
-
-def _record(path: str | os.PathLike[str], kind: str, file: h5py.File) -> tuple[dict[str, Any], dict[str, Any]]:
-    with file:
+    with _opened(path) as file:
         found = file.attrs.get("kind")
         if found != kind:
             raise StoreError(f"{path}: holds {found or 'no record of ours'}, expected {kind}")
-        version = int(file.attrs.get("schema_version", 0))
-        if version > SCHEMA_VERSION:
-            raise StoreError(f"{path}: schema version {version} is newer than {SCHEMA_VERSION}; update vanedamp")
-        attributes = _Fields(path, {name: _plain(value) for name, value in file.attrs.items()})
+        attributes = _attributes(path, file)
         variables = {name: _read(item) for name, item in file.items() if isinstance(item, h5py.Dataset)}
         return _Fields(path, variables), attributes
+
+
+def load_any(path: str | os.PathLike[str]) -> tuple[str, dict[str, Variable], dict[str, Any]]:
+    """Read a record of any kind: (kind, variables with dimensions and units, attributes). Raises StoreError."""
+    with _opened(path) as file:
+        kind = file.attrs.get("kind")
+        if kind is None:
+            raise StoreError(f"{path}: holds no record of ours")
+        variables = {
+            name: Variable(_read(item), _dimensions(item, name), str(item.attrs.get("units", "1")))
+            for name, item in file.items()
+            if isinstance(item, h5py.Dataset) and not _without_coordinate(item)
+        }
+        return str(kind), variables, _attributes(path, file)
+
+
+@contextlib.contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
+    """Yield a record's file. Raises StoreError for one that is missing or damaged."""
+    if not Path(path).is_file():
+        raise StoreError(f"{path}: no such file")
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except (OSError, RuntimeError) as error:  # not opened, or opened and yet damaged
+        raise StoreError(f"{path}: not a readable HDF5 file ({error})") from error
+
+
+def _attributes(path: str | os.PathLike[str], file: h5py.File) -> dict[str, Any]:
+    version = int(file.attrs.get("schema_version", 0))
+    if version > SCHEMA_VERSION:
+        raise StoreError(f"{path}: schema version {version} is newer than {SCHEMA_VERSION}; update vanedamp")
+    return _Fields(path, {name: _plain(value) for name, value in file.attrs.items()})
+
+
+def _dimensions(dataset: h5py.Dataset, name: str) -> tuple[str, ...]:
+    """Return the names of a variable's dimensions; that of a coordinate is its own."""
+    return tuple(scales[0].name.lstrip("/") if len(scales) else name for scales in dataset.dims)
+
+
+def _without_coordinate(dataset: h5py.Dataset) -> bool:
+    """Whether a dataset only stands for a dimension, as netCDF-4 marks it."""
+    return bytes(dataset.attrs.get("NAME", b"")).startswith(_NO_COORDINATE.encode())
 
 
 class _Fields(dict[str, Any]):

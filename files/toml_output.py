@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import tomlkit
 from tomlkit.container import Container
-from tomlkit.items import Float, Item, Table, Trivia
+from tomlkit.items import Array, Float, Item, Table, Trivia
 
 from vanedamp.files.reference import FileKind, key_in, options, table_at
 from vanedamp.files.store import replacing
@@ -19,6 +19,8 @@ from vanedamp.files.toml_input import plain
 
 #: widest line that a comment at its end may make; longer comments stand above
 _WIDTH = 120
+#: width of the lines of a long list
+_LINE = 96
 
 
 def write_commented(
@@ -152,13 +154,27 @@ def _item(value: Any) -> Item:
             inline.append(key, _item(entry))
         return inline
     if isinstance(value, list):
-        array = tomlkit.array()
-        for entry in value:
-            array.append(_item(entry))
-        return array
+        return _array([_item(entry) for entry in value])
     if isinstance(value, float):
         return Float(value, Trivia(), _digits(value))
     return tomlkit.item(value)
+
+
+def _array(items: list[Item]) -> Array:
+    """Return a list, in several lines where it is long."""
+    array = tomlkit.array()
+    if sum(len(item.as_string()) + 2 for item in items) < _WIDTH:
+        array.extend(items)
+        return array
+    line: list[Item] = []
+    for item in items:
+        if sum(len(one.as_string()) + 2 for one in [*line, item]) > _LINE:
+            array.add_line(*line)
+            line = []
+        line.append(item)
+    array.add_line(*line)
+    array.add_line(indent="")
+    return array
 
 
 def _digits(value: float) -> str:

@@ -23,8 +23,9 @@ from vanedamp.modal.msh import MeshError
 _ELEMENTS = (
     (re.compile(r"C3D(\d+)[A-Z]*"), SOLIDS),
     (re.compile(r"(?:S|DS|STRI|M3D|SFM3D|CPS|CPE|CAX)(\d)[A-Z0-9]*"), SHELLS),
-    # gmsh writes the edges of a mesh as trusses
+    # gmsh and others write the edges of a mesh as trusses or beams
     (re.compile(r"T[23]D(\d)"), LINES),
+    (re.compile(r"B[23](\d)[A-Z]*"), {1: "line", 2: "line3", 3: "line"}),
 )
 # the corners of the faces S1, S2 ...
 _TETRAHEDRON: list[tuple[int, ...]] = [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)]
@@ -41,6 +42,9 @@ _REFUSED = {
         "TIE", "MPC", "EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING",
         "EMBEDDED ELEMENT", "SHELL TO SOLID COUPLING", "CYCLIC SYMMETRY MODEL", "FASTENER", "SPRING",
         "CONNECTOR SECTION",
+    ),
+    "gives beams a stiffness, which is not imported; mesh them as solids, or remove the keyword": (
+        "BEAM SECTION", "BEAM GENERAL SECTION", "FRAME SECTION",
     ),
     "adds mass, which is not imported; mesh it, or remove the keyword": (
         "MASS", "ROTARY INERTIA", "NONSTRUCTURAL MASS",
@@ -147,9 +151,10 @@ class _Deck:
     def _element(self, card: _Card) -> None:
         given = card.parameters.get("TYPE", "").upper()
         matches = ((pattern.fullmatch(given), kinds) for pattern, kinds in _ELEMENTS)
-        kind, width = next(((kinds[int(m[1])], int(m[1])) for m, kinds in matches if m and int(m[1]) in kinds), ("", 0))
+        kind = next((kinds[int(m[1])] for m, kinds in matches if m and int(m[1]) in kinds), "")
         if not kind:
             raise card.error(f"TYPE={given}: expected solids (C3D4, C3D10, C3D8, C3D20), or shells as their skin")
+        width = next(nodes for kinds in (SOLIDS, SHELLS, LINES) for nodes, own in kinds.items() if own == kind)
         words = [(line, word) for line, row in card.data for word in row if word]
         if len(words) % (width + 1):
             raise card.error(f"TYPE={given}: expected a label and {width} nodes an element")

@@ -6,6 +6,7 @@ guide to interfacing, coded database file commands; element reference for the no
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -45,8 +46,8 @@ _SOLIDS = (
     285,
 )
 _SKINS = (25, 28, 41, 42, 43, 63, 77, 82, 91, 93, 99, 131, 132, 151, 152, 153, 154, 157, 181, 182, 183, 200, 223, 281)
-# an element without stiffness, and its first options that make it a line
-_MESH, _MESH_LINES = 200, (0, 1, 2, 3)
+# an element without stiffness, and its first options that make it a line or a solid
+_MESH, _MESH_LINES, _MESH_SOLIDS = 200, (0, 1, 2, 3), (8, 9, 10, 11)
 # nodes of a brick whose corners fall together: corners first, then those between them
 _SHAPES = {
     "tetra10": [0, 1, 2, 4, 8, 9, 11, 16, 17, 18],
@@ -97,7 +98,7 @@ def read(path: Path) -> LabelledMesh:
     for line in lines:
         name, *words = line.words
         for why, refused in _REFUSED.items():
-            if re.fullmatch(refused, name):
+            if re.fullmatch(refused, name) and "-1" not in words:  # the end of a block of nodes
                 raise line.error(f"{name} {why}")
         if name == "ET" and len(words) > 1:
             label, kind = line.whole([words[0], re.sub(r"^[A-Za-z]+", "", words[1])])
@@ -149,7 +150,7 @@ def _take_elements(
             raise line.error(f"element {label}: there is no node {missing[0]}")
         if label in mesh.elements:
             raise line.error(f"element {label} is given twice")
-        if given in _SOLIDS:
+        if given in _SOLIDS or (given == _MESH and option in _MESH_SOLIDS):
             mesh.elements[label] = _solid(line, label, nodes)
         elif given in _SKINS:
             most = 2 if given == _MESH and option in _MESH_LINES else 3 if count in (3, 6) else 4
@@ -211,23 +212,27 @@ def _rows(head: _Line, lines: Iterator[_Line]) -> Iterator[tuple[_Line, list[int
     layout = next(lines, None)
     if layout is None:
         raise cut
-    found = re.search(r"\((\d+)i(\d+)(?:,\d+[eg](\d+))?", layout.text, re.IGNORECASE)
-    if found is None:
+    widths: dict[str, list[int]] = {"i": [], "e": []}
+    for count, letter, width in re.findall(r"(\d*)([a-z])(\d+)", layout.text.lower().replace("g", "e")):
+        widths.get(letter, []).extend([int(width)] * int(count or 1))
+    if not widths["i"]:
         raise layout.error(f"{head.words[0]}: expected a format such as (19i10), not {layout.text.strip()!r}")
-    count, width, real = (int(number or 0) for number in found.groups())
+    ends = np.cumsum([0, *widths["i"], *widths["e"]]).tolist()
     for line in lines:
         text = line.text.rstrip()
         if text.strip() == "-1" or text.upper().startswith("N,"):
             return
         if not text:
             continue
-        split = count * width if real else len(text)
+        fields = [text[start:stop] for start, stop in itertools.pairwise(ends) if start < len(text)]
+        split = len(widths["i"])
         try:
-            whole = [int(text[place : place + width]) for place in range(0, min(split, len(text)), width)]
-            reals = [float(text[place : place + real]) for place in range(split, len(text), real or 1)]
+            whole, reals = [int(word) for word in fields[:split]], [float(word) for word in fields[split:]]
         except ValueError as error:
-            raise line.error(f"{head.words[0]}: expected numbers by the format {found[0]}...) ({error})") from error
-        if (len(text) - split) % (real or 1):
+            raise line.error(
+                f"{head.words[0]}: expected numbers by the format {layout.text.strip()} ({error})"
+            ) from error
+        if len(text) not in ends[1:] and len(text) < ends[-1]:
             raise line.error(f"{head.words[0]}: the last number is cut short")
         yield line, whole, reals
     raise cut

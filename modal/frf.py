@@ -12,6 +12,8 @@ from vanedamp.modal.rational_fit import Fit, Rational
 
 #: powers of i w that a response has over the displacement
 QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}
+#: and their units per force
+UNITS = {"receptance": "m/N", "mobility": "m/(N s)", "accelerance": "m/(N s^2)"}
 # share of a damping ratio: a standard deviation above it means that the response does not determine the pole
 _UNCERTAIN = 0.5
 # share of the line spacing: in a narrower half-power bandwidth not two lines see a mode rise to half of its peak

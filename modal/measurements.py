@@ -1,8 +1,9 @@
-"""Shapes and frequency responses from and for other programs: CSV, and universal files (UFF 15, 55, 58) by pyuff.
+"""Shapes and frequency responses from and for other programs: CSV, and universal files by pyuff.
 
 Temperatures come from CSV only.
 
-Universal files are read and written in SI units and in the global frame; pyuff is an optional dependency.
+Universal files (datasets 15 or 2411, 55, 58) are read and written in SI units and in the global frame; pyuff is an
+optional dependency.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def read_shapes(path: str | os.PathLike[str]) -> MeasuredShapes:
 
     CSV: a header `x, y, z, dx, dy, dz, <mode>, ...`, then a row for every measured displacement: its point (m), its
     direction, and its value in every mode, as 0.5 or 0.5+0.1j; a mode's name is its frequency in Hz, if it is a number.
-    Universal: datasets 15 (nodes) and 55 (normal or complex modes). Raises MeasurementError.
+    Universal: datasets 15 or 2411 (nodes) and 55 (normal or complex modes). Raises MeasurementError.
     """
     file = _existing(path)
     return _shapes_of_universal(file) if file.suffix.lower() in _UNIVERSAL else _shapes_of_csv(file)
@@ -242,7 +243,7 @@ def _datasets(file: Path) -> list[dict[str, Any]]:
     universal = _pyuff().UFF(str(file))
     try:
         kinds = universal.get_set_types()
-        wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58)))
+        wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58, 2411)))
         return [universal.read_sets(int(index)) for index in wanted]
     except Exception as error:  # pyuff raises what its parsing meets
         raise MeasurementError(f"{file}: not a universal file that pyuff can read ({error})") from error
@@ -252,19 +253,19 @@ def _shapes_of_universal(file: Path) -> MeasuredShapes:
     datasets = _datasets(file)
     nodes: dict[int, np.ndarray] = {}
     for dataset in datasets:
-        if dataset["type"] == 15:
+        if dataset["type"] in (15, 2411):
             points = np.column_stack([dataset["x"], dataset["y"], dataset["z"]])
             nodes |= dict(zip(np.asarray(dataset["node_nums"], dtype=int).tolist(), points, strict=True))
     modes = [d for d in datasets if d["type"] == 55 and d["analysis_type"] in (_NORMAL_MODE, _COMPLEX_MODE)]
     if not nodes or not modes:
-        raise MeasurementError(f"{file}: holds no nodes (dataset 15) or no mode shapes (dataset 55)")
+        raise MeasurementError(f"{file}: holds no nodes (dataset 15 or 2411) or no mode shapes (dataset 55)")
     numbers = np.asarray(modes[0]["node_nums"], dtype=int)
     for mode in modes:
         if not np.array_equal(np.asarray(mode["node_nums"], dtype=int), numbers):
             raise MeasurementError(f"{file}: the modes are given at different nodes; give all of them at the same")
     missing = sorted(set(numbers.tolist()) - set(nodes))
     if missing:
-        raise MeasurementError(f"{file}: node {missing[0]} of the shapes has no coordinates in dataset 15")
+        raise MeasurementError(f"{file}: node {missing[0]} of the shapes has no coordinates in the file")
     shapes = np.array([np.column_stack([mode["r1"], mode["r2"], mode["r3"]]).ravel() for mode in modes])
     frequencies = [m["freq"] if "freq" in m else abs(m["eig"]) / (2 * np.pi) for m in modes]
     # exact zeros in every mode are axes that no sensor looked along
@@ -303,7 +304,7 @@ def _shapes_to_universal(shapes: MeasuredShapes, target: Path) -> None:
         field = np.zeros((len(points), 3), dtype=shape.dtype)
         field[number, axes] = signs * shape
         sets.append(_mode_dataset(prepare, shapes, index, labels, field, complex_valued))
-    _write_universal(prepare, sets, target)
+    write_universal(sets, target)
 
 
 def _mode_dataset(
@@ -366,10 +367,12 @@ def _frf_to_universal(frf: Frf, target: Path) -> None:
         )
         for index, (values, label) in enumerate(zip(frf.values, frf.labels, strict=True))
     ]  # fmt: skip
-    _write_universal(prepare, sets, target)
+    write_universal(sets, target)
 
 
-def _write_universal(prepare: Any, sets: Sequence[Any], target: Path) -> None:
+def write_universal(sets: Sequence[Any], target: Path) -> None:
+    """Write datasets as pyuff takes them. Raises MeasurementError without pyuff, StoreError for an unwritable file."""
+    prepare = _pyuff()
     with replacing(target) as temporary:
         temporary.unlink()  # pyuff appends
         universal = prepare.UFF(str(temporary))

@@ -91,6 +91,8 @@ def _read(path: Path) -> LabelledMesh:
 
 def _source(path: Path, mesh: LabelledMesh) -> _Source:
     """Return the mesh by indices, with its volume elements of one kind."""
+    if not mesh.nodes:
+        raise MeshError(f"{path}: holds no nodes: empty, or not of the format of {path.suffix}")
     points = mesh.coordinates(mesh.nodes)
     labels = np.array(list(mesh.nodes), dtype=int)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
@@ -185,7 +187,7 @@ def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] 
                 f"{source.path}: {len(faces) - covered.size} of the {len(faces)} faces of {name!r} are no outer facets "
                 "of the volume elements; take them out of the set"
             )
-        groups[name] = np.union1d(groups.get(name, covered), covered)
+        groups[name] = np.unique(covered)  # which says more than a node set of that name
     lower = {name: np.empty(0, dtype=int) for dimension in (0, 1) for name in source.covers[dimension]}
     return _wanted(source, lower | groups, wanted, "set or surface")
 
@@ -214,8 +216,8 @@ def _lower_groups(
         if name in facets or name not in (groups.keys() - source.absent.keys() if wanted is None else wanted):
             continue
         inside = np.zeros(len(source.points), dtype=bool)
-        inside[source.node_sets.get(name, [])] = True
         pairs, single = source.covers[1].get(name, set()), source.covers[0].get(name, set())
+        inside[[] if pairs or single else source.node_sets[name]] = True
         given = [keys[pair] for pair in pairs if pair in keys]
         lines[name] = np.union1d(np.flatnonzero(inside[edges].all(axis=1)), np.array(given, dtype=int))
         inside[[node for (node,) in single]] = True

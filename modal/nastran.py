@@ -248,7 +248,7 @@ def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
     """Return the sets of the case control, and the entries of the bulk data: free, small and large fields."""
     lines = list(_lines(path))
     begin = next((place for place, line in enumerate(lines) if line[2].strip().upper().startswith("BEGIN")), -1)
-    end = next((place for place, line in enumerate(lines) if line[2].strip().upper() == "ENDDATA"), None)
+    end = next((place for place, line in enumerate(lines) if line[2].strip().upper().startswith("ENDDATA")), None)
     if end is None:
         raise MeshError(f"{path}: no ENDDATA: the file is cut short; write it again")
     commands, head = [], iter(lines[: max(begin, 0)])

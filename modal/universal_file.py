@@ -75,7 +75,8 @@ def read(path: Path) -> LabelledMesh:
                     _take_element(mesh, head, rows)
             elif number in _GROUPS:
                 for head in rows:
-                    _take_group(mesh, head, rows, _GROUPS[number])
+                    if head.text.strip():  # Salome leaves a line of an empty group blank
+                        _take_group(mesh, head, rows, _GROUPS[number])
             elif number in _SYSTEMS:
                 moved |= _moved_systems(rows)
         except StopIteration:

@@ -1,4 +1,4 @@
-"""Reduced models of other codes: small dense M, K (and C) from npz, Matrix Market or Nastran OP4 files.
+"""Reduced models of other codes: small dense M, K (and C) from npz, Matrix Market, Abaqus and Nastran files, and back.
 
 Coordinates without mass, such as boundary points that another code's reduction left without any, are condensed: their
 additional static flexibility becomes the model's residual flexibility, a massless boundary.
@@ -20,10 +20,12 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.files.matrix_input import read_mat, read_table
 from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom import checks
+from vanedamp.rom.abaqus_matrices import AbaqusMatrixError, is_matrix_market
+from vanedamp.rom.abaqus_matrices import read_matrices as read_abaqus
 from vanedamp.rom.reduced import ReducedModel
 
-#: endings of files that hold several matrices by name, and of those that hold one
-NAMED, SINGLE = (".npz", ".mat", ".op4"), (".mtx", ".npy", ".csv")
+#: endings of files that hold several matrices by name, and of those that hold one, but for substructures of Abaqus
+NAMED, SINGLE = (".npz", ".mat", ".op4", ".op2", ".pch", ".dmig"), (".mtx", ".npy", ".csv")
 # of the largest entry or eigenvalue: other codes write 5 to 9 digits, of which the last are not symmetric
 _ASYMMETRY = 1e-6
 _INDEFINITE = 1e-6
@@ -49,21 +51,45 @@ class Findings:
     condensed: int
 
 
-def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Read the dense matrices of an .npz, .mat or .op4 file by lower-case name; where those clash, by their own names.
+def plain_matrices(model: ReducedModel) -> dict[str, np.ndarray]:
+    """Return mass, stiffness, damping (m, m), selection (k, m) and base_load (m, 3) of a model, as other codes take it.
 
-    That of .mtx, .npy, .csv or scipy's save_npz is "". Entries of a file that are no numbers are left out. Raises
-    ExternalError for a missing, damaged or unknown file, and for OP4 without the package pyyeti.
+    A residual flexibility V diag(s) V^T becomes further coordinates without mass, of stiffness 1 / s, by which the
+    interface moves by V: what `external_model` condenses into the same flexibility again.
+    """
+    found = {
+        name: np.array(getattr(model, name)) for name in ("mass", "stiffness", "damping", "selection", "base_load")
+    }
+    if model.residual_flexibility is None:
+        return found
+    values, vectors = linalg.eigh(model.residual_flexibility)
+    kept = values > np.finfo(float).eps * len(values) * values[-1]
+    springs = {"mass": 0.0 * values[kept], "damping": 0.0 * values[kept], "stiffness": 1.0 / values[kept]}
+    found |= {name: linalg.block_diag(found[name], np.diag(added)) for name, added in springs.items()}
+    found["selection"] = np.hstack([found["selection"], vectors[:, kept]])
+    found["base_load"] = np.vstack([found["base_load"], np.zeros((int(kept.sum()), 3))])
+    return found
+
+
+def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
+    """Read the dense matrices of a file by lower-case name; where those clash, by their own names.
+
+    That of .mtx, .npy, .csv or scipy's save_npz is "". Several hold .npz, MATLAB's .mat, Nastran's OP4, OP2 and DMIG
+    entries (.pch, .dmig), of which all have the same rows, by grid point and component, and .mtx of Abaqus, of whose
+    substructures the names are stiffness, mass and damping. Entries of a file that are no numbers are left out. Raises
+    ExternalError for a missing, damaged or unknown file, and for those of Nastran without the package pyyeti.
     """
     file = Path(path)
-    if file.suffix not in NAMED + SINGLE:
+    if file.suffix.lower() not in NAMED + SINGLE:
         raise ExternalError(f"{path}: expected a file ending in {', '.join(NAMED + SINGLE)}")
     if not file.is_file():
         raise ExternalError(f"{path}: no such file")
     try:
-        found = _READERS[file.suffix](str(file))
+        found = _READERS[file.suffix.lower()](str(file))
     except ExternalError:
         raise
+    except AbaqusMatrixError as error:
+        raise ExternalError(f"{path}: {error}") from error
     except Exception as error:  # every format has exceptions of its own
         raise ExternalError(f"{path}: cannot be read ({error})") from error
     dense = {name: np.asarray(_dense(matrix)) for name, matrix in found.items()}
@@ -172,12 +198,58 @@ def _npz(path: str) -> dict[str, Any]:
         return {name: data[name] for name in data.files}
 
 
-def _op4(path: str) -> dict[str, Any]:
+def _nastran(path: str) -> Any:
+    """Return the package that reads and writes Nastran's files."""
     try:
-        from pyyeti.nastran import op4
+        from pyyeti import nastran
     except ImportError as error:
-        raise ExternalError(f"{path}: Nastran OP4 needs the package pyyeti: pip install pyyeti") from error
-    return dict(op4.read(path))
+        raise ExternalError(f"{path}: files of Nastran need the package pyyeti: pip install pyyeti") from error
+    return nastran
+
+
+def _op4(path: str) -> dict[str, Any]:
+    return dict(_nastran(path).op4.read(path))
+
+
+def _op2(path: str) -> dict[str, Any]:
+    nastran = _nastran(path)
+    with nastran.op2.OP2(path) as file:
+        found = dict(file.rdop2mats())
+    found = found or _assembled(nastran.rddmig(path))
+    if not found:
+        raise ExternalError(f"{path}: holds no matrices; OUTPUT2 of DMAP or EXTSEOUT(DMIGOP2) of Nastran write them")
+    return found
+
+
+def _dmig(path: str) -> dict[str, Any]:
+    with open(path, encoding="latin-1") as stream:
+        if not any(line.upper().startswith("DMIG") for line in stream):
+            raise ExternalError(f"{path}: holds no DMIG entries")
+    return _assembled(_nastran(path).rddmig(path))
+
+
+def _assembled(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the matrices of DMIG entries (pandas.DataFrame), square ones over the freedoms of any of them."""
+    square = {name: frame for name, frame in found.items() if frame.columns.nlevels == 2}
+    freedoms = sorted(
+        {place for frame in found.values() for place in frame.index}
+        | {place for frame in square.values() for place in frame.columns}
+    )
+    places = {place: index for index, place in enumerate(freedoms)}
+    matrices = {}
+    for name, frame in found.items():
+        rows = [places[place] for place in frame.index]
+        columns = [places[place] for place in frame.columns] if name in square else [int(c) - 1 for c in frame.columns]
+        matrix = np.zeros(
+            (len(freedoms), len(freedoms) if name in square else max(columns) + 1), frame.to_numpy().dtype
+        )
+        matrix[np.ix_(rows, columns)] = frame.to_numpy()
+        matrices[name] = matrix
+    return matrices
+
+
+def _mtx(path: str) -> dict[str, Any]:
+    return {"": io.mmread(path)} if is_matrix_market(Path(path)) else read_abaqus(Path(path))
 
 
 _READERS = {
@@ -185,6 +257,9 @@ _READERS = {
     ".mat": read_mat,
     ".op4": _op4,
     ".csv": lambda path: {"": read_table(path)},
-    ".mtx": lambda path: {"": io.mmread(path)},
+    ".op2": _op2,
+    ".pch": _dmig,
+    ".dmig": _dmig,
+    ".mtx": _mtx,
     ".npy": lambda path: {"": np.load(path, allow_pickle=False)},
 }

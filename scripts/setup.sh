@@ -133,7 +133,7 @@ rm -f $stamp
 say "installing Python packages into $venv"
 pip() { $venv/bin/pip install --quiet --disable-pip-version-check "$@"; }
 if [ $dolfinx = wheel ]; then
-    pip --constraint requirements.txt -e ".[fem,explore,exchange,nastran,cluster,peers,dev]"
+    pip --constraint requirements.txt -e ".[fem,explore,exchange,nastran,cluster,peers,docs,dev]"
 else
     # --no-deps: requirements.txt is complete, and dependencies that apt provides under other names stay apt's
     pip --no-deps -r requirements.txt

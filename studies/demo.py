@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.store import load
+from vanedamp.files.toml_output import write_commented
+from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.paper.figure_file import Effort, Structure
 from vanedamp.studies.paper.runner import MODES, Session, prepare, print_claims, study
 from vanedamp.studies.report.claims import CLAIMS
@@ -21,6 +23,8 @@ from vanedamp.studies.workers import WorkerPool, available_cores
 FIGURES = ("fig9", "fig10", "fig12")
 #: those that need no reduced model
 RIGID_FIGURES = ("fig9", "fig10")
+#: the file that makes the sweeps again
+PIPELINE = "pipeline.toml"
 EFFORT = Effort(points=61, periods=1500, transient=700)
 _COMMANDS = """\
 The same, step by step:
@@ -30,25 +34,32 @@ The same, step by step:
     vanedamp sweep fig9.toml -o fig9.h5
     vanedamp sweep fig12_reduced.toml -o fig12_reduced.h5
     vanedamp report . -o report.html
+After a change of the case or a scene, all that depends on it: vanedamp pipeline pipeline.toml
 All figures of the paper: vanedamp paper -o paper"""
-
-
 _RIGID_COMMANDS = """\
 The same, step by step:
     cd {folder}
     vanedamp sweep fig9.toml -o fig9.h5
     vanedamp report . -o report.html
+After a change of a scene, all that depends on it: vanedamp pipeline pipeline.toml
 With finite elements: vanedamp demo"""
+_PIPELINE_NOTE = (
+    "The whole demonstration again, but its comparison with the paper: `vanedamp pipeline pipeline.toml`. It does only "
+    "what changed: edit the case or a scene and run it; with --dry-run it says what would run."
+)
 
 
 def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> Path:
     """Make modes, rigid model, reduction, three figures of the paper and the report. Returns the report's path.
+
+    Case and scenes are left as one would write them, with the pipeline that makes all of it again.
 
     rigid: take the shipped rigid model and leave out what needs finite elements.
     """
     started = time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)
     results = [] if rigid else [folder / "modes.h5", folder / "rom.h5"]
+    sources: list[str] = []
     with WorkerPool(workers or available_cores()) as pool:
         # compiling the engine takes as long as the finite elements: side by side, and once for all workers
         compiled = pool.submit(warm_up)
@@ -64,7 +75,9 @@ def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> P
             begun = time.perf_counter()
             figure = study(name, session)
             print_claims(figure, time.perf_counter() - begun)
+            sources += figure.sources
             results += [*(folder / source for source in figure.sources), folder / f"{name}{CLAIMS}"]
+    _write_pipeline(folder, sources, rigid)
     from vanedamp.studies.report.page import write_report
     from vanedamp.studies.report.results import collect
 
@@ -75,6 +88,14 @@ def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> P
     print((_RIGID_COMMANDS if rigid else _COMMANDS).format(folder=folder, modes=MODES))
     print(f"{folder / 'report.html'}: done in {time.perf_counter() - started:.0f} s")
     return folder / "report.html"
+
+
+def _write_pipeline(folder: Path, sources: Sequence[str], rigid: bool) -> None:
+    """Write the pipeline that makes these sweeps again."""
+    case = {} if rigid else {"case": "case.toml", "modal": {}, "reduce": {"modes": MODES}}
+    sweeps = [{"scene": f"{Path(source).stem}.toml"} for source in sources]
+    tables = case | {"sweep": sweeps, "report": {"file": "results.html"}}
+    write_commented(folder / PIPELINE, tables, KINDS["pipeline"], {"": _PIPELINE_NOTE})
 
 
 def _summary(folder: Path) -> None:

@@ -12,6 +12,11 @@ from vanedamp.files.toml_input import InputError
 KINDS = {
     kind.name: kind
     for kind in (
+        FileKind(
+            "pipeline",
+            "vanedamp.studies.pipeline.tables:PipelineFile",
+            ("calibrate", "modal", "reduce", "report", "folder"),
+        ),
         FileKind("external", "vanedamp.studies.case.external_model:External", ("matrices",)),
         FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",)),
         FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support")),

@@ -15,8 +15,8 @@ from vanedamp.studies.paper.figure_file import Structure
 
 #: share of the structure's mass that the body has, and of the undamped amplitude that its gap has
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
-#: share of the natural frequency at which a run shows the body at work, and the ends of a sweep over it
-_RUN, _SWEEP = 0.988, (0.96, 1.02)
+#: share of the natural frequency at which a run shows the body at work, and the ends of a sweep and of a study's band
+_RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)
 
 _SCENE_NOTE = """\
 A structure with one loose body in a cavity. `vanedamp run {file}` runs it at one frequency, `vanedamp sweep {file}`
@@ -58,12 +58,13 @@ def scene_template(file: Path, rom: Path | None = None) -> Template:
 def study_template(file: Path, rom: Path | None = None) -> Template:
     """Return a study for a file, on the same scene. Raises InputError for the file of a reduced model."""
     data = _scene(file, rom)
-    sweep = data.pop("sweep")["excitation.frequency"]
+    del data["sweep"]
+    low, high = (_rounded(share / _RUN * data["excitation"]["frequency"]) for share in _BAND)
     data["time"] = {"periods": 500, "transient": 400}
     data["optimise"] = {
-        "band": sweep | {"num": 20}, "samples": 4, "evaluations": 20,
+        "band": {"start": low, "stop": high, "num": 12}, "samples": 4, "evaluations": 10,
         "variables": {"mass_ratio": [0.005, 0.05], "gap_ratio": [0.1, 2.0], "bodies": [1, 2]},
-        "tolerances": {"gap": 0.1, "excitation": 0.2}, "map": {"mass_ratio": 5, "gap_ratio": 6},
+        "tolerances": {"gap": 0.1, "excitation": 0.2}, "map": {"mass_ratio": 4, "gap_ratio": 5},
     }  # fmt: skip
     return Template(data, {"": _STUDY_NOTE.format(file=file.name)})
 

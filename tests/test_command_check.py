@@ -201,7 +201,11 @@ def test_undamped_and_unmoved_scenes_are_told(tmp_path, capfd):
         "excitation": {"frequency": 10.0},
     }
     found = checked(tmp_path, capfd, still)
-    assert "nothing moves" in found["warnings"][0] and "resonance_amplitude" not in found
+    assert "nothing moves" in found["warnings"][-1] and "resonance_amplitude" not in found
+    assert found["commands"] == []
+    blow = still | {"ring_down": {"start": "impulse", "impulse": 0.1, "periods": 3}}
+    found = checked(tmp_path, capfd, blow)
+    assert found["commands"] == ["ringdown"] and found["warnings"] == []
 
 
 # other kinds

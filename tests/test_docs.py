@@ -6,12 +6,14 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from textwrap import dedent
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 import tomli_w
 
+from docs._ext.pages import language
 from tests.tools.input_files import CLUSTER, SCENE, changed
 from tests.tools.processes import RANKS, ROOT, environment
 from tests.tools.schemas import faults, kind_of
@@ -26,9 +28,14 @@ from vanedamp.studies.cli import _parser, main
 from vanedamp.studies.demo import EFFORT
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.paper.figure_file import PaperFigure, Structure
+from vanedamp.studies.pipeline.tables import PipelineFile
 
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-SHELL = ("vanedamp", "mpirun", "cd", "make", ".venv/bin/python", ".venv/bin/pip")
+DOCS = ROOT / "docs"
+FOLDERS = (".", "tutorial", "howto", "reference")
+PAGES = [
+    ROOT / "README.md", ROOT / "CONTRIBUTING.md",
+    *(page for folder in FOLDERS for page in sorted((DOCS / folder).glob("*.md"))),
+]  # fmt: skip
 
 
 class Example(NamedTuple):
@@ -40,12 +47,7 @@ class Example(NamedTuple):
 
     @property
     def language(self) -> str:
-        first = self.text.split()[0]
-        if re.match(r"\[+[\w.]+\]", self.text):
-            return "toml"
-        if first in ("from", "import"):
-            return "python"
-        return "shell" if first in SHELL else "text"
+        return language(self.text)
 
     def __str__(self) -> str:
         return f"{self.page}:{self.line}"
@@ -65,7 +67,7 @@ def examples_of(page: Path) -> list[Example]:
             found[-1] = found[-1]._replace(text=found[-1].text + "\n")
         else:
             inside = False
-    return found
+    return [example._replace(text=dedent(example.text)) for example in found]
 
 
 EXAMPLES = [example for page in PAGES for example in examples_of(page)]
@@ -151,7 +153,12 @@ def test_files_are_read(example, tmp_path):
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "docs" / "examples").glob("*.toml")), ids=lambda path: path.name)
-def test_example_files_are_read(path):
+def test_example_files_are_read(path, tmp_path):
+    if "[report]" in path.read_text():
+        for name in ("pipeline", "case", "gaps", "reduced"):
+            (tmp_path / f"{name}.toml").write_text(path.read_text())
+        assert len(PipelineFile.load(tmp_path / "pipeline.toml").sweep) == 2
+        return
     if "[mesh]" in path.read_text():
         assert Case.load(path).campbell is not None
         return

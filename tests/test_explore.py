@@ -19,6 +19,7 @@ pytest.importorskip("dash", reason="the page is made with dash")
 from tests.test_studies_interrupts import heed_interrupts, members, until
 from tests.tools.processes import environment
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError
 from vanedamp.files.toml_output import commented
@@ -200,7 +201,7 @@ def test_curve_is_the_sweep_of_the_scene_that_is_written(tmp_path):
     exploration = page.Exploration.of(scene(), "scene.toml")
     curve = Curve(exploration.seen(exploration.texts | {"gap": "150", "bodies": "2", "evaluated": "20"}), at_once)
     assert curve.done == curve.size == POINTS
-    (tmp_path / "scene.toml").write_text(commented(curve.scene.tables(), KINDS["scene"].schema, "scene"))
+    (tmp_path / "scene.toml").write_text(commented(short_form(curve.scene), KINDS["scene"].schema, "scene"))
     written = Scene.load(tmp_path / "scene.toml")
     assert written.to_dict() == curve.scene.to_dict()
     drawn, again = curve.sweep(), sweep(written)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.bodies import Damper
+from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.reference import field_docstrings, schema
 from vanedamp.files.toml_input import STRICT, Positive
 from vanedamp.files.toml_output import commented, toml, write_commented
@@ -113,3 +114,19 @@ def test_any_tables_read_back(data) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_schemas_are_plain_data(kind: str) -> None:
     assert json.loads(json.dumps(KINDS[kind].schema)) == KINDS[kind].schema
+
+
+@pytest.mark.parametrize(
+    ("path", "unit"),
+    [
+        ("excitation.frequency", "Hz"), ("cavity.c1.gap", "m"), ("cavity.gap", "m"), ("damper.0.mass", "kg"),
+        ("damper.friction", "1"), ("structure.stiffness", "N/m"), ("structure.damping", "N s/m"),
+        ("gravity.orientation_deg", "degree"), ("rotation.rpm", "rpm"), ("rotation.speed", "rad/s"),
+        ("excitation.load.1.phase", "degree"), ("excitation.harmonic.0.amplitude", "1"), ("cavity.c1.play", "m"),
+        ("damper.tilt", "rad"), ("contact.stiffness", "N/m"), ("solver.contact_stiffness", "N/m"),
+        ("friction_damper.0.normal_force", "N"), ("excitation.waveform.crest_factor", "1"), ("time.periods", "1"),
+        ("continuation.direction", "1"), ("nothing.here", "1"),
+    ],
+)  # fmt: skip
+def test_units_of_paths_are_those_of_the_records(path: str, unit: str) -> None:
+    assert unit_of(path) == unit

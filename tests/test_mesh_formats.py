@@ -298,6 +298,36 @@ def test_node_groups_and_archives_that_meshlane_writes(forks, tmp_path):
         assert system.patches["feet"].area == pytest.approx(12e-4, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("ending", "changes"),
+    [
+        # of older versions: the end of a block of rotations, whole numbers of several widths, no counts
+        ("cdb", {"N,R5.3,LOC,       -1,": "N,R5.3,LOC,       -1,\nN,R5.1,LOC,       -1,"}),
+        ("cdb", {"(3i9,6e21.13e3)": "(1I9,2I9,6G21.13)"}),
+        (
+            "cdb",
+            {"NBLOCK,6,SOLID,        99,        99": "nblock,6,solid", "CMBLOCK,tip     ,ELEM": "cmblock,tip,element"},
+        ),
+        ("bdf", {"ENDDATA": "ENDDATA 45c1b6cc"}),
+        ("bdf", {"CTETRA  ": "ctetra  ", "GRID*   ": "grid*   "}),
+        ("inp", {"type=T3D2": "type=B31"}),
+        # Salome's empty group
+        ("unv", {"  2477\n": "  2477\n" + f"{99:10d}" + 7 * f"{0:10d}" + "\nnothing\n\n"}),
+        ("inp", {"C3D4": "c3d4", "*NODE": "*node", "*ELEMENT, type": "*Element ,Type", "CPS3": "s3r"}),
+    ],
+)
+def test_other_spellings_are_the_same_mesh(forks, tmp_path, ending, changes):
+    text = forks["tetra"][ending].read_text()
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / f"fork.{ending}").write_text(text)
+    ours, again = read(forks["tetra"][ending]), read(tmp_path / f"fork.{ending}")
+    assert again.elements == ours.elements
+    assert again.element_sets == ours.element_sets
+    assert again.coordinates(again.nodes) == pytest.approx(ours.coordinates(ours.nodes), abs=1e-9)
+
+
 # of every format: a change of the text (old, new), and what is told of it
 @pytest.mark.parametrize(
     ("ending", "old", "new", "told"),
@@ -382,3 +412,12 @@ def test_references_of_medit(forks, expected, tmp_path):
     system = Solid(again, {"default": STEEL}).assemble({names["clamp"]: "xyz"}, 0.0)
     assert system.patches[names["tip"]].area == pytest.approx(4e-4, rel=1e-9)
     assert solve_modes(system, 3).frequencies_hz == pytest.approx(expected["tetra"], rel=1e-9)
+
+
+def test_shells_say_more_than_a_node_set_of_their_name(tmp_path):
+    """Of one tetrahedron two faces have all of its nodes."""
+    deck = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n"
+    deck += "*ELEMENT, TYPE=S3, ELSET=walls\n2, 1, 2, 4\n3, 1, 3, 4\n*NSET, NSET=walls\n1, 2, 3, 4\n"
+    (tmp_path / "one.inp").write_text(deck)
+    solid = Solid(convert(tmp_path / "one.inp", tmp_path / "one.msh", facets=["walls"]), {"default": STEEL})
+    assert solid.assemble({}, 0.0).patches["walls"].area == pytest.approx(1.0, rel=1e-12)

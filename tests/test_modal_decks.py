@@ -107,7 +107,11 @@ PLAIN = "*NODE\n" + nodes(CORNERS) + TETRAHEDRON
         (PLAIN + "*TIE, NAME=t\na, b\n", r"line 8: \*TIE joins or stiffens nodes"),
         (PLAIN + "*MASS, ELSET=all\n1.0\n", r"line 8: \*MASS adds mass"),
         (PLAIN + "*ELEMENT, TYPE=MASS\n2, 1\n", r"line 8: \*ELEMENT TYPE=MASS: expected solids"),
-        (PLAIN + "*ELEMENT, TYPE=B31\n2, 1, 2\n", r"line 8: \*ELEMENT TYPE=B31: expected solids"),
+        (
+            PLAIN + "*ELEMENT, TYPE=B31, ELSET=b\n2, 1, 2\n*BEAM SECTION, ELSET=b\n",
+            r"line 10: \*BEAM SECTION gives beams",
+        ),
+        (PLAIN + "*ELEMENT, TYPE=CONN3D2\n2, 1, 2\n", r"line 8: \*ELEMENT TYPE=CONN3D2: expected solids"),
         (PLAIN + "*NGEN\n1, 2\n", r"line 8: \*NGEN makes or moves nodes or elements; write them out"),
         ("*NODE\n1, 0, 0, nan\n", r"line 2: \*NODE 1: expected a label and finite coordinates"),
         ("*NODE\n1, 0, zero, 1\n", r"line 2: \*NODE expected numbers"),

@@ -1,15 +1,21 @@
 """The demonstration, and what the paper says that it must show: impact mistuning."""
 
 import math
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import vanedamp as vd
+from tests.tools.schemas import faults
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.studies import demo
+from vanedamp.studies.cli import main
 from vanedamp.studies.paper.figure_file import Effort, PaperFigure, Structure
+from vanedamp.studies.paper.runner import _write_scene
 from vanedamp.studies.report.forced_response import forced_responses
 
 MASS, FREQUENCY, RATIO, AMPLITUDE = 0.157, 2412.0, 0.002, 70e-6
@@ -44,13 +50,68 @@ def test_rigid_model_shows_impact_mistuning():
     shows_impact_mistuning(response, FREQUENCY, FREQUENCY / math.sqrt(1.02), peak=(0.35, 0.6))
 
 
+SCENES = [
+    (name, curve, scene)
+    for name in ("fig9", "fig10", "fig14", "mistuning", "blocks", "self_tuning", "rotating_body")
+    for curve, scene in PaperFigure.load(name, STRUCTURE, demo.EFFORT).scenes.items()
+]
+
+
+@pytest.mark.parametrize(("name", "curve", "scene"), SCENES, ids=[f"{name}-{curve}" for name, curve, _ in SCENES])
+def test_scenes_are_left_as_one_would_write_them(name, curve, scene, tmp_path):
+    """Nothing that the defaults give, in some fifty lines, and the same scene to the last bit."""
+    path = tmp_path / "scene.toml"
+    _write_scene(scene, path, name)
+    text = path.read_text()
+    assert text.startswith("#:schema ./scene.schema.json\n")
+    assert (tmp_path / "scene.schema.json").is_file()
+    again = Scene.load(path)
+    assert again.replace({"sweep": {}}) == scene.replace({"sweep": {}})
+    (axes, _), (mine, _) = scene.sweep_points(), again.sweep_points()
+    assert list(axes) == list(mine)
+    for one, other in zip(axes.values(), mine.values(), strict=True):
+        np.testing.assert_array_equal(one, other)
+    tables = tomllib.loads(text)
+    assert faults("scene", tables) == []
+    assert len(text.splitlines()) < 55 + 15 * len(scene.damper)
+    assert max(map(len, text.splitlines())) <= 135
+    assert not tables.keys() & {"solver", "continuation", "friction_damper"}
+
+
+@pytest.fixture(scope="module")
+def rigid(tmp_path_factory):
+    """The folder of a small rigid demonstration."""
+    folder = tmp_path_factory.mktemp("demo")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(demo, "EFFORT", Effort(points=6, periods=60, transient=30))
+        assert main(["demo", "--rigid", "--workers", "1", "-o", str(folder)]) == 0
+    return folder
+
+
+def test_the_demo_leaves_a_pipeline_that_repeats_it(rigid, monkeypatch):
+    monkeypatch.chdir(rigid)
+    text = (rigid / "pipeline.toml").read_text()
+    assert text.startswith("#:schema ./pipeline.schema.json\n")
+    assert faults("pipeline", tomllib.loads(text)) == []
+    names = ["sweep fig9", "sweep fig10_single", "sweep fig10_separate", "sweep fig10_shared"]
+    plan = vd.pipeline("pipeline.toml", dry_run=True)
+    assert [(stage.stage, stage.status) for stage in plan.stages] == [
+        *((name, "kept") for name in names), ("report", "runs"),
+    ]  # fmt: skip
+    before = Sweep.load("fig9.h5")
+    result = vd.pipeline("pipeline.toml", folder="again", workers=1)
+    assert result.done == [*names, "report"]
+    np.testing.assert_array_equal(Sweep.load("again/fig9.h5").amplitude_mean, before.amplitude_mean)
+
+
 @pytest.mark.slow
 def test_demo_leaves_every_file_of_the_pipeline(tmp_path, capfd):
     report = demo.run_demo(tmp_path / "out", workers=2)
     stems = ["fig9", "fig10_single", "fig10_separate", "fig10_shared", "fig12_reduced", "fig12_rigid"]
     names = {f"{stem}{suffix}" for stem in stems for suffix in (".toml", ".h5")}
     names |= {f"{figure}{suffix}" for figure in demo.FIGURES for suffix in (".png", ".claims.json")}
-    names |= {"case.toml", "modes.h5", "report.html", "rom.h5", "summary.png", "vane_cluster.msh"}
+    names |= {"case.toml", "modes.h5", "report.html", "rom.h5", "summary.png", "vane_cluster.msh", "pipeline.toml"}
+    names |= {f"{kind}.schema.json" for kind in ("case", "scene", "pipeline")}
     assert {path.name for path in report.parent.iterdir()} == names
     printed = capfd.readouterr().out
     assert "vanedamp sweep fig9.toml -o fig9.h5" in printed

@@ -196,7 +196,7 @@ def succeeds(finished):
 def test_help_lists_the_command_after_ours(vanedamp):
     lines = succeeds(vanedamp("--help")).splitlines()
     names = [line.split()[0] for line in lines if re.match(r"    \S", line)]
-    assert names[0] == "mesh" and names[-1] == "body-masses"
+    assert names[0] == "new" and names[-1] == "body-masses"
     assert "Masses of the bodies over that of the structure." in succeeds(vanedamp("body-masses", "--help"))
 
 

@@ -29,19 +29,24 @@ if TYPE_CHECKING:
     from vanedamp.files.toml_input import InputError
     from vanedamp.modal.campbell import Campbell, campbell
     from vanedamp.modal.eigen import Modes, solve_modes
-    from vanedamp.modal.matrices import SystemMatrices
+    from vanedamp.modal.matrices import Patch, SystemMatrices
     from vanedamp.modal.rigid_model import RigidModel, rigid_model
-    from vanedamp.rom.interface import Interface
+    from vanedamp.rom.interface import Interface, InterfaceCoordinate
     from vanedamp.rom.reduced import ReducedModel
     from vanedamp.rom.reduction import reduce
+    from vanedamp.studies.case.stages import assemble
     from vanedamp.studies.case.tables import Case
+    from vanedamp.studies.export.export import export
+    from vanedamp.studies.optimisation.search import optimise
+    from vanedamp.studies.optimisation.study import Study
+    from vanedamp.studies.pipeline.pipeline import pipeline
     from vanedamp.studies.report.plot import plot
 
 __all__ = [
-    "Branches", "Campbell", "Case", "InputError", "Interface", "Modes", "Ramp", "ReducedModel", "Response",
-    "RigidModel", "RingDown", "Scene", "Status", "Sweep", "SystemMatrices", "VanedampError", "campbell", "find_orbit",
-    "orbits", "plot", "ramp", "reduce", "rigid_model", "ring_down", "simulate", "solve_modes", "steady_states",
-    "sweep",
+    "Branches", "Campbell", "Case", "InputError", "Interface", "InterfaceCoordinate", "Modes", "Patch", "Ramp",
+    "ReducedModel", "Response", "RigidModel", "RingDown", "Scene", "Status", "Study", "Sweep", "SystemMatrices",
+    "VanedampError", "assemble", "campbell", "export", "find_orbit", "optimise", "orbits", "pipeline", "plot", "ramp",
+    "reduce", "rigid_model", "ring_down", "simulate", "solve_modes", "steady_states", "sweep",
 ]  # fmt: skip
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -51,7 +56,9 @@ _HOMES = {
     "Case": "studies.case.tables",
     "InputError": "files.toml_input",
     "Interface": "rom.interface",
+    "InterfaceCoordinate": "rom.interface",
     "Modes": "modal.eigen",
+    "Patch": "modal.matrices",
     "Ramp": "coupling.transients.ramp_record",
     "ReducedModel": "rom.reduced",
     "Response": "coupling.response.response",
@@ -59,12 +66,17 @@ _HOMES = {
     "RingDown": "coupling.transients.ring_down_record",
     "Scene": "coupling.scene.scene",
     "Status": "coupling.response.response",
+    "Study": "studies.optimisation.study",
     "Sweep": "coupling.sweep.sweep",
     "SystemMatrices": "modal.matrices",
     "VanedampError": "files.errors",
+    "assemble": "studies.case.stages",
     "campbell": "modal.campbell",
+    "export": "studies.export.export",
     "find_orbit": "coupling.orbits.orbits",
+    "optimise": "studies.optimisation.search",
     "orbits": "coupling.orbits.orbits",
+    "pipeline": "studies.pipeline.pipeline",
     "plot": "studies.report.plot",
     "ramp": "coupling.transients.ramp",
     "reduce": "rom.reduction",

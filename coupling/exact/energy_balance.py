@@ -317,7 +317,7 @@ def _driven_integral(c, decay, drive, other, other_decay, other_drive):
 
 @kernel
 def _sample(system, flows, st, rec, s, tau, constant):
-    """Record response and slips at the equidistant sampling times within [time, time + tau)."""
+    """Record response, slips and coordinates at the equidistant sampling times within [time, time + tau)."""
     each = len(rec.samples) // (len(rec.section) - 1)
     start = st.time[0]
     begin = math.ceil(start / system.period * each - 1e-12)
@@ -327,7 +327,10 @@ def _sample(system, flows, st, rec, s, tau, constant):
             break
         t = max(t, 0.0)
         entry = rec.samples[st.counters[PERIOD] * each + i]
+        p = rec.coordinates[st.counters[PERIOD] * each + i]
         entry[0] = constant
+        for k in range(len(p)):
+            p[k] = st.constant[k]
         for r in range(system.bodies):
             entry[1 + r] = st.displacement[r] + t * (st.velocity[r] + 0.5 * st.free_acceleration[r] * t)
         for a in range(st.counters[AWAKE]):
@@ -338,6 +341,8 @@ def _sample(system, flows, st, rec, s, tau, constant):
             entry[0] += (flows.response[s, j] * st.amplitude[j] * (1.0 + first)).real
             for r in range(system.bodies):
                 entry[1 + r] += (flows.motion[s, r, j] * st.amplitude[j] * line).real
+            for k in range(len(p)):
+                p[k] += (flows.shape[s, k, j] * st.amplitude[j] * (1.0 + first)).real
         for h in range(len(system.frequency)):
             for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
                 growth, beyond = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, h], t)
@@ -345,3 +350,5 @@ def _sample(system, flows, st, rec, s, tau, constant):
                 entry[0] += (flows.response[s, j] * drive * growth).real
                 for r in range(system.bodies):
                     entry[1 + r] += (flows.motion[s, r, j] * drive * beyond).real
+                for k in range(len(p)):
+                    p[k] += (flows.shape[s, k, j] * drive * growth).real

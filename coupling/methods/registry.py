@@ -6,9 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
-from vanedamp.coupling.methods import Method, exact
+from vanedamp.coupling.methods import Method
 from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
 from vanedamp.coupling.response.records import Records, new_records
 from vanedamp.coupling.response.response import Response
@@ -16,6 +14,7 @@ from vanedamp.coupling.response.restart import at_speed_of, marked_with_speed, r
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import InitialMotion, assemble, initial_motion, loads_of, physical_scale
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
@@ -42,24 +41,6 @@ def final_state(scene: Scene, run: Run) -> RestartState | None:
     return None if state is None else marked_with_speed(scene, state)
 
 
-def run_with_response(scene: Scene, functional: np.ndarray, samples_per_period: int) -> Response:
-    """Run all periods in the exact engine with another functional (n,) of the structure's modes as the response.
-
-    `scene` has no open choices. Raises InputError for a scene that the model does not allow.
-    """
-    started = time.perf_counter()
-    check_waveform(scene, "exact")
-    system = assemble(scene)
-    system = system._replace(response=np.r_[functional, np.zeros(system.bodies)])
-    records = new_records(system, scene.time.simulated, samples_per_period)
-    if scene.planar:
-        run = exact.begin_planar(scene, system, scene.solver, records, False)
-    else:
-        run = exact.begin(system, scene.solver, initial_motion(scene, system), records, False)
-    status, transient = run_scene(run, scene)
-    return evaluate(scene, run.outcome(), status, transient, started)
-
-
 def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, start: RestartState | None = None) -> Run:
     """Return a run of the scene's method at time zero.
 
@@ -73,7 +54,7 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     system = assemble(scene)
     scale = physical_scale(scene, system)
     start = None if start is None else at_speed_of(scene, start)
-    records = new_records(system, scene.time.simulated, samples_per_period)
+    records = new_records(system, scene.time.simulated, samples_per_period, isinstance(scene.structure, Rom))
     if scene.planar:
         return _begin_planar(scene, system, method, records, events, start)
     initial = initial_motion(scene, system) if start is None else restart_from(system, scale, start)

@@ -179,8 +179,11 @@ def record_sample(system, times, motion, records, k, q):
         return
     stride = steps // each
     if k % stride == 0 and k // stride < each:
-        entry = records.samples[motion.counters[PERIOD] * each + k // stride]
+        row = motion.counters[PERIOD] * each + k // stride
+        entry, p = records.samples[row], records.coordinates[row]
         entry[0] = response_of(system, times, k, q)
+        for i in range(len(p)):
+            p[i] = q[i]
         for i in range(b):
             entry[1 + i] = row_speed(system, i, q)
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.orbits.newton import Orbit
-from vanedamp.coupling.scene.paths import unit_of
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Displayed
 from vanedamp.files.store import Variable, frozen, load, save
 from vanedamp.files.toml_input import validate

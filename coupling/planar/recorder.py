@@ -116,6 +116,8 @@ def put_sample(system, st, rec, row, x, q, state, opened):
         rec.samples[row, 1 + b] = slip
     for i in range(len(q)):
         st.sampled[row, i] = q[i]
+    for i in range(rec.coordinates.shape[1]):
+        rec.coordinates[row, i] = q[i]
     for r in range(system.contacts):
         st.shut[row, r] = 0 if state[r] == opened else 1
 

@@ -190,9 +190,16 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         time=np.arange(done * samples) * (system.period / max(samples, 1)),
         displacement=records.samples[: done * samples, 0].copy(),
         body_displacement=records.samples[: done * samples, 1:].copy(),
+        coordinates=_coordinates(records, done * samples),
         penetration=run.penetration,
         **extent,
     )
+
+
+def _coordinates(records: Records, count: int) -> np.ndarray | None:
+    """Return the first samples of modal coordinates; None where they were not wanted, or the method keeps none."""
+    kept = records.coordinates[:count]
+    return kept.copy() if kept.size and np.all(np.isfinite(kept)) else None
 
 
 def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any], bool]:

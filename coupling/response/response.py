@@ -19,51 +19,60 @@ _OF_BODIES = ("tilt_max", "lift_share", "linearisation")
 
 
 class Status(StrEnum):
-    """How a run ended.
-
-    PENETRATION: a body is deeper in a wall than `solver.penetration` allows, an impact was missed; DIVERGED: the motion
-    grew beyond all bounds; ENERGY: the ledger is open by more than the method's bound, its figures are not to be used.
-    ILL_CONDITIONED: while some contacts are closed, modes are critically damped to round-off or masses and stiffnesses
-    so far apart that doubles cannot resolve the motion; change a damping, a mass or a stiffness.
-    TILTED: bodies tilt so far that what small tilts neglect exceeds `solver.linearisation`.
-    NOT_STEADY: no end of the transient in sight, or `time.transient` is too short for it; UNCERTAIN: the mean's
-    confidence interval is still too wide. The other troubles mean that the figures cover only the periods that were
-    completed.
-    """
+    """How a run ended. Without `ok` the figures cover only the periods that were completed."""
 
     OK = "ok"
+    """all periods done, or steady to the tolerance asked for"""
     EVENT_BUDGET = "event_budget"
+    """`solver.max_events` events without reaching the end"""
     ACCURACY_LOST = "accuracy_lost"
+    """round-off has let a body through a wall"""
     UNDECIDED = "undecided_contact"
+    """the complementarity problem of the contacts found no solution"""
     ILL_CONDITIONED = "ill_conditioned"
+    """while some contacts are closed, modes are critically damped to round-off or masses and stiffnesses so far apart
+    that doubles cannot resolve the motion; change a damping, a mass or a stiffness"""
     PENETRATION = "penetration"
+    """a body is deeper in a wall than `solver.penetration` allows: an impact was missed, or the steps are too long"""
     DIVERGED = "diverged"
+    """the motion grew beyond all bounds"""
     TILTED = "tilt_too_large"
+    """bodies tilt so far that what small tilts neglect exceeds `solver.linearisation`"""
     ENERGY = "energy_not_balanced"
+    """the ledger of energy is open by more than the method's bound: the figures are not to be used"""
     NOT_STEADY = "not_steady"
+    """no end of the transient in sight, or `time.transient` is too short for it; the figures are those of the periods
+    evaluated"""
     UNCERTAIN = "confidence_not_reached"
+    """the mean's confidence interval is still too wide"""
 
 
 @dataclass(frozen=True)
 class Event:
-    """One event: time (s), kind, number of the body, side, speeds (m/s) and impulse (N s).
-
-    side: "left", "right" (walls), "body" (the next body to the right), "floor", "ceiling"; "casing" for a friction
-    damper, "stop" for a stop, whose number is then meant. Speeds are relative to the wall or body met; of bodies in the
-    plane and at stops, those of the gap. corner: of a block, 0 to 3 against the clock from the lower left one; -1:
-    none. loss: energy that the impulses of an impact take, J, which leaves out what completes a chatter.
-    """
+    """One event. Speeds are relative to the wall or body met; of bodies in the plane and at stops, those of the gap."""
 
     time: float
+    """time [s]"""
     kind: str
+    """what happened: "impact"; "stick" and "slip" on the floor or of a friction damper; "rest" at a wall or a neighbour, and
+    "detach" from it"""
     damper: int
+    """number of the body, from 0; of a stop or a friction damper its own number"""
     side: str
+    """"left", "right" (walls), "body" (the next body to the right), "floor", "ceiling"; "casing" for a friction damper,
+    "stop" for a stop"""
     relative_velocity_before: float
+    """relative speed before [m/s]"""
     relative_velocity_after: float
+    """relative speed after [m/s]"""
     impulse: float
+    """impulse along the normal [N s]"""
     corner: int = -1
+    """corner of a block, 0 to 3 against the clock from the lower left one; -1: none"""
     tangential_impulse: float = 0.0
+    """impulse of friction [N s]"""
     loss: float = 0.0
+    """energy that the impulses of an impact take, without what completes a chatter [J]"""
 
 
 class PlanarSamples(NamedTuple):
@@ -117,59 +126,82 @@ UNITS = {
 
 @dataclass(frozen=True, repr=False)
 class Response(Displayed):
-    """The response of a structure with loose bodies. Amplitudes and energies are those of the evaluated periods.
-
-    amplitude_*: of the displacement at excitation.at (m), with the half width of the mean's 95 % confidence interval
-    (None if there are too few periods); amplitude_harmonic, phase: of its part at the excitation's frequency, order 1;
-    energy: J over the evaluated time, `stored` its change; energy_residual: imbalance of the whole run's ledger
-    relative to its largest term; attached_mass_fraction: share of the bodies' mass that the structure feels at that
-    frequency (None without bodies or motion); peak: (periods,) largest |x| of each
-    period (m); section: (periods + 1, 2) x and x' at the start of each period; slip, slip_velocity: the bodies' there;
-    time, displacement, body_displacement: samples, empty if none were asked for; penetration: deepest overlap of bodies
-    and rigid walls, relative to the free travel (0 for the exact engine); estimate: of the error of a reduced model
-    whose number of modes was chosen automatically (model_order.selection), advice: on the bodies whose shape was
-    (model_order.body_choice), None otherwise; warnings: to be read
-    before its figures are used; final: the state at its end, with which another run can begin, None for one
-    that ended within a period, or whose method leaves none; tilt_max (rad), lift_share (of the time), linearisation:
-    largest tilt of each body in its cavity, its share of the time off the floor, and what small tilts neglect over the
-    smallest play; None for sliders, and without bodies in the plane; in_plane: their samples, None without any.
-    """
+    """The response of a structure with loose bodies. Amplitudes and energies are those of the evaluated periods."""
 
     status: Status
+    """how the run ended"""
     frequency: float
+    """frequency of the excitation [Hz]"""
     amplitude_max: float
+    """largest displacement, without its sign, at `excitation.at` [m]"""
     amplitude_mean: float
+    """mean of the largest displacements of the periods [m]"""
     amplitude_mean_confidence: float | None
+    """half width of the 95 % confidence interval of that mean; None if there are too few periods [m]"""
     amplitude_rms: float
+    """root mean square of the displacement [m]"""
     amplitude_harmonic: float
+    """amplitude X of its part X sin(2 pi f t + phase) at the excitation's frequency, order 1 [m]"""
     phase: float
+    """phase of that part [rad]"""
     impacts_per_period: float
+    """mean number of impacts in a period"""
     events: int
+    """events of the whole run"""
     classification: str
+    """"periodic-k", "non-periodic", "no-contact" or "stuck" (`classify`)"""
     energy: dict[str, float]
+    """over the evaluated time: work of the `excitation`; `viscous`, `friction`, `impact` and `contact` loss; change of what is
+    `stored` [J]"""
     energy_residual: float
+    """imbalance of the whole run's ledger relative to its largest term [-]"""
     attached_mass_fraction: float | None
+    """share of the bodies' mass that the structure feels at that frequency; None without bodies or motion [-]"""
     wall_time_s: float
+    """time that the run took [s]"""
     periods: int
+    """periods simulated"""
     transient: int
+    """periods of these that are left out"""
     counters: dict[str, int]
+    """counts of what the method did, by name"""
     peak: np.ndarray
+    """(periods,) largest displacement of each period [m]"""
     section: np.ndarray
+    """(periods + 1, 2) displacement and velocity at the start of each period [m, m/s]"""
     slip: np.ndarray
+    """(periods + 1, bodies) displacements of the bodies relative to their cavities at the start of each period [m]"""
     slip_velocity: np.ndarray
+    """(periods + 1, bodies) velocities of the bodies relative to their cavities [m/s]"""
     event_list: Sequence[Event]
+    """events, empty if they were not asked for"""
     time: np.ndarray
+    """(n,) times of the samples, empty if none were asked for [s]"""
     displacement: np.ndarray
+    """(n,) displacement at `excitation.at` [m]"""
     body_displacement: np.ndarray
+    """(n, bodies) displacements of the bodies relative to their cavities [m]"""
     penetration: float = 0.0
+    """deepest overlap of bodies and rigid walls, relative to the free travel; 0 for the exact engine [-]"""
     estimate: dict[str, Any] | None = None
+    """estimate of the error of a reduced model whose number of modes was chosen automatically"""
     final: RestartState | None = None
+    """the state at the end, with which another run can begin; None for a run that ended within a period, or whose
+    method leaves none"""
     warnings: tuple[str, ...] = ()
+    """to be read before the figures are used"""
     tilt_max: tuple[float | None, ...] | None = None
+    """largest tilt of each body in its cavity; None for sliders, and without bodies in the plane [rad]"""
     lift_share: tuple[float | None, ...] | None = None
+    """share of the time that each body is off its floor [-]"""
     linearisation: tuple[float | None, ...] | None = None
+    """what small tilts neglect over the smallest play, for each body [-]"""
     in_plane: PlanarSamples | None = None
+    """samples of bodies in the plane; None without any"""
     advice: dict[str, Any] | None = None
+    """advice on the bodies whose shape was chosen automatically"""
+    coordinates: np.ndarray | None = None
+    """(n, m) samples of a reduced model's mass-normalised modal coordinates; None without [kg^0.5 m]"""
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
@@ -214,6 +246,8 @@ class Response(Displayed):
             variables["time"] = Variable(self.time, ("time",), "s")
             variables["displacement"] = Variable(self.displacement, ("time",), "m")
             variables["body_displacement"] = Variable(self.body_displacement, ("time", "damper"), "m")
+        if self.coordinates is not None:
+            variables["coordinates"] = Variable(self.coordinates, ("time", "mode"), "kg^0.5 m")
         if self.in_plane is not None:
             variables |= self.in_plane.variables()
         if self.event_list:

@@ -11,14 +11,6 @@ from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, InputError, Real, Whole, nearest
 
-_UNITS = {
-    "frequency": "Hz", "gap": "m", "mass": "kg", "stiffness": "N/m", "damping": "N s/m", "force": "N",
-    "base_acceleration": "m/s^2", "acceleration": "m/s^2", "resonance_amplitude": "m", "displacement_amplitude": "m",
-    "position": "m", "displacement": "m", "velocity": "m/s", "normal_load": "N", "normal_force": "N",
-    "orientation_deg": "degree", "phase": "degree",
-    "speed": "rad/s", "rpm": "rpm",
-}  # fmt: skip
-
 
 @dataclass(frozen=True, config=STRICT | ConfigDict(json_schema_extra={"x-inline": True}))
 class Range:
@@ -99,8 +91,3 @@ def number_at(node: Any, path: str) -> float:
         shown = "several numbers; name one entry by its index" if len(values) > 1 else "no number"
         raise InputError(f"scene: {path}: names {shown}")
     return values.pop()
-
-
-def unit_of(path: str) -> str:
-    """Return the unit of the number at a path, "1" if it has none."""
-    return _UNITS.get(path.rsplit(".", 1)[-1], "1")

@@ -84,6 +84,8 @@ _FILES = (("structure", "file"), ("excitation", "pattern"), ("excitation", "wave
 
 
 def _several(axis: Any) -> Any:
+    if isinstance(axis, np.ndarray):
+        return axis.tolist()
     if not isinstance(axis, Mapping | list | tuple | Range):
         raise ValueError("a sweep needs a list, such as [1.0, 2.0], or a range {start = 1.0, stop = 2.0, num = 11}")
     return axis
@@ -370,19 +372,8 @@ class Scene(Displayed):
 
     def save(self, path: str | Path) -> None:
         """Write the TOML file that `load` reads; files beside it, such as a reduced model's, are relative to it."""
-        data = _beside(self.to_dict(), path)
         with replacing(path) as temporary:
-            temporary.write_text(toml(data), encoding="utf-8")
-
-    def tables(self, path: str | Path | None = None) -> dict[str, Any]:
-        """Return the tables of a short file that `load` reads: without values that are the default.
-
-        path: of the file, to which files beside it are relative; without it they have their whole path.
-        """
-        data: dict[str, Any] = TypeAdapter(Scene).dump_python(
-            self, mode="json", exclude_none=True, exclude_defaults=True, by_alias=True
-        )
-        return _beside(data, path)
+            temporary.write_text(toml(relative(self.to_dict(), path)), encoding="utf-8")
 
     @property
     def files(self) -> list[str]:
@@ -436,15 +427,6 @@ class Scene(Displayed):
         return {path: np.asarray(values) for path, values in axes.items()}, points
 
 
-def _beside(data: dict[str, Any], path: str | Path | None) -> dict[str, Any]:
-    """Return the tables of a scene for a file at `path`: files beside it are named relative to it."""
-    folder = None if path is None else Path(path).resolve().parent
-    for table, key in _named_files(data):
-        file = Path(table[key]).resolve()
-        table[key] = str(file.relative_to(folder) if folder and file.is_relative_to(folder) else file)
-    return data
-
-
 def _named_files(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
     """Yield the tables of a scene that name a file, each with its key."""
     for place in _FILES:
@@ -453,6 +435,18 @@ def _named_files(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
             table = table.get(step) if isinstance(table, dict) else None
         if isinstance(table, dict) and isinstance(table.get(place[-1]), str):
             yield table, place[-1]
+
+
+def relative(data: dict[str, Any], path: str | Path | None) -> dict[str, Any]:
+    """Name the files of a scene as one that lies at `path` does: those in its folder or below relative to it.
+
+    Without a path they have their whole path.
+    """
+    folder = None if path is None else Path(path).resolve().parent
+    for table, key in _named_files(data):
+        file = Path(table[key]).resolve()
+        table[key] = str(file.relative_to(folder) if folder and file.is_relative_to(folder) else file)
+    return data
 
 
 def loaded(scene: Scene | str | Path) -> Scene:

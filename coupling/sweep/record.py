@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.scene.paths import unit_of
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Displayed

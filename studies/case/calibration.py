@@ -14,12 +14,12 @@ from scipy import sparse
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable, save
 from vanedamp.files.toml_input import InputError, nearest
-from vanedamp.modal.frf import Frf, FrfError, Poles, identify
+from vanedamp.modal.frf import UNITS, Frf, FrfError, Poles, identify
 from vanedamp.modal.measurements import read_frf, read_shapes
 from vanedamp.modal.model_updating import Tuning, tune
 from vanedamp.modal.rigid_model import RigidModel, rigid_model
 from vanedamp.modal.stress import HotSpot
-from vanedamp.studies.case.calibration_tables import CalibrationTable, TuneTable
+from vanedamp.studies.case.calibration_tables import CalibrationTable, DampingTable, TuneTable
 from vanedamp.studies.case.stages import ModalAnalysis, Structure, assemble, base_inertia, modal_analysis
 from vanedamp.studies.case.tables import Case, MaterialTable
 
@@ -32,13 +32,60 @@ _AROUND = 0.25
 
 
 @dataclass(frozen=True, eq=False)
+class MeasuredDamping:
+    """The damping of the first bending in a measured response.
+
+    file      of the measurement
+    response  what was measured in the band and half its width around it
+    band      Hz, where poles were fitted
+    poles     of the fit; `pole` is the one of the first bending
+    """
+
+    file: str
+    response: Frf
+    band: tuple[float, float]
+    poles: Poles
+    pole: int
+
+    @property
+    def ratio(self) -> float:
+        """The damping ratio."""
+        return float(self.poles.damping_ratios[self.pole])
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the damping ratio."""
+        return float(self.poles.deviations[self.pole, 1])
+
+    @property
+    def frequency_hz(self) -> float:
+        """Measured frequency of the mode."""
+        return float(self.poles.frequencies_hz[self.pole])
+
+    def variables(self) -> dict[str, Variable]:
+        """Return the measured response and its fit, which is nan outside the band."""
+        measured = self.response
+        (low, high), lines = self.band, measured.frequencies_hz
+        inside = (lines >= low) & (lines <= high) & (lines > 0.0)
+        fitted = np.full(measured.values.shape, np.nan + 0j)
+        fitted[:, inside] = self.poles.fitted
+        unit, made = UNITS[measured.quantity], {"response": measured.values, "fitted": fitted}
+        return {
+            "line": Variable(measured.frequencies_hz, ("line",), "Hz"),
+            "label": Variable(np.array(measured.labels, dtype=object), ("label",)),
+            **{f"{name}_real": Variable(values.real, ("label", "line"), unit) for name, values in made.items()},
+            **{f"{name}_imaginary": Variable(values.imag, ("label", "line"), unit) for name, values in made.items()},
+        }
+
+
+@dataclass(frozen=True, eq=False)
 class Calibration:
     """A case brought to its measurements.
 
     analysis  modes of the calibrated case
     rigid     the first bending at the response coordinate, with the calibrated damping ratio
     tuning    None where nothing was tuned
-    poles     of the measured response; None where the damping ratio is the case's; `pole` is the one used
+    damping   None where the damping ratio is the case's
     warnings  what to look at: those of the analysis, and a response that does not look like the first bending's
     """
 
@@ -46,8 +93,7 @@ class Calibration:
     analysis: ModalAnalysis
     rigid: RigidModel
     tuning: Tuning | None
-    poles: Poles | None
-    pole: int | None
+    damping: MeasuredDamping | None
     warnings: tuple[str, ...]
     wall_time_s: float
 
@@ -90,19 +136,26 @@ class Calibration:
                 "mac_after": Variable(tuning.mac_after, ("target",)),
                 "sensitivity": Variable(tuning.sensitivities, ("target", "part")),
             }
+        if self.damping is not None:
+            variables |= self.damping.variables()
         attributes = {name: result[name] for name in ("first_bending", "rigid", "cavity", "damping", "excitation")}
         attributes = {name: value for name, value in attributes.items() if value not in (None, {})}
+        if self.warnings:
+            attributes["warnings"] = list(self.warnings)
         attributes |= {"versions": versions(), "provenance": dict(self.analysis.structure.matrices.provenance)}
         save(path, "calibration", variables, attributes)
 
     def _damping(self) -> dict[str, Any]:
         damping: dict[str, Any] = {"ratio": self.rigid.damping_ratio, "source": "case"}
-        if self.poles is not None and self.pole is not None:
+        if self.damping is not None:
+            measured = self.damping
             damping |= {
                 "source": "frf",
-                "deviation": float(self.poles.deviations[self.pole, 1]),
-                "frequency_hz": float(self.poles.frequencies_hz[self.pole]),
-                "misfit": self.poles.misfit,
+                "deviation": measured.deviation,
+                "frequency_hz": measured.frequency_hz,
+                "misfit": measured.poles.misfit,
+                "quantity": measured.response.quantity,
+                "band": list(measured.band),
             }
         return damping
 
@@ -135,24 +188,17 @@ def calibrate(case: Case) -> Calibration:
     analysis = modal_analysis(structure)
     if analysis.first_bending is None or analysis.functional is None:
         raise InputError("; ".join(analysis.warnings))
-    poles, pole, ratio, warnings = None, None, case.damping_ratio, analysis.warnings
+    damping, ratio, warnings = None, case.damping_ratio, analysis.warnings
     frequency = float(analysis.modes.frequencies_hz[analysis.first_bending])
     if table.damping is not None:
-        frf = read_frf(table.damping.frf, table.damping.quantity, table.damping.columns)
-        band = table.damping.band or (0.95 * frequency, 1.05 * frequency)
-        poles = _poles(frf, band, table.damping.modes, frequency)
-        pole = poles.nearest(frequency)
-        ratio = float(poles.damping_ratios[pole])
-        measured = float(poles.frequencies_hz[pole])
-        _check_near(measured, frequency)
-        warnings += tuple(
-            f"calibration.damping: {doubt}" for doubt in _doubts(frf, band, poles.misfit, measured, frequency)
-        )
+        damping, doubts = _damping(table.damping, frequency)
+        ratio = damping.ratio
+        warnings += tuple(f"calibration.damping: {doubt}" for doubt in doubts)
     inertia = base_inertia(structure.case, structure.matrices, case.response_label)
     rigid = rigid_model(
         analysis.modes, analysis.first_bending, analysis.functional, case.response_label, ratio, inertia
     )
-    return Calibration(structure.case, analysis, rigid, tuning, poles, pole, warnings, time.perf_counter() - started)
+    return Calibration(structure.case, analysis, rigid, tuning, damping, warnings, time.perf_counter() - started)
 
 
 def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> Case:
@@ -187,6 +233,17 @@ def _tuned(structure: Structure, table: TuneTable) -> Tuning:
     varied = {name: sparse.csr_array(sum(parts[part] for part in known[name])) for name in table.vary}
     measured = None if table.shapes is None else read_shapes(table.shapes)
     return tune(structure.matrices, varied, table.frequencies, measured, table.modes, starts=table.starts)
+
+
+def _damping(table: DampingTable, frequency: float) -> tuple[MeasuredDamping, list[str]]:
+    """Return the damping of the mode nearest to a computed frequency, Hz, and what is odd about it."""
+    frf = read_frf(table.frf, table.quantity, table.columns)
+    low, high = band = table.band or (0.95 * frequency, 1.05 * frequency)
+    poles = _poles(frf, band, table.modes, frequency)
+    around = frf.band(low - (high - low) / 2.0, high + (high - low) / 2.0)
+    damping = MeasuredDamping(table.frf, around, band, poles, poles.nearest(frequency))
+    _check_near(damping.frequency_hz, frequency)
+    return damping, list(_doubts(frf, band, poles.misfit, damping.frequency_hz, frequency))
 
 
 def _poles(frf: Frf, band: tuple[float, float], count: int, frequency: float) -> Poles:

@@ -29,7 +29,7 @@ class MatricesTable:
     stiffness: Name
     """stiffness matrix"""
     file: Name | None = None
-    """file of several matrices by name (npz, MATLAB, OP4)"""
+    """file of several matrices by name (npz, MATLAB, OP4, OP2, DMIG, Abaqus)"""
     damping: Name | None = None
     """damping matrix; or give `damping_ratio`"""
     damping_ratio: Annotated[Real, Field(ge=0, lt=1)] | None = None

@@ -452,6 +452,25 @@ def reduction(
     return replace(model, provenance=dict(model.provenance) | {"basis": basis, "estimate": estimate})
 
 
+def reduced_case(
+    structure: Structure,
+    modes: int | None,
+    basis: str = "craig-bampton",
+    tolerance: float = 0.01,
+    max_frequency: float | None = None,
+    spots: int = 0,
+    recovery: bool = False,
+) -> ReducedModel:
+    """Return what `vanedamp reduce` writes: a reduction with the stresses at `spots` places of its first mode.
+
+    recovery: keep the basis, by which responses are shown on the mesh.
+    """
+    model = reduction(structure, modes, basis, tolerance, max_frequency, recovery or bool(spots))
+    if spots:
+        model = with_hot_spots(structure, model, spots)
+    return model if recovery else replace(model, recovery=None, residual_recovery=None, coordinates=None)
+
+
 def _greatest_speed(structure: Structure, basis: str) -> float:
     """Return the greatest speed, rad/s, that a reduced model of the structure is for; 0 if it does not rotate.
 

@@ -110,12 +110,14 @@ class BlockMesh(_Generated):
 
 
 #: keys that name a file of measurements
-_FILES = (
+_MEASURED = (
     ("modes", "shape"),
     ("calibration", "damping", "frf"),
     ("calibration", "tune", "shapes"),
     ("temperature", "file"),
 )
+#: keys that name a file
+FILES = (("mesh", "file"), *_MEASURED)
 
 #: the records of the generators' parameters
 GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block}
@@ -381,7 +383,7 @@ class Case:
         mesh = data.get("mesh")
         if isinstance(mesh, dict):
             _check_mesh(mesh, path)
-        for keys in _FILES:
+        for keys in _MEASURED:
             _find_file(data, keys, path)
         case = validate(cls, data, str(path))
         for group, table in case.material.items():
@@ -472,6 +474,12 @@ class Case:
         for group in self.material:
             if group != "default":
                 _check_group(f"material.{group}", group, {"volume": [*volumes, "default"]})
+
+
+def check_interface(case: Case) -> None:
+    """Raise InputError for a case without interface coordinates, which cannot be reduced."""
+    if not case.interface:
+        raise InputError("interface: missing; a reduction needs at least one [interface.<label>] table")
 
 
 def _check_materials(materials: Mapping[str, MaterialTable], reference: float) -> None:

@@ -13,9 +13,11 @@ SUMMARY = "tune to measurements; rigid model, damping ratio and excitation"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Take a case and the result files."""
+    """Take a case, the result files and those to go on with."""
     add_input(parser, "CASE.toml")
     add_output(parser, "CALIBRATION.h5")
+    parser.add_argument("--case", metavar="TUNED.toml", help="the case with the tuned numbers")
+    parser.add_argument("--scene", metavar="RIGID.toml", help="a scene of the calibrated rigid model")
     add_json(parser)
 
 
@@ -25,14 +27,14 @@ def run(arguments: Namespace) -> None:
     from vanedamp.studies.commands.support.messages import print_warnings, write_result
     from vanedamp.studies.commands.support.outputs import check_outputs
 
-    outputs = check_outputs(arguments)
+    outputs = check_outputs(arguments, case=(".toml",), scene=(".toml",))
     case = Case.load(arguments.input)
     outputs.keep(case.files)
+    from vanedamp.studies.case.calibrated_files import save_calibration
     from vanedamp.studies.case.calibration import calibrate
 
     calibration = calibrate(case)
-    if arguments.output:
-        calibration.save(arguments.output)
+    save_calibration(arguments.input, calibration, arguments.output, arguments.case, arguments.scene)
     result = calibration.to_json()
     write_result(arguments.json, result)
     print_warnings(arguments.input, calibration.warnings)

@@ -38,7 +38,8 @@ def run(arguments: Namespace) -> None:
     left = facts.defaults(kind, tables)
     write_result(arguments.json, {"kind": kind.name} | {fact.key: fact.value for fact in found} | {"defaults": left})
     if arguments.json != "-":
-        print(f"{arguments.input}: a {kind.name}, for vanedamp {', '.join(found[0].value)}")
+        commands = ", ".join(found[0].value) or "nothing as it is"
+        print(f"{arguments.input}: a {kind.name}, for vanedamp {commands}")
         _print(found[1:])
         if left:
             print("left at their defaults: " + ", ".join(f"{key} = {_word(value)}" for key, value in left.items()))
@@ -49,8 +50,13 @@ def _print(facts: Iterable[Fact]) -> None:
         if key == "warnings":
             for warning in value:
                 print(f"warning: {warning}")
-        elif value not in ([], {}, None):
+        elif _known(value):
             print(f"  {key:21} {f'{_word(value)} {unit}':26} {text}".rstrip())
+
+
+def _known(value: Any) -> bool:
+    """Whether there is something to print of a value."""
+    return any(map(_known, value)) if isinstance(value, list) else value not in ({}, None)
 
 
 def _word(value: Any) -> str:

@@ -21,6 +21,9 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> None:
     """Run the demonstration."""
     from vanedamp.studies.commands.support.outputs import output_folder
-    from vanedamp.studies.demo import run_demo
+    from vanedamp.studies.demo import PIPELINE, run_demo
+    from vanedamp.studies.pipeline.pipeline import adopt
 
-    run_demo(output_folder(arguments), arguments.workers, arguments.rigid)
+    folder = output_folder(arguments)
+    run_demo(folder, arguments.workers, arguments.rigid)
+    adopt(folder / PIPELINE)

@@ -44,4 +44,7 @@ def run(arguments: Namespace) -> None:
     if arguments.json != "-":
         print(optimisation.sentence)
         if optimisation.trouble:
-            print(f"{optimisation.trouble} of {optimisation.scenes} scenes are not ok")
+            print(
+                f"{optimisation.trouble} of {optimisation.scenes} scenes are not ok and count as undamped, so that the "
+                "optimum may lie elsewhere; give [time] more periods and a longer transient"
+            )

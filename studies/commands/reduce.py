@@ -41,15 +41,16 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--hot-spots", type=_spots, default=0, metavar="N",
         help="keep the stresses at the N most stressed places of the first mode as outputs",
     )  # fmt: skip
+    parser.add_argument(
+        "--recovery", action="store_true",
+        help="keep the basis, so that `vanedamp export` can show responses on the mesh",
+    )  # fmt: skip
 
 
 def run(arguments: Namespace) -> None:
     """Reduce the case."""
-    from dataclasses import replace
-
-    from vanedamp.files.toml_input import InputError
     from vanedamp.rom.reduction import check_basis
-    from vanedamp.studies.case.tables import Case
+    from vanedamp.studies.case.tables import Case, check_interface
     from vanedamp.studies.commands.support.messages import print_warnings, write_result
     from vanedamp.studies.commands.support.outputs import check_outputs
 
@@ -57,20 +58,15 @@ def run(arguments: Namespace) -> None:
     check_basis(arguments.basis)
     case = Case.load(arguments.input)
     outputs.keep(case.files)
-    if not case.interface:
-        raise InputError("interface: missing; a reduction needs at least one [interface.<label>] table")
-    from vanedamp.studies.case.stages import assemble, reduction, unit_doubts, with_hot_spots
+    check_interface(case)
+    from vanedamp.studies.case.stages import assemble, reduced_case, unit_doubts
 
     started = time.perf_counter()
     structure = assemble(case)
-    spots = arguments.hot_spots
-    model = reduction(
-        structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, bool(spots)
-    )
-    if spots:
-        model = replace(
-            with_hot_spots(structure, model, spots), recovery=None, residual_recovery=None, coordinates=None
-        )
+    model = reduced_case(
+        structure, arguments.modes, arguments.basis, arguments.tolerance, arguments.max_frequency, arguments.hot_spots,
+        arguments.recovery,
+    )  # fmt: skip
     estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
     if arguments.output:
         model.save(arguments.output)

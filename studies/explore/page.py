@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 from dash import ClientsideFunction, Dash, Input, Output, State, dcc, html, no_update
 from dash.exceptions import PreventUpdate
 
-from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.scene import Scene, relative
+from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.toml_input import validate
 from vanedamp.files.toml_output import commented, write_commented
@@ -237,11 +238,11 @@ def _write(exploration: Exploration, scene: Scene) -> tuple[Any, str]:
     if exploration.output is not None:
         replaced = ", in place of the file that was there" if exploration.output.exists() else ""
         try:
-            write_commented(exploration.output, scene.tables(exploration.output), KINDS["scene"])
+            write_commented(exploration.output, relative(short_form(scene), exploration.output), KINDS["scene"])
             said = f"{exploration.output} written{replaced}; {said}"
         except (OSError, VanedampError) as error:
             said = f"{exploration.output} cannot be written ({error}); {said}"
-    text = commented(scene.tables(), KINDS["scene"].schema, "scene")
+    text = commented(relative(short_form(scene), None), KINDS["scene"].schema, "scene")
     return {"content": text, "filename": "scene.toml", "type": "application/toml"}, said
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from dash import ClientsideFunction, Dash, Input, Output, State, ctx, dcc, html, no_update
 
-from vanedamp.coupling.scene.paths import unit_of
+from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.errors import VanedampError
 from vanedamp.studies.explore.curves import Submit
 from vanedamp.studies.explore.point_view import PointView, axis_of, point_view

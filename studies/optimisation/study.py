@@ -215,7 +215,12 @@ class Study(NamedTuple):
     @classmethod
     def load(cls, path: str | Path) -> Study:
         """Read the study in a TOML file. Raises InputError."""
-        data = read_toml(path)
+        return cls.of(read_toml(path), path)
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Any], path: str | Path = "study") -> Study:
+        """Return the study in the tables of a TOML file that lies at `path`, which errors name. Raises InputError."""
+        data = dict(tables)
         if "optimise" not in data:
             raise InputError(f"{path}: optimise: missing; say what is best in an [optimise] table (docs/sweeps.md)")
         given = data["optimise"]

@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.rotation import FREQUENCY
+from vanedamp.coupling.scene.scene import Scene, relative
+from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
@@ -26,8 +28,10 @@ from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import StoreError, digest, finite, load, write_json
 from vanedamp.files.toml_input import InputError, nearest, read_toml, validate
+from vanedamp.files.toml_output import schema_name, write_commented, write_schema
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.paper import (
     blade,
     claims_blocks,
@@ -93,12 +97,14 @@ def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None,
 
 def prepare(folder: Path, resume: bool = False) -> Structure:
     """Make the shipped cluster's modes.h5 and rom.h5 in a folder; resume: unless those of this case are there."""
-    case, mesh, source = folder / "case.toml", folder / "vane_cluster.msh", FOLDER / "case.toml"
-    modes, reduced = folder / "modes.h5", folder / "rom.h5"
-    same = all(old.is_file() and old.read_bytes() == new.read_bytes() for old, new in ((case, source), (mesh, SHIPPED)))
+    case, mesh, modes, reduced = (folder / name for name in ("case.toml", "vane_cluster.msh", "modes.h5", "rom.h5"))
+    text = f"#:schema ./{schema_name('case')}\n" + (FOLDER / "case.toml").read_text(encoding="utf-8")
+    same = case.is_file() and case.read_text(encoding="utf-8") == text
+    same = same and mesh.is_file() and mesh.read_bytes() == SHIPPED.read_bytes()
     if not (resume and same and _made_by_us(modes, reduced, MODES)):
         shutil.copyfile(SHIPPED, mesh)
-        shutil.copyfile(source, case)
+        case.write_text(text, encoding="utf-8")
+        write_schema(folder / schema_name("case"), KINDS["case"].schema)
         from vanedamp.studies.case.stages import assemble, modal_analysis, reduction
         from vanedamp.studies.case.tables import Case
 
@@ -165,13 +171,22 @@ def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
     if old is None or old.scene != scene or any(old.provenance.get(key) != provenance[key] for key in provenance):
         if not session.resume:
             clear(checkpoint)
-        scene.save(session.folder / f"{stem}.toml")
+        _write_scene(scene, session.folder / f"{stem}.toml", f"{figure.title}{f': {curve}' if curve else ''}")
         with progress(stem) as report:
             old = sweep(scene, session.pool, report, checkpoint, provenance)
         old.save(path)
         clear(checkpoint)
     session.computed[stem] = old
     return old
+
+
+def _write_scene(scene: Scene, path: Path, title: str) -> None:
+    """Write a scene as one would write it by hand, with comments."""
+    command = "sweep" if scene.sweep else "run"
+    notes = {"": f"{title}. `vanedamp {command} {path.name}` runs it; every key: `vanedamp schema scene`. SI units."}
+    if isinstance(scene.sweep.get(FREQUENCY), tuple):
+        notes["sweep"] = "The frequencies lie closer around the resonances with the bodies loose and fixed."
+    write_commented(path, relative(short_form(scene), path), KINDS["scene"], notes)
 
 
 def _kept(path: Path) -> Sweep | None:
@@ -276,7 +291,7 @@ def _history(session: Session) -> Study:
         runs[curve] = scene, simulate(scene, events=True, samples_per_period=data["samples"]), simulate(aside)
     scene, response, alike = runs["reduced"]
     folder = session.folder
-    scene.save(folder / "fig13.toml")
+    _write_scene(scene, folder / "fig13.toml", data["title"])
     response.save(folder / "fig13_response.h5", {"versions": versions(), "scene": scene.to_dict()})
     title = f"{data['title']}, {response.frequency:.1f} Hz"
     plots.history_picture(response, session.structure.amplitude, title, folder / "fig13.png")

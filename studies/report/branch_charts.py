@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from vanedamp.coupling.orbits.branch import Branch, Branches, SpecialPoint
-from vanedamp.coupling.scene.paths import unit_of
+from vanedamp.coupling.scene.units import unit_of
 from vanedamp.studies.report.charts import axis_title, dressed
 from vanedamp.studies.report.forced_response import for_people
 

@@ -25,5 +25,5 @@ def faults(kind: str, tables: dict[str, Any]) -> list[str]:
 
 def kind_of(tables: dict[str, Any]) -> str:
     """The kind of a file, from its tables."""
-    names = {"matrices": "external", "optimise": "study", "mesh": "case"}
+    names = {"matrices": "external", "optimise": "study", "mesh": "case", "report": "pipeline"}
     return next((kind for table, kind in names.items() if table in tables), "scene")

@@ -114,6 +114,7 @@ class Recorder:
             slips = y[u.d][: self.system.bodies]
             phase = (index % self.each) * self.system.period / self.each
             self.records.samples[index] = [self._parts(self.functionals @ u.extended(phase, y[: u.size]))[2][0], *slips]
+            self.records.coordinates[index] = y[: self.records.coordinates.shape[1]]
 
     def impact(self, t: float, impact: Impact) -> None:
         """Count and log impacts."""

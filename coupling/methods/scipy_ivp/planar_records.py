@@ -127,6 +127,7 @@ class PlanarRecorder:
             q = y[self.free.q]
             x = self.watched[0] @ self.free.extended(t, y[: self.free.size])
             self.records.samples[index] = [x, *(q[self.system.along] - self.system.floor @ q)]
+            self.records.coordinates[index] = q[: self.records.coordinates.shape[1]]
             self.sampled[index], self.shut[index] = q, self.state != OPEN
 
     def impact(self, t: float, before: np.ndarray, impact: Impact) -> None:

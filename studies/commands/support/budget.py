@@ -7,7 +7,9 @@ generous: whoever meets one has most likely slipped by some powers of ten.
 from __future__ import annotations
 
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
+from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.workers import available_cores
 
@@ -25,6 +27,7 @@ def check_run(scene: Scene, samples: int = 0) -> None:
     """Refuse a run whose records fill the memory, or that takes a month. Raises InputError."""
     periods, channels = scene.time.simulated, 2 * (1 + len(scene.damper) + len(scene.friction_damper))
     channels += _IN_PLANE * len(scene.damper) if scene.planar else 0
+    channels += _modes(scene) if samples else 0
     sampled = _SAMPLE * samples * channels * periods
     for key, name, needed in (("time.periods", "periods", _RECORD * periods), ("--samples", "samples", sampled)):
         if needed > MOST_BYTES:
@@ -55,24 +58,32 @@ def check_optimise(study: Study, workers: int | None) -> None:
     _check_time("optimise", f"{scenes:.3g} scenes on {count} workers", scenes * run_seconds(study.scene) / count)
 
 
+def _modes(scene: Scene) -> int:
+    """Return the number of modal coordinates that samples have: at most those of the model's file."""
+    if not isinstance(scene.structure, Rom):
+        return 0
+    modes = scene.structure.modes
+    return modes if isinstance(modes, int) else ReducedModel.load(scene.structure.file).size
+
+
 def designs_of(study: Study) -> int:
-    """Return the designs that an optimisation may run: of its map, and of both searches."""
+    """Return about how many designs an optimisation runs: of its map, and of both searches."""
     table = study.table
     return table.map.mass_ratio * table.map.gap_ratio + 2 * table.evaluations
 
 
 def scenes_of(study: Study) -> int:
-    """Return the scenes that an optimisation may run: its designs, and samples of the tolerances, over the band."""
+    """Return about how many scenes an optimisation runs: designs, and samples of the tolerances, over the band."""
     return (designs_of(study) + study.table.evaluations * study.table.samples) * study.table.count
 
 
 def sweep_seconds(scene: Scene, workers: int) -> float:
-    """Return the time of a sweep."""
+    """Return the time of a sweep, s."""
     return scene.points * run_seconds(scene) / workers
 
 
 def run_seconds(scene: Scene) -> float:
-    """Return the processor time of a run."""
+    """Return the processor time of a run, s, of one body on a rigid structure: richer scenes take more."""
     return _RUN + scene.time.simulated * scene.solver.seconds_per_period
 
 

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.resonance import chosen_resonance
-from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.messages import print_note, print_warnings
 from vanedamp.studies.commands.support.outputs import Outputs
+from vanedamp.studies.scene_checks import check_model, check_moved
 
 
 def load_scene(path: str, outputs: Outputs) -> Scene:
     """Load a scene that moves and whose files are there; none of them may be an output. Raises InputError."""
     scene = load_any_scene(path, outputs)
-    if not scene.moved:
-        raise InputError(
-            "excitation: nothing moves the structure; give force, base_acceleration, resonance_amplitude or load, or "
-            "an [initial] state"
-        )
+    check_moved(scene)
     return scene
 
 
@@ -30,8 +25,7 @@ def load_any_scene(path: str, outputs: Outputs) -> Scene:
     """Load a scene whose files are there, whether or not something moves it; as load_scene."""
     scene = Scene.load(path)
     outputs.keep(scene.files)
-    if isinstance(scene.structure, Rom) and not Path(scene.structure.file).is_file():
-        raise InputError(f"structure.file: no such file {scene.structure.file}; `vanedamp reduce` writes one")
+    check_model(scene)
     return scene
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.history import OrbitHistory, orbit_history
 from vanedamp.coupling.orbits.orbits import map_along
-from vanedamp.coupling.scene.paths import unit_of
+from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.errors import VanedampError
 from vanedamp.studies.report.branch_charts import (
     amplitude_at,

@@ -36,13 +36,18 @@ _COMMANDS = {"sweep": "sweep", "orbit": "orbits", "ramp": "ramp", "ring_down": "
 def facts(path: str | Path) -> list[Fact]:
     """Return what the scene in a file means. Raises InputError, as its commands do."""
     scene = load_any_scene(str(path), Outputs(()))
-    found = [Fact("commands", ["run", *(name for table, name in _COMMANDS.items() if getattr(scene, table))])]
-    return found + facts_of(scene)
+    commands = [name for table, name in _COMMANDS.items() if getattr(scene, table)]
+    found = facts_of(scene)
+    if scene.moved:
+        commands.insert(0, "run")
+    elif not scene.ring_down:
+        found[-1].value.append("excitation: nothing moves the structure, so that `vanedamp run` refuses it")
+    return [Fact("commands", commands), *found]
 
 
 def facts_of(scene: Scene) -> list[Fact]:
-    """Return what a scene means. Raises InputError for one that cannot run."""
-    warnings = [] if scene.moved else ["excitation: nothing moves the structure, so that the commands refuse it"]
+    """Return what a scene means, warnings last. Raises InputError for one that cannot run."""
+    warnings: list[str] = []
     whole = scene
     if scene.sweep and not leaves_open(scene):
         scene = grid(scene).base
@@ -142,9 +147,9 @@ def _of_cost(scene: Scene, whole: Scene) -> Iterator[Fact]:
     if not lasting.time.steady:
         yield Fact("transient", lasting.time.dropped, "", "of these are not evaluated")
         yield Fact("transient_left", left_over(lasting, lasting.time.dropped), "", "of the linear transient, after it")
-    yield Fact("run_seconds", run_seconds(lasting), "s", "of processor time, roughly, with one body")
+    yield Fact("run_seconds", run_seconds(lasting), "s", "of processor time at least")
     if whole.sweep:
         cores = available_cores()
         cost = sweep_seconds(replace(whole, time=lasting.time), cores)
         yield Fact("sweep_points", whole.points)
-        yield Fact("sweep_seconds", cost, "s", f"on {cores} cores")
+        yield Fact("sweep_seconds", cost, "s", f"at least, on {cores} cores")

@@ -22,7 +22,7 @@ def facts(path: str | Path) -> list[Fact]:
         *facts_of(study.scene),
         Fact("band_hz", [float(band[0]), float(band[-1])], "Hz", f"{len(band)} frequencies"),
         Fact("reference_amplitude", study.reference, "m", "undamped, that damped amplitudes are divided by"),
-        Fact("designs", designs_of(study), "", "at most"),
-        Fact("scenes", scenes, "", "at most, with samples of the tolerances"),
-        Fact("seconds", scenes * run_seconds(study.scene) / cores, "s", f"on {cores} cores, roughly"),
+        Fact("designs", designs_of(study), "", "about"),
+        Fact("scenes", scenes, "", "about, with samples of the tolerances"),
+        Fact("seconds", scenes * run_seconds(study.scene) / cores, "s", f"at least, on {cores} cores"),
     ]

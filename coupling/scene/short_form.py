@@ -1,0 +1,68 @@
+"""A scene as one would write it: without what the defaults give, and with ranges in place of long lists."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from typing import Any
+
+from vanedamp.coupling.scene.paths import Range, axis_values
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError, validate
+
+#: values of an axis from which on a range is shorter
+_FEW = 4
+
+
+def short_form(scene: Scene) -> dict[str, Any]:
+    """Return the least plain data that are read as this very scene."""
+    data = scene.to_dict()
+    for path, values in data.get("sweep", {}).items():
+        data["sweep"][path] = _range(values)
+    for place in list(_places(data)):
+        without = copy.deepcopy(data)
+        table = without
+        try:
+            for step in place[:-1]:
+                table = table[step]
+            del table[place[-1]]
+        except (KeyError, IndexError):  # its table is gone already
+            continue
+        if _reads_as(without, scene):
+            data = without
+    if "law" in (contact := data.get("contact", {})):  # says what the other keys are
+        data["contact"] = {"law": contact["law"]} | contact
+    return data
+
+
+def _places(node: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the keys of nested tables, a table before the keys in it."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield (*place, key)
+            yield from _places(value, (*place, key))
+    elif isinstance(node, list):
+        for index, value in enumerate(node):
+            yield from _places(value, (*place, index))
+
+
+def _reads_as(data: dict[str, Any], scene: Scene) -> bool:
+    try:
+        return _even(validate(Scene, data, "scene")) == _even(scene)
+    except InputError:
+        return False
+
+
+def _even(scene: Scene) -> dict[str, Any]:
+    """Return a scene's data with ranges as lists."""
+    data = scene.to_dict()
+    values = {path: axis_values(axis) for path, axis in scene.sweep.items()}
+    return data | {"sweep": values}
+
+
+def _range(values: Any) -> Any:
+    """Return the range that has exactly these values, or else the values."""
+    if not isinstance(values, list) or len(values) <= _FEW or not all(isinstance(value, float) for value in values):
+        return values
+    shorter = {"start": values[0], "stop": values[-1], "num": len(values)}
+    return shorter if axis_values(Range(**shorter)) == values else values

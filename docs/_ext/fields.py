@@ -1,0 +1,50 @@
+"""Tables of the fields of a record or of the values of an enumeration, from the docstrings after them: `fields`."""
+
+from __future__ import annotations
+
+from enum import Enum
+from importlib import import_module
+from typing import Any
+
+from docutils import nodes
+from docutils.parsers.rst import Directive
+from sphinx.application import Sphinx
+from sphinx.pycode import ModuleAnalyzer
+
+from docs._ext.toml_keys import table_node, with_literals
+from vanedamp.files.reference import unit_in
+
+
+class Fields(Directive):
+    """`{fields} MODULE:CLASS`, then the names of the fields in their order: all of them without any."""
+
+    required_arguments = 1
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        place, name = self.arguments[0].split(":")
+        record = getattr(import_module(place), name)
+        texts = {
+            field: " ".join(" ".join(lines).split())
+            for (owner, field), lines in ModuleAnalyzer.for_module(record.__module__).find_attr_docs().items()
+            if owner == name
+        }
+        names = " ".join(self.content).split() or list(texts)
+        if issubclass(record, Enum):
+            rows = [[_code(record[one].value), with_literals(texts[one])] for one in names]
+            return [table_node(("Value", "Meaning"), rows, (25, 75))]
+        rows = []
+        for one in names:
+            unit = unit_in(texts[one]) or ""
+            meaning = texts[one].removesuffix(f"[{unit}]").rstrip()
+            rows.append([_code(one), [nodes.Text(unit)], with_literals(meaning)])
+        return [table_node(("Name", "Unit", "Meaning"), rows, (25, 10, 65))]
+
+
+def _code(text: str) -> list[nodes.Node]:
+    return [nodes.literal(text, text)]
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    app.add_directive("fields", Fields)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,82 @@
+"""Export of results: the format follows the file's ending, the writer the kind of the result."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from pathlib import Path
+from typing import Any, Protocol
+
+from vanedamp.files.extensions import ExtensionPoint
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.export.options import Option
+from vanedamp.studies.export.record import Record, Saved, read_record
+
+FORMATS = ExtensionPoint(
+    "format of exports", "vanedamp.studies.export.formats", "vanedamp.export_formats",
+    ("SUMMARY", "ENDINGS", "WRITERS", "OPTIONS"),
+)  # fmt: skip
+#: the kind of a writer that takes results of every kind
+ANY = "*"
+
+
+class Format(Protocol):
+    """The contract of a format; the folder `formats` says more."""
+
+    SUMMARY: str
+    ENDINGS: tuple[str, ...]
+    WRITERS: dict[str, Any]
+    OPTIONS: tuple[Option, ...]
+
+
+def export(result: str | os.PathLike[str] | Saved, path: str | os.PathLike[str], **options: Any) -> tuple[str, ...]:
+    """Write a result, or that of a file, to a file of another program, whose ending names the format.
+
+    options: those of the format, such as `table="events"` of a .csv (docs/exchange.md). Returns warnings: what the
+    file does not hold. Raises InputError for an ending that is none, a format that cannot hold this kind of result, or
+    an option that is not for it, StoreError for a file that cannot be read or written.
+    """
+    chosen = format_of(path)
+    return write(read_record(result), chosen, path, options)
+
+
+def format_of(path: str | os.PathLike[str]) -> Format:
+    """Return the format of a file's ending. Raises InputError."""
+    known = FORMATS.all()
+    for part in known.values():
+        if Path(path).suffix.lower() in part.ENDINGS:
+            found: Format = part
+            return found
+    endings = ", ".join(ending for part in known.values() for ending in part.ENDINGS)
+    raise InputError(f"{path}: expected a file name ending in one of {endings}")
+
+
+def write(record: Record, chosen: Format, path: str | os.PathLike[str], options: dict[str, Any]) -> tuple[str, ...]:
+    """Write a record in a format. Returns warnings; raises InputError and StoreError."""
+    writer = chosen.WRITERS.get(record.kind) or chosen.WRITERS.get(ANY)
+    if writer is None:
+        able = [
+            ending
+            for part in FORMATS.all().values()
+            if part.WRITERS.keys() & {record.kind, ANY}
+            for ending in part.ENDINGS
+        ]
+        raise InputError(
+            f"{record.file}: {_named(record.kind)} cannot go to {Path(path).suffix}; it can to {', '.join(able)}"
+        )
+    taken = list(inspect.signature(writer).parameters)[2:]
+    for name in options:
+        if name not in taken:
+            known = ", ".join(f"--{_flag(each)}" for each in taken) or "none"
+            raise InputError(
+                f"--{_flag(name)}: is no option of {_named(record.kind)} in {Path(path).suffix}, which has {known}"
+            )
+    return tuple(writer(record, Path(path), **options) or ())
+
+
+def _named(kind: str) -> str:
+    return f"a result of the kind {kind}"
+
+
+def _flag(name: str) -> str:
+    return name.replace("_", "-")

@@ -1,0 +1,13 @@
+"""The formats that results are exported to: each file of this folder is one, and other packages add theirs.
+
+A format is a module with
+
+    SUMMARY   what it is and who reads it, in a line
+    ENDINGS   of files, such as (".mat",)
+    WRITERS   by the kind of a result (the attribute `kind` of its file; ANY: every kind) a function
+              write(record, path, **options) that writes a file, from a studies.export.record.Record, by
+              files.store.replacing. It may return warnings: what the file does not hold
+    OPTIONS   the keyword arguments of its writers, as studies.export.options.Option
+
+Import what is heavy inside the writers: `vanedamp export --help` loads all formats.
+"""

@@ -1,0 +1,127 @@
+"""Tidy tables: one row a point of a sweep, a sample, a period or an event; units stand in the header."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files.store import Variable, write_csv
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.export.options import Option
+from vanedamp.studies.export.record import Record
+
+SUMMARY = "tables with one row a point, units in the header: pandas, R, spreadsheets"
+ENDINGS = (".csv",)
+OPTIONS = (
+    Option("table", "of a .csv: which rows, such as time, full_period or event of a response", "NAME"),
+)  # fmt: skip
+#: tables by kind: dimensions of their rows, the first that a result has is written
+_TABLES = {
+    "response": ("time", "full_period"),
+    "ramp": ("period",),
+    "ring_down": ("cycle", "half_cycle"),
+    "modes": ("mode",),
+}  # fmt: skip
+#: rows that are made at once, and columns that a variable may have
+_CHUNK, _MOST_COLUMNS = 4096, 1000
+
+Column = tuple[str, np.ndarray]
+
+
+def sweep(record: Record, path: Path) -> None:
+    """Write the grid of a sweep: a row a point, columns of its axes, statuses and measures."""
+    axes: Sequence[str] = record.attributes["axes"]
+    dims = tuple(axis.replace(".", "_") for axis in axes)
+    on_grid = {
+        name: variable
+        for name, variable in record.variables.items()
+        if variable.dims[: len(dims)] == dims and name not in dims
+    }
+    texts = [name for name in ("status", "classification") if name in on_grid]
+    names = [*texts, *(name for name in on_grid if name not in texts)]
+    columns = [column for name in names for column in _columns(record, name, len(dims))]
+    given = [record.variables[name] for name in dims]
+    shape = tuple(len(axis.values) for axis in given)
+    header = [*(_headed(axis, item.units) for axis, item in zip(axes, given, strict=True)), *(n for n, _ in columns)]
+
+    def rows() -> Iterator[Sequence[Any]]:
+        for start in range(0, math.prod(shape), _CHUNK):
+            points = np.arange(start, min(start + _CHUNK, math.prod(shape)))
+            places = np.unravel_index(points, shape)
+            at = [np.asarray(item.values)[place] for item, place in zip(given, places, strict=True)]
+            yield from _rows([*at, *(values[points] for _, values in columns)])
+
+    write_csv(path, header, rows())
+
+
+def table(record: Record, path: Path, table: str | None = None) -> tuple[str, ...]:
+    """Write the variables over one dimension: a row an entry, further dimensions as columns of their own.
+
+    Fields, which would be too many columns, are left out. Raises InputError for rows that a result does not have.
+    """
+    known = _lengths(record.variables)
+    if table is not None and table not in known:
+        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(known)}")
+    dimension = table or next(name for name in (*_TABLES[record.kind], *known) if name in known)
+    own = [name for name, item in record.variables.items() if item.dims[:1] == (dimension,)]
+    own.sort(key=lambda name: name != dimension)  # a coordinate comes first
+    fields = [name for name in own if math.prod(np.shape(record.variables[name].values)[1:]) > _MOST_COLUMNS]
+    columns = [column for name in own if name not in fields for column in _columns(record, name, 1)]
+
+    def rows() -> Iterator[Sequence[Any]]:
+        for start in range(0, known[dimension], _CHUNK):
+            yield from _rows([values[start : start + _CHUNK] for _, values in columns])
+
+    write_csv(path, [name for name, _ in columns], rows())
+    return tuple(f"left out: {name}, a field; .mat or .vtkhdf hold it" for name in fields)
+
+
+WRITERS = {"sweep": sweep, **dict.fromkeys(_TABLES, table)}
+
+
+def _lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
+    """Return the dimensions that variables begin with, and their lengths."""
+    return {item.dims[0]: len(item.values) for item in variables.values() if item.dims}
+
+
+def _columns(record: Record, name: str, leading: int) -> list[Column]:
+    """Return a variable's columns, over its leading dimensions as one: one for each place in the further ones."""
+    variable = record.variables[name]
+    values = np.asarray(variable.values)
+    rows, further = math.prod(values.shape[:leading]), values.shape[leading:]
+    if not further:
+        return [(_headed(name, variable.units), values.reshape(rows))]
+    places = list(np.ndindex(*further))
+    units = variable.units.split(", ")
+    units = units if len(units) == len(places) else [variable.units] * len(places)
+    labels = [
+        ".".join(_label(record, dimension, index) for dimension, index in zip(variable.dims[leading:], at, strict=True))
+        for at in places
+    ]
+    flat = values.reshape(rows, len(places))
+    return [
+        (_headed(f"{name}.{label}", unit), flat[:, place])
+        for place, (label, unit) in enumerate(zip(labels, units, strict=True))
+    ]
+
+
+def _label(record: Record, dimension: str, index: int) -> str:
+    """Return the name of a place in a dimension, or its number from 1."""
+    named = record.variables.get(dimension)
+    if named is not None and np.asarray(named.values).dtype.kind in "UO":
+        return str(named.values[index])
+    return str(index + 1)
+
+
+def _headed(name: str, unit: str) -> str:
+    return name if unit == "1" else f"{name} [{unit}]"
+
+
+def _rows(columns: Sequence[np.ndarray]) -> Iterator[list[Any]]:
+    """Yield rows of plain values; nan is an empty field."""
+    for row in zip(*(column.tolist() for column in columns), strict=True):
+        yield ["" if isinstance(value, float) and math.isnan(value) else value for value in row]

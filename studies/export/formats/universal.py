@@ -1,0 +1,247 @@
+"""Universal files of test systems: modes on their mesh (datasets 2411, 2412, 55), curves and histories (58).
+
+SI units and the global frame, as datasets 164 says. Datasets 55 and 58 hold six digits of shapes, frequencies and steps
+of time, twelve of curves: the curves of a reduced model are those at the frequencies that the file holds.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vanedamp.files.toml_input import InputError
+from vanedamp.modal.measurements import write_universal
+from vanedamp.studies.export.formats.vtkhdf import shapes_of
+from vanedamp.studies.export.options import Option
+from vanedamp.studies.export.record import Record
+
+SUMMARY = "modes, receptances, curves and histories: Simcenter Testlab, MATLAB toolboxes, pyuff"
+ENDINGS = (".uff", ".unv")
+OPTIONS = (
+    Option(
+        "frequencies", "of a .uff of a reduced model: the receptances' frequencies, Hz", ("START", "STOP", "NUM"), float
+    ),
+)
+# specific data types, function types, analysis and data types of the datasets
+_UNKNOWN, _DISPLACEMENT, _FORCE, _TIME, _FREQUENCY = 0, 8, 13, 17, 18
+_GENERAL, _HISTORY, _FRF = 0, 1, 4
+_NORMAL_MODE, _COMPLEX_MODE, _REAL, _COMPLEX = 2, 3, 2, 5
+#: corners and descriptor of solids in dataset 2412 by the number of nodes of a cell
+_SOLIDS = {4: (4, 111), 10: (4, 111), 8: (8, 115), 20: (8, 115), 27: (8, 115), 6: (6, 112), 15: (6, 112), 18: (6, 112)}
+_CURVES = {
+    "amplitude_mean": "mean of the peaks", "amplitude_max": "largest peak", "amplitude_harmonic": "harmonic",
+    "amplitude_undamped": "undamped", "amplitude_fixed": "bodies fixed",
+}  # fmt: skip
+
+
+def modes(record: Record, path: Path) -> None:
+    """Write nodes, cells by their corners, and the modes at all nodes, mass-normalised (modal mass 1).
+
+    Of a rotating structure with gyroscopic coupling, the complex modes.
+    """
+    for name in ("coordinates", "cell"):
+        if name not in record.variables:
+            raise InputError(f"{record.file}: holds no mesh; `vanedamp modal CASE.toml -o` writes modes with it")
+    points, cells = record.values("coordinates"), record.values("cell")
+    labels = np.arange(1, len(points) + 1)
+    zero = np.zeros(len(points), dtype=int)
+    sets: list[Any] = [
+        *_headers(record),
+        {
+            "type": 2411, "node_nums": labels, "def_cs": zero, "disp_cs": zero, "color": zero, "x": points[:, 0],
+            "y": points[:, 1], "z": points[:, 2],
+        },
+    ]  # fmt: skip
+    solid = _SOLIDS.get(cells.shape[1])
+    if solid is not None:
+        sets.append({"type": 2412, solid[1]: list(_elements(cells[:, : solid[0]] + 1, solid[1]))})
+    frequencies, shapes, word = shapes_of(record)
+    rigid = record.attributes.get("rigid")
+    ratio = float(rigid["damping_ratio"]) if rigid else 0.0
+    for number, (frequency, shape) in enumerate(zip(frequencies, shapes, strict=True), start=1):
+        sets.append(_mode(number, word, float(frequency), ratio, shape, labels))
+    write_universal(sets, path)
+
+
+def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | None = None) -> tuple[str, ...]:
+    """Write the receptances between all interface coordinates, m/N, at evenly spaced frequencies.
+
+    frequencies: first and last (Hz) and their number; left out: 1000 up to the estimate's highest frequency, or 1.5
+    times the first natural one. Raises InputError for frequencies that are no range.
+    """
+    model = record.reduced_model()
+    start, step, count = _range(frequencies, _top(record, model.natural_frequencies_hz, model.rigid_modes))
+    x = start + step * np.arange(count)
+    receptance = model.receptance(x)
+    directions = [_direction(row) for row in model.directions]
+    sets = [*_headers(record)]
+    for (i, response), (j, force) in itertools.product(enumerate(model.interface), repeat=2):
+        sets.append(
+            _curve(
+                f"receptance {response} / {force}", x, receptance[:, i, j], _FRF, _FREQUENCY, _DISPLACEMENT, _FORCE,
+                rsp_node=i + 1, rsp_dir=directions[i], ref_node=j + 1, ref_dir=directions[j],
+                rsp_ent_name=_short(response), ref_ent_name=_short(force),
+            )
+        )  # fmt: skip
+    write_universal(sets, path)
+    turned = model.arms is not None and np.any(model.arms > 0.0)
+    return ("receptances: coordinates that are rotations have rad and N m in place of m and N",) if turned else ()
+
+
+def sweep(record: Record, path: Path) -> None:
+    """Write the amplitude curves of a sweep over its frequencies, m, one for each of its other points.
+
+    Raises InputError for a sweep that is not over the frequency.
+    """
+    axes: list[str] = record.attributes["axes"]
+    swept = "excitation.frequency"
+    if swept not in axes or len(record.values(_dimension(swept))) < 2:
+        raise InputError(f"{record.file}: is no sweep over {swept}; a .csv or a .mat holds it")
+    x = record.values(_dimension(swept))
+    others = [axis for axis in axes if axis != swept]
+    given = {axis: record.values(_dimension(axis)) for axis in others}
+    sets = [*_headers(record)]
+    for place in np.ndindex(*(len(values) for values in given.values())):
+        at = ", ".join(f"{axis} = {given[axis][index]}" for axis, index in zip(others, place, strict=True))
+        for name, words in _CURVES.items():
+            curves = np.moveaxis(record.values(name), axes.index(swept), -1)
+            sets.append(_curve(words, x, curves[place], _GENERAL, _FREQUENCY, _DISPLACEMENT, id2=at or "NONE"))
+    write_universal(sets, path)
+
+
+def response(record: Record, path: Path) -> None:
+    """Write the samples of a run: displacement and those of the bodies in their cavities, m, over time.
+
+    Raises InputError for a response without samples.
+    """
+    if "time" not in record.variables or len(record.values("time")) < 2:
+        raise InputError(f"{record.file}: holds no samples; run the scene by `vanedamp run --samples N`")
+    time, bodies = record.values("time"), record.values("body_displacement")
+    sets = [*_headers(record), _curve("displacement", time, record.values("displacement"), _HISTORY, _TIME)]
+    for body, moved in enumerate(bodies.T, start=1):
+        sets.append(_curve(f"body {body} in its cavity", time, moved, _HISTORY, _TIME, rsp_node=1 + body))
+    write_universal(sets, path)
+
+
+WRITERS = {"modes": modes, "reduced-model": reduced_model, "sweep": sweep, "response": response}
+
+
+def _headers(record: Record) -> list[dict[str, Any]]:
+    """Return the datasets 151 (where the file comes from) and 164 (SI units)."""
+    from importlib.metadata import version
+
+    program = f"vanedamp {version('vanedamp')}"
+    name = _ascii(Path(record.file).name)
+    return [
+        {
+            "type": 151, "model_name": name[:80], "description": f"{record.kind} of {name}"[:80], "db_app": program,
+            "program": program,
+        },
+        {
+            "type": 164, "units_code": 1, "units_description": "SI: Meter (newton)", "temp_mode": 1, "length": 1.0,
+            "force": 1.0, "temp": 1.0, "temp_offset": 273.15,
+        },
+    ]  # fmt: skip
+
+
+def _elements(corners: np.ndarray, descriptor: int) -> Iterator[dict[str, Any]]:
+    for number, nodes in enumerate(corners.tolist(), start=1):
+        yield {
+            "element_nums": number, "fe_descriptor": descriptor, "phys_table": 1, "mat_table": 1, "color": 7,
+            "num_nodes": len(nodes), "nodes_nums": nodes,
+        }  # fmt: skip
+
+
+def _mode(
+    number: int, word: str, frequency: float, ratio: float, shape: np.ndarray, labels: np.ndarray
+) -> dict[str, Any]:
+    """Return dataset 55 of a mode: normal, or complex with an eigenvalue."""
+    data: dict[str, Any] = {
+        "type": 55, "id1": f"{word} {number}: {frequency:.6g} Hz", "id2": "displacement, kg^-0.5", "id3": "NONE",
+        "id4": "NONE", "id5": "NONE", "model_type": 1, "data_ch": 2, "spec_data_type": _DISPLACEMENT,
+        "n_data_per_node": 3, "load_case": 1, "mode_n": number, "node_nums": labels, "r1": shape[:, 0],
+        "r2": shape[:, 1], "r3": shape[:, 2],
+    }  # fmt: skip
+    if np.iscomplexobj(shape):
+        eigenvalue = 2j * np.pi * frequency
+        return data | {"analysis_type": _COMPLEX_MODE, "data_type": _COMPLEX, "eig": eigenvalue}
+    return data | {
+        "analysis_type": _NORMAL_MODE, "data_type": _REAL, "freq": frequency, "modal_m": 1.0, "modal_damp_vis": ratio,
+        "modal_damp_his": 0.0,
+    }  # fmt: skip
+
+
+def _curve(
+    title: str, x: np.ndarray, values: np.ndarray, function: int, abscissa: int, ordinate: int = _DISPLACEMENT,
+    per: int = _UNKNOWN, **more: Any,
+) -> dict[str, Any]:  # fmt: skip
+    """Return dataset 58 of a curve: even, where the spacing is even in the digits that the file has."""
+    step = _rounded(float(x[1] - x[0]))
+    even = np.abs(_rounded(float(x[0])) + step * np.arange(len(x)) - x).max() <= 1e-5 * np.abs(x).max()
+    units = {_TIME: ("time", "s"), _FREQUENCY: ("frequency", "Hz")}[abscissa]
+    data: dict[str, Any] = {
+        "type": 58, "binary": 0, "func_type": function, "id1": _ascii(title)[:80], "rsp_node": 1, "rsp_dir": 0,
+        "ref_node": 0, "ref_dir": 0, "data": values, "x": x, "abscissa_spacing": int(even),
+        "abscissa_spec_data_type": abscissa, "abscissa_axis_lab": units[0], "abscissa_axis_units_lab": units[1],
+        "ordinate_spec_data_type": ordinate, "ordinate_axis_lab": "displacement", "ordinate_axis_units_lab": "m",
+        "orddenom_spec_data_type": per, "orddenom_axis_lab": "force" if per else "NONE",
+        "orddenom_axis_units_lab": "N" if per else "NONE", "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
+        "ver_num": 0, "load_case_id": 0, "z_axis_value": 0.0,
+    }  # fmt: skip
+    if "id2" in more:
+        more["id2"] = _ascii(more["id2"])[:80]
+    return data | more
+
+
+def _range(given: Sequence[float] | None, top: float) -> tuple[float, float, int]:
+    """Return the first frequency, the step and the number of frequencies that a file holds exactly."""
+    if given is None:
+        step = _rounded(top / 1000.0, 2)
+        return step, step, 1000
+    if len(given) != 3:
+        raise InputError(f"--frequencies: expected START STOP NUM, not {len(given)} numbers")
+    start, stop, number = given
+    if not (0.0 <= start < stop < np.inf and number >= 2 and number == int(number)):
+        raise InputError(
+            "--frequencies: expected 0 <= START < STOP and a whole NUM of at least 2, not "
+            f"{start:g} {stop:g} {number:g}"
+        )
+    return _rounded(start), _rounded((stop - start) / (number - 1)), int(number)
+
+
+def _top(record: Record, frequencies: np.ndarray, rigid: int) -> float:
+    """Return the highest frequency that a model is for, Hz."""
+    provenance: Mapping[str, Any] = record.attributes.get("provenance") or {}
+    estimate = provenance.get("estimate") or {}
+    if "frequencies_hz" in estimate:
+        return float(estimate["frequencies_hz"][1])
+    return 1.5 * float(frequencies[min(rigid, len(frequencies) - 1)])
+
+
+def _direction(direction: np.ndarray) -> int:
+    """Return 1, 2, 3 (x, y, z), negative against an axis, 0 for any other direction."""
+    axis = int(np.argmax(np.abs(direction)))
+    along = np.abs(direction[axis]) > 1.0 - 1e-9
+    return int(np.sign(direction[axis])) * (axis + 1) if along else 0
+
+
+def _rounded(value: float, digits: int = 5) -> float:
+    """Return a number in the digits that the file has behind the point."""
+    return float(f"{value:.{digits}e}")
+
+
+def _dimension(axis: str) -> str:
+    return axis.replace(".", "_")
+
+
+def _short(name: str) -> str:
+    return _ascii(name)[:10]
+
+
+def _ascii(text: str) -> str:
+    """Return a text in the letters that the format has."""
+    return text.encode("ascii", "replace").decode()

@@ -1,0 +1,220 @@
+"""VTKHDF, the file format of VTK for fields on meshes that move: modes, a mode over its phase, responses over time.
+
+Written after VTK's specification (VTKHDF 2.0, UnstructuredGrid with Steps): mesh and cells once, fields a step.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+
+from vanedamp.files.store import replacing
+from vanedamp.files.toml_input import InputError, validate
+from vanedamp.studies.export.options import INPUT, Option
+from vanedamp.studies.export.record import Record, read_record
+
+SUMMARY = "modes and animated responses on the mesh: ParaView, PyVista"
+ENDINGS = (".vtkhdf",)
+OPTIONS = (
+    Option("mode", "of a .vtkhdf: animate this mode, counted from 1, over a cycle", "N", int),
+    Option("frames", "of a .vtkhdf: steps of that cycle (24)", "N", int),
+    Option(
+        "mesh", "of a .vtkhdf: the modes of the same case, on whose mesh a response is shown", "MODES.h5", role=INPUT
+    ),
+    Option("periods", "of a .vtkhdf: the last periods of a response (4)", "N", int),
+)
+#: bytes of the fields of a file
+_MOST_BYTES = 8e9
+#: by which displacements from the coordinates may differ from the samples of the run, of their largest
+_SAME = 1e-6
+
+
+class Mesh(NamedTuple):
+    """Nodes (n, 3) m, cells (c, k) as VTK counts their nodes, and their type in VTK."""
+
+    points: np.ndarray
+    cells: np.ndarray
+    cell_type: int
+
+
+def modes(record: Record, path: Path, mode: int | None = None, frames: int | None = None) -> None:
+    """Write a field a mode, kg^-0.5; or one mode, `displacement` over `frames` steps of its cycle.
+
+    Of a rotating structure with gyroscopic coupling, the complex modes: their real and imaginary parts as fields, or
+    animated as Re(shape exp(i phase)). Raises InputError for a mode that is not there and too few frames.
+    """
+    mesh = _mesh(record)
+    frequencies, shapes, word = shapes_of(record)
+    if mode is None:
+        if frames is not None:
+            raise InputError("--frames: is for one mode; name it by --mode")
+        fields: dict[str, np.ndarray] = {}
+        for number, (frequency, shape) in enumerate(zip(frequencies, shapes, strict=True), start=1):
+            name = f"{word} {number}: {frequency:.6g} Hz"
+            if np.iscomplexobj(shape):
+                fields |= {f"{name}, real": shape.real, f"{name}, imaginary": shape.imag}
+            else:
+                fields[name] = shape
+        _write(path, mesh, fields)
+        return
+    if not 1 <= mode <= len(shapes):
+        raise InputError(f"--mode: expected 1 to {len(shapes)}, not {mode}")
+    steps = 24 if frames is None else frames
+    if steps < 2:
+        raise InputError(f"--frames: expected at least 2, not {steps}")
+    frequency, shape = frequencies[mode - 1], shapes[mode - 1]
+    phases = 2.0 * np.pi * np.arange(steps) / steps
+    times = phases / (2.0 * np.pi * frequency) if frequency > 0.0 else phases
+    _write_steps(path, mesh, times, ((shape * np.exp(1j * phase)).real for phase in phases))
+
+
+def response(record: Record, path: Path, mesh: str | Path | None = None, periods: int | None = None) -> tuple[str, ...]:
+    """Write the displacements of a reduced model, m, relative to the base, at the samples of the last periods.
+
+    Raises InputError for a response without samples of a reduced model's coordinates, a model without its recovery, or
+    another model or mesh than those of the run.
+    """
+    from vanedamp.coupling.scene.scene import Scene
+    from vanedamp.coupling.scene.structures import Rom
+    from vanedamp.coupling.system.reduced_model_file import reduced_model
+
+    if "coordinates" not in record.variables:
+        raise InputError(
+            f"{record.file}: holds no samples of a reduced model's coordinates; run a scene with structure.model = "
+            '"rom" by `vanedamp run --samples N`'
+        )
+    if mesh is None:
+        raise InputError("--mesh: missing; name the modes of the same case, which hold its mesh (vanedamp modal)")
+    last = 4 if periods is None else periods
+    if last < 1:
+        raise InputError(f"--periods: expected at least 1, not {last}")
+    scene = validate(Scene, record.attributes["provenance"]["scene"], record.file)
+    structure = _chosen(scene.structure, record.attributes.get("estimate"))
+    assert isinstance(structure, Rom)
+    if not Path(structure.file).is_file():
+        raise InputError(f"{record.file}: no such file {structure.file}, the reduced model of the run")
+    model = reduced_model(structure, scene.speed)
+    if model.recovery is None or model.coordinates is None:
+        raise InputError(f"{structure.file}: holds no basis to recover displacements; run `vanedamp reduce --recovery`")
+    coordinates, shapes = record.values("coordinates"), model.natural[1]
+    seen = record.values("displacement")
+    if coordinates.shape[1] != len(shapes) or _differ(
+        coordinates @ (model.row(str(scene.excitation.at)) @ shapes), seen
+    ):
+        raise InputError(f"{structure.file}: is not the reduced model of the run any more; run the scene again")
+    on = _mesh(read_record(mesh))
+    if on.points.shape != model.coordinates.shape or _differ(on.points, np.asarray(model.coordinates)):
+        raise InputError(f"--mesh {mesh}: is not the mesh of {structure.file}; take the modes of the same case")
+    time = record.values("time")
+    shown = np.flatnonzero(time > time[-1] + time[1] - last / record.attributes["frequency"] - 1e-9 * time[-1])
+    basis = model.recovery @ shapes
+    _write_steps(path, on, time[shown], ((basis @ coordinates[step]).reshape(-1, 3) for step in shown))
+    residual = model.residual_flexibility is not None
+    return ("displacements: the yielding of the massless boundary itself is left out",) if residual else ()
+
+
+WRITERS = {"modes": modes, "response": response}
+
+
+def shapes_of(record: Record) -> tuple[np.ndarray, list[np.ndarray], str]:
+    """Return frequencies (m,), Hz, shapes (n, 3) of the modes in a record, and what they are called.
+
+    The shapes are complex where the record has those with the gyroscopic coupling.
+    """
+    if "gyroscopic_frequency" in record.variables:
+        real, imaginary = (record.values(f"gyroscopic_shape_{part}") for part in ("real", "imaginary"))
+        frequencies, shapes, word = record.values("gyroscopic_frequency"), real + 1j * imaginary, "gyroscopic mode"
+    else:
+        frequencies, shapes, word = record.values("frequency"), record.values("shape"), "mode"
+    return frequencies, [shape.reshape(-1, 3) for shape in shapes], word
+
+
+def _chosen(structure: Any, estimate: Mapping[str, Any] | None) -> Any:
+    """Return the structure with the number of modes that the run chose, if it was open."""
+    from dataclasses import replace
+
+    if structure.modes != "auto" or estimate is None:
+        return structure
+    return replace(structure, modes=int(estimate["modes"]), natural=True, attached=bool(estimate["attached"]))
+
+
+def _differ(values: np.ndarray, others: np.ndarray) -> bool:
+    return bool(np.abs(values - others).max(initial=0.0) > _SAME * np.abs(others).max(initial=0.0))
+
+
+def _mesh(record: Record) -> Mesh:
+    missing = [name for name in ("coordinates", "cell") if name not in record.variables]
+    if record.kind != "modes" or missing or "vtk_cell_type" not in record.attributes:
+        raise InputError(f"{record.file}: holds no modes with their mesh; `vanedamp modal CASE.toml -o` writes them")
+    return Mesh(record.values("coordinates"), record.values("cell"), int(record.attributes["vtk_cell_type"]))
+
+
+def _write(path: Path, mesh: Mesh, fields: Mapping[str, np.ndarray]) -> None:
+    image = io.BytesIO()  # a write that fails within HDF5 ends the whole process
+    with h5py.File(image, "w") as file:
+        point_data = _grid(file, mesh).create_group("PointData")
+        for name, field in fields.items():
+            _dataset(point_data, name, field)
+    _put(path, image)
+
+
+def _write_steps(path: Path, mesh: Mesh, times: Sequence[float] | np.ndarray, fields: Iterator[np.ndarray]) -> None:
+    """Write the field `displacement` at times, s: the mesh is written once, every step names it by its offsets."""
+    steps, count = len(times), len(mesh.points)
+    if 24.0 * steps * count > _MOST_BYTES:
+        raise InputError(
+            f"{steps} steps of {count} nodes take {24e-9 * steps * count:.3g} GB; at most {_MOST_BYTES / 1e9:.0f} GB: "
+            "take fewer periods, samples or frames"
+        )
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        root = _grid(file, mesh)
+        field = root.create_group("PointData").create_dataset(
+            "displacement", shape=(steps * count, 3), dtype=float, chunks=(min(count, 65536), 3), compression="gzip",
+            compression_opts=1, shuffle=True,
+        )  # fmt: skip
+        for step, values in enumerate(fields):
+            field[step * count : (step + 1) * count] = values
+        group = root.create_group("Steps")
+        group.attrs["NSteps"] = steps
+        group["Values"] = np.asarray(times, float)
+        still = np.zeros(steps, np.int64)
+        group["PartOffsets"], group["PointOffsets"] = still, still
+        group["NumberOfParts"] = np.ones(steps, np.int64)
+        group["CellOffsets"], group["ConnectivityIdOffsets"] = still[:, None], still[:, None]
+        group.create_group("PointDataOffsets")["displacement"] = np.arange(steps, dtype=np.int64) * count
+    _put(path, image)
+
+
+def _put(path: Path, image: io.BytesIO) -> None:
+    with replacing(path) as temporary:
+        temporary.write_bytes(image.getbuffer())
+
+
+def _grid(file: h5py.File, mesh: Mesh) -> Any:
+    """Write the mesh as one part; return its group."""
+    cells, nodes = mesh.cells.shape
+    root = file.create_group("VTKHDF")
+    root.attrs["Version"] = np.array([2, 0])
+    root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
+    for name, length in (("Points", len(mesh.points)), ("Cells", cells), ("ConnectivityIds", mesh.cells.size)):
+        root[f"NumberOf{name}"] = np.array([length], np.int64)
+    _dataset(root, "Points", mesh.points)
+    _dataset(root, "Connectivity", mesh.cells.astype(np.int64).ravel())
+    _dataset(root, "Offsets", nodes * np.arange(cells + 1, dtype=np.int64))
+    _dataset(root, "Types", np.full(cells, mesh.cell_type, np.uint8))
+    return root
+
+
+def _dataset(group: Any, name: str, values: np.ndarray) -> None:
+    # a slash would be a folder of HDF5
+    group.create_dataset(
+        name.replace("/", "_"), data=values, compression="gzip", compression_opts=1, shuffle=True,
+        chunks=(min(math.ceil(len(values)), 65536), *values.shape[1:]),
+    )  # fmt: skip

@@ -1,0 +1,182 @@
+"""Pipelines: the stages from a case to a report, of which only those run whose inputs have changed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.display import Displayed
+from vanedamp.files.errors import VanedampError
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.pipeline.record import Record
+from vanedamp.studies.pipeline.stages import Stage, Tools, stages
+from vanedamp.studies.pipeline.tables import PipelineFile
+from vanedamp.studies.workers import workers as worker_processes
+
+
+@dataclass(frozen=True)
+class StageResult:
+    """What became of a stage.
+
+    status   "kept": nothing has changed, "done"; of a dry run "runs", or "perhaps": if what it takes changes
+    reasons  why it is not kept
+    found    what it found, in a line
+    outputs  its files
+    """
+
+    stage: str
+    status: Literal["kept", "done", "runs", "perhaps"]
+    reasons: tuple[str, ...]
+    outputs: tuple[str, ...]
+    found: str = ""
+    wall_time_s: float = 0.0
+
+
+@dataclass(frozen=True, repr=False)
+class PipelineResult(Displayed):
+    """What became of the stages of a pipeline, in their order."""
+
+    stages: tuple[StageResult, ...]
+    wall_time_s: float
+
+    @property
+    def done(self) -> list[str]:
+        """The names of the stages that ran."""
+        return [stage.stage for stage in self.stages if stage.status == "done"]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {"status": "ok", "stages": [asdict(stage) for stage in self.stages], "wall_time_s": self.wall_time_s}
+
+
+def pipeline(
+    path: str | Path,
+    folder: str | Path | None = None,
+    workers: int | None = None,
+    dry_run: bool = False,
+    note: Callable[[str], None] | None = None,
+    check_scene: Callable[[Scene, bool], None] | None = None,
+) -> PipelineResult:
+    """Run the stages of a pipeline file whose inputs have changed since their results were made.
+
+    Inputs are what the stage reads: tables of the case and the scene, files that they name, results of earlier stages,
+    options, and the versions of the software; a comment is none. What was done is kept in PIPELINE.record.json beside
+    the results, so that a run that was killed goes on, sweeps at their last points.
+
+    folder: of the results, by default the one that the file names; workers: processes of sweeps, by default one for
+    every core; dry_run: only say what would run; note: takes a line as stages begin and end; check_scene: takes every
+    scene that will run, and whether its peak runs with samples, to refuse it. Raises InputError, with the stage's
+    file: nothing has run then if the file, the case or a scene is bad.
+    """
+    started = time.perf_counter()
+    table, source = PipelineFile.load(path), Path(path)
+    target = Path(folder) if folder is not None else source.parent / table.folder
+    if target.exists() and not target.is_dir():
+        raise InputError(f"{path}: folder: {target} is a file; name a folder for the results")
+    listed = stages(table, source, target)
+    say = note or (lambda line: None)
+    _check(listed, [source, *table.named_files.values()], source, check_scene or (lambda scene, peak: None))
+    record = Record(target / f"{source.stem}.record.json")
+    if dry_run:
+        return PipelineResult(tuple(_plan(listed, record, say)), time.perf_counter() - started)
+    target.mkdir(parents=True, exist_ok=True)
+    results = []
+    with ExitStack() as stack:
+        pool = cache(lambda: stack.enter_context(worker_processes(workers)))
+        for stage in listed:
+            with _located(stage):
+                results.append(_done(stage, record, say, pool))
+    result = PipelineResult(tuple(results), time.perf_counter() - started)
+    say(f"{path}: {len(result.done)} of {len(listed)} stages ran, {result.wall_time_s:.1f} s")
+    return result
+
+
+def adopt(path: str | Path) -> None:
+    """Note that results in the folder of a pipeline file are those of its inputs as they are: made by other means."""
+    table, source = PipelineFile.load(path), Path(path)
+    folder = source.parent / table.folder
+    record = Record(folder / f"{source.stem}.record.json")
+    for stage in stages(table, source, folder):
+        if all(output.exists() for output in stage.outputs):
+            record.end(stage.name, stage.inputs(), stage.outputs)
+
+
+def _done(stage: Stage, record: Record, say: Callable[[str], None], pool: Callable[[], Executor | None]) -> StageResult:
+    """Run a stage unless its results are those of its inputs."""
+    outputs, inputs = tuple(map(_shown, stage.outputs)), stage.inputs()
+    reasons = tuple(record.reasons(stage.name, inputs, stage.outputs))
+    if not reasons:
+        say(f"{stage.name}: kept")
+        return StageResult(stage.name, "kept", (), outputs)
+    say(f"{stage.name}: runs, {'; '.join(reasons)}")
+    same = record.begin(stage.name, inputs)
+    started = time.perf_counter()
+    found = stage.work(Tools(say, pool, fresh=not same))
+    seconds = time.perf_counter() - started
+    record.end(stage.name, inputs, stage.outputs)
+    say(f"{stage.name}: {found} ({seconds:.1f} s)")
+    return StageResult(stage.name, "done", reasons, outputs, found, seconds)
+
+
+def _plan(listed: Sequence[Stage], record: Record, say: Callable[[str], None]) -> list[StageResult]:
+    """Return which stages would run and why."""
+    running: dict[Path, str] = {}
+    plan = []
+    for stage in listed:
+        with _located(stage):
+            reasons = tuple(record.reasons(stage.name, stage.inputs(), stage.outputs))
+        before = tuple(dict.fromkeys(running[path] for path in stage.takes if path in running))
+        status: Literal["kept", "runs", "perhaps"] = "runs" if reasons else "perhaps" if before else "kept"
+        if not reasons and before:
+            reasons = (f"takes results of {', '.join(before)}",)
+        if status != "kept":
+            running |= dict.fromkeys(stage.outputs, stage.name)
+        word = {"kept": "kept", "runs": "runs, ", "perhaps": "runs if its input changes, "}[status]
+        say(f"{stage.name}: {word}{'; '.join(reasons)}")
+        plan.append(StageResult(stage.name, status, reasons, tuple(map(_shown, stage.outputs))))
+    return plan
+
+
+def _check(
+    listed: Sequence[Stage], files: Iterable[str | Path], source: Path, check_scene: Callable[[Scene, bool], None]
+) -> None:
+    """Refuse bad input before anything runs, and results that would take the place of an input."""
+    inputs = {(source.parent / file).resolve() if file != source else source.resolve() for file in files}
+    made: dict[Path, str] = {}
+    for stage in listed:
+        with _located(stage):
+            inputs |= {Path(file).resolve() for file in stage.check(check_scene)}
+        for path in stage.outputs:
+            if path in made:
+                raise InputError(
+                    f"{source}: {made[path]} and {stage.name} both write {path.name}; give one of them another name"
+                )
+            made[path] = stage.name
+    taken = {path for stage in listed for path in stage.takes}
+    for path, name in made.items():
+        if path in inputs - taken:
+            raise InputError(f"{source}: {name} writes {path.name}, which is an input; give another folder or name")
+
+
+@contextmanager
+def _located(stage: Stage) -> Iterator[None]:
+    """Name the stage's file in errors about input."""
+    try:
+        yield
+    except VanedampError as error:
+        file = _shown(stage.file)
+        text = str(error).replace(str(stage.file), file)
+        raise InputError(text if text.startswith(f"{file}:") else f"{file}: {text}") from error
+
+
+def _shown(path: Path) -> str:
+    """Return a path as seen from the working directory, if it lies below."""
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)

@@ -1,0 +1,130 @@
+"""What was done, in a file beside the results: from what each stage made which files, and what has changed since."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from vanedamp.files.store import digest, write_json
+from vanedamp.files.toml_input import InputError
+
+_KIND = "vanedamp pipeline"
+#: changes of one file that are told, and entries of a list
+_MOST, _ENTRIES = 3, 4
+
+#: what decides about doing a stage again: by subject ("case case.toml", "file cluster.msh"), nested data or a digest
+Inputs = Mapping[str, Any]
+
+
+class Record:
+    """The record of a pipeline.
+
+    done: by the name of a stage its `inputs` and the digests of its `outputs`; begun: the inputs of stages that were
+    begun and have not ended, to whose checkpoints they belong.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read the file, if there is one. Raises InputError for one that cannot be read."""
+        self.path = path
+        self._done: dict[str, Any] = {}
+        self._begun: dict[str, Any] = {}
+        if not path.exists():
+            return
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            if data["kind"] != _KIND:
+                raise KeyError(data["kind"])
+            self._done, self._begun = dict(data["done"]), dict(data["begun"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError(
+                f"{path}: the record of the pipeline cannot be read ({error}); delete it to do all again"
+            ) from None
+
+    def reasons(self, name: str, inputs: Inputs, outputs: Sequence[Path]) -> list[str]:
+        """Return why a stage must run; nothing where its results are those of these inputs."""
+        done = self._done.get(name)
+        if done is None:
+            return ["not done so far"]
+        return list(changes(done["inputs"], plain(inputs))) + list(_lost(done["outputs"], outputs))
+
+    def begin(self, name: str, inputs: Inputs) -> bool:
+        """Note that a stage begins. Returns whether what an earlier start left is of the same inputs, or unknown."""
+        mine = plain(inputs)
+        same = self._begun.get(name, mine) == mine
+        self._begun[name] = mine
+        self._write()
+        return same
+
+    def end(self, name: str, inputs: Inputs, outputs: Sequence[Path]) -> None:
+        """Note that a stage has made its outputs."""
+        files = {path.name: digest(path) for path in outputs if path.exists()}
+        self._done[name] = {"inputs": plain(inputs), "outputs": files}
+        self._begun.pop(name, None)
+        self._write()
+
+    def _write(self) -> None:
+        write_json(self.path, {"kind": _KIND, "done": self._done, "begun": self._begun})
+
+
+def plain(inputs: Inputs) -> dict[str, Any]:
+    """Return inputs as they come back from the file."""
+    data: dict[str, Any] = json.loads(json.dumps(inputs, default=str))
+    return data
+
+
+def changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what differs between two inputs of a stage, a line a subject."""
+    for subject in dict.fromkeys([*new, *old]):
+        before, after = old.get(subject), new.get(subject)
+        if before == after:
+            continue
+        if not (isinstance(before, dict) and isinstance(after, dict)):
+            yield f"{subject} " + ("is new" if before is None else "is gone" if after is None else "changed")
+            continue
+        one, other = leaves(before), leaves(after)
+        paths = [path for path in dict.fromkeys([*other, *one]) if one.get(path) != other.get(path)]
+        told = [f"{path} {_pair(one.get(path), other.get(path))}" for path in paths[:_MOST]]
+        more = f" and {len(paths) - _MOST} more" if len(paths) > _MOST else ""
+        yield f"{subject} changed: {', '.join(told)}{more}"
+
+
+def leaves(data: Any, path: str = "") -> dict[str, Any]:
+    """Return the values of nested data by their dotted paths; of a list of tables by their names or indices."""
+    items: list[tuple[str, Any]]
+    if isinstance(data, dict) and data:
+        items = list(data.items())
+    elif isinstance(data, list) and data and all(isinstance(entry, dict) for entry in data):
+        items = [(str(entry.get("name", index)), entry) for index, entry in enumerate(data)]
+    else:
+        return {path: data}
+    return {
+        key: value for name, inner in items for key, value in leaves(inner, f"{path}.{name}" if path else name).items()
+    }
+
+
+def _lost(made: Mapping[str, str], outputs: Sequence[Path]) -> Iterator[str]:
+    """Yield which outputs are not as they were made."""
+    for path in outputs:
+        if path.name in made and not path.exists():
+            yield f"{path.name} is missing"
+        elif path.name in made and digest(path) != made[path.name]:
+            yield f"{path.name} is not as it was made"
+
+
+def _pair(before: Any, after: Any) -> str:
+    """Return two values that differ as text, in as many digits as it takes."""
+    shown = ((_shown(before, digits), _shown(after, digits)) for digits in (".6g", ".9g", ".12g", "r"))
+    one, other = next(pair for pair in shown if pair[0] != pair[1])
+    return f"{one} -> {other}"
+
+
+def _shown(value: Any, digits: str) -> str:
+    """Return a value as text, floats in a format ("r": all digits)."""
+    if isinstance(value, float):
+        return repr(value) if digits == "r" else f"{value:{digits}}"
+    if isinstance(value, list):
+        entries = ", ".join(_shown(entry, digits) for entry in value[:_ENTRIES])
+        return f"[{entries}, ... {len(value)} values]" if len(value) > _ENTRIES else f"[{entries}]"
+    return "nothing" if value is None else str(value)

@@ -1,0 +1,410 @@
+"""The stages of a pipeline: what each reads, what decides about doing it again, and how it is done."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.provenance import versions
+from vanedamp.files.store import digest, load
+from vanedamp.files.toml_input import InputError, read_toml
+from vanedamp.studies.case.tables import Case, check_interface
+from vanedamp.studies.pipeline.tables import (
+    CALIBRATION,
+    MODES,
+    REDUCED,
+    RIGID_SCENE,
+    TUNED_CASE,
+    PipelineFile,
+    ReduceStage,
+    SweepStage,
+)
+from vanedamp.studies.scene_checks import check_model, check_moved
+
+#: tables of a case that a stage does not read
+_OF_CALIBRATE, _OF_CAMPBELL = "calibration", "campbell"
+#: tables of a scene for other commands
+_OF_OTHERS = ("orbit", "ramp", "ring_down")
+#: keys of the rigid model that a scene takes
+_RIGID = ("mass", "stiffness", "damping_ratio", "base_mass")
+#: the model of a structure that the pipeline gives, and the keys of the scene's own that it replaces
+_MODELS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "rigid": ("rigid", (*_RIGID, "damping")),
+    "reduced": ("rom", ("file",)),
+}
+#: the level of a scene, which `level` replaces
+_LEVELS = ("force", "base_acceleration", "resonance_amplitude", "load_factor")
+#: the rigid model and the reduced one before they are made, to check a scene with
+_ANY_RIGID = {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.01}
+_DOLFINX = ("fenics-dolfinx", "dolfinx-solver-real")
+
+
+@dataclass(frozen=True)
+class Tools:
+    """What stages work with.
+
+    note: takes a line for the user; pool: returns the worker processes, started when first asked for; fresh: what an
+    earlier start left is of other inputs.
+    """
+
+    note: Callable[[str], None]
+    pool: Callable[[], Executor | None]
+    fresh: bool = False
+
+
+@dataclass(frozen=True)
+class Stage(ABC):
+    """One step.
+
+    name     as lines and records call it
+    file     that its errors are about
+    outputs  files that it writes
+    takes    outputs of earlier stages that it reads
+    """
+
+    name: str
+    file: Path
+    outputs: tuple[Path, ...]
+    takes: tuple[Path, ...]
+
+    @abstractmethod
+    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
+        """Check the input before anything runs, and return the files that it names. Raises VanedampError.
+
+        check_scene: takes a scene that will run, and whether its peak runs with samples.
+        """
+
+    @abstractmethod
+    def inputs(self) -> dict[str, Any]:
+        """Return what decides about doing it again (record.Inputs). Products that are not there yet are left out."""
+
+    @abstractmethod
+    def work(self, tools: Tools) -> str:
+        """Do it, and return what was found in a line. Raises VanedampError."""
+
+
+@dataclass(frozen=True)
+class CaseStage(Stage):
+    """A stage with finite elements."""
+
+    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
+        """Check the case, which a tuned one does not differ from but in numbers."""
+        if self.takes:
+            return []
+        return [self.file, *self._checked().files]
+
+    def _checked(self) -> Case:
+        return Case.load(self.file)
+
+    def inputs(self) -> dict[str, Any]:
+        """Return the case's tables without those of others, and the files that it names."""
+        if not self.file.exists():
+            return {}
+        tables, files = self.tables(read_toml(self.file)), self.files(Case.load(self.file))
+        return {f"case {self.file.name}": tables} | _digests(files, self.file.parent) | _software(*_DOLFINX)
+
+    def files(self, case: Case) -> list[str]:
+        """Return the files that the stage reads: those of the case without the measurements of its calibration."""
+        return replace(case, calibration=None).files
+
+    def tables(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return the tables that the stage reads."""
+        return {key: table for key, table in data.items() if key not in (_OF_CALIBRATE, _OF_CAMPBELL)}
+
+
+@dataclass(frozen=True)
+class Calibrate(CaseStage):
+    """From a case to its calibration, the tuned case and a scene of the rigid model."""
+
+    def tables(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return the tables that the stage reads: with the measurements."""
+        return {key: table for key, table in data.items() if key != _OF_CAMPBELL}
+
+    def files(self, case: Case) -> list[str]:
+        """Return the files that the stage reads."""
+        return case.files
+
+    def work(self, tools: Tools) -> str:
+        """Calibrate."""
+        from vanedamp.studies.case.calibrated_files import save_calibration
+        from vanedamp.studies.case.calibration import calibrate
+
+        found = calibrate(Case.load(self.file))
+        save_calibration(self.file, found, *self.outputs)
+        _warn(tools, self.name, found.warnings)
+        rigid, factors = found.rigid, ""
+        if found.tuning is not None:
+            pairs = zip(found.tuning.names, found.tuning.factors.tolist(), strict=True)
+            factors = "; " + ", ".join(f"{name} times {factor:.4g}" for name, factor in pairs)
+        return f"{rigid.frequency_hz:.6g} Hz, damping ratio {rigid.damping_ratio:.4g}{factors}"
+
+
+@dataclass(frozen=True)
+class Modal(CaseStage):
+    """From a case to its modes."""
+
+    def tables(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return the tables that the stage reads: with the share of the fatigue strength."""
+        own = super().tables(data)
+        table = data.get(_OF_CALIBRATE, {})
+        return own | {_OF_CALIBRATE: {key: table[key] for key in ("share", "hot_spot") if key in table}}
+
+    def work(self, tools: Tools) -> str:
+        """Compute the modes."""
+        from vanedamp.studies.case.stages import assemble, modal_analysis
+
+        analysis = modal_analysis(assemble(Case.load(self.file)))
+        analysis.save(self.outputs[0])
+        _warn(tools, self.name, analysis.warnings)
+        first = "" if analysis.rigid is None else f", first bending {analysis.rigid.frequency_hz:.6g} Hz"
+        return f"{len(analysis.modes)} modes{first}"
+
+
+@dataclass(frozen=True)
+class Reduce(CaseStage):
+    """From a case to its reduced model."""
+
+    table: ReduceStage
+
+    def _checked(self) -> Case:
+        case = super()._checked()
+        check_interface(case)
+        return case
+
+    def inputs(self) -> dict[str, Any]:
+        """Return those of the case, and the options."""
+        keys = ("modes", "basis", "tolerance", "max_frequency", "hot_spots")
+        return super().inputs() | {"option": {key: getattr(self.table, key) for key in keys}}
+
+    def work(self, tools: Tools) -> str:
+        """Reduce."""
+        from vanedamp.studies.case.stages import assemble, reduced_case, unit_doubts
+
+        table, structure = self.table, assemble(Case.load(self.file))
+        modes = None if table.modes == "auto" else table.modes
+        model = reduced_case(structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots)
+        model.save(self.outputs[0])
+        _warn(tools, self.name, unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])))
+        return str(model.provenance["estimate"]["sentence"])
+
+
+@dataclass(frozen=True)
+class Sweep(Stage):
+    """From a scene to its sweep. products: the files of the rigid model and of the reduced one, by their kind."""
+
+    table: SweepStage
+    products: dict[str, Path]
+
+    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
+        """Check the scene, on any structure of the kind where its own is not made yet."""
+        if self.file in self.takes:
+            return []
+        reduced = str(self.products.get("reduced", REDUCED))
+        scene = Scene.of(self._tables(_ANY_RIGID, 1e-6, reduced), self.file)
+        self._check(scene)
+        check_scene(scene, self.table.peak)
+        made = {path.resolve() for path in self.takes}
+        if self.table.structure is None and not made:
+            check_model(scene)
+        return [self.file, *(file for file in scene.files if Path(file).resolve() not in made)]
+
+    def inputs(self) -> dict[str, Any]:
+        """Return the scene, what the pipeline gives it, and the files that it names."""
+        if not self.file.exists():
+            return {}
+        scene, (rigid, amplitude) = self._scene(), self._model()
+        tables = {key: table for key, table in self._kept(read_toml(self.file)).items() if key not in _OF_OTHERS}
+        given: dict[str, Any] = {"option": {key: getattr(self.table, key) for key in ("structure", "level", "peak")}}
+        if self.table.structure == "rigid":
+            given["rigid model"] = rigid
+        if self.table.level is not None:
+            given["fatigue level"] = {"amplitude": amplitude}
+        files = [] if scene is None else scene.files
+        return {f"scene {self.file.name}": tables} | given | _digests(files, self.file.parent) | _software()
+
+    def work(self, tools: Tools) -> str:
+        """Run the points that are not done."""
+        from vanedamp.files.checkpoint_file import clear
+        from vanedamp.studies.report.forced_response import best_first, forced_responses
+        from vanedamp.studies.sweep_steps import finish, prepare, run_peak, run_points
+
+        scene = self._scene()
+        assert scene is not None
+        self._check(scene)
+        check_model(scene)
+        checkpoint = Path(f"{self.outputs[0]}.partial")
+        if tools.fresh:
+            clear(checkpoint)
+        prepared = prepare(scene, checkpoint, self.table.peak)
+        _warn(tools, self.name, prepared.points.warnings)
+        if prepared.resumed:
+            tools.note(f"{self.name}: {prepared.resumed} of {prepared.points.size} points are done, the rest goes on")
+        result = run_points(prepared, self.outputs[0], tools.pool(), self.name)
+        if self.table.peak:
+            peak = self.outputs[1]
+            run_peak(
+                prepared, result, peak, lambda text: tools.note(f"{self.name}: {text.replace(str(peak), peak.name)}")
+            )
+        finish(prepared, self.outputs[0])
+        bad = int((result.status != "ok").sum())
+        told = f"{bad} of {result.status.size} points are not ok; " if bad else ""
+        best = [response for response in best_first(forced_responses(result)) if response.reference > 0]
+        return told + (best[0].sentence if best else f"{result.status.size} points")
+
+    def _check(self, scene: Scene) -> None:
+        check_moved(scene)
+        if not scene.sweep:
+            raise InputError(
+                'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
+            )
+
+    def _scene(self) -> Scene | None:
+        """Return the scene on its structure; None as long as that is not made."""
+        rigid, amplitude = self._model()
+        if (self.table.structure == "rigid" and not rigid) or (self.table.level is not None and amplitude is None):
+            return None
+        return Scene.of(self._tables(rigid, amplitude, str(self.products.get("reduced", REDUCED))), self.file)
+
+    def _tables(self, rigid: dict[str, Any], amplitude: float | None, reduced: str) -> dict[str, Any]:
+        """Return the scene's tables with the structure and the level that the pipeline gives."""
+        tables = self._kept(read_toml(self.file))
+        if self.table.structure is not None:
+            tables["structure"] |= rigid if self.table.structure == "rigid" else {"file": reduced}
+        if self.table.level is not None:
+            tables["excitation"]["resonance_amplitude"] = amplitude
+        return tables
+
+    def _kept(self, tables: dict[str, Any]) -> dict[str, Any]:
+        """Return the scene's tables without the keys in whose place the pipeline gives others."""
+        structure, excitation = tables.get("structure", {}), tables.get("excitation", {})
+        if not (isinstance(structure, dict) and isinstance(excitation, dict)):
+            raise InputError("structure, excitation: expected tables, headed [structure] and [excitation]")
+        if self.table.structure is not None:
+            model, replaced = _MODELS[self.table.structure]
+            own = structure if structure.get("model") == model else {}
+            tables["structure"] = {"model": model} | _without(own, replaced)
+        if self.table.level is not None:
+            tables["excitation"] = _without(excitation, _LEVELS)
+        return tables
+
+    def _model(self) -> tuple[dict[str, Any], float | None]:
+        """Return the rigid model (nothing before it is made) and the amplitude at the share of the fatigue strength."""
+        source = self.products.get("rigid")
+        if source is None or not source.exists() or (self.table.structure != "rigid" and self.table.level is None):
+            return {}, None
+        calibrated = source.name == CALIBRATION
+        _, attributes = load(source, "calibration" if calibrated else "modes")
+        rigid = json.loads(attributes["rigid"]) if "rigid" in attributes else {}
+        fatigue = json.loads(attributes.get("excitation" if calibrated else "fatigue", "{}"))
+        if self.table.structure == "rigid" and not rigid:
+            raise InputError(f"structure: {source} has no rigid model; give the case an [interface.<label>] table")
+        if self.table.level is not None and not fatigue:
+            raise InputError(f"level: {source} has no fatigue amplitude; give the case a material.fatigue_strength")
+        return {key: rigid[key] for key in _RIGID if rigid.get(key) is not None}, fatigue.get("amplitude")
+
+
+@dataclass(frozen=True)
+class Report(Stage):
+    """From all results to the page."""
+
+    results: tuple[Path, ...]
+
+    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
+        """Return the results that are not the pipeline's."""
+        return self.results
+
+    def inputs(self) -> dict[str, Any]:
+        """Return all results."""
+        return _digests([*self.takes, *self.results], self.file.parent) | _software()
+
+    def work(self, tools: Tools) -> str:
+        """Write the page."""
+        from vanedamp.studies.report.page import write_report
+        from vanedamp.studies.report.results import collect
+
+        files = [path for path in (*self.takes, *self.results) if path.exists()]
+        write_report(collect(files), self.outputs[0])
+        return f"{len(files)} results on {self.outputs[0].name}"
+
+
+def stages(pipeline: PipelineFile, source: Path, folder: Path) -> list[Stage]:
+    """Return the stages of a pipeline file with results in a folder, each after those that it takes from."""
+    return list(_stages(pipeline, source.resolve().parent, folder.resolve()))
+
+
+def _stages(pipeline: PipelineFile, base: Path, folder: Path) -> Iterator[Stage]:
+    made: list[Path] = []
+    case, tuned = (base / (pipeline.case or "")).resolve(), tuple[Path, ...]()
+    products: dict[str, Path] = {}
+    if pipeline.calibrate is not None:
+        files = tuple(folder / name for name in (CALIBRATION, TUNED_CASE, RIGID_SCENE))
+        yield Calibrate("calibrate", case, files, ())
+        products["rigid"] = files[0]
+        case, tuned = files[1], files[1:2]
+        made.append(files[0])
+    if pipeline.modal is not None:
+        yield Modal("modal", case, (folder / MODES,), tuned)
+        products.setdefault("rigid", folder / MODES)
+        made.append(folder / MODES)
+    if pipeline.reduce is not None:
+        yield Reduce("reduce", case, (folder / REDUCED,), tuned, pipeline.reduce)
+        products["reduced"] = folder / REDUCED
+        made.append(folder / REDUCED)
+    for table in pipeline.sweep:
+        stage = _sweep(table, base, folder, products, pipeline)
+        yield stage
+        made += stage.outputs
+    if pipeline.report is not None:
+        further = tuple(base / name for name in pipeline.report.results)
+        yield Report("report", folder / pipeline.report.file, (folder / pipeline.report.file,), tuple(made), further)
+
+
+def _sweep(table: SweepStage, base: Path, folder: Path, products: dict[str, Path], pipeline: PipelineFile) -> Sweep:
+    scene = (base / table.scene).resolve()
+    takes = []
+    if pipeline.calibrate is not None and scene == folder / RIGID_SCENE:
+        takes.append(scene)
+    if table.structure == "rigid" or table.level is not None:
+        takes.append(products["rigid"])
+    if table.structure == "reduced":
+        takes.append(products["reduced"])
+    elif table.structure is None and "reduced" in products and scene.is_file():
+        # a scene may name the pipeline's own model
+        with suppress(InputError, AttributeError):  # the stage's check tells what is wrong
+            named = read_toml(scene).get("structure", {}).get("file")
+            if isinstance(named, str) and (scene.parent / named).resolve() == products["reduced"]:
+                takes.append(products["reduced"])
+    names = [f"{table.stem}.h5"] + ([f"{table.stem}_peak.h5"] if table.peak else [])
+    return Sweep(f"sweep {table.stem}", scene, tuple(folder / name for name in names), tuple(takes), table, products)
+
+
+def _digests(files: Iterable[str | Path], folder: Path) -> dict[str, str]:
+    """Return the digests of the files that are there, by their paths from a folder."""
+    return {f"file {os.path.relpath(file, folder)}": digest(file) for file in files if Path(file).is_file()}
+
+
+def _software(*packages: str) -> dict[str, Any]:
+    """Return the versions of what the numbers of a stage depend on."""
+    found = versions()
+    for package in packages:
+        with suppress(importlib.metadata.PackageNotFoundError):
+            found[package] = importlib.metadata.version(package)
+    return {"version": found}
+
+
+def _without(table: dict[str, Any], keys: Iterable[str]) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if key not in keys}
+
+
+def _warn(tools: Tools, name: str, warnings: Iterable[str]) -> None:
+    for warning in warnings:
+        tools.note(f"{name}: warning: {warning}")

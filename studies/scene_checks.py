@@ -1,0 +1,24 @@
+"""What a scene must have before it runs, beyond what its record checks; quick to load, for quick answers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.files.toml_input import InputError
+
+
+def check_moved(scene: Scene) -> None:
+    """Raise InputError for a scene in which nothing moves the structure."""
+    if not scene.moved:
+        raise InputError(
+            "excitation: nothing moves the structure; give force, base_acceleration, resonance_amplitude or load, or "
+            "an [initial] state"
+        )
+
+
+def check_model(scene: Scene) -> None:
+    """Raise InputError for a scene whose reduced model is not there."""
+    if isinstance(scene.structure, Rom) and not Path(scene.structure.file).is_file():
+        raise InputError(f"structure.file: no such file {scene.structure.file}; `vanedamp reduce` writes one")

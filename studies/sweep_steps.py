@@ -1,0 +1,93 @@
+"""The steps from a scene with a [sweep] to its result file, as the command and a pipeline take them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.checkpoint import Checkpoint
+from vanedamp.coupling.sweep.grid import Grid, Points, grid
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.files.checkpoint_file import clear
+from vanedamp.files.provenance import versions
+from vanedamp.files.store import clear_leftovers
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.headline import format_value
+from vanedamp.studies.terminal import progress
+
+#: samples a period of the run at the peak
+PEAK_SAMPLES = 200
+
+
+class Prepared(NamedTuple):
+    """A sweep before its first run: its points, what its result says of its making, and those points that are done.
+
+    checkpoint: the file that keeps finished points, None: nowhere; resumed: points that it had.
+    """
+
+    points: Grid
+    provenance: dict[str, Any]
+    checkpoint: Path | None
+    resumed: int
+
+
+def prepare(scene: Scene, checkpoint: Path | None, peak: bool = False) -> Prepared:
+    """Make the grid and take up the checkpoint; peak: the point with the highest mean will run once more.
+
+    Raises InputError for a point that is no scene, a peak that cannot be run, and the checkpoint of another sweep:
+    processes are slow to start.
+    """
+    if peak:
+        scene.solver.check_samples(PEAK_SAMPLES)
+    points, provenance = grid(scene), {"versions": versions()}
+    if peak and points.along is not None:
+        raise InputError(
+            "--peak: a point of this sweep begins with the state of its neighbour (continuation.direction) and cannot "
+            'run once more by itself; take "independent", or leave --peak out'
+        )
+    resumed = Checkpoint(checkpoint, scene, points.size, provenance).finished.count
+    return Prepared(points, provenance, checkpoint, resumed)
+
+
+def run_points(prepared: Prepared, output: str | Path | None, pool: Executor | None, title: str = "sweep") -> Sweep:
+    """Run every point that is not done, and write the result. The checkpoint stays until `finish`."""
+    with progress(title) as report:
+        result = sweep(prepared.points, pool, report, prepared.checkpoint, prepared.provenance)
+    if output:
+        result.save(output)
+    return result
+
+
+def run_peak(prepared: Prepared, result: Sweep, path: str | Path, note: Callable[[str], None]) -> None:
+    """Run the point with the highest mean of those that are ok, and write its response; note: takes what to tell."""
+    points = prepared.points
+    mean = np.where(result.status == "ok", result.amplitude_mean, -np.inf)
+    index = int(np.argmax(mean))
+    if not np.isfinite(mean.flat[index]):
+        note(f"--peak: no point is ok, {path} was not written")
+        return
+    values = points.values(index)
+    chosen = Points(points.base, points.choices).chosen(values)
+    with progress("peak") as report:
+        response = simulate(
+            chosen.scene, events=True, samples_per_period=PEAK_SAMPLES, start=chosen.start, progress=report
+        )  # fmt: skip
+    response = replace(response, advice=chosen.advice)
+    response.save(path, {"versions": result.provenance.get("versions", {}), "scene": chosen.scene.to_dict()})
+    at = ", ".join(f"{axis} = {format_value(value)}" for axis, value in values.items())
+    note(f"--peak: {path} is the run at {at}")
+
+
+def finish(prepared: Prepared, output: str | Path | None) -> None:
+    """Remove the checkpoint of a sweep whose result is safe."""
+    if prepared.checkpoint is not None and output is not None:
+        clear(prepared.checkpoint)
+        clear_leftovers(output)
