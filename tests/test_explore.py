@@ -258,6 +258,23 @@ def test_newer_curve_cancels_the_one_before_of_its_tab_only():
     assert second.wanted
 
 
+def test_curve_of_a_closed_tab_gives_its_workers_back():
+    exploration, submit = page.Exploration.of(scene(), "scene.toml"), Waiting()
+    curves = Curves(submit)
+
+    def take(tab, version=1):
+        return curves.take(tab, version, lambda: exploration.seen(exploration.texts))
+
+    closed, other = take("closed"), take("other")
+    assert take("closed") is closed
+    closed.asked -= 60.0
+    take("new")
+    assert (closed.wanted, other.wanted) == (False, True)
+    assert all(future.cancelled() for future in submit.futures[:POINTS])
+    again = take("closed")  # a browser that was asleep
+    assert again is not closed and again.wanted
+
+
 def test_worker_that_breaks_leaves_a_point_that_says_so():
     exploration = page.Exploration.of(scene(), "scene.toml")
 
