@@ -400,6 +400,34 @@ def test_massless_boundary_comes_back(tmp_path):
     np.testing.assert_allclose(back.receptance(x), model.receptance(x), rtol=1e-9)
 
 
+def test_points_without_figures_are_no_points_of_a_universal_curve(results, tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    sweep = vd.Sweep.load(results / "sweep.h5")
+    mean = sweep.amplitude_mean.copy()
+    place = [0] * mean.ndim
+    place[list(sweep.axes).index("excitation.frequency")] = 1
+    mean[tuple(place)] = np.nan
+    assert vd.export(replace(sweep, amplitude_mean=mean), tmp_path / "sweep.uff") == (
+        "left out: 1 points of curves without a figure",
+    )
+    curves = [one for one in pyuff.UFF(str(tmp_path / "sweep.uff")).read_sets() if one["type"] == 58]
+    frequencies = sweep.axes["excitation.frequency"]
+    assert sorted({len(one["x"]) for one in curves}) == [len(frequencies) - 1, len(frequencies)]
+    (short,) = (one for one in curves if len(one["x"]) < len(frequencies))
+    np.testing.assert_allclose(short["x"], np.delete(frequencies, 1), rtol=1e-5)
+    assert np.isfinite(short["data"]).all()
+
+
+def test_free_structures(tmp_path):
+    """They have receptances above 0 Hz only, and matrices with their rigid motion."""
+    pytest.importorskip("pyuff")
+    free = ReducedModel.from_matrices(np.eye(2), [[1e4, -1e4], [-1e4, 1e4]], {"a": [1.0, 0.0]}, damping_ratio=0.0)
+    assert vd.export(free, tmp_path / "free.uff") == vd.export(free, tmp_path / "free.mtx") == ()
+    with pytest.raises(vd.InputError, match="no receptance at 0 Hz"):
+        vd.export(free, tmp_path / "free.uff", frequencies=(0.0, 10.0, 3))
+    assert np.array_equal(read_matrices(tmp_path / "free.mtx")["stiffness"], free.stiffness)
+
+
 def test_what_matrices_do_not_say_is_told(tmp_path):
     """A damping matrix of no ratio has no place in a substructure."""
     plain = random_reduced(6, modes=3)
@@ -591,6 +619,11 @@ def test_results_in_memory(results, tmp_path):
     assert (tmp_path / "réponse.csv").read_text().startswith("time [s],")
     vd.export(response, tmp_path / "response.mat")
     assert loadmat(tmp_path / "response.mat")["displacement"].ravel() == pytest.approx(response.displacement, rel=0)
+    with pytest.raises(vd.InputError, match="Response: does not say what was run"):
+        vd.export(
+            replace(response, coordinates=np.ones((len(response.time), 1))), tmp_path / "out.vtkhdf",
+            mesh=results / "modes.h5",
+        )  # fmt: skip
     with pytest.raises(vd.InputError, match="expected a result or its file, not dict"):
         vd.export({}, tmp_path / "out.mat")
     with pytest.raises(vd.InputError, match="holds no modes with their mesh"):

@@ -75,6 +75,8 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
     """
     model = record.reduced_model()
     start, step, count = _range(frequencies, _top(record, model.natural_frequencies_hz, model.rigid_modes))
+    if start == 0.0 and model.rigid_modes:
+        raise InputError("--frequencies: a structure that moves freely has no receptance at 0 Hz; begin above")
     x = start + step * np.arange(count)
     receptance = model.receptance(x)
     directions = [_direction(row) for row in model.directions]
@@ -92,10 +94,11 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
     return ("receptances: coordinates that are rotations have rad and N m in place of m and N",) if turned else ()
 
 
-def sweep(record: Record, path: Path) -> None:
+def sweep(record: Record, path: Path) -> tuple[str, ...]:
     """Write the amplitude curves of a sweep over its frequencies, m, one for each of its other points.
 
-    Raises InputError for a sweep that is not over the frequency.
+    Points without a figure are left out, since the format has no mark for them. Raises InputError for a sweep that is
+    not over the frequency.
     """
     axes: list[str] = record.attributes["axes"]
     swept = "excitation.frequency"
@@ -111,9 +114,14 @@ def sweep(record: Record, path: Path) -> None:
         for place in np.ndindex(*(len(values) for values in given.values())):
             at = ", ".join(f"{axis} = {given[axis][index]}" for axis, index in zip(others, place, strict=True))
             for name, words in _CURVES.items():
-                yield _curve(words, x, curves[name][place], _GENERAL, _FREQUENCY, _DISPLACEMENT, id2=at or "NONE")
+                curve = curves[name][place]
+                known = np.isfinite(curve)
+                if np.count_nonzero(known) > 1:
+                    yield _curve(words, x[known], curve[known], _GENERAL, _FREQUENCY, id2=at or "NONE")
 
     write_universal(sets(), path)
+    lost = sum(int(np.count_nonzero(~np.isfinite(curve))) for curve in curves.values())
+    return (f"left out: {lost} points of curves without a figure",) if lost else ()
 
 
 def response(record: Record, path: Path) -> None:
