@@ -152,8 +152,8 @@ def linear_curves(scene: Scene) -> Linear:
 class Curve:
     """The forced response of a `seen` scene under way: its points run in workers, coarse ones first.
 
-    done, size: points so far, and of the whole curve; coarse: of its coarse form; note: of transient_note; asked: when a
-    tab last asked for it, s of time.monotonic. Raises InputError.
+    done, size: points so far, and of the whole curve; coarse: of its coarse form; note: a warning, of transient_note;
+    asked: when a tab last asked for it, s of time.monotonic. Raises InputError.
     """
 
     def __init__(self, scene: Scene, submit: Submit) -> None:
