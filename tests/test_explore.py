@@ -146,19 +146,19 @@ def test_nonsense_is_said_in_one_line_and_the_curve_stays():
     exploration = page.Exploration.of(scene(), "scene.toml")
     curves = Curves(at_once)
     drawn = draw(exploration, curves, 1)
-    assert drawn[4:7] == (f"{POINTS} frequencies", "message", "")
+    assert (drawn.message, drawn.tone, drawn.frame) == (f"{POINTS} frequencies", "message", "")
     for version, (name, text, said) in enumerate(NONSENSE, start=2):
         old = draw(exploration, curves, version, **{name: text})
-        assert old[4].startswith(said) and "\n" not in old[4] and len(old[4]) < 200
-        assert old[5:7] == ("message bad", "old")
-        assert old[:4] == (page.no_update,) * 4  # figure, figures, scene and sweep
-        assert old[7] == {"serial": version, "version": version, "have": 0, "complete": True}
-    assert draw(exploration, curves, 99)[4:7] == drawn[4:7]
+        assert old.message.startswith(said) and "\n" not in old.message and len(old.message) < 200
+        assert (old.tone, old.frame) == ("message bad", "old")
+        assert (old.figure, old.figures, old.scene, old.sweep) == (page.no_update,) * 4
+        assert old.answer == {"serial": version, "version": version, "have": 0, "complete": True}
+    assert draw(exploration, curves, 99).message == drawn.message
 
 
 def draw(exploration, curves, version, have=0, **changed_texts):
     request = {"tab": "t", "serial": version, "version": version, "values": exploration.texts | changed_texts}
-    return page._draw(exploration, curves, request | {"have": have})
+    return page.changes(exploration, curves, request | {"have": have})
 
 
 @pytest.mark.parametrize(
@@ -256,6 +256,23 @@ def test_newer_curve_cancels_the_one_before_of_its_tab_only():
     with pytest.raises(InputError):
         curves.take("one", 3, lambda: exploration.seen(exploration.texts | {"gap": "x"}))
     assert second.wanted
+
+
+def test_curve_of_a_closed_tab_gives_its_workers_back():
+    exploration, submit = page.Exploration.of(scene(), "scene.toml"), Waiting()
+    curves = Curves(submit)
+
+    def take(tab, version=1):
+        return curves.take(tab, version, lambda: exploration.seen(exploration.texts))
+
+    closed, other = take("closed"), take("other")
+    assert take("closed") is closed
+    closed.asked -= 60.0
+    take("new")
+    assert (closed.wanted, other.wanted) == (False, True)
+    assert all(future.cancelled() for future in submit.futures[:POINTS])
+    again = take("closed")  # a browser that was asleep
+    assert again is not closed and again.wanted
 
 
 def test_worker_that_breaks_leaves_a_point_that_says_so():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Callable
@@ -36,6 +37,8 @@ EVALUATED, _SHORTEST, _LONGEST, _EVENTS = 200, 50, 2000, 300_000
 _MOST_PERIODS = 10_000
 #: tabs of the page whose curves are kept
 _TABS = 32
+#: s without a request after which a tab is taken for closed
+_SILENT = 20.0
 
 #: runs a call in a worker process
 Submit = Callable[..., Future[Any]]
@@ -138,7 +141,8 @@ def linear_curves(scene: Scene) -> Linear:
 class Curve:
     """The forced response of a `seen` scene under way: its points run in workers, coarse ones first.
 
-    done, size: points so far, and of the whole curve; coarse: of its coarse form. Raises InputError.
+    done, size: points so far, and of the whole curve; coarse: of its coarse form; asked: when a tab last asked for it,
+    s of time.monotonic. Raises InputError.
     """
 
     def __init__(self, scene: Scene, submit: Submit) -> None:
@@ -146,7 +150,7 @@ class Curve:
         self._grid = grid(scene)
         self.size = self._grid.size
         self._table = SweepTable(self.size, width_of(self._grid.base))
-        self._news, self._cancelled = Condition(), False
+        self._news, self._cancelled, self.asked = Condition(), False, time.monotonic()
         first = [0, self.size - 1, *range(_COARSE, self.size - 1, _COARSE)]  # the ends are those of all its parts
         self.coarse = len(first)
         self._futures = list[Future[TaskResult]]()
@@ -217,12 +221,16 @@ class Curves:
             known, curve = self._of_tab.get(tab, (-1, None))
             if known > version:
                 return None
+            now = time.monotonic()
             if curve is not None and known == version and curve.wanted:
+                curve.asked = now
                 return curve
             begun = Curve(scene(), self._submit)
+            begun.asked = now
             self._of_tab[tab] = (version, begun)
             self._of_tab.move_to_end(tab)
-            forgotten = [curve]
+            # a tab that is there asks until its curve is complete; one that comes back has it begun again
+            forgotten = [curve, *(other for _, other in self._of_tab.values() if now - other.asked > _SILENT)]
             if len(self._of_tab) > _TABS:
                 forgotten.append(self._of_tab.popitem(last=False)[1][1])
         for curve in filter(None, forgotten):
