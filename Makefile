@@ -5,6 +5,9 @@ PYTHON = .venv/bin/python
 # one worker a core, each with one thread
 TESTS = OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q -n auto --dist worksteal
 
+# what is read: pages and docstrings
+SPELLED = README.md CONTRIBUTING.md CHANGELOG.md docs files meshes modal rom coupling studies scripts vanedamp/__init__.py
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-all test-arithmetic test-versions check bench docs
 
@@ -40,5 +43,7 @@ check: setup ## ruff, mypy, import contracts
 bench: setup ## speed and accuracy of the engine, measured here; figures in out/bench
 	$(PYTHON) -m vanedamp bench engine -o out/bench
 
-docs: setup ## the documentation site, a folder of files: docs/_build/html/index.html
+docs: setup ## the documentation site, its links and spelling checked: docs/_build/html/index.html
 	$(PYTHON) -m sphinx -q -W --keep-going -n docs docs/_build/html
+	$(PYTHON) docs/check_site.py docs/_build/html
+	$(PYTHON) -m codespell_lib $(SPELLED)

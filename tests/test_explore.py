@@ -27,7 +27,17 @@ from vanedamp.studies.cli import main
 from vanedamp.studies.explore import page, server
 from vanedamp.studies.explore.chart import key_figures, response_figure
 from vanedamp.studies.explore.controls import controls_of, moved
-from vanedamp.studies.explore.curves import POINTS, Band, Curve, Curves, ends_of, explorable, linear_curves, seen
+from vanedamp.studies.explore.curves import (
+    POINTS,
+    Band,
+    Curve,
+    Curves,
+    ends_of,
+    explorable,
+    linear_curves,
+    seen,
+    transient_note,
+)
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.report.forced_response import forced_responses
 
@@ -188,6 +198,16 @@ def test_band_holds_both_resonances_and_runs_their_transient():
     # exp(-2 pi zeta n) of the linear transient is left after n periods at the resonance: 1 % after 73
     assert 73 <= shown.time.transient <= 100
     assert shown.time.simulated == shown.time.transient + 200
+
+
+def test_transient_that_is_too_long_to_run_is_warned_of():
+    assert transient_note(seen(explorable(scene()), Band())) is None
+    slow = seen(explorable(scene(structure=TABLES["structure"] | {"damping_ratio": 1e-4})), Band())
+    assert slow.time.transient == 2000
+    # the natural motion begins as fast as the steady one, r times its own rate, and decays for 2000 / r of its periods
+    r = ends_of(slow)[1] / (math.sqrt(1e4) / (2 * math.pi))
+    said = re.search(r"after 2000 periods (\d+)% of its own transient is left", transient_note(slow))
+    assert int(said[1]) == pytest.approx(100 * r * math.exp(-2 * math.pi * 1e-4 * 2000 / r), abs=1.0)
 
 
 def test_band_is_that_of_the_scenes_own_sweep():

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -245,6 +246,20 @@ def test_all_variables_in_a_mat_file(results, kind):
         assert float(cavity["gap"][0, 0][0, 0]) == pytest.approx(2e-6 if kind == "response" else 2e-4)
 
 
+def test_statuses_of_a_large_sweep_in_a_mat_file(results, tmp_path, monkeypatch):
+    """Numbers in a list of words, since a million cells take minutes."""
+    from scipy.io import loadmat
+
+    from vanedamp.studies.export.formats import matlab
+
+    monkeypatch.setattr(matlab, "_MOST_CELLS", 3)
+    vd.export(results / "sweep.h5", tmp_path / "sweep.mat")
+    data, sweep = loadmat(tmp_path / "sweep.mat"), vd.Sweep.load(results / "sweep.h5")
+    for name in ("status", "classification"):
+        words = np.array([str(text[0]) for text in data[f"{name}_names"].ravel()])
+        assert words[data[name].astype(int) - 1].tolist() == getattr(sweep, name).tolist()
+
+
 def test_sweep_as_a_tidy_table(results):
     pandas = pytest.importorskip("pandas")
     sweep = vd.Sweep.load(results / "sweep.h5")
@@ -267,8 +282,6 @@ def test_sweep_as_a_tidy_table(results):
 def test_points_without_figures_keep_their_status(results, tmp_path):
     """A run that broke has empty fields and says why."""
     pandas = pytest.importorskip("pandas")
-    from dataclasses import replace
-
     sweep = vd.Sweep.load(results / "sweep.h5")
     status, mean = sweep.status.copy(), sweep.amplitude_mean.copy()
     status[0, 1], mean[0, 1] = "error: broken, oh", np.nan
@@ -327,6 +340,21 @@ def test_reduced_models_come_back(results, kind, coordinates, capsys):
     if kind == "op4":
         load_of = [np.abs(one.natural[1].T @ one.base_load) for one in (model, back)]
         np.testing.assert_allclose(load_of[1], load_of[0], atol=1e-9 * load_of[0].max())
+
+
+def test_a_reduced_model_comes_back_from_matlab(results, tmp_path):
+    """Bit by bit; a massless boundary, of which the matrices know nothing, is refused."""
+    words = ("-o", str(tmp_path / "rom.mat"), "--description", str(tmp_path / "external.toml"))
+    assert main(["export", str(results / "rom.h5"), *words]) == 0
+    assert main(["import", str(tmp_path / "external.toml"), "-o", str(tmp_path / "back.h5")]) == 0
+    model, back = ReducedModel.load(results / "rom.h5"), ReducedModel.load(tmp_path / "back.h5")
+    for name in ("mass", "stiffness", "selection", "base_load", "directions"):
+        assert np.array_equal(getattr(back, name), getattr(model, name))
+    assert back.damping_ratio == model.damping_ratio
+    massless = random_reduced(5, modes=4)
+    massless = replace(massless, residual_flexibility=1e-7 * np.eye(2))
+    with pytest.raises(vd.InputError, match=r"take \.op4"):
+        vd.export(massless, tmp_path / "rom.mat", description=tmp_path / "external.toml")
 
 
 def test_matrices_read_by_other_programs(results):
@@ -530,6 +558,27 @@ def test_another_model_than_that_of_the_run(results, tmp_path, monkeypatch, caps
     assert main(["modal", "case.toml", "-o", "modes.h5"]) == 0
     assert main(arguments) == BAD_INPUT
     assert "is not the mesh of" in capsys.readouterr().err
+
+
+def test_names_of_any_language(tmp_path):
+    """Cavities keep their names where the format has letters for them."""
+    pyuff, pandas = pytest.importorskip("pyuff"), pytest.importorskip("pandas")
+    from scipy.io import loadmat
+
+    text = changed(
+        SCENE, ('[[cavity]]\nname = "c1"', '[[cavity]]\nname = "Käfig 空"'), ('cavity = "c1"', 'cavity = "Käfig 空"')
+    )
+    (tmp_path / "scene.toml").write_text(text + '"cavity.Käfig 空.gap" = [1e-4, 2e-4]\n', encoding="utf-8")
+    sweep = vd.sweep(vd.Scene.load(tmp_path / "scene.toml"))
+    for ending in ("csv", "mat", "uff"):
+        vd.export(sweep, tmp_path / f"sweep.{ending}")
+    table = pandas.read_csv(tmp_path / "sweep.csv")
+    assert table["cavity.Käfig 空.gap [m]"].nunique() == 2
+    data = loadmat(tmp_path / "sweep.mat")
+    assert [str(path[0]) for path in data["about"]["axes"][0, 0].ravel()] == list(sweep.axes)
+    assert np.array_equal(data["cavity_K_fig___gap"].ravel(), sweep.axes["cavity.Käfig 空.gap"])
+    curves = [one for one in pyuff.UFF(str(tmp_path / "sweep.uff")).read_sets() if one["type"] == 58]
+    assert {one["id2"].strip() for one in curves} == {"cavity.K?fig ?.gap = 0.0001", "cavity.K?fig ?.gap = 0.0002"}
 
 
 def test_results_in_memory(results, tmp_path):

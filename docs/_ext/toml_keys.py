@@ -7,8 +7,8 @@ and the search finds it under the kind of file: `scene.damper.normal_load`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Container, Iterable, Iterator
+from typing import Any, ClassVar, NamedTuple
 
 from docutils import nodes
 from docutils.parsers.rst import Directive
@@ -57,7 +57,7 @@ class Table(NamedTuple):
 
     def anchor(self, key: str = "") -> str:
         """Return the anchor of the table, or of a key in it."""
-        return ".".join(part for part in (self.path.replace(NAME, "name"), self.variant, key) if part)
+        return ".".join(part for part in (self.path, self.variant, key) if part).replace(NAME, "name")
 
     def dotted(self, key: str) -> str:
         """Return the dotted name of a key, without the variant."""
@@ -72,12 +72,12 @@ def tables(schema: Schema) -> Iterator[Table]:
     yield from _inner(schema, schema, "")
 
 
-def _inner(schema: Schema, table: Schema, path: str) -> Iterator[Table]:
+def _inner(schema: Schema, table: Schema, path: str, text: str = "") -> Iterator[Table]:
     for name, node in table.get("properties", {}).items():
         yield from _tables_at(schema, node, f"{path}.{name}" if path else name, node.get("description", ""))
     others = table.get("additionalProperties")
     if isinstance(others, dict):
-        yield from _tables_at(schema, others, f"{path}.{NAME}", "")
+        yield from _tables_at(schema, others, f"{path}.{NAME}", text)
 
 
 def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[Table]:
@@ -89,20 +89,23 @@ def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[T
         heading = brackets.format(path) + "".join(f' {key} = "{value}"' for key, value in told.items())
         others = one.get("additionalProperties")
         own = isinstance(others, dict) and not _own_tables(schema, others)
-        if one.get("properties") or own:
-            keys = _keys(schema, one) + ((_key(schema, '"path"', others, False),) if own else ())
-            said = text if own else one.get("description", text)
-            yield Table(path, heading, "".join(told.values()), said, keys)
-        yield from _inner(schema, one, path)
+        if "properties" in one or own:
+            free = (_key(schema, NAME, {"description": text} | others, False),) if own else ()
+            said = "" if own else one.get("description", text)
+            yield Table(path, heading, "".join(told.values()), said, _keys(schema, one, told) + free)
+        yield from _inner(schema, one, path, text)
 
 
 def _own_tables(schema: Schema, node: Schema) -> list[Schema]:
-    """Return the tables of a file that a node stands for, those in a list as well; inline tables are values."""
-    found = []
-    for option in options(schema, node):
+    """Return the tables of a file that a node stands for, those in a list as well.
+
+    Inline tables are values, and so are names with values where a list or a text would do as well.
+    """
+    found, some = [], options(schema, node)
+    for option in some:
         if isinstance(option.get("items"), dict):
             found += _own_tables(schema, option["items"])
-        elif option.get("type") == "object" and "x-inline" not in option:
+        elif option.get("type") == "object" and "x-inline" not in option and ("properties" in option or len(some) == 1):
             found.append(option)
     return found
 
@@ -115,10 +118,10 @@ def _distinguishing(table: Schema, among: list[Schema]) -> dict[str, str]:
     return {key: here[key] for key in list(here)[:1]}
 
 
-def _keys(schema: Schema, table: Schema) -> tuple[Key, ...]:
-    """Return the keys of a table that are no tables themselves."""
-    required, fixed = table.get("required", ()), constants(table)
-    nodes = sorted(table.get("properties", {}).items(), key=lambda item: item[0] not in fixed)
+def _keys(schema: Schema, table: Schema, first: Container[str] = ()) -> tuple[Key, ...]:
+    """Return the keys of a table that are no tables themselves, some of them first."""
+    required = table.get("required", ())
+    nodes = sorted(table.get("properties", {}).items(), key=lambda item: item[0] not in first)
     return tuple(_key(schema, name, node, name in required) for name, node in nodes if not _own_tables(schema, node))
 
 
@@ -140,7 +143,9 @@ def _value(schema: Schema, node: Schema) -> str:
     if node.get("type") == "array":
         return _list(schema, node)
     if node.get("type") == "object":
-        return "{" + ", ".join(node.get("properties", {})) + "}"
+        others = node.get("additionalProperties")
+        inner = f"{NAME} = {_value(schema, others)}" if isinstance(others, dict) else ", ".join(node["properties"])
+        return "{" + inner + "}"
     return " ".join(part for part in (WORDS.get(node.get("type", ""), "any"), _range(node)) if part)
 
 
@@ -220,8 +225,9 @@ class Keys(Directive):
         domain = env.domains["toml"]
         assert isinstance(domain, TomlDomain)
         section = nodes.section(ids=self._ids(table), names=[f"{kind} {table.heading}"])
-        if table.path:
-            domain.note(f"{kind}.{table.path}", env.docname, section["ids"][0], "table")
+        for path in dict.fromkeys((table.path, table.path.removesuffix(f".{NAME}"))):
+            if path:
+                domain.note(f"{kind}.{path}", env.docname, section["ids"][0], "table")
         section += nodes.title("", table.heading)
         paragraphs = [" ".join(text.split()) for text in table.text.split("\n\n") if text]
         section += [nodes.paragraph("", "", *with_literals(text)) for text in paragraphs]
@@ -239,9 +245,8 @@ class Keys(Directive):
     def _ids(self, table: Table, key: str = "") -> list[str]:
         """Return the anchors of a table or a key: that with the variant; of the first variant also that without."""
         taken = self.state.document.settings.env.temp_data.setdefault("toml_keys", set())
-        name = key.strip('"')
-        plain = table._replace(variant="").anchor(name) or "top-level"
-        ids = list(dict.fromkeys([table.anchor(name) or plain, *([] if plain in taken else [plain])]))
+        plain = table._replace(variant="").anchor(key) or "top-level"
+        ids = list(dict.fromkeys([table.anchor(key) or plain, *([] if plain in taken else [plain])]))
         taken.update(ids)
         return ids
 
@@ -251,9 +256,9 @@ class TomlDomain(Domain):
 
     name = "toml"
     label = "TOML"
-    object_types = {"key": ObjType("key", "key"), "table": ObjType("table", "key")}
-    roles = {"key": XRefRole()}
-    initial_data: dict[str, Any] = {"keys": []}
+    object_types: ClassVar = {"key": ObjType("key", "key"), "table": ObjType("table", "key")}
+    roles: ClassVar = {"key": XRefRole()}
+    initial_data: ClassVar = {"keys": []}
     data_version = 1
 
     def note(self, name: str, docname: str, anchor: str, kind: str = "key") -> None:

@@ -217,10 +217,11 @@ def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
     """Return figure, key figures and a line on what there is of a curve so far."""
     sweep = curve.sweep()
     count, complete = len(sweep.status), len(sweep.status) == curve.size
+    notes = [*([curve.note] if curve.note else []), *remarks(sweep, complete)]
     figures = html.Div(
         [
             html.Dl([part for figure in key_figures(sweep) for part in _term(figure)]),
-            html.Ul([html.Li(remark) for remark in remarks(sweep, complete)], className="remarks"),
+            html.Ul([html.Li(note) for note in notes], className="remarks"),
         ]
     )
     text = f"{count} frequencies" if complete else f"{count} of {curve.size} frequencies so far"
