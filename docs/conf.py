@@ -43,6 +43,8 @@ html_title = "vanedamp"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
+# a page of its own, without others beside it
+html_sidebars = {"tutorial/index": []}
 html_theme_options = {
     "show_prev_next": True,
     "secondary_sidebar_items": ["page-toc"],

@@ -12,7 +12,8 @@ import csv
 import importlib
 import os
 import re
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -370,10 +371,12 @@ def _frf_to_universal(frf: Frf, target: Path) -> None:
     write_universal(sets, target)
 
 
-def write_universal(sets: Sequence[Any], target: Path) -> None:
+def write_universal(sets: Iterable[Any], target: Path) -> None:
     """Write datasets as pyuff takes them. Raises MeasurementError without pyuff, StoreError for an unwritable file."""
     prepare = _pyuff()
-    with replacing(target) as temporary:
-        temporary.unlink()  # pyuff appends
-        universal = prepare.UFF(str(temporary))
-        universal.write_sets(list(sets), "add")
+    with replacing(target) as temporary, temporary.open("wb") as whole, tempfile.TemporaryDirectory() as folder:
+        part = Path(folder) / "dataset.uff"
+        for dataset in sets:  # each by itself: pyuff reads all of a file again for every set that it appends
+            prepare.UFF(str(part)).write_sets([dataset], "add")
+            whole.write(part.read_bytes())
+            part.unlink()

@@ -31,7 +31,7 @@ _CORNERS = {"tetra": 4, "hexahedron": 8}
 _VOLUMES = {"tetra": ("tetra", 4), "tetra10": ("tetra10", 10), "hexahedron": ("hexahedron", 8)}
 _VOLUMES |= dict.fromkeys(("hexahedron20", "hexahedron27"), ("hexahedron", 8))
 _READERS = {".inp": abaqus.read, ".cdb": ansys.read, ".unv": universal_file.read}
-_READERS |= dict.fromkeys((".bdf", ".nas", ".fem"), nastran.read)
+_READERS |= dict.fromkeys((".bdf", ".nas", ".fem", ".dat"), nastran.read)
 # gmsh's elements by dimension from 0
 _GMSH = {"tetra": (15, 1, 2, 4), "tetra10": (15, 8, 9, 11), "hexahedron": (15, 1, 3, 5)}
 # gmsh's order of a quadratic tetrahedron; it is its own inverse
@@ -74,13 +74,35 @@ def convert(
     with straight edges (the displacements have a degree of their own). Raises MeshError.
     """
     source = _source(Path(path), _read(Path(path)))
-    surface, edges = _boundary(source), _edges(source)
-    groups = {2: _facet_groups(source, surface, facets), 3: _volume_groups(source, volumes)}
-    groups[1], groups[0] = _lower_groups(source, edges, groups[2], facets)
+    entities, groups = _grouped(source, volumes, facets)
     for dimension, what in ((2, "facet"), (3, "volume")):
         _check_disjoint(source.path, what, groups[dimension])
-    entities = {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]}
     return _write(source, entities, groups, scale, output)
+
+
+def group_names(
+    path: str | os.PathLike[str], volumes: Collection[str] = (), facets: Collection[str] = ()
+) -> tuple[dict[int, list[str]], int]:
+    """Return the names that `convert` can make groups of by dimension (3: volumes), and the number of nodes.
+
+    Raises MeshError as `convert` does, for `volumes` and `facets` that are not there, too.
+    """
+    source = _source(Path(path), _read(Path(path)))
+    _, wanted = _grouped(source, volumes, facets)
+    for dimension, what in ((2, "facet"), (3, "volume")):
+        _check_disjoint(source.path, what, wanted[dimension])
+    _, groups = _grouped(source, None, None)
+    return {dimension: list(named) for dimension, named in groups.items()}, np.unique(source.cells).size
+
+
+def _grouped(
+    source: _Source, volumes: Collection[str] | None, facets: Collection[str] | None
+) -> tuple[dict[int, np.ndarray], dict[int, dict[str, np.ndarray]]]:
+    """Return the nodes of cells, facets, edges and points by dimension, and groups of them by name."""
+    surface, edges = _boundary(source), _edges(source)
+    groups = {3: _volume_groups(source, volumes), 2: _facet_groups(source, surface, facets)}
+    groups[1], groups[0] = _lower_groups(source, edges, groups[2], facets)
+    return {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]}, groups
 
 
 def _read(path: Path) -> LabelledMesh:
@@ -283,8 +305,12 @@ def _write(
                 gmsh.model.mesh.addElementsByType(entity, _GMSH[source.kind][dimension], [], nodes[members].ravel())
                 if name:
                     gmsh.model.addPhysicalGroup(dimension, [entity], name=name)
-        gmsh.option.setNumber("Mesh.SaveAll", 1)
-        return msh.write(output)
+        before = gmsh.option.getNumber("Mesh.SaveAll")
+        gmsh.option.setNumber("Mesh.SaveAll", 1)  # cells without a group, too
+        try:
+            return msh.write(output)
+        finally:
+            gmsh.option.setNumber("Mesh.SaveAll", before)
 
 
 def _all(members: Iterable[np.ndarray]) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Nastran files (.bdf, .nas, .fem): grid points in global coordinates, elements, properties and sets.
+"""Nastran files (.bdf, .nas, .fem, .dat): grid points in global coordinates, elements, properties and sets.
 
 A property number is a set of elements of that name. A SET of the case control, a SET1, a SET3 or OptiStruct's SET holds
 numbers: `set 7 grids` are the grid points among them, `set 7 elements` the elements. The systems of displacements (CD)
@@ -250,7 +250,7 @@ def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
     begin = next((place for place, line in enumerate(lines) if line[2].strip().upper().startswith("BEGIN")), -1)
     end = next((place for place, line in enumerate(lines) if line[2].strip().upper().startswith("ENDDATA")), None)
     if end is None:
-        raise MeshError(f"{path}: no ENDDATA: the file is cut short; write it again")
+        raise MeshError(f"{path}: no ENDDATA: cut short, or no file of Nastran; write it again")
     commands, head = [], iter(lines[: max(begin, 0)])
     for file, number, text in head:
         while text.endswith(","):

@@ -73,7 +73,7 @@ prepare_apt() {
 
 # A browser for the tests of `vanedamp explore`, which are skipped without one.
 install_browser() {
-    installed chromium || apt_get install -y --no-install-recommends chromium 2>/dev/null ||
+    installed chromium || (apt_get install -y --no-install-recommends chromium) 2>/dev/null ||
         say "no chromium to install here; the tests in a browser are skipped"
 }
 

@@ -27,7 +27,17 @@ from vanedamp.studies.cli import main
 from vanedamp.studies.explore import page, server
 from vanedamp.studies.explore.chart import key_figures, response_figure
 from vanedamp.studies.explore.controls import controls_of, moved
-from vanedamp.studies.explore.curves import POINTS, Band, Curve, Curves, ends_of, explorable, linear_curves, seen
+from vanedamp.studies.explore.curves import (
+    POINTS,
+    Band,
+    Curve,
+    Curves,
+    ends_of,
+    explorable,
+    linear_curves,
+    seen,
+    transient_note,
+)
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.report.forced_response import forced_responses
 
@@ -146,19 +156,19 @@ def test_nonsense_is_said_in_one_line_and_the_curve_stays():
     exploration = page.Exploration.of(scene(), "scene.toml")
     curves = Curves(at_once)
     drawn = draw(exploration, curves, 1)
-    assert drawn[4:7] == (f"{POINTS} frequencies", "message", "")
+    assert (drawn.message, drawn.tone, drawn.frame) == (f"{POINTS} frequencies", "message", "")
     for version, (name, text, said) in enumerate(NONSENSE, start=2):
         old = draw(exploration, curves, version, **{name: text})
-        assert old[4].startswith(said) and "\n" not in old[4] and len(old[4]) < 200
-        assert old[5:7] == ("message bad", "old")
-        assert old[:4] == (page.no_update,) * 4  # figure, figures, scene and sweep
-        assert old[7] == {"serial": version, "version": version, "have": 0, "complete": True}
-    assert draw(exploration, curves, 99)[4:7] == drawn[4:7]
+        assert old.message.startswith(said) and "\n" not in old.message and len(old.message) < 200
+        assert (old.tone, old.frame) == ("message bad", "old")
+        assert (old.figure, old.figures, old.scene, old.sweep) == (page.no_update,) * 4
+        assert old.answer == {"serial": version, "version": version, "have": 0, "complete": True}
+    assert draw(exploration, curves, 99).message == drawn.message
 
 
 def draw(exploration, curves, version, have=0, **changed_texts):
     request = {"tab": "t", "serial": version, "version": version, "values": exploration.texts | changed_texts}
-    return page._draw(exploration, curves, request | {"have": have})
+    return page.changes(exploration, curves, request | {"have": have})
 
 
 @pytest.mark.parametrize(
@@ -188,6 +198,16 @@ def test_band_holds_both_resonances_and_runs_their_transient():
     # exp(-2 pi zeta n) of the linear transient is left after n periods at the resonance: 1 % after 73
     assert 73 <= shown.time.transient <= 100
     assert shown.time.simulated == shown.time.transient + 200
+
+
+def test_transient_that_is_too_long_to_run_is_warned_of():
+    assert transient_note(seen(explorable(scene()), Band())) is None
+    slow = seen(explorable(scene(structure=TABLES["structure"] | {"damping_ratio": 1e-4})), Band())
+    assert slow.time.transient == 2000
+    # the natural motion begins as fast as the steady one, r times its own rate, and decays for 2000 / r of its periods
+    r = ends_of(slow)[1] / (math.sqrt(1e4) / (2 * math.pi))
+    said = re.search(r"after 2000 periods (\d+)% of its own transient is left", transient_note(slow))
+    assert int(said[1]) == pytest.approx(100 * r * math.exp(-2 * math.pi * 1e-4 * 2000 / r), abs=1.0)
 
 
 def test_band_is_that_of_the_scenes_own_sweep():
@@ -256,6 +276,23 @@ def test_newer_curve_cancels_the_one_before_of_its_tab_only():
     with pytest.raises(InputError):
         curves.take("one", 3, lambda: exploration.seen(exploration.texts | {"gap": "x"}))
     assert second.wanted
+
+
+def test_curve_of_a_closed_tab_gives_its_workers_back():
+    exploration, submit = page.Exploration.of(scene(), "scene.toml"), Waiting()
+    curves = Curves(submit)
+
+    def take(tab, version=1):
+        return curves.take(tab, version, lambda: exploration.seen(exploration.texts))
+
+    closed, other = take("closed"), take("other")
+    assert take("closed") is closed
+    closed.asked -= 60.0
+    take("new")
+    assert (closed.wanted, other.wanted) == (False, True)
+    assert all(future.cancelled() for future in submit.futures[:POINTS])
+    again = take("closed")  # a browser that was asleep
+    assert again is not closed and again.wanted
 
 
 def test_worker_that_breaks_leaves_a_point_that_says_so():

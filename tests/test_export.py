@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -245,6 +246,20 @@ def test_all_variables_in_a_mat_file(results, kind):
         assert float(cavity["gap"][0, 0][0, 0]) == pytest.approx(2e-6 if kind == "response" else 2e-4)
 
 
+def test_statuses_of_a_large_sweep_in_a_mat_file(results, tmp_path, monkeypatch):
+    """Numbers in a list of words, since a million cells take minutes."""
+    from scipy.io import loadmat
+
+    from vanedamp.studies.export.formats import matlab
+
+    monkeypatch.setattr(matlab, "_MOST_CELLS", 3)
+    vd.export(results / "sweep.h5", tmp_path / "sweep.mat")
+    data, sweep = loadmat(tmp_path / "sweep.mat"), vd.Sweep.load(results / "sweep.h5")
+    for name in ("status", "classification"):
+        words = np.array([str(text[0]) for text in data[f"{name}_names"].ravel()])
+        assert words[data[name].astype(int) - 1].tolist() == getattr(sweep, name).tolist()
+
+
 def test_sweep_as_a_tidy_table(results):
     pandas = pytest.importorskip("pandas")
     sweep = vd.Sweep.load(results / "sweep.h5")
@@ -267,8 +282,6 @@ def test_sweep_as_a_tidy_table(results):
 def test_points_without_figures_keep_their_status(results, tmp_path):
     """A run that broke has empty fields and says why."""
     pandas = pytest.importorskip("pandas")
-    from dataclasses import replace
-
     sweep = vd.Sweep.load(results / "sweep.h5")
     status, mean = sweep.status.copy(), sweep.amplitude_mean.copy()
     status[0, 1], mean[0, 1] = "error: broken, oh", np.nan
@@ -329,6 +342,21 @@ def test_reduced_models_come_back(results, kind, coordinates, capsys):
         np.testing.assert_allclose(load_of[1], load_of[0], atol=1e-9 * load_of[0].max())
 
 
+def test_a_reduced_model_comes_back_from_matlab(results, tmp_path):
+    """Bit by bit; a massless boundary, of which the matrices know nothing, is refused."""
+    words = ("-o", str(tmp_path / "rom.mat"), "--description", str(tmp_path / "external.toml"))
+    assert main(["export", str(results / "rom.h5"), *words]) == 0
+    assert main(["import", str(tmp_path / "external.toml"), "-o", str(tmp_path / "back.h5")]) == 0
+    model, back = ReducedModel.load(results / "rom.h5"), ReducedModel.load(tmp_path / "back.h5")
+    for name in ("mass", "stiffness", "selection", "base_load", "directions"):
+        assert np.array_equal(getattr(back, name), getattr(model, name))
+    assert back.damping_ratio == model.damping_ratio
+    massless = random_reduced(5, modes=4)
+    massless = replace(massless, residual_flexibility=1e-7 * np.eye(2))
+    with pytest.raises(vd.InputError, match=r"take \.op4"):
+        vd.export(massless, tmp_path / "rom.mat", description=tmp_path / "external.toml")
+
+
 def test_matrices_read_by_other_programs(results):
     """pyyeti reads OP4 and DMIG; the text of a substructure is parsed as Abaqus describes it."""
     nastran = pytest.importorskip("pyyeti.nastran")
@@ -370,6 +398,34 @@ def test_massless_boundary_comes_back(tmp_path):
     assert back.natural_frequencies_hz == pytest.approx(model.natural_frequencies_hz, rel=1e-12)
     x = np.linspace(0.0, 2.0 * model.natural_frequencies_hz[0], 21)
     np.testing.assert_allclose(back.receptance(x), model.receptance(x), rtol=1e-9)
+
+
+def test_points_without_figures_are_no_points_of_a_universal_curve(results, tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    sweep = vd.Sweep.load(results / "sweep.h5")
+    mean = sweep.amplitude_mean.copy()
+    place = [0] * mean.ndim
+    place[list(sweep.axes).index("excitation.frequency")] = 1
+    mean[tuple(place)] = np.nan
+    assert vd.export(replace(sweep, amplitude_mean=mean), tmp_path / "sweep.uff") == (
+        "left out: 1 points of curves without a figure",
+    )
+    curves = [one for one in pyuff.UFF(str(tmp_path / "sweep.uff")).read_sets() if one["type"] == 58]
+    frequencies = sweep.axes["excitation.frequency"]
+    assert sorted({len(one["x"]) for one in curves}) == [len(frequencies) - 1, len(frequencies)]
+    (short,) = (one for one in curves if len(one["x"]) < len(frequencies))
+    np.testing.assert_allclose(short["x"], np.delete(frequencies, 1), rtol=1e-5)
+    assert np.isfinite(short["data"]).all()
+
+
+def test_free_structures(tmp_path):
+    """They have receptances above 0 Hz only, and matrices with their rigid motion."""
+    pytest.importorskip("pyuff")
+    free = ReducedModel.from_matrices(np.eye(2), [[1e4, -1e4], [-1e4, 1e4]], {"a": [1.0, 0.0]}, damping_ratio=0.0)
+    assert vd.export(free, tmp_path / "free.uff") == vd.export(free, tmp_path / "free.mtx") == ()
+    with pytest.raises(vd.InputError, match="no receptance at 0 Hz"):
+        vd.export(free, tmp_path / "free.uff", frequencies=(0.0, 10.0, 3))
+    assert np.array_equal(read_matrices(tmp_path / "free.mtx")["stiffness"], free.stiffness)
 
 
 def test_what_matrices_do_not_say_is_told(tmp_path):
@@ -532,6 +588,27 @@ def test_another_model_than_that_of_the_run(results, tmp_path, monkeypatch, caps
     assert "is not the mesh of" in capsys.readouterr().err
 
 
+def test_names_of_any_language(tmp_path):
+    """Cavities keep their names where the format has letters for them."""
+    pyuff, pandas = pytest.importorskip("pyuff"), pytest.importorskip("pandas")
+    from scipy.io import loadmat
+
+    text = changed(
+        SCENE, ('[[cavity]]\nname = "c1"', '[[cavity]]\nname = "Käfig 空"'), ('cavity = "c1"', 'cavity = "Käfig 空"')
+    )
+    (tmp_path / "scene.toml").write_text(text + '"cavity.Käfig 空.gap" = [1e-4, 2e-4]\n', encoding="utf-8")
+    sweep = vd.sweep(vd.Scene.load(tmp_path / "scene.toml"))
+    for ending in ("csv", "mat", "uff"):
+        vd.export(sweep, tmp_path / f"sweep.{ending}")
+    table = pandas.read_csv(tmp_path / "sweep.csv")
+    assert table["cavity.Käfig 空.gap [m]"].nunique() == 2
+    data = loadmat(tmp_path / "sweep.mat")
+    assert [str(path[0]) for path in data["about"]["axes"][0, 0].ravel()] == list(sweep.axes)
+    assert np.array_equal(data["cavity_K_fig___gap"].ravel(), sweep.axes["cavity.Käfig 空.gap"])
+    curves = [one for one in pyuff.UFF(str(tmp_path / "sweep.uff")).read_sets() if one["type"] == 58]
+    assert {one["id2"].strip() for one in curves} == {"cavity.K?fig ?.gap = 0.0001", "cavity.K?fig ?.gap = 0.0002"}
+
+
 def test_results_in_memory(results, tmp_path):
     """vd.export takes what the Python functions return."""
     from scipy.io import loadmat
@@ -542,6 +619,11 @@ def test_results_in_memory(results, tmp_path):
     assert (tmp_path / "réponse.csv").read_text().startswith("time [s],")
     vd.export(response, tmp_path / "response.mat")
     assert loadmat(tmp_path / "response.mat")["displacement"].ravel() == pytest.approx(response.displacement, rel=0)
+    with pytest.raises(vd.InputError, match="Response: does not say what was run"):
+        vd.export(
+            replace(response, coordinates=np.ones((len(response.time), 1))), tmp_path / "out.vtkhdf",
+            mesh=results / "modes.h5",
+        )  # fmt: skip
     with pytest.raises(vd.InputError, match="expected a result or its file, not dict"):
         vd.export({}, tmp_path / "out.mat")
     with pytest.raises(vd.InputError, match="holds no modes with their mesh"):

@@ -8,7 +8,7 @@ import tomllib
 from dataclasses import dataclass as plain_dataclass
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic.dataclasses import dataclass
 
@@ -106,6 +106,7 @@ VALUES = st.recursive(
 )  # fmt: skip
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.dictionaries(KEYS, VALUES, max_size=4))
 def test_any_tables_read_back(data) -> None:
     assert tomllib.loads(toml(data)) == data

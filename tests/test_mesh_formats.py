@@ -1,5 +1,7 @@
 """One fork in the formats of other programs: the groups, volumes and frequencies of gmsh's own file."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -148,13 +150,16 @@ def test_the_whole_way_from_another_programs_file(forks, expected, tmp_path, mon
     path = forks["tetra10"][ending]
     names = NUMBERS if ending == "bdf" else {name: name for name in NUMBERS}
     (tmp_path / "case.toml").write_text(CASE.format(file=path, **names))
+    assert main(["check", "case.toml"]) == 0
+    assert names["floor"] in capfd.readouterr().out
     assert main(["modal", "case.toml", "-o", "modes.h5"]) == 0
     assert f"{expected['tetra10'][0]:.2f}" in capfd.readouterr().out
     (tmp_path / "case.toml").write_text(CASE.format(file=path, **names | {"floor": "flor"}))
-    assert main(["modal", "case.toml"]) == BAD_INPUT
-    told = capfd.readouterr().err
-    assert "no set or surface 'flor'; there are: " in told
-    assert told.count("\n") == 1
+    for command in ("check", "modal"):
+        assert main([command, "case.toml"]) == BAD_INPUT
+        told = capfd.readouterr().err
+        assert "no set or surface 'flor'; there are: " in told
+        assert told.count("\n") == 1
 
 
 # corners of Abaqus' faces, from 1 as in its manual
@@ -354,7 +359,7 @@ def test_other_spellings_are_the_same_mesh(forks, tmp_path, ending, changes):
             "a finite element 122 is not imported; expected solids (111, 115, 116, 118)",
         ),
         ("unv", "clamp\n", "clamped\n", "no set or surface 'clamp'; there are: "),
-        ("bdf", "ENDDATA", "", "no ENDDATA: the file is cut short; write it again"),
+        ("bdf", "ENDDATA", "", "no ENDDATA: cut short, or no file of Nastran; write it again"),
         ("bdf", "CTETRA  ", "CIHEX1  ", "CIHEX1 is an element that is not known; expected solids (CTETRA, CHEXA)"),
         ("inp", "type=C3D4", "type=DC3D4", "*ELEMENT TYPE=DC3D4: expected solids (C3D4, C3D10, C3D8, C3D20)"),
         (
@@ -421,3 +426,19 @@ def test_shells_say_more_than_a_node_set_of_their_name(tmp_path):
     (tmp_path / "one.inp").write_text(deck)
     solid = Solid(convert(tmp_path / "one.inp", tmp_path / "one.msh", facets=["walls"]), {"default": STEEL})
     assert solid.assemble({}, 0.0).patches["walls"].area == pytest.approx(1.0, rel=1e-12)
+
+
+def test_walls_and_floor_that_are_rigid_share_edges(forks, tmp_path, monkeypatch, capfd):
+    """By the command: three plates on two hinges, stiffer than walls that deform, and by little."""
+    monkeypatch.chdir(tmp_path)
+    frequencies = {}
+    for kind in ("average", "rigid"):
+        text = CASE.format(file=forks["hexahedron"]["msh"], **{name: name for name in NUMBERS})
+        text = text[: text.index("[interface.walls]")]
+        for name in ("left", "right", "floor"):
+            text += f'[interface.{name}]\nfacets = "{name}"\nkind = "{kind}"\ndirection = [1, 0, 0]\n'
+        (tmp_path / f"{kind}.toml").write_text(text)
+        assert main(["reduce", f"{kind}.toml", "--modes", "4", "--json", f"{kind}.json"]) == 0
+        frequencies[kind] = json.loads((tmp_path / f"{kind}.json").read_text())["frequency_hz"]
+    first, second = (frequencies[kind][0] for kind in ("average", "rigid"))
+    assert first < second < 1.2 * first

@@ -164,7 +164,7 @@ def test_what_cannot_be_taken_is_told(tmp_path):
     for name, text, message in [
         ("none.inp", None, "no such mesh file"),
         ("empty.inp", "nothing\n", "holds no nodes: empty, or not of the format of .inp"),
-        ("bad.bdf", "GRID\n", "no ENDDATA: the file is cut short"),
+        ("bad.bdf", "GRID\n", "no ENDDATA: cut short, or no file of Nastran"),
         ("flat.inp", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*ELEMENT,TYPE=S3\n1,1,2,3\n", "volume elements: none"),
         (
             "wedge.inp",

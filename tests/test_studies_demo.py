@@ -15,7 +15,7 @@ from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.studies import demo
 from vanedamp.studies.cli import main
 from vanedamp.studies.paper.figure_file import Effort, PaperFigure, Structure
-from vanedamp.studies.paper.runner import _write_scene
+from vanedamp.studies.paper.runner import write_scene
 from vanedamp.studies.report.forced_response import forced_responses
 
 MASS, FREQUENCY, RATIO, AMPLITUDE = 0.157, 2412.0, 0.002, 70e-6
@@ -61,7 +61,7 @@ SCENES = [
 def test_scenes_are_left_as_one_would_write_them(name, curve, scene, tmp_path):
     """Nothing that the defaults give, in some fifty lines, and the same scene to the last bit."""
     path = tmp_path / "scene.toml"
-    _write_scene(scene, path, name)
+    write_scene(scene, path, name)
     text = path.read_text()
     assert text.startswith("#:schema ./scene.schema.json\n")
     assert (tmp_path / "scene.schema.json").is_file()

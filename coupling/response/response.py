@@ -54,8 +54,8 @@ class Event:
     time: float
     """time [s]"""
     kind: str
-    """what happened: "impact"; "stick" and "slip" on the floor or of a friction damper; "rest" at a wall or a neighbour, and
-    "detach" from it"""
+    """what happened: "impact"; "stick" and "slip" on the floor or of a friction damper; "rest" at a wall or a
+    neighbour, and "detach" from it"""
     damper: int
     """number of the body, from 0; of a stop or a friction damper its own number"""
     side: str
@@ -151,8 +151,8 @@ class Response(Displayed):
     classification: str
     """"periodic-k", "non-periodic", "no-contact" or "stuck" (`classify`)"""
     energy: dict[str, float]
-    """over the evaluated time: work of the `excitation`; `viscous`, `friction`, `impact` and `contact` loss; change of what is
-    `stored` [J]"""
+    """over the evaluated time: work of the `excitation`; `viscous`, `friction`, `impact` and `contact` loss; change of
+    what is `stored` [J]"""
     energy_residual: float
     """imbalance of the whole run's ledger relative to its largest term [-]"""
     attached_mass_fraction: float | None

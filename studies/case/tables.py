@@ -54,7 +54,7 @@ class MeshFile:
     """A mesh from a file."""
 
     file: str
-    """mesh file, relative to the case's: gmsh (.msh), or another program's (.inp, .bdf ...)"""
+    """mesh file, relative to the case's: gmsh (.msh), or another program's (.inp, .bdf, .cdb, .unv, .med ...)"""
     degree: Degree = 2
     """polynomial degree of the displacements"""
     scale: Positive = 1.0

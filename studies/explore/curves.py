@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Callable
@@ -36,6 +37,8 @@ EVALUATED, _SHORTEST, _LONGEST, _EVENTS = 200, 50, 2000, 300_000
 _MOST_PERIODS = 10_000
 #: tabs of the page whose curves are kept
 _TABS = 32
+#: s without a request after which a tab is taken for closed
+_SILENT = 20.0
 
 #: runs a call in a worker process
 Submit = Callable[..., Future[Any]]
@@ -69,21 +72,32 @@ class Band:
 def seen(scene: Scene, band: Band) -> Scene:
     """Return the scene with the [sweep] over frequencies and the [time] of which its curve is made.
 
-    The transient is as long as leaves `time.tolerance` of it, or as is affordable: its points are then "not_steady".
-    Raises InputError.
+    The transient is as long as leaves `time.tolerance` of it at the highest frequency, or as is affordable
+    (transient_note). Raises InputError.
     """
     if not scene.moved:
         raise InputError("excitation: nothing moves the structure; give a level above zero")
     low, high = _ends(scene, band)
     if not 1 <= band.evaluated <= _MOST_PERIODS:
         raise InputError(f"periods evaluated: expected 1 to {_MOST_PERIODS}, not {band.evaluated:g}")
-    at_end, lengths = scene.replace({FREQUENCY: high}), range(_SHORTEST, _LONGEST, 10)
-    enough = bisect_left(lengths, True, key=lambda n: left_over(at_end, n) <= Time().tolerance)
+    slowest, lengths = scene.replace({FREQUENCY: high}), range(_SHORTEST, _LONGEST, 10)
+    enough = bisect_left(lengths, True, key=lambda n: left_over(slowest, n) <= Time().tolerance)
     transient = _SHORTEST + 10 * enough
     return replace(
         scene.replace({"solver.max_events": min(scene.solver.max_events, _EVENTS)}),
         time=Time(periods=transient + band.evaluated, transient=transient),
         sweep={FREQUENCY: Range(start=low, stop=high, num=POINTS)},
+    )
+
+
+def transient_note(scene: Scene) -> str | None:
+    """Return a warning where the transient of a `seen` scene has not ended before its runs are evaluated."""
+    left = left_over(scene.replace({FREQUENCY: ends_of(scene)[1]}), scene.time.dropped)
+    if left <= scene.time.tolerance:
+        return None
+    return (
+        f"the structure is damped so little that after {scene.time.dropped} periods {min(left, 1.0):.0%} of its own "
+        "transient is left unless the bodies have ended it: points may not be steady responses, whatever their status"
     )
 
 
@@ -138,15 +152,16 @@ def linear_curves(scene: Scene) -> Linear:
 class Curve:
     """The forced response of a `seen` scene under way: its points run in workers, coarse ones first.
 
-    done, size: points so far, and of the whole curve; coarse: of its coarse form. Raises InputError.
+    done, size: points so far, and of the whole curve; coarse: of its coarse form; note: a warning, of transient_note;
+    asked: when a tab last asked for it, s of time.monotonic. Raises InputError.
     """
 
     def __init__(self, scene: Scene, submit: Submit) -> None:
-        self.scene, self.linear = scene, linear_curves(scene)
+        self.scene, self.linear, self.note = scene, linear_curves(scene), transient_note(scene)
         self._grid = grid(scene)
         self.size = self._grid.size
         self._table = SweepTable(self.size, width_of(self._grid.base))
-        self._news, self._cancelled = Condition(), False
+        self._news, self._cancelled, self.asked = Condition(), False, time.monotonic()
         first = [0, self.size - 1, *range(_COARSE, self.size - 1, _COARSE)]  # the ends are those of all its parts
         self.coarse = len(first)
         self._futures = list[Future[TaskResult]]()
@@ -217,12 +232,16 @@ class Curves:
             known, curve = self._of_tab.get(tab, (-1, None))
             if known > version:
                 return None
+            now = time.monotonic()
             if curve is not None and known == version and curve.wanted:
+                curve.asked = now
                 return curve
             begun = Curve(scene(), self._submit)
+            begun.asked = now
             self._of_tab[tab] = (version, begun)
             self._of_tab.move_to_end(tab)
-            forgotten = [curve]
+            # a tab that is there asks until its curve is complete; one that comes back has it begun again
+            forgotten = [curve, *(other for _, other in self._of_tab.values() if now - other.asked > _SILENT)]
             if len(self._of_tab) > _TABS:
                 forgotten.append(self._of_tab.popitem(last=False)[1][1])
         for curve in filter(None, forgotten):

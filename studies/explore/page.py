@@ -7,7 +7,7 @@ import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from dash import ClientsideFunction, Dash, Input, Output, State, dcc, html, no_update
 from dash.exceptions import PreventUpdate
@@ -130,8 +130,8 @@ def layout(exploration: Exploration) -> html.Main:
     )  # fmt: skip
 
 
-def register(app: Dash, exploration: Exploration, submit: Submit) -> None:
-    """Let the sliders move the curve; submit: runs a call in the page's worker processes."""
+def register(app: Dash, exploration: Exploration, submit: Submit, apart: Submit) -> None:
+    """Let the sliders move the curve; submit: runs a call in a worker process, apart: in one that waits for points."""
     curves = Curves(submit)
     for control in exploration.controls:
         app.clientside_callback(
@@ -151,13 +151,13 @@ def register(app: Dash, exploration: Exploration, submit: Submit) -> None:
     )  # fmt: skip
 
     @app.callback(
-        Output("curve", "figure"), Output("figures", "children"), Output("scene", "data"), Output("sweep", "data"),
+        Output("answer", "data"), Output("curve", "figure"), Output("figures", "children"),
+        Output("scene", "data"), Output("sweep", "data"),
         Output("message", "children"), Output("message", "className"), Output("frame", "className"),
-        Output("answer", "data"),
         Input("request", "data"), prevent_initial_call=True,
     )  # fmt: skip
-    def draw(request: dict[str, Any]) -> tuple[Any, ...]:
-        return _draw(exploration, curves, request)
+    def draw(request: dict[str, Any]) -> Changes:
+        return changes(exploration, curves, request)
 
     @app.callback(
         Output("file", "data"), Output("written", "children"),
@@ -168,43 +168,60 @@ def register(app: Dash, exploration: Exploration, submit: Submit) -> None:
             return no_update, "no curve yet"
         return _write(exploration, validate(Scene, scene | {"sweep": sweep}, "scene"))
 
-    point.register(app, submit)
+    point.register(app, apart)
 
 
-def _draw(exploration: Exploration, curves: Curves, request: dict[str, Any]) -> tuple[Any, ...]:
-    """Return what changes in the page for a request: {tab, serial, version, values, have}, the points it has."""
-    reply = {"serial": request["serial"], "version": request["version"], "have": 0, "complete": True}
+class Changes(NamedTuple):
+    """What a request changes in the page: the properties of its parts, in the order of the callback's outputs."""
+
+    answer: dict[str, Any]
+    figure: Any = no_update
+    figures: Any = no_update
+    scene: Any = no_update
+    sweep: Any = no_update
+    message: Any = no_update
+    tone: Any = no_update
+    frame: Any = no_update
+
+
+def changes(exploration: Exploration, curves: Curves, request: dict[str, Any]) -> Changes:
+    """Return what changes for a request: {tab, serial, version, values, have}, the last the points that it has.
+
+    Waits a little for more of its curve. Raises PreventUpdate for a request that is overtaken.
+    """
+    have, version = request["have"], request["version"]
+    answer = {"serial": request["serial"], "version": version, "have": 0, "complete": True}
     try:
-        curve = curves.take(request["tab"], request["version"], lambda: exploration.seen(request["values"]))
+        curve = curves.take(request["tab"], version, lambda: exploration.seen(request["values"]))
     except VanedampError as error:
-        return (*[no_update] * 4, str(error), "message bad", "old", reply)
+        return Changes(answer, message=str(error), tone="message bad", frame="old")
     if curve is None:
         raise PreventUpdate
-    have = request["have"]
     curve.wait(curve.coarse if have < curve.coarse else curve.size, _PATIENCE)
     if not curve.wanted:
         raise PreventUpdate
-    reply |= {"have": curve.done, "complete": curve.done == curve.size}
+    answer |= {"have": curve.done, "complete": curve.done == curve.size}
+    if curve.done == 0:
+        return Changes(answer, message=_FIRST)
     if curve.done == have:
-        said = _FIRST if have == 0 else no_update
-        return (*[no_update] * 4, said, no_update, no_update, reply)
-    figure, figures, text = _drawn(curve, request["version"])
-    data: Any = no_update
-    table: Any = no_update
-    if not have:  # further forms of the curve are of the same scene
-        data = curve.scene.to_dict()
-        table, data["sweep"] = data["sweep"], {}
-    return figure, figures, data, table, text, "message", "", reply
+        return Changes(answer)
+    figure, figures, text = _drawn(curve, version)
+    drawn = Changes(answer, figure, figures, message=text, tone="message", frame="")
+    if have:  # further forms of a curve are of the same scene
+        return drawn
+    data = curve.scene.to_dict()
+    return drawn._replace(scene=data | {"sweep": {}}, sweep=data["sweep"])
 
 
 def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
     """Return figure, key figures and a line on what there is of a curve so far."""
     sweep = curve.sweep()
     count, complete = len(sweep.status), len(sweep.status) == curve.size
+    notes = [*([curve.note] if curve.note else []), *remarks(sweep, complete)]
     figures = html.Div(
         [
             html.Dl([part for figure in key_figures(sweep) for part in _term(figure)]),
-            html.Ul([html.Li(remark) for remark in remarks(sweep, complete)], className="remarks"),
+            html.Ul([html.Li(note) for note in notes], className="remarks"),
         ]
     )
     text = f"{count} frequencies" if complete else f"{count} of {curve.size} frequencies so far"

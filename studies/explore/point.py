@@ -71,7 +71,8 @@ class PointRuns:
         if run is None:
             return PointView("This run is not known any more: choose the point again.")
         if not run.future.done():
-            return f"{run.point}: running for {time.monotonic() - run.begun:.0f} s …"
+            what = "running" if run.future.running() else "waiting for a worker"
+            return f"{run.point}: {what} for {time.monotonic() - run.begun:.0f} s …"
         try:
             return run.future.result()
         except VanedampError as error:

@@ -34,8 +34,13 @@ _INDEX = """<!DOCTYPE html>
 </html>"""
 
 
-def explore_app(exploration: page.Exploration | None, sweeps: Mapping[str, Sweep], submit: Submit) -> Dash:
-    """Return the page of a scene, of sweeps or of both."""
+def explore_app(
+    exploration: page.Exploration | None, sweeps: Mapping[str, Sweep], submit: Submit, apart: Submit | None = None
+) -> Dash:
+    """Return the page of a scene, of sweeps or of both.
+
+    submit: runs a call in a worker process; apart: the same for the motion at a point, which has no queue to wait in.
+    """
     app = Dash(
         "vanedamp", title="vanedamp explore", update_title="", serve_locally=True, index_string=_INDEX,
         assets_folder=str(Path(__file__).with_name("assets")), add_log_handler=False,
@@ -49,9 +54,9 @@ def explore_app(exploration: page.Exploration | None, sweeps: Mapping[str, Sweep
 
     app.layout = layout
     if exploration is not None:
-        page.register(app, exploration, submit)
+        page.register(app, exploration, submit, apart or submit)
     if sweeps:
-        sweep_files.register(app, sweeps, submit)
+        sweep_files.register(app, sweeps, apart or submit)
     return app
 
 
@@ -114,11 +119,11 @@ def serve(
     except (OSError, OverflowError) as error:
         raise InputError(f"--port: {port} is not to be had ({error}); leave it out for a free one") from None
     token = secrets.token_urlsafe(24)
-    with listening, WorkerPool(count, _NICENESS) as pool:
+    with listening, WorkerPool(count, _NICENESS) as pool, WorkerPool(1, _NICENESS) as apart:
         for _ in range(count):
             pool.submit(warm_up)
         port = listening.getsockname()[1]
-        app = explore_app(exploration, sweeps, pool.submit)
+        app = explore_app(exploration, sweeps, pool.submit, apart.submit)
         guard(app, port, token)
         server = make_server(HOST, port, app.server, threaded=True, request_handler=_Quiet, fd=listening.fileno())
         address = f"http://{HOST}:{port}/?token={token}"

@@ -171,7 +171,7 @@ def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
     if old is None or old.scene != scene or any(old.provenance.get(key) != provenance[key] for key in provenance):
         if not session.resume:
             clear(checkpoint)
-        _write_scene(scene, session.folder / f"{stem}.toml", f"{figure.title}{f': {curve}' if curve else ''}")
+        write_scene(scene, session.folder / f"{stem}.toml", f"{figure.title}{f': {curve}' if curve else ''}")
         with progress(stem) as report:
             old = sweep(scene, session.pool, report, checkpoint, provenance)
         old.save(path)
@@ -180,7 +180,7 @@ def _swept(figure: PaperFigure, curve: str, session: Session) -> Sweep:
     return old
 
 
-def _write_scene(scene: Scene, path: Path, title: str) -> None:
+def write_scene(scene: Scene, path: Path, title: str) -> None:
     """Write a scene as one would write it by hand, with comments."""
     command = "sweep" if scene.sweep else "run"
     notes = {"": f"{title}. `vanedamp {command} {path.name}` runs it; every key: `vanedamp schema scene`. SI units."}
@@ -291,7 +291,7 @@ def _history(session: Session) -> Study:
         runs[curve] = scene, simulate(scene, events=True, samples_per_period=data["samples"]), simulate(aside)
     scene, response, alike = runs["reduced"]
     folder = session.folder
-    _write_scene(scene, folder / "fig13.toml", data["title"])
+    write_scene(scene, folder / "fig13.toml", data["title"])
     response.save(folder / "fig13_response.h5", {"versions": versions(), "scene": scene.to_dict()})
     title = f"{data['title']}, {response.frequency:.1f} Hz"
     plots.history_picture(response, session.structure.amplitude, title, folder / "fig13.png")

@@ -7,6 +7,9 @@ window.dash_clientside = window.dash_clientside || {};
   // the request under way, and when it was sent
   let sent = null;
   let version = 0;
+  let pumped = 0;
+  // ms, after which an answer counts as lost
+  const PATIENCE = 10000;
 
   const position = (control, number) => (control.log ? Math.log10(number) : number);
 
@@ -49,7 +52,11 @@ window.dash_clientside = window.dash_clientside || {};
     pump: function (wanted, answer, _ticks, tab) {
       if (sent && answer && answer.serial === sent.serial) sent = null;
       if (!wanted) return;
-      const lost = sent && Date.now() - sent.time > 15000;
+      const lost = sent && Date.now() - sent.time > PATIENCE;
+      if (lost) {
+        same.set_props("message", { children: "no answer: has vanedamp ended?", className: "message bad" });
+        same.set_props("frame", { className: "old" });
+      }
       if (sent && !lost && !(sent.have > 0 && sent.version !== wanted.version)) return;
       const current = answer && answer.version === wanted.version;
       if (current && answer.complete) return;
@@ -60,5 +67,4 @@ window.dash_clientside = window.dash_clientside || {};
       });
     },
   };
-  let pumped = 0;
 })();

@@ -12,15 +12,18 @@ import numpy as np
 
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
+from vanedamp.rom.external import plain_matrices
 from vanedamp.studies.export.export import ANY
-from vanedamp.studies.export.options import Option
 from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.reduced_matrices import DESCRIPTION, describe
 
 SUMMARY = "all variables with units, dimensions and the scene: MATLAB, Octave"
 ENDINGS = (".mat",)
-OPTIONS: tuple[Option, ...] = ()
+OPTIONS = (DESCRIPTION,)
 #: bytes of a variable, and letters of a name, that version 5 holds
 _MOST_BYTES, _MOST_LETTERS = 2**31 - 1, 63
+#: texts of a variable that are cells; of more, which would take minutes to read and write, numbers in a list of words
+_MOST_CELLS = 10_000
 _RESERVED = {"case", "catch", "end", "function", "otherwise", "parfor", "persistent", "spmd", "switch"}
 
 
@@ -36,7 +39,17 @@ def write(record: Record, path: Path) -> None:
                 "MATLAB's h5read"
             )
     dimensions = {name: _cells(list(item.dims)) for name, item in record.variables.items()}
-    data = {name: _array(np.asarray(item.values)) for name, item in record.variables.items()}
+    data: dict[str, Any] = {}
+    for name, item in record.variables.items():
+        values = np.asarray(item.values)
+        if values.dtype.kind not in "UO":
+            data[name] = values
+        elif values.size <= _MOST_CELLS:
+            data[name] = _texts(values)
+        else:
+            words, places = np.unique(values.astype(str), return_inverse=True)
+            data[name] = 1.0 + places.reshape(values.shape)
+            data[f"{name}_names"] = _texts(words)
     data |= {
         "units": _struct({name: item.units for name, item in record.variables.items()}),
         "dimensions": {_name(name): cells for name, cells in dimensions.items()},
@@ -50,21 +63,33 @@ def write(record: Record, path: Path) -> None:
         savemat(temporary, dict(_unique(data.items())), long_field_names=True, oned_as="column", do_compression=True)
 
 
-WRITERS = {ANY: write}
+def reduced_model(record: Record, path: Path, description: str | None = None) -> None:
+    """Write a reduced model; description: the file by which `vanedamp import` reads it back."""
+    model = record.reduced_model()
+    if description is not None and model.residual_flexibility is not None:
+        raise InputError(
+            "--description: the matrices of a .mat have no massless boundary, whose flexibility stands beside them; "
+            "take .op4"
+        )
+    write(record, path)
+    if description is not None:
+        names = {name: name for name in ("mass", "stiffness", "damping", "base_load")}
+        describe(model, plain_matrices(model), names, path, description)
+
+
+WRITERS = {ANY: write, "reduced-model": reduced_model}
 
 
 def _scene_of(provenance: Any) -> Any:
     return provenance.get("scene") if isinstance(provenance, Mapping) else None
 
 
-def _array(values: np.ndarray) -> Any:
-    """Return an array as MATLAB has it: texts as cells, numbers as they are."""
-    if values.dtype.kind in "UO":
-        cells = np.empty(values.shape, dtype=object)
-        for place, text in np.ndenumerate(values):
-            cells[place] = str(text)
-        return cells
-    return values
+def _texts(values: np.ndarray) -> np.ndarray:
+    """Return texts as MATLAB has them: cells."""
+    cells = np.empty(values.shape, dtype=object)
+    for place, text in np.ndenumerate(values):
+        cells[place] = str(text)
+    return cells
 
 
 def _struct(data: Mapping[str, Any]) -> dict[str, Any]:

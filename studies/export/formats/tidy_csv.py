@@ -68,7 +68,7 @@ def table(record: Record, path: Path, table: str | None = None) -> tuple[str, ..
         raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(known)}")
     dimension = table or next(name for name in (*_TABLES[record.kind], *known) if name in known)
     own = [name for name, item in record.variables.items() if item.dims[:1] == (dimension,)]
-    own.sort(key=lambda name: name != dimension)  # a coordinate comes first
+    own.sort(key=lambda name: (name != dimension, not name.endswith("time")))  # coordinate and times come first
     fields = [name for name in own if math.prod(np.shape(record.variables[name].values)[1:]) > _MOST_COLUMNS]
     columns = [column for name in own if name not in fields for column in _columns(record, name, 1)]
 

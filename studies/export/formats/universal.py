@@ -75,27 +75,30 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
     """
     model = record.reduced_model()
     start, step, count = _range(frequencies, _top(record, model.natural_frequencies_hz, model.rigid_modes))
+    if start == 0.0 and model.rigid_modes:
+        raise InputError("--frequencies: a structure that moves freely has no receptance at 0 Hz; begin above")
     x = start + step * np.arange(count)
     receptance = model.receptance(x)
     directions = [_direction(row) for row in model.directions]
-    sets = [*_headers(record)]
-    for (i, response), (j, force) in itertools.product(enumerate(model.interface), repeat=2):
-        sets.append(
-            _curve(
-                f"receptance {response} / {force}", x, receptance[:, i, j], _FRF, _FREQUENCY, _DISPLACEMENT, _FORCE,
-                rsp_node=i + 1, rsp_dir=directions[i], ref_node=j + 1, ref_dir=directions[j],
-                rsp_ent_name=_short(response), ref_ent_name=_short(force),
-            )
-        )  # fmt: skip
-    write_universal(sets, path)
+    pairs = itertools.product(enumerate(model.interface), repeat=2)
+    curves = (
+        _curve(
+            f"receptance {response} / {force}", x, receptance[:, i, j], _FRF, _FREQUENCY, _DISPLACEMENT, _FORCE,
+            rsp_node=i + 1, rsp_dir=directions[i], ref_node=j + 1, ref_dir=directions[j],
+            rsp_ent_name=_short(response), ref_ent_name=_short(force),
+        )
+        for (i, response), (j, force) in pairs
+    )  # fmt: skip
+    write_universal([*_headers(record), *curves], path)
     turned = model.arms is not None and np.any(model.arms > 0.0)
     return ("receptances: coordinates that are rotations have rad and N m in place of m and N",) if turned else ()
 
 
-def sweep(record: Record, path: Path) -> None:
+def sweep(record: Record, path: Path) -> tuple[str, ...]:
     """Write the amplitude curves of a sweep over its frequencies, m, one for each of its other points.
 
-    Raises InputError for a sweep that is not over the frequency.
+    Points without a figure are left out, since the format has no mark for them. Raises InputError for a sweep that is
+    not over the frequency.
     """
     axes: list[str] = record.attributes["axes"]
     swept = "excitation.frequency"
@@ -104,13 +107,21 @@ def sweep(record: Record, path: Path) -> None:
     x = record.values(_dimension(swept))
     others = [axis for axis in axes if axis != swept]
     given = {axis: record.values(_dimension(axis)) for axis in others}
-    sets = [*_headers(record)]
-    for place in np.ndindex(*(len(values) for values in given.values())):
-        at = ", ".join(f"{axis} = {given[axis][index]}" for axis, index in zip(others, place, strict=True))
-        for name, words in _CURVES.items():
-            curves = np.moveaxis(record.values(name), axes.index(swept), -1)
-            sets.append(_curve(words, x, curves[place], _GENERAL, _FREQUENCY, _DISPLACEMENT, id2=at or "NONE"))
-    write_universal(sets, path)
+    curves = {name: np.moveaxis(record.values(name), axes.index(swept), -1) for name in _CURVES}
+
+    def sets() -> Iterator[dict[str, Any]]:
+        yield from _headers(record)
+        for place in np.ndindex(*(len(values) for values in given.values())):
+            at = ", ".join(f"{axis} = {given[axis][index]}" for axis, index in zip(others, place, strict=True))
+            for name, words in _CURVES.items():
+                curve = curves[name][place]
+                known = np.isfinite(curve)
+                if np.count_nonzero(known) > 1:
+                    yield _curve(words, x[known], curve[known], _GENERAL, _FREQUENCY, id2=at or "NONE")
+
+    write_universal(sets(), path)
+    lost = sum(int(np.count_nonzero(~np.isfinite(curve))) for curve in curves.values())
+    return (f"left out: {lost} points of curves without a figure",) if lost else ()
 
 
 def response(record: Record, path: Path) -> None:

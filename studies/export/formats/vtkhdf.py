@@ -94,7 +94,12 @@ def response(record: Record, path: Path, mesh: str | Path | None = None, periods
     last = 4 if periods is None else periods
     if last < 1:
         raise InputError(f"--periods: expected at least 1, not {last}")
-    scene = validate(Scene, record.attributes["provenance"]["scene"], record.file)
+    provenance = record.attributes.get("provenance") or {}
+    if "scene" not in provenance:
+        raise InputError(
+            f'{record.file}: does not say what was run; `vanedamp run -o` and save(path, {{"scene": ...}}) do'
+        )
+    scene = validate(Scene, provenance["scene"], record.file)
     structure = _chosen(scene.structure, record.attributes.get("estimate"))
     assert isinstance(structure, Rom)
     if not Path(structure.file).is_file():
@@ -112,7 +117,8 @@ def response(record: Record, path: Path, mesh: str | Path | None = None, periods
     if on.points.shape != model.coordinates.shape or _differ(on.points, np.asarray(model.coordinates)):
         raise InputError(f"--mesh {mesh}: is not the mesh of {structure.file}; take the modes of the same case")
     time = record.values("time")
-    shown = np.flatnonzero(time > time[-1] + time[1] - last / record.attributes["frequency"] - 1e-9 * time[-1])
+    each = round(1.0 / (record.attributes["frequency"] * (time[1] - time[0]))) if len(time) > 1 else 1
+    shown = range(max(len(time) - last * each, 0), len(time))
     basis = model.recovery @ shapes
     _write_steps(path, on, time[shown], ((basis @ coordinates[step]).reshape(-1, 3) for step in shown))
     residual = model.residual_flexibility is not None

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from vanedamp.meshes.parameters import expected_elements
+from vanedamp.modal.mesh_import import group_names
 from vanedamp.modal.msh_header import read_header
 from vanedamp.studies.case.tables import Case, MaterialTable, MeshFile, VaneClusterMesh
 from vanedamp.studies.commands.support.facts import Fact
@@ -33,7 +34,12 @@ def _of_mesh(case: Case) -> Iterator[Fact]:
     slowest = min(shear_speed(table) for table in case.material.values())
     if isinstance(mesh, MeshFile):
         yield Fact("mesh", mesh.file, "", f"{Path(mesh.file).stat().st_size / 1e6:.3g} MB")
-        if not mesh.foreign:
+        if mesh.foreign:
+            groups, nodes = group_names(mesh.file, set(case.material) - {"default"}, case.facet_groups)
+            kinds = {"volumes": groups[3], "facets": groups[2], "edges": groups[1], "points": groups[0]}
+            yield Fact("groups", {kind: names for kind, names in kinds.items() if names})
+            yield Fact("nodes", nodes, "", "of the mesh; degree 2 adds those between two")
+        else:
             header = read_header(mesh.file)
             case.check_groups(header.groups[2], header.groups[3], {"edge": header.groups[1], "point": header.groups[0]})
             yield Fact("groups", {"volumes": header.groups[3], "facets": header.groups[2]})
