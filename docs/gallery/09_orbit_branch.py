@@ -44,7 +44,11 @@ for number, branch in enumerate(found.branches):
         if point.kind in ("fold", "pitchfork", "period doubling"):
             left.plot(point.parameter, amplitude[point.index], "ks", markersize=5)
 left.plot(sweep.axes["excitation.frequency"], 1e6 * sweep.amplitude_mean, ".", color="0.3", label="runs")
-left.set(xlabel="excitation frequency (Hz)", ylabel="mean amplitude (µm)", title="solid: stable, dashed: not, squares: bifurcations")
+left.set(
+    xlabel="excitation frequency (Hz)",
+    ylabel="mean amplitude (µm)",
+    title="solid: stable, dashed: not, squares: bifurcations",
+)
 left.legend(loc="upper left")
 
 # %%
