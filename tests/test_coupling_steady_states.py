@@ -109,7 +109,7 @@ def test_report_shows_basins_and_how_many_states_there_are(basin, tmp_path):
     found = charts(page)
     # a sweep of starts only has no curves
     assert set(found) == {"response-0", "mistuning-0", "energy-0", "map-0", "basins-0", "basins-1", "states-0"}
-    assert not any("starts" in trace["legendgroup"] for trace in found["response-0"])
+    assert not any("starts" in name for trace in found["response-0"] for name in trace["meta"]["curves"])
     states = steady_states(basin)
     panels = [trace for trace in found["basins-0"] if trace["type"] == "heatmap"]
     legend = [trace["name"] for trace in found["basins-0"] if trace["type"] == "scatter"]

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from functools import cache
 from typing import Any
 
 from jsonschema import Draft202012Validator
 
+from tests.tools.processes import ROOT, environment
 from vanedamp.studies.file_kinds import KINDS
+
+
+@cache
+def shipped_schema(kind: str) -> dict[str, Any]:
+    """The schema of a kind of files in a process of its own, without the records that tests have registered here."""
+    command = [sys.executable, "-m", "vanedamp", "schema", kind]
+    printed = subprocess.run(command, cwd=ROOT, env=environment(), capture_output=True, text=True, check=True)
+    schema: dict[str, Any] = json.loads(printed.stdout)
+    return schema
 
 
 @cache
