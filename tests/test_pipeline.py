@@ -157,6 +157,7 @@ CHANGES = [
     ("pipeline.toml", "modes = 3", "modes = 4", ["reduce", "sweep reduced", "report"], "option changed: modes 3 -> 4"),
     ("pipeline.toml", "peak = true", "", ["sweep own", "report"], "option changed: peak True -> False"),
     ("pipeline.toml", "[report]", "", [], ""),
+    ("pipeline.toml", "[report]", '[report]\nfile = "page.html"', ["report"], "page.html is new"),
 ]
 
 
