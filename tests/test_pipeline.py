@@ -311,6 +311,7 @@ def test_the_points_of_another_scene_are_not_taken(killed):
         ("pipeline.toml", 'case = "case.toml"', "", "pipeline.toml: case: missing; [calibrate] needs a case file"),
         ("pipeline.toml", '"case.toml"', '"csae.toml"', "pipeline.toml: case: no such file csae.toml"),
         ("pipeline.toml", "modes = 3", "mods = 3", "pipeline.toml: reduce.mods: unknown key; did you mean 'modes'?"),
+        ("pipeline.toml", "[modal]", "[modal]\ncount = 3", "pipeline.toml: modal.count: unknown key; known: none"),
         ("pipeline.toml", "modes = 3", 'basis = "craig"', "pipeline.toml: reduce: basis"),
         ("pipeline.toml", "[reduce]\nmodes = 3", "", "reduced.toml: structure.file: no such file"),
         ("pipeline.toml", "[calibrate]\n[modal]", "", 'sweep[0].structure: "rigid" is that of [calibrate] or [modal]'),
