@@ -107,9 +107,13 @@ def _sync(path: Path) -> None:
 
 
 def file_stamp(path: str | os.PathLike[str]) -> int:
-    """Return a number that distinguishes a file from a later one of that name."""
+    """Return a number that distinguishes a file from a later one of that name, and of that time."""
     file = Path(path)
-    return file.stat().st_mtime_ns if file.is_file() else 0
+    if not file.is_file():
+        return 0
+    found = file.stat()
+    # copies and archives keep the time of the content; that of the change they cannot set
+    return hash((found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns))
 
 
 def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:

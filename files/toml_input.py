@@ -118,7 +118,7 @@ def _adapter(record: Any) -> TypeAdapter[Any]:
 def nearest(word: str, known: list[str]) -> str:
     """Return "did you mean ...?" for a misspelt word, otherwise the list of known ones."""
     close = difflib.get_close_matches(word, known, n=1)
-    return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(sorted(known))}"
+    return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(sorted(known)) or 'none'}"
 
 
 def _explain(adapter: TypeAdapter[Any], error: Any, data: Any) -> str:

@@ -313,6 +313,11 @@ def read(path: Path) -> LabelledMesh:
     return deck.mesh
 
 
+def files(path: Path) -> list[Path]:
+    """Return the files of a deck: itself and those that it names. Raises MeshError with file and line."""
+    return list(dict.fromkeys([path, *(card.file for card in _cards(path))]))
+
+
 def _spelling(sets: Mapping[str, object], name: str) -> str:
     """Return the name as it was first written: Abaqus ignores case."""
     return next((known for known in sets if known.upper() == name.upper()), name)

@@ -31,7 +31,10 @@ _CORNERS = {"tetra": 4, "hexahedron": 8}
 _VOLUMES = {"tetra": ("tetra", 4), "tetra10": ("tetra10", 10), "hexahedron": ("hexahedron", 8)}
 _VOLUMES |= dict.fromkeys(("hexahedron20", "hexahedron27"), ("hexahedron", 8))
 _READERS = {".inp": abaqus.read, ".cdb": ansys.read, ".unv": universal_file.read}
-_READERS |= dict.fromkeys((".bdf", ".nas", ".fem", ".dat"), nastran.read)
+_NASTRAN = (".bdf", ".nas", ".fem", ".dat")
+_READERS |= dict.fromkeys(_NASTRAN, nastran.read)
+# decks that may consist of several files
+_INCLUDING = {".inp": abaqus.files} | dict.fromkeys(_NASTRAN, nastran.files)
 # gmsh's elements by dimension from 0
 _GMSH = {"tetra": (15, 1, 2, 4), "tetra10": (15, 8, 9, 11), "hexahedron": (15, 1, 3, 5)}
 # gmsh's order of a quadratic tetrahedron; it is its own inverse
@@ -93,6 +96,11 @@ def group_names(
         _check_disjoint(source.path, what, wanted[dimension])
     _, groups = _grouped(source, None, None)
     return {dimension: list(named) for dimension, named in groups.items()}, np.unique(source.cells).size
+
+
+def files(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the files that a mesh is read from: itself and those that it includes. Raises MeshError."""
+    return _INCLUDING.get(Path(path).suffix.lower(), lambda file: [file])(Path(path))
 
 
 def _grouped(

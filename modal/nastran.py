@@ -268,6 +268,11 @@ def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
     return commands, cards
 
 
+def files(path: Path) -> list[Path]:
+    """Return the files of a deck: itself and those that it includes. Raises MeshError with file and line."""
+    return list(dict.fromkeys([path, *(file for file, _, _ in _lines(path))]))
+
+
 def _lines(path: Path, within: tuple[Path, ...] = ()) -> Iterator[tuple[Path, int, str]]:
     """Yield file, number and text of the lines that say something, of included files in their place."""
     within = (*within, path.resolve())

@@ -27,8 +27,15 @@ KINDS = {
 
 def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:
     """Return the kind of a file, which its tables tell. Raises InputError for a file of no kind."""
+    if isinstance(tables.get("sweep"), list):  # a scene has one table of that name
+        return KINDS["pipeline"]
     for kind in KINDS.values():
         if not set(kind.tables).isdisjoint(tables):
             return kind
-    known = "; ".join(f"[{'], ['.join(kind.tables)}] make a {kind.name}" for kind in reversed(KINDS.values()))
-    raise InputError(f"{source}: no kind of input file has these tables; {known}")
+    known = "; ".join(f"{a(kind)} has {', '.join(kind.tables)}" for kind in reversed(KINDS.values()))
+    raise InputError(f"{source}: no kind of input file has these keys; {known}")
+
+
+def a(kind: FileKind) -> str:
+    """Return a kind with its article: "an external", "a case"."""
+    return f"{'an' if kind.name[0] in 'aeiou' else 'a'} {kind.name}"

@@ -11,6 +11,7 @@ import pytest
 from tests.tools.input_files import BLOCK, CLUSTER, SCENE, changed
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.system.onset import NEVER_STICKS, onset, onsets, swing
 from vanedamp.files.toml_input import validate
 from vanedamp.files.toml_output import toml
@@ -38,6 +39,17 @@ def checked(tmp_path, capfd, tables, name="file.toml"):
 
 
 # scenes
+
+
+def test_warnings_are_those_of_the_sweep(tmp_path, capfd):
+    """Gravity, which matters less the faster it turns, is told of the slow end of a sweep."""
+    turning = DAMPED | {
+        "rotation": {"speed": 400.0}, "cavity": [{"name": "c1", "gap": 2e-5, "radius": 0.3}],
+        "sweep": {"rotation.speed": [40.0, 400.0]},
+    }  # fmt: skip
+    expected = list(grid(validate(Scene, turning, "scene")).warnings)
+    assert any("gravity turns once a revolution" in warning for warning in expected)
+    assert checked(tmp_path, capfd, turning)["warnings"] == expected
 
 
 def test_numbers_of_a_rigid_structure(tmp_path, capfd):
@@ -252,13 +264,26 @@ def test_external_model(tmp_path, capfd):
     assert found["natural_frequency_hz"] == pytest.approx([2e3 / (2 * math.pi), 3e3 / (2 * math.pi)])
 
 
+# pipelines, which tests/test_pipeline.py has more of
+
+
+def test_sweeps_make_a_pipeline(tmp_path, capfd):
+    (tmp_path / "own.toml").write_text(SCENE)
+    found = checked(tmp_path, capfd, '[[sweep]]\nscene = "own.toml"\n', "pipeline.toml")
+    assert (found["kind"], found["runs"]) == ("pipeline", ["sweep own"])
+
+
 # files that are none
 
 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[structur]\nmass = 1.0\n", "no kind of input file has these tables"),
+        (
+            "[structur]\nmass = 1.0\n",
+            "no kind of input file has these keys; a scene has structure, excitation, cavity, damper; a case has",
+        ),
+        ("[matrix]\nmass = 'm.npz'\n", "an external has matrices"),
         (changed(SCENE, ("frequency = 15.9", "frequenzy = 15.9")), "frequenzy: unknown key; did you mean 'frequency'?"),
         ("a = ", "not valid TOML"),
         (changed(BLOCK, ("length = 0.1", "length = '1'")), "length: expected a number, not '1'"),

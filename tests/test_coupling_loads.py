@@ -2,6 +2,7 @@
 
 import cmath
 import math
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -136,6 +137,20 @@ def test_a_pattern_in_a_file_is_the_list(tmp_path):
     half = [load | {"force": load["force"] / 2} for load in UNEVEN]
     listed = simulate(scene(structure, half))
     assert np.abs(simulate(case).section - listed.section).max() <= 1e-12 * np.abs(listed.section).max()
+
+
+def test_a_pattern_is_read_again_when_a_copy_has_its_time(tmp_path):
+    """Copies and archives keep the time of a file."""
+    structure, _ = ring(tmp_path)
+    file = tmp_path / "pattern.csv"
+    excitation = {"frequency": FREQUENCY, "at": "tip0", "pattern": str(file)}
+    case = validate(Scene, {"structure": structure, "excitation": excitation}, "scene")
+    forces = []
+    for force in (1, 2):
+        file.write_text(f"at,order,force,phase_deg\ntip0,1,{force},0\n")
+        os.utime(file, (1e9, 1e9))
+        forces.append(linear_responses(case)[0].amplitude(np.array([FREQUENCY]))[0])
+    assert forces[1] == pytest.approx(2 * forces[0], rel=1e-12)
 
 
 def test_one_load_at_the_response_is_the_force(tmp_path):

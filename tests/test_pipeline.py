@@ -20,6 +20,7 @@ from vanedamp.modal.measurements import write_frf
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.pipeline import stages
 from vanedamp.studies.pipeline.record import changes
+from vanedamp.studies.pipeline.tables import PipelineFile
 
 #: the first bending of the block, Hz, and what its test is said to have found
 FIRST, MEASURED, RATIO = 816.0, 800.0, 0.004
@@ -157,6 +158,7 @@ CHANGES = [
     ("pipeline.toml", "modes = 3", "modes = 4", ["reduce", "sweep reduced", "report"], "option changed: modes 3 -> 4"),
     ("pipeline.toml", "peak = true", "", ["sweep own", "report"], "option changed: peak True -> False"),
     ("pipeline.toml", "[report]", "", [], ""),
+    ("pipeline.toml", "[report]", '[report]\nfile = "page.html"', ["report"], "page.html is new"),
 ]
 
 
@@ -175,6 +177,27 @@ def test_a_change_redoes_what_depends_on_it(folder, file, old, new, done, told):
     assert result.done == done
     assert told in "; ".join(reason for stage in result.stages for reason in stage.reasons)
     assert vd.pipeline("pipeline.toml", workers=1).done == []
+
+
+@pytest.mark.parametrize(
+    ("name", "deck"),
+    [("deck.inp", "*NODE, INPUT=part.txt\n*INCLUDE, INPUT=part.inp\n"), ("deck.bdf", "INCLUDE 'part.bdf'\n")],
+)
+def test_a_stage_depends_on_the_files_that_its_mesh_includes(tmp_path, name, deck):
+    (tmp_path / "case.toml").write_text(
+        f'[mesh]\nfile = "{name}"\n[material.default]\nyoung = 2e11\npoisson = 0.3\ndensity = 8000.0\n'
+    )
+    (tmp_path / "pipeline.toml").write_text('case = "case.toml"\n[modal]\n')
+    (tmp_path / name).write_text(deck)
+    parts = [tmp_path / part for part in ("part.txt", "part.inp", "part.bdf") if part in deck]
+    for part in parts:
+        part.write_text("1, 0.0, 0.0, 0.0\n" if part.suffix == ".txt" else "*ELSET, ELSET=all\n1\n")
+    (modal,) = stages.stages(PipelineFile.load(tmp_path / "pipeline.toml"), tmp_path / "pipeline.toml", tmp_path)
+    before = modal.inputs()
+    for part in parts:
+        part.write_text(part.read_text() + "2\n")
+        assert list(changes(before, modal.inputs())) == [f"file {part.name} changed"]
+        before = modal.inputs()
 
 
 def test_lost_and_changed_results_are_made_again(folder):
@@ -288,6 +311,7 @@ def test_the_points_of_another_scene_are_not_taken(killed):
         ("pipeline.toml", 'case = "case.toml"', "", "pipeline.toml: case: missing; [calibrate] needs a case file"),
         ("pipeline.toml", '"case.toml"', '"csae.toml"', "pipeline.toml: case: no such file csae.toml"),
         ("pipeline.toml", "modes = 3", "mods = 3", "pipeline.toml: reduce.mods: unknown key; did you mean 'modes'?"),
+        ("pipeline.toml", "[modal]", "[modal]\ncount = 3", "pipeline.toml: modal.count: unknown key; known: none"),
         ("pipeline.toml", "modes = 3", 'basis = "craig"', "pipeline.toml: reduce: basis"),
         ("pipeline.toml", "[reduce]\nmodes = 3", "", "reduced.toml: structure.file: no such file"),
         ("pipeline.toml", "[calibrate]\n[modal]", "", 'sweep[0].structure: "rigid" is that of [calibrate] or [modal]'),

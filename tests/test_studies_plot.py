@@ -1,5 +1,7 @@
 """The figure of a result in a notebook: that of the report, from the record or from its file."""
 
+from pathlib import Path
+
 import numpy as np
 import plotly.graph_objects as go
 import pytest
@@ -8,6 +10,8 @@ import vanedamp as vd
 from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.processes import ROOT
 from vanedamp.files.toml_input import InputError, validate
+from vanedamp.modal.frf import Frf
+from vanedamp.modal.measurements import write_frf
 from vanedamp.studies.cli import main
 
 RESONANCE = 100.0 / (2 * np.pi)
@@ -63,6 +67,22 @@ def test_modes_are_shown_from_their_file(tmp_path, monkeypatch):
     (tmp_path / "case.toml").write_text(DAMPED_BLOCK)
     assert main(["modal", "case.toml", "-o", "modes.h5"]) == 0
     assert [trace.type for trace in vd.plot("modes.h5").data].count("mesh3d") == 4
+
+
+def test_calibrations_are_shown_from_their_file(tmp_path, monkeypatch):
+    """The measured response, or else the tuned frequencies; one without measurements has nothing to show."""
+    monkeypatch.chdir(tmp_path)
+    line = np.linspace(720.0, 880.0, 201)
+    write_frf(Frf(line, 1.0 / (800.0**2 - line**2 + 2j * 0.004 * 800.0 * line)), "tip.csv")
+    tune = '[calibration.tune]\nfrequencies = [800.0]\nvary = ["material.default"]\n'
+    for text, curves in ((tune + '[calibration.damping]\nfrf = "tip.csv"\n', 4), (tune, 3), ("", 0)):
+        Path("case.toml").write_text(DAMPED_BLOCK + text)
+        assert main(["calibrate", "case.toml", "-o", "calibration.h5"]) == 0
+        if curves:
+            assert len(vd.plot("calibration.h5").data) == curves
+        else:
+            with pytest.raises(InputError, match="no figure of a calibration without measurements"):
+                vd.plot("calibration.h5")
 
 
 def test_what_has_no_figure_is_told():

@@ -65,6 +65,13 @@ class MeshFile:
         """Say whether another program than gmsh wrote it."""
         return not self.file.lower().endswith(".msh")
 
+    @property
+    def files(self) -> list[str]:
+        """The file, and those that it includes. Raises MeshError."""
+        from vanedamp.modal import mesh_import
+
+        return [str(file) for file in mesh_import.files(self.file)]
+
 
 class _Generated:
     """Base of meshes by a generator, whose parameters are keys of [mesh] beside its own."""
@@ -394,12 +401,12 @@ class Case:
 
     @property
     def files(self) -> list[str]:
-        """The files that the case names: mesh and measurements."""
-        mesh = self.mesh.file if isinstance(self.mesh, MeshFile) else None
+        """The files that the case names: mesh, with those that it includes, and measurements. Raises MeshError."""
+        mesh = self.mesh.files if isinstance(self.mesh, MeshFile) else []
         damping = self.calibration.damping.frf if self.calibration and self.calibration.damping else None
         tune = self.calibration.tune.shapes if self.calibration and self.calibration.tune else None
         heat = self.temperature.file if self.temperature else None
-        return [file for file in (mesh, self.modes.shape, damping, tune, heat) if file is not None]
+        return mesh + [file for file in (self.modes.shape, damping, tune, heat) if file is not None]
 
     @property
     def damping_ratio(self) -> float:

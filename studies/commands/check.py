@@ -29,7 +29,7 @@ def run(arguments: Namespace) -> None:
     from vanedamp.studies.commands.support import facts
     from vanedamp.studies.commands.support.messages import write_result
     from vanedamp.studies.commands.support.outputs import check_outputs
-    from vanedamp.studies.file_kinds import kind_of
+    from vanedamp.studies.file_kinds import a, kind_of
 
     check_outputs(arguments)
     tables = read_toml(arguments.input)
@@ -39,7 +39,7 @@ def run(arguments: Namespace) -> None:
     write_result(arguments.json, {"kind": kind.name} | {fact.key: fact.value for fact in found} | {"defaults": left})
     if arguments.json != "-":
         commands = ", ".join(found[0].value) or "nothing as it is"
-        print(f"{arguments.input}: a {kind.name}, for vanedamp {commands}")
+        print(f"{arguments.input}: {a(kind)}, for vanedamp {commands}")
         _print(found[1:])
         if left:
             print("left at their defaults: " + ", ".join(f"{key} = {_word(value)}" for key, value in left.items()))

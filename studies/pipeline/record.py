@@ -21,8 +21,8 @@ Inputs = Mapping[str, Any]
 class Record:
     """The record of a pipeline.
 
-    done: by the name of a stage its `inputs` and the digests of its `outputs`; begun: the inputs of stages that were
-    begun and have not ended, to whose checkpoints they belong.
+    done: by the name of a stage its `inputs` and the digests of its `outputs` (None: not written); begun: the inputs of
+    stages that were begun and have not ended, to whose checkpoints they belong.
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,7 +59,7 @@ class Record:
 
     def end(self, name: str, inputs: Inputs, outputs: Sequence[Path]) -> None:
         """Note that a stage has made its outputs."""
-        files = {path.name: digest(path) for path in outputs if path.exists()}
+        files = {path.name: digest(path) if path.exists() else None for path in outputs}
         self._done[name] = {"inputs": plain(inputs), "outputs": files}
         self._begun.pop(name, None)
         self._write()
@@ -104,12 +104,15 @@ def leaves(data: Any, path: str = "") -> dict[str, Any]:
     }
 
 
-def _lost(made: Mapping[str, str], outputs: Sequence[Path]) -> Iterator[str]:
-    """Yield which outputs are not as they were made."""
+def _lost(made: Mapping[str, str | None], outputs: Sequence[Path]) -> Iterator[str]:
+    """Yield which outputs are not as they were made; a digest of None: the stage had none to write."""
     for path in outputs:
-        if path.name in made and not path.exists():
-            yield f"{path.name} is missing"
-        elif path.name in made and digest(path) != made[path.name]:
+        if path.name not in made:
+            yield f"{path.name} is new"
+        elif not path.exists():
+            if made[path.name] is not None:
+                yield f"{path.name} is missing"
+        elif digest(path) != made[path.name]:
             yield f"{path.name} is not as it was made"
 
 

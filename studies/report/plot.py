@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,9 @@ from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.campbell import Campbell
+from vanedamp.modal.frf import UNITS
 from vanedamp.studies.report.branch_charts import branches_figure
+from vanedamp.studies.report.calibration_charts import frequencies_figure, response_figure
 from vanedamp.studies.report.campbell_chart import campbell_figure
 from vanedamp.studies.report.forced_response import best_first, forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import responses_figure
@@ -35,8 +38,9 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     """Return an interactive figure (plotly) of a result: a record, or the HDF5 file that a command wrote.
 
     A Sweep gives its forced responses, the best of many; a Response its time history (with the walls of its cavities if
-    its scene is given); Branches, Ramp, RingDown and Campbell their diagrams; a file of `vanedamp modal` its modes.
-    Raises InputError for anything else, and for a response without samples.
+    its scene is given); Branches, Ramp, RingDown and Campbell their diagrams; a file of `vanedamp modal` its modes; one
+    of `vanedamp calibrate` the measured response with its fit, or else the tuned frequencies. Raises
+    InputError for anything else, and for a response without samples.
     """
     raise InputError(f"plot: there is no figure of a {type(result).__name__}; pass a result, or its file")
 
@@ -86,6 +90,8 @@ def _(result: str | Path, scene: Scene | None = None) -> go.Figure:
     if len(found.files) > 1:
         raise InputError(f"{result}: holds several results; name one file")
     ((file, entry),) = found.by_file.items()
+    if file in found.kinds["calibration"]:
+        return _of_calibration(file, *entry.record)
     if file not in found.kinds["modes"]:
         return plot(entry.record)
     values, attributes = entry.record
@@ -93,3 +99,12 @@ def _(result: str | Path, scene: Scene | None = None) -> go.Figure:
     if surface is None:
         raise InputError(f"{file}: the surface of this mesh is too large for a figure; take vanedamp modal --vtk")
     return mode_figure(values, surface, int(attributes.get("first_bending", 0)))
+
+
+def _of_calibration(file: str, values: dict[str, Any], attributes: dict[str, Any]) -> go.Figure:
+    if "line" in values:
+        damping = json.loads(attributes["damping"])
+        return response_figure(values, damping, UNITS[damping["quantity"]])
+    if "target_frequency" in values:
+        return frequencies_figure(values)
+    raise InputError(f"{file}: there is no figure of a calibration without measurements")

@@ -50,13 +50,14 @@ def facts_of(scene: Scene) -> list[Fact]:
     warnings: list[str] = []
     whole = scene
     if scene.sweep and not leaves_open(scene):
-        scene = grid(scene).base
+        points = grid(scene)
+        scene, warnings = points.base, list(points.warnings)
     scene = replace(scene, sweep={})
     if leaves_open(scene):
         warnings.append('modes or shape = "auto" is chosen by the run: figures here are of all modes, and of sliders')
         scene = _closed(scene)
     else:
-        warnings += warnings_of(scene)
+        warnings += [warning for warning in warnings_of(scene) if warning not in warnings]
     found = [*_of_structure(scene), *_of_level(scene, warnings), *_of_bodies(scene), *_of_cost(scene, whole)]
     return [*found, Fact("warnings", warnings)]
 
