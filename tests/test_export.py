@@ -140,7 +140,7 @@ def gyroscopic_modes(path):
         "gyroscopic_shape_real": Variable(shapes[1], mode, "kg^-0.5"),
         "gyroscopic_shape_imaginary": Variable(shapes[2], mode, "kg^-0.5"),
     }  # fmt: skip
-    save(path, "modes", variables, {"vtk_cell_type": 10, "provenance": {}})
+    save(path, "modes", variables, {"vtk_cell_type": 10, "provenance": {}, "rigid": '{"damping_ratio": 0.03}'})
     return (shapes[1] + 1j * shapes[2]).reshape(2, 5, 3)
 
 
@@ -154,6 +154,7 @@ def test_complex_modes_of_a_rotating_structure(tmp_path):
     np.testing.assert_allclose(moving["displacement|1"], -shapes[0].imag, rtol=0, atol=1e-14)
     measured = read_shapes(export(tmp_path, "modes.h5", "modes.uff"))
     assert measured.frequencies_hz == pytest.approx([9.0, 21.0], rel=1e-5)
+    assert measured.damping_ratios == pytest.approx([0.03, 0.03], rel=1e-4)
     assert np.asarray(measured.shapes) == pytest.approx(shapes.reshape(2, -1), rel=0, abs=1e-5 * np.abs(shapes).max())
 
 
@@ -340,6 +341,7 @@ def test_reduced_models_come_back(results, kind, coordinates, capsys):
     if kind == "op4":
         load_of = [np.abs(one.natural[1].T @ one.base_load) for one in (model, back)]
         np.testing.assert_allclose(load_of[1], load_of[0], atol=1e-9 * load_of[0].max())
+    assert ("left out: the base load" in told) is (kind != "op4")
 
 
 def test_a_reduced_model_comes_back_from_matlab(results, tmp_path):

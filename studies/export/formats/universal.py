@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files.toml_input import InputError
-from vanedamp.modal.measurements import write_universal
+from vanedamp.modal.measurements import mode_dataset, write_universal
 from vanedamp.studies.export.formats.vtkhdf import shapes_of
 from vanedamp.studies.export.options import Option
 from vanedamp.studies.export.record import Record
@@ -26,10 +26,9 @@ OPTIONS = (
         "frequencies", "of a .uff of a reduced model: the receptances' frequencies, Hz", ("START", "STOP", "NUM"), float
     ),
 )
-# specific data types, function types, analysis and data types of the datasets
+# specific data types and function types of the datasets
 _UNKNOWN, _DISPLACEMENT, _FORCE, _TIME, _FREQUENCY = 0, 8, 13, 17, 18
 _GENERAL, _HISTORY, _FRF = 0, 1, 4
-_NORMAL_MODE, _COMPLEX_MODE, _REAL, _COMPLEX = 2, 3, 2, 5
 #: corners and descriptor of solids in dataset 2412 by the number of nodes of a cell
 _SOLIDS = {4: (4, 111), 10: (4, 111), 8: (8, 115), 20: (8, 115), 27: (8, 115), 6: (6, 112), 15: (6, 112), 18: (6, 112)}
 _CURVES = {
@@ -63,7 +62,8 @@ def modes(record: Record, path: Path) -> None:
     rigid = record.attributes.get("rigid")
     ratio = float(rigid["damping_ratio"]) if rigid else 0.0
     for number, (frequency, shape) in enumerate(zip(frequencies, shapes, strict=True), start=1):
-        sets.append(_mode(number, word, float(frequency), ratio, shape, labels))
+        given = (number, float(frequency), ratio, labels, shape)
+        sets.append(mode_dataset(*given, title=word, quantity="displacement, kg^-0.5", mass=1.0))
     write_universal(sets, path)
 
 
@@ -165,25 +165,6 @@ def _elements(corners: np.ndarray, descriptor: int) -> Iterator[dict[str, Any]]:
             "element_nums": number, "fe_descriptor": descriptor, "phys_table": 1, "mat_table": 1, "color": 7,
             "num_nodes": len(nodes), "nodes_nums": nodes,
         }  # fmt: skip
-
-
-def _mode(
-    number: int, word: str, frequency: float, ratio: float, shape: np.ndarray, labels: np.ndarray
-) -> dict[str, Any]:
-    """Return dataset 55 of a mode: normal, or complex with an eigenvalue."""
-    data: dict[str, Any] = {
-        "type": 55, "id1": f"{word} {number}: {frequency:.6g} Hz", "id2": "displacement, kg^-0.5", "id3": "NONE",
-        "id4": "NONE", "id5": "NONE", "model_type": 1, "data_ch": 2, "spec_data_type": _DISPLACEMENT,
-        "n_data_per_node": 3, "load_case": 1, "mode_n": number, "node_nums": labels, "r1": shape[:, 0],
-        "r2": shape[:, 1], "r3": shape[:, 2],
-    }  # fmt: skip
-    if np.iscomplexobj(shape):
-        eigenvalue = 2j * np.pi * frequency
-        return data | {"analysis_type": _COMPLEX_MODE, "data_type": _COMPLEX, "eig": eigenvalue}
-    return data | {
-        "analysis_type": _NORMAL_MODE, "data_type": _REAL, "freq": frequency, "modal_m": 1.0, "modal_damp_vis": ratio,
-        "modal_damp_his": 0.0,
-    }  # fmt: skip
 
 
 def _curve(
