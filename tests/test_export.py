@@ -140,7 +140,7 @@ def gyroscopic_modes(path):
         "gyroscopic_shape_real": Variable(shapes[1], mode, "kg^-0.5"),
         "gyroscopic_shape_imaginary": Variable(shapes[2], mode, "kg^-0.5"),
     }  # fmt: skip
-    save(path, "modes", variables, {"vtk_cell_type": 10, "provenance": {}, "rigid": '{"damping_ratio": 0.03}'})
+    save(path, "modes", variables, {"vtk_cell_type": 10, "provenance": {}, "damping_ratio": 0.03})
     return (shapes[1] + 1j * shapes[2]).reshape(2, 5, 3)
 
 
@@ -179,6 +179,15 @@ def test_modes_in_a_universal_file(results):
     again = read_shapes(path)
     assert again.points.shape == again.directions.shape == (again.shapes.shape[1], 3)
     assert again.frequencies_hz == pytest.approx(values["frequency"], rel=1e-5)
+
+
+def test_modes_without_an_interface_keep_their_damping(tmp_path):
+    pytest.importorskip("pyuff")
+    case = changed(BLOCK.split("[interface.tip]")[0], ("density = 8000.0", "density = 8000.0\ndamping_ratio = 0.01"))
+    (tmp_path / "case.toml").write_text(changed(case, ("count = 6", "count = 2")))
+    assert main(["modal", str(tmp_path / "case.toml"), "-o", str(tmp_path / "modes.h5")]) == 0
+    measured = read_shapes(export(tmp_path, "modes.h5", "modes.uff"))
+    assert measured.damping_ratios == pytest.approx([0.01, 0.01], rel=1e-5)
 
 
 @pytest.mark.parametrize("options", [(), ("--frequencies", "100", "3000", "77")], ids=["default", "given"])

@@ -59,8 +59,8 @@ def modes(record: Record, path: Path) -> None:
     if solid is not None:
         sets.append({"type": 2412, solid[1]: list(_elements(cells[:, : solid[0]] + 1, solid[1]))})
     frequencies, shapes, word = shapes_of(record)
-    rigid = record.attributes.get("rigid")
-    ratio = float(rigid["damping_ratio"]) if rigid else 0.0
+    rigid = record.attributes.get("rigid") or {}  # of a file of an older version
+    ratio = float(record.attributes.get("damping_ratio", rigid.get("damping_ratio", 0.0)))
     for number, (frequency, shape) in enumerate(zip(frequencies, shapes, strict=True), start=1):
         given = (number, float(frequency), ratio, labels, shape)
         sets.append(mode_dataset(*given, title=word, quantity="displacement, kg^-0.5", mass=1.0))
