@@ -418,15 +418,34 @@ def test_points_without_figures_are_no_points_of_a_universal_curve(results, tmp_
     place = [0] * mean.ndim
     place[list(sweep.axes).index("excitation.frequency")] = 1
     mean[tuple(place)] = np.nan
-    assert vd.export(replace(sweep, amplitude_mean=mean), tmp_path / "sweep.uff") == (
-        "left out: 1 points of curves without a figure",
-    )
+    told, *_ = vd.export(replace(sweep, amplitude_mean=mean), tmp_path / "sweep.uff")
+    assert told == "left out: 1 points of curves without a figure"
     curves = [one for one in pyuff.UFF(str(tmp_path / "sweep.uff")).read_sets() if one["type"] == 58]
     frequencies = sweep.axes["excitation.frequency"]
     assert sorted({len(one["x"]) for one in curves}) == [len(frequencies) - 1, len(frequencies)]
     (short,) = (one for one in curves if len(one["x"]) < len(frequencies))
     np.testing.assert_allclose(short["x"], np.delete(frequencies, 1), rtol=1e-5)
     assert np.isfinite(short["data"]).all()
+
+
+def test_universal_curves_run_upwards_and_statuses_are_told(results, tmp_path):
+    """Of a sweep from above, with a point that is not steady."""
+    pyuff = pytest.importorskip("pyuff")
+    swept, given = "excitation.frequency", vd.Sweep.load(results / "sweep.h5")
+    place = list(given.axes).index(swept)
+    status = given.status.copy()
+    status.flat[0] = "not_steady"
+    down = {swept: np.flip(given.axes[swept])}
+    turned = {name: np.flip(getattr(given, name), place) for name in ("amplitude_mean", "amplitude_undamped")}
+    told = vd.export(replace(given, axes=given.axes | down, status=status, **turned), tmp_path / "down.uff")
+    bad = sum(one != "ok" for one in status.flat)
+    assert told == (f"left out: the status; {bad} of {status.size} points are not ok, such as: not_steady",)
+    vd.export(given, tmp_path / "up.uff")
+    ours, again = (pyuff.UFF(str(tmp_path / name)).read_sets() for name in ("up.uff", "down.uff"))
+    for one, other in zip(ours, again, strict=True):
+        if one["type"] == 58 and one["id1"].strip() in ("mean of the peaks", "undamped"):
+            assert np.all(np.diff(other["x"]) > 0)
+            assert np.array_equal(other["data"], one["data"])
 
 
 def test_free_structures(tmp_path):

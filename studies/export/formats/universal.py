@@ -95,19 +95,20 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
 
 
 def sweep(record: Record, path: Path) -> tuple[str, ...]:
-    """Write the amplitude curves of a sweep over its frequencies, m, one for each of its other points.
+    """Write the amplitude curves of a sweep over its frequencies, m, upwards, one for each of its other points.
 
-    Points without a figure are left out, since the format has no mark for them. Raises InputError for a sweep that is
-    not over the frequency.
+    Points without a figure are left out, since the format has no mark for them; nor has it one for a status. Raises
+    InputError for a sweep that is not over the frequency.
     """
     axes: list[str] = record.attributes["axes"]
     swept = "excitation.frequency"
     if swept not in axes or len(record.values(_dimension(swept))) < 2:
         raise InputError(f"{record.file}: is no sweep over {swept}; a .csv or a .mat holds it")
-    x = record.values(_dimension(swept))
+    upwards = np.argsort(record.values(_dimension(swept)))
+    x = record.values(_dimension(swept))[upwards]
     others = [axis for axis in axes if axis != swept]
     given = {axis: record.values(_dimension(axis)) for axis in others}
-    curves = {name: np.moveaxis(record.values(name), axes.index(swept), -1) for name in _CURVES}
+    curves = {name: np.moveaxis(record.values(name), axes.index(swept), -1)[..., upwards] for name in _CURVES}
 
     def sets() -> Iterator[dict[str, Any]]:
         yield from _headers(record)
@@ -121,10 +122,11 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
 
     write_universal(sets(), path)
     lost = sum(int(np.count_nonzero(~np.isfinite(curve))) for curve in curves.values())
-    return (f"left out: {lost} points of curves without a figure",) if lost else ()
+    told = [f"left out: {lost} points of curves without a figure"] if lost else []
+    return (*told, *_troubles(record.values("status").ravel().tolist(), "points"))
 
 
-def response(record: Record, path: Path) -> None:
+def response(record: Record, path: Path) -> tuple[str, ...]:
     """Write the samples of a run: displacement and those of the bodies in their cavities, m, over time.
 
     Raises InputError for a response without samples.
@@ -136,6 +138,15 @@ def response(record: Record, path: Path) -> None:
     for body, moved in enumerate(bodies.T, start=1):
         sets.append(_curve(f"body {body} in its cavity", time, moved, _HISTORY, _TIME, rsp_node=1 + body))
     write_universal(sets, path)
+    return _troubles([record.attributes["status"]], "runs")
+
+
+def _troubles(statuses: list[str], what: str) -> tuple[str, ...]:
+    """Return a warning of statuses, for which the format has no mark."""
+    bad = [status for status in statuses if status != "ok"]
+    if not bad:
+        return ()
+    return (f"left out: the status; {len(bad)} of {len(statuses)} {what} are not ok, such as: {bad[0]}",)
 
 
 WRITERS = {"modes": modes, "reduced-model": reduced_model, "sweep": sweep, "response": response}
