@@ -277,7 +277,7 @@ def _shapes_of_universal(file: Path) -> MeasuredShapes:
         directions=np.tile(np.eye(3), (len(numbers), 1))[seen],
         shapes=shapes[:, seen],
         frequencies_hz=frequencies,
-        damping_ratios=[float(m.get("modal_damp_vis", np.nan)) for m in modes],
+        damping_ratios=[_damping_ratio(mode) for mode in modes],
     )
 
 
@@ -300,40 +300,41 @@ def _shapes_to_universal(shapes: MeasuredShapes, target: Path) -> None:
             node_nums=labels, def_cs=zero, disp_cs=zero, color=zero, x=points[:, 0], y=points[:, 1], z=points[:, 2]
         )
     ]
-    complex_valued = np.iscomplexobj(shapes.shapes)
     for index, shape in enumerate(shapes.shapes):
         field = np.zeros((len(points), 3), dtype=shape.dtype)
         field[number, axes] = signs * shape
-        sets.append(_mode_dataset(prepare, shapes, index, labels, field, complex_valued))
+        frequency, ratio = (float(np.nan_to_num(v[index])) for v in (shapes.frequencies_hz, shapes.damping_ratios))
+        sets.append(mode_dataset(index + 1, frequency, ratio, labels, field))
     write_universal(sets, target)
 
 
-def _mode_dataset(
-    prepare: Any, shapes: MeasuredShapes, index: int, labels: np.ndarray, field: np.ndarray, complex_valued: bool
-) -> Any:
-    frequency, ratio = (float(np.nan_to_num(v[index])) for v in (shapes.frequencies_hz, shapes.damping_ratios))
-    common: dict[str, Any] = {
-        "id1": f"mode {index + 1}",
-        "id2": "displacement",
-        "id3": "NONE",
-        "id4": "NONE",
-        "id5": "NONE",
-    }
-    common |= {"model_type": 1, "data_ch": 2, "spec_data_type": 8, "n_data_per_node": 3, "load_case": 1}
-    common |= {"mode_n": index + 1, "node_nums": labels, "r1": field[:, 0], "r2": field[:, 1], "r3": field[:, 2]}
-    if complex_valued:
+def mode_dataset(
+    number: int, frequency: float, ratio: float, nodes: np.ndarray, shape: np.ndarray, *, title: str = "mode",
+    quantity: str = "displacement", mass: float = 0.0,
+) -> dict[str, Any]:  # fmt: skip
+    """Return dataset 55 of a mode, for `write_universal`: a normal one, or of a complex shape one with an eigenvalue.
+
+    number: from 1; frequency: Hz; ratio: of damping; nodes: labels (n,); shape: (n, 3); mass: modal, of a normal mode.
+    """
+    data: dict[str, Any] = {
+        "type": 55, "id1": f"{title} {number}: {frequency:.6g} Hz", "id2": quantity, "id3": "NONE", "id4": "NONE",
+        "id5": "NONE", "model_type": 1, "data_ch": 2, "spec_data_type": 8, "n_data_per_node": 3, "load_case": 1,
+        "mode_n": number, "node_nums": nodes, "r1": shape[:, 0], "r2": shape[:, 1], "r3": shape[:, 2],
+    }  # fmt: skip
+    if np.iscomplexobj(shape):
         eigenvalue = 2 * np.pi * frequency * complex(-ratio, np.sqrt(1 - ratio**2))
-        kind: dict[str, Any] = {
-            "analysis_type": _COMPLEX_MODE,
-            "data_type": 5,
-            "eig": eigenvalue,
-            "modal_a": 0j,
-            "modal_b": 0j,
-        }
-    else:
-        kind = {"analysis_type": _NORMAL_MODE, "data_type": 2, "freq": frequency, "modal_m": 0.0}
-        kind |= {"modal_damp_vis": ratio, "modal_damp_his": 0.0}
-    return prepare.prepare_55(**common, **kind)
+        return data | {"analysis_type": _COMPLEX_MODE, "data_type": 5, "eig": eigenvalue, "modal_a": 0j, "modal_b": 0j}
+    return data | {
+        "analysis_type": _NORMAL_MODE, "data_type": 2, "freq": frequency, "modal_m": mass, "modal_damp_vis": ratio,
+        "modal_damp_his": 0.0,
+    }  # fmt: skip
+
+
+def _damping_ratio(mode: dict[str, Any]) -> float:
+    """Return the damping ratio of dataset 55; nan where it says none."""
+    if "eig" in mode:
+        return -mode["eig"].real / abs(mode["eig"]) if mode["eig"].real else np.nan
+    return float(mode.get("modal_damp_vis", np.nan))
 
 
 def _frf_of_universal(file: Path) -> Frf:

@@ -124,10 +124,9 @@ def _source(path: Path, mesh: LabelledMesh) -> _Source:
     if not mesh.nodes:
         raise MeshError(f"{path}: holds no nodes: empty, or not of the format of {path.suffix}")
     points = mesh.coordinates(mesh.nodes)
-    labels = np.array(list(mesh.nodes), dtype=int)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
-        raise MeshError(f"{path}: the coordinates of node {labels[bad[0]]} are not finite")
+        raise MeshError(f"{path}: the coordinates of node {list(mesh.nodes)[bad[0]]} are not finite")
     place = dict(zip(mesh.nodes, range(len(mesh.nodes)), strict=True))
     volumes = {label: kind for label, (kind, _) in mesh.elements.items() if KINDS.get(kind, (3, 0))[0] == 3}
     for label, (_, nodes) in mesh.elements.items():

@@ -144,6 +144,8 @@ def _take_group(mesh: LabelledMesh, head: _Line, rows: Iterator[_Line], width: i
     members: list[int] = []
     while len(members) < width * count:
         members += next(rows).whole(width)
+    if len(members) != width * count:
+        raise head.error(f"group {name} announces {count} members and has others: the file is damaged; write it again")
     for code, sets in ((_NODE, mesh.node_sets), (_ELEMENT, mesh.element_sets)):
         labels = [label for kind, label in zip(members[::width], members[1::width], strict=True) if kind == code]
         if labels:

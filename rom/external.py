@@ -7,6 +7,7 @@ additional static flexibility becomes the model's residual flexibility, a massle
 from __future__ import annotations
 
 import os
+import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -85,13 +86,15 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
     if not file.is_file():
         raise ExternalError(f"{path}: no such file")
     try:
-        found = _READERS[file.suffix.lower()](str(file))
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", "Premature end-of-file")  # so pyyeti calls a file that is cut short
+            found = _READERS[file.suffix.lower()](str(file))
     except ExternalError:
         raise
     except AbaqusMatrixError as error:
         raise ExternalError(f"{path}: {error}") from error
     except Exception as error:  # every format has exceptions of its own
-        raise ExternalError(f"{path}: cannot be read ({error})") from error
+        raise ExternalError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
     dense = {name: np.asarray(_dense(matrix)) for name, matrix in found.items()}
     dense = {name: matrix for name, matrix in dense.items() if matrix.dtype.kind in "biufc"}
     counts = Counter(name.lower() for name in dense)

@@ -140,7 +140,7 @@ def gyroscopic_modes(path):
         "gyroscopic_shape_real": Variable(shapes[1], mode, "kg^-0.5"),
         "gyroscopic_shape_imaginary": Variable(shapes[2], mode, "kg^-0.5"),
     }  # fmt: skip
-    save(path, "modes", variables, {"vtk_cell_type": 10, "provenance": {}})
+    save(path, "modes", variables, {"vtk_cell_type": 10, "provenance": {}, "damping_ratio": 0.03})
     return (shapes[1] + 1j * shapes[2]).reshape(2, 5, 3)
 
 
@@ -154,6 +154,7 @@ def test_complex_modes_of_a_rotating_structure(tmp_path):
     np.testing.assert_allclose(moving["displacement|1"], -shapes[0].imag, rtol=0, atol=1e-14)
     measured = read_shapes(export(tmp_path, "modes.h5", "modes.uff"))
     assert measured.frequencies_hz == pytest.approx([9.0, 21.0], rel=1e-5)
+    assert measured.damping_ratios == pytest.approx([0.03, 0.03], rel=1e-4)
     assert np.asarray(measured.shapes) == pytest.approx(shapes.reshape(2, -1), rel=0, abs=1e-5 * np.abs(shapes).max())
 
 
@@ -178,6 +179,15 @@ def test_modes_in_a_universal_file(results):
     again = read_shapes(path)
     assert again.points.shape == again.directions.shape == (again.shapes.shape[1], 3)
     assert again.frequencies_hz == pytest.approx(values["frequency"], rel=1e-5)
+
+
+def test_modes_without_an_interface_keep_their_damping(tmp_path):
+    pytest.importorskip("pyuff")
+    case = changed(BLOCK.split("[interface.tip]")[0], ("density = 8000.0", "density = 8000.0\ndamping_ratio = 0.01"))
+    (tmp_path / "case.toml").write_text(changed(case, ("count = 6", "count = 2")))
+    assert main(["modal", str(tmp_path / "case.toml"), "-o", str(tmp_path / "modes.h5")]) == 0
+    measured = read_shapes(export(tmp_path, "modes.h5", "modes.uff"))
+    assert measured.damping_ratios == pytest.approx([0.01, 0.01], rel=1e-5)
 
 
 @pytest.mark.parametrize("options", [(), ("--frequencies", "100", "3000", "77")], ids=["default", "given"])
@@ -340,6 +350,7 @@ def test_reduced_models_come_back(results, kind, coordinates, capsys):
     if kind == "op4":
         load_of = [np.abs(one.natural[1].T @ one.base_load) for one in (model, back)]
         np.testing.assert_allclose(load_of[1], load_of[0], atol=1e-9 * load_of[0].max())
+    assert ("left out: the base load" in told) is (kind != "op4")
 
 
 def test_a_reduced_model_comes_back_from_matlab(results, tmp_path):
@@ -407,15 +418,34 @@ def test_points_without_figures_are_no_points_of_a_universal_curve(results, tmp_
     place = [0] * mean.ndim
     place[list(sweep.axes).index("excitation.frequency")] = 1
     mean[tuple(place)] = np.nan
-    assert vd.export(replace(sweep, amplitude_mean=mean), tmp_path / "sweep.uff") == (
-        "left out: 1 points of curves without a figure",
-    )
+    told, *_ = vd.export(replace(sweep, amplitude_mean=mean), tmp_path / "sweep.uff")
+    assert told == "left out: 1 points of curves without a figure"
     curves = [one for one in pyuff.UFF(str(tmp_path / "sweep.uff")).read_sets() if one["type"] == 58]
     frequencies = sweep.axes["excitation.frequency"]
     assert sorted({len(one["x"]) for one in curves}) == [len(frequencies) - 1, len(frequencies)]
     (short,) = (one for one in curves if len(one["x"]) < len(frequencies))
     np.testing.assert_allclose(short["x"], np.delete(frequencies, 1), rtol=1e-5)
     assert np.isfinite(short["data"]).all()
+
+
+def test_universal_curves_run_upwards_and_statuses_are_told(results, tmp_path):
+    """Of a sweep from above, with a point that is not steady."""
+    pyuff = pytest.importorskip("pyuff")
+    swept, given = "excitation.frequency", vd.Sweep.load(results / "sweep.h5")
+    place = list(given.axes).index(swept)
+    status = given.status.copy()
+    status.flat[0] = "not_steady"
+    down = {swept: np.flip(given.axes[swept])}
+    turned = {name: np.flip(getattr(given, name), place) for name in ("amplitude_mean", "amplitude_undamped")}
+    told = vd.export(replace(given, axes=given.axes | down, status=status, **turned), tmp_path / "down.uff")
+    bad = sum(one != "ok" for one in status.flat)
+    assert told == (f"left out: the status; {bad} of {status.size} points are not ok, such as: not_steady",)
+    vd.export(given, tmp_path / "up.uff")
+    ours, again = (pyuff.UFF(str(tmp_path / name)).read_sets() for name in ("up.uff", "down.uff"))
+    for one, other in zip(ours, again, strict=True):
+        if one["type"] == 58 and one["id1"].strip() in ("mean of the peaks", "undamped"):
+            assert np.all(np.diff(other["x"]) > 0)
+            assert np.array_equal(other["data"], one["data"])
 
 
 def test_free_structures(tmp_path):

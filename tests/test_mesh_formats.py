@@ -387,6 +387,20 @@ def test_damaged_files_are_told_in_one_line(forks, tmp_path, ending, old, new, t
     assert not (tmp_path / "out.msh").exists()
 
 
+def test_a_group_with_another_number_of_members_is_damaged(tmp_path):
+    numbers = [[1, 0, 0, 0, 0, 0, 0, 1], [8, 4, 0, 0, 8, 5, 0, 0]]
+    head, members = ("".join(f"{number:10d}" for number in row) for row in numbers)
+    (tmp_path / "group.unv").write_text(f"    -1\n  2467\n{head}\nfeet\n{members}\n    -1\n")
+    with pytest.raises(MeshError, match=r"group\.unv: line 3: group feet announces 1 members and has others"):
+        universal_file.read(tmp_path / "group.unv")
+
+
+def test_labels_of_any_length(tmp_path):
+    """A node that no element has may have a label beyond 64 bits."""
+    (tmp_path / "two.inp").write_text(TWO.replace("*ELEMENT, TYPE=C3D4", f"{10**20}, 9, 9, 9\n*ELEMENT, TYPE=C3D4"))
+    assert convert(tmp_path / "two.inp", tmp_path / "two.msh").is_file()
+
+
 def test_encodings_of_text_files(tmp_path):
     """UTF-8 with a mark, Latin-1, and what is no text."""
     text = TWO + "*NSET, NSET=Läufer\n1, 2, 3\n"

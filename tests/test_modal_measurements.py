@@ -43,8 +43,7 @@ def test_shapes_through_a_universal_file(tmp_path, kind):
     for ours, theirs in zip(ordered(given), ordered(again), strict=True):
         assert theirs == pytest.approx(ours, rel=1e-5, abs=1e-12)  # the format holds six digits
     assert again.frequencies_hz == pytest.approx(given.frequencies_hz, rel=1e-5)
-    if kind is float:
-        assert again.damping_ratios == pytest.approx(given.damping_ratios, rel=1e-5)
+    assert again.damping_ratios == pytest.approx(given.damping_ratios, rel=1e-4)  # of an eigenvalue of six digits
 
 
 @pytest.mark.parametrize("name", ["frf.csv", "frf.uff"])

@@ -116,6 +116,23 @@ def test_text_files_of_few_digits_pass():
     assert np.array_equal(made.mass, made.mass.T)
 
 
+def test_a_binary_file_cut_short_is_damaged(model, tmp_path):
+    op4 = pytest.importorskip("pyyeti.nastran.op4")
+    op4.write(str(tmp_path / "whole.op4"), {"kaa": model.stiffness, "maa": model.mass})
+    whole = (tmp_path / "whole.op4").read_bytes()
+    op4.write(str(tmp_path / "first.op4"), {"kaa": model.stiffness})
+    (tmp_path / "cut.op4").write_bytes(whole[: (tmp_path / "first.op4").stat().st_size - 8])
+    with pytest.raises(ExternalError, match=r"cannot be read .*Premature"):
+        read_matrices(tmp_path / "cut.op4")
+
+
+def test_a_damaged_head_is_told_in_a_line(tmp_path):
+    (tmp_path / "k.mtx").write_text("%%MatrixMarket matrix array real general\n2\n1.0\n")
+    with pytest.raises(ExternalError, match="cannot be read") as told:
+        read_matrices(tmp_path / "k.mtx")
+    assert "\n" not in str(told.value)
+
+
 def test_bad_files(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "broken.npz").write_bytes(b"nothing")

@@ -246,6 +246,7 @@ class ModalAnalysis:
         result = self.to_json()
         kept = ("first_bending", "rigid", "cavity", "fatigue", "speed")
         attributes = {name: result[name] for name in kept if result.get(name) not in (None, {})}
+        attributes |= {"damping_ratio": self.structure.matrices.damping_ratio}
         attributes |= {"vtk_cell_type": cell_type, "versions": versions()}
         self.modes.save(path, variables, attributes)
 

@@ -55,11 +55,13 @@ def lost_digits(model: ReducedModel, file: Path, names: Mapping[str, str]) -> tu
     )
 
 
-def left_out(model: ReducedModel, damping: bool = True) -> tuple[str, ...]:
-    """Return what files of mass, stiffness and, perhaps, damping do not say of a model."""
+def left_out(model: ReducedModel, damping: bool = True, base_load: bool = False) -> tuple[str, ...]:
+    """Return what files of mass, stiffness and, perhaps, damping and base load do not say of a model."""
     lacks = []
     if not damping and model.damping_ratio is None and np.any(model.damping):
         lacks.append("the damping matrix: this format holds none, and the model has no damping ratio")
+    if not base_load and np.any(model.base_load):
+        lacks.append("the base load: a base acceleration needs it; .op4 and .mat hold it")
     if model.centrifugal_stiffness is not None:
         lacks.append("the centrifugal stiffness: the matrices are those at standstill")
     if model.arms is not None and np.any(model.arms > 0.0):

@@ -37,7 +37,7 @@ def write(
     if description is not None:
         names = {key: _NAMES[key].lower() for key in ("mass", "stiffness", "damping", "base_load")}
         describe(model, matrices, names, path, description)
-    return left_out(model)
+    return left_out(model, base_load=True)
 
 
 WRITERS = {"reduced-model": write}

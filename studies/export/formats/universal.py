@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files.toml_input import InputError
-from vanedamp.modal.measurements import write_universal
+from vanedamp.modal.measurements import mode_dataset, write_universal
 from vanedamp.studies.export.formats.vtkhdf import shapes_of
 from vanedamp.studies.export.options import Option
 from vanedamp.studies.export.record import Record
@@ -26,10 +26,9 @@ OPTIONS = (
         "frequencies", "of a .uff of a reduced model: the receptances' frequencies, Hz", ("START", "STOP", "NUM"), float
     ),
 )
-# specific data types, function types, analysis and data types of the datasets
+# specific data types and function types of the datasets
 _UNKNOWN, _DISPLACEMENT, _FORCE, _TIME, _FREQUENCY = 0, 8, 13, 17, 18
 _GENERAL, _HISTORY, _FRF = 0, 1, 4
-_NORMAL_MODE, _COMPLEX_MODE, _REAL, _COMPLEX = 2, 3, 2, 5
 #: corners and descriptor of solids in dataset 2412 by the number of nodes of a cell
 _SOLIDS = {4: (4, 111), 10: (4, 111), 8: (8, 115), 20: (8, 115), 27: (8, 115), 6: (6, 112), 15: (6, 112), 18: (6, 112)}
 _CURVES = {
@@ -60,10 +59,11 @@ def modes(record: Record, path: Path) -> None:
     if solid is not None:
         sets.append({"type": 2412, solid[1]: list(_elements(cells[:, : solid[0]] + 1, solid[1]))})
     frequencies, shapes, word = shapes_of(record)
-    rigid = record.attributes.get("rigid")
-    ratio = float(rigid["damping_ratio"]) if rigid else 0.0
+    rigid = record.attributes.get("rigid") or {}  # of a file of an older version
+    ratio = float(record.attributes.get("damping_ratio", rigid.get("damping_ratio", 0.0)))
     for number, (frequency, shape) in enumerate(zip(frequencies, shapes, strict=True), start=1):
-        sets.append(_mode(number, word, float(frequency), ratio, shape, labels))
+        given = (number, float(frequency), ratio, labels, shape)
+        sets.append(mode_dataset(*given, title=word, quantity="displacement, kg^-0.5", mass=1.0))
     write_universal(sets, path)
 
 
@@ -95,19 +95,20 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
 
 
 def sweep(record: Record, path: Path) -> tuple[str, ...]:
-    """Write the amplitude curves of a sweep over its frequencies, m, one for each of its other points.
+    """Write the amplitude curves of a sweep over its frequencies, m, upwards, one for each of its other points.
 
-    Points without a figure are left out, since the format has no mark for them. Raises InputError for a sweep that is
-    not over the frequency.
+    Points without a figure are left out, since the format has no mark for them; nor has it one for a status. Raises
+    InputError for a sweep that is not over the frequency.
     """
     axes: list[str] = record.attributes["axes"]
     swept = "excitation.frequency"
     if swept not in axes or len(record.values(_dimension(swept))) < 2:
         raise InputError(f"{record.file}: is no sweep over {swept}; a .csv or a .mat holds it")
-    x = record.values(_dimension(swept))
+    upwards = np.argsort(record.values(_dimension(swept)))
+    x = record.values(_dimension(swept))[upwards]
     others = [axis for axis in axes if axis != swept]
     given = {axis: record.values(_dimension(axis)) for axis in others}
-    curves = {name: np.moveaxis(record.values(name), axes.index(swept), -1) for name in _CURVES}
+    curves = {name: np.moveaxis(record.values(name), axes.index(swept), -1)[..., upwards] for name in _CURVES}
 
     def sets() -> Iterator[dict[str, Any]]:
         yield from _headers(record)
@@ -121,10 +122,11 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
 
     write_universal(sets(), path)
     lost = sum(int(np.count_nonzero(~np.isfinite(curve))) for curve in curves.values())
-    return (f"left out: {lost} points of curves without a figure",) if lost else ()
+    told = [f"left out: {lost} points of curves without a figure"] if lost else []
+    return (*told, *_troubles(record.values("status").ravel().tolist(), "points"))
 
 
-def response(record: Record, path: Path) -> None:
+def response(record: Record, path: Path) -> tuple[str, ...]:
     """Write the samples of a run: displacement and those of the bodies in their cavities, m, over time.
 
     Raises InputError for a response without samples.
@@ -136,6 +138,15 @@ def response(record: Record, path: Path) -> None:
     for body, moved in enumerate(bodies.T, start=1):
         sets.append(_curve(f"body {body} in its cavity", time, moved, _HISTORY, _TIME, rsp_node=1 + body))
     write_universal(sets, path)
+    return _troubles([record.attributes["status"]], "runs")
+
+
+def _troubles(statuses: list[str], what: str) -> tuple[str, ...]:
+    """Return a warning of statuses, for which the format has no mark."""
+    bad = [status for status in statuses if status != "ok"]
+    if not bad:
+        return ()
+    return (f"left out: the status; {len(bad)} of {len(statuses)} {what} are not ok, such as: {bad[0]}",)
 
 
 WRITERS = {"modes": modes, "reduced-model": reduced_model, "sweep": sweep, "response": response}
@@ -165,25 +176,6 @@ def _elements(corners: np.ndarray, descriptor: int) -> Iterator[dict[str, Any]]:
             "element_nums": number, "fe_descriptor": descriptor, "phys_table": 1, "mat_table": 1, "color": 7,
             "num_nodes": len(nodes), "nodes_nums": nodes,
         }  # fmt: skip
-
-
-def _mode(
-    number: int, word: str, frequency: float, ratio: float, shape: np.ndarray, labels: np.ndarray
-) -> dict[str, Any]:
-    """Return dataset 55 of a mode: normal, or complex with an eigenvalue."""
-    data: dict[str, Any] = {
-        "type": 55, "id1": f"{word} {number}: {frequency:.6g} Hz", "id2": "displacement, kg^-0.5", "id3": "NONE",
-        "id4": "NONE", "id5": "NONE", "model_type": 1, "data_ch": 2, "spec_data_type": _DISPLACEMENT,
-        "n_data_per_node": 3, "load_case": 1, "mode_n": number, "node_nums": labels, "r1": shape[:, 0],
-        "r2": shape[:, 1], "r3": shape[:, 2],
-    }  # fmt: skip
-    if np.iscomplexobj(shape):
-        eigenvalue = 2j * np.pi * frequency
-        return data | {"analysis_type": _COMPLEX_MODE, "data_type": _COMPLEX, "eig": eigenvalue}
-    return data | {
-        "analysis_type": _NORMAL_MODE, "data_type": _REAL, "freq": frequency, "modal_m": 1.0, "modal_damp_vis": ratio,
-        "modal_damp_his": 0.0,
-    }  # fmt: skip
 
 
 def _curve(
