@@ -448,6 +448,18 @@ def test_universal_curves_run_upwards_and_statuses_are_told(results, tmp_path):
             assert np.array_equal(other["data"], one["data"])
 
 
+def test_receptances_of_a_rotating_model_are_those_at_standstill(tmp_path):
+    pytest.importorskip("pyuff")
+    plain = random_reduced(7, modes=3)
+    turning = replace(
+        plain, centrifugal_stiffness=1e-3 * plain.stiffness, rotation_axis=np.array([1.0, 0.0, 0.0]),
+        rotation_point=np.zeros(3), greatest_speed=10.0,
+    )  # fmt: skip
+    assert vd.export(plain, tmp_path / "rom.uff") == ()
+    (told,) = vd.export(turning, tmp_path / "rom.uff")
+    assert "at standstill" in told
+
+
 def test_free_structures(tmp_path):
     """They have receptances above 0 Hz only, and matrices with their rigid motion."""
     pytest.importorskip("pyuff")

@@ -90,8 +90,12 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
         for (i, response), (j, force) in pairs
     )  # fmt: skip
     write_universal([*_headers(record), *curves], path)
-    turned = model.arms is not None and np.any(model.arms > 0.0)
-    return ("receptances: coordinates that are rotations have rad and N m in place of m and N",) if turned else ()
+    told = []
+    if model.arms is not None and np.any(model.arms > 0.0):
+        told.append("receptances: coordinates that are rotations have rad and N m in place of m and N")
+    if model.centrifugal_stiffness is not None:
+        told.append("receptances: of a model that rotates, those at standstill")
+    return tuple(told)
 
 
 def sweep(record: Record, path: Path) -> tuple[str, ...]:
