@@ -448,6 +448,23 @@ def test_universal_curves_run_upwards_and_statuses_are_told(results, tmp_path):
             assert np.array_equal(other["data"], one["data"])
 
 
+def test_universal_curves_of_many_axes_keep_their_names(tmp_path):
+    """The lines of 80 letters that the format has hold the values of all axes."""
+    pyuff = pytest.importorskip("pyuff")
+    axes = """"damper.0.friction" = [0.1, 0.30000000000000004]
+"damper.0.restitution" = [0.7]
+"cavity.c1.gap" = [2e-4]
+"gravity.orientation_deg" = [45.0, 46.0]
+"""
+    (tmp_path / "scene.toml").write_text(SCENE + axes)
+    assert main(["sweep", str(tmp_path / "scene.toml"), "--workers", "1", "-o", str(tmp_path / "sweep.h5")]) == 0
+    sets = pyuff.UFF(str(export(tmp_path, "sweep.h5", "sweep.uff"))).read_sets()
+    means = [one for one in sets if one["type"] == 58 and one["id1"].strip() == "mean of the peaks"]
+    names = {" ".join(one[f"id{line}"].strip() for line in (2, 3, 4)) for one in means}
+    assert len(names) == len(means) == 4
+    assert all("gravity.orientation_deg = 4" in name for name in names)
+
+
 def test_receptances_of_a_rotating_model_are_those_at_standstill(tmp_path):
     pytest.importorskip("pyuff")
     plain = random_reduced(7, modes=3)

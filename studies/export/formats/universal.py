@@ -7,6 +7,7 @@ of time, twelve of curves: the curves of a reduced model are those at the freque
 from __future__ import annotations
 
 import itertools
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -118,11 +119,13 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
         yield from _headers(record)
         for place in np.ndindex(*(len(values) for values in given.values())):
             at = ", ".join(f"{axis} = {given[axis][index]}" for axis, index in zip(others, place, strict=True))
+            lines = textwrap.wrap(_ascii(at), 80)
+            names: dict[str, Any] = dict(zip(("id2", "id3", "id4", "id5"), lines, strict=False))
             for name, words in _CURVES.items():
                 curve = curves[name][place]
                 known = np.isfinite(curve)
                 if np.count_nonzero(known) > 1:
-                    yield _curve(words, x[known], curve[known], _GENERAL, _FREQUENCY, id2=at or "NONE")
+                    yield _curve(words, x[known], curve[known], _GENERAL, _FREQUENCY, **names)
 
     write_universal(sets(), path)
     lost = sum(int(np.count_nonzero(~np.isfinite(curve))) for curve in curves.values())
@@ -199,8 +202,6 @@ def _curve(
         "orddenom_axis_units_lab": "N" if per else "NONE", "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
         "ver_num": 0, "load_case_id": 0, "z_axis_value": 0.0,
     }  # fmt: skip
-    if "id2" in more:
-        more["id2"] = _ascii(more["id2"])[:80]
     return data | more
 
 
