@@ -21,7 +21,7 @@ from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.commands.support.budget import run_seconds, sweep_seconds
+from vanedamp.studies.commands.support.budget import check_run, check_sweep, run_seconds, sweep_seconds
 from vanedamp.studies.commands.support.facts import Fact
 from vanedamp.studies.commands.support.outputs import Outputs
 from vanedamp.studies.commands.support.scenes import load_any_scene
@@ -42,6 +42,10 @@ def facts(path: str | Path) -> list[Fact]:
         commands.insert(0, "run")
     elif not scene.ring_down:
         found[-1].value.append("excitation: nothing moves the structure, so that `vanedamp run` refuses it")
+    try:
+        check_sweep(scene, None) if scene.sweep else check_run(scene)
+    except InputError as error:
+        found[-1].value.append(f"{error}; `vanedamp {'sweep' if scene.sweep else 'run'}` refuses it")
     return [Fact("commands", commands), *found]
 
 
