@@ -139,12 +139,8 @@ def _explain(adapter: TypeAdapter[Any], error: Any, data: Any) -> str:
         return f"{key}: expected a table, headed {heading}"
     if kind in _NO_LIST and isinstance(value, Mapping) and len(path) == 1:
         return f"{key}: expected a list of tables, each headed [[{key}]], not [{key}]"
-    if kind in ("too_short", "too_long"):
-        least = kind == "too_short"
-        return (
-            f"{key}: expected at {'least' if least else 'most'} {error['ctx']['min_length' if least else 'max_length']} "
-            f"entries, not {error['ctx']['actual_length']}"
-        )
+    if kind == "too_short":
+        return f"{key}: expected at least {error['ctx']['min_length']} entries, not {error['ctx']['actual_length']}"
     message = error["msg"].removeprefix("Value error, ").removeprefix("Input ")
     shown = f" (got {reprlib.repr(value)})" if isinstance(value, str | int | float | bool) else ""
     return f"{key}: {message}{shown}" if key else message
