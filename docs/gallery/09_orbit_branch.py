@@ -34,31 +34,32 @@ for number, branch in enumerate(found.branches):
 # The points of a sweep lie on the stable parts. Where no motion of the branches is stable, they find another one.
 
 sweep = vd.sweep(scene.replace({"orbit": None, "sweep": {"excitation.frequency": np.linspace(2300.0, 2368.0, 35)}}))
-figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.4), layout="constrained", width_ratios=[3, 2])
+figure, axes = plt.subplots(figsize=(8, 4.6), layout="constrained")
 for number, branch in enumerate(found.branches):
     colour, amplitude = f"C{number}", 1e6 * branch.amplitude_mean
-    left.plot(branch.parameter, amplitude, "--", color=colour, linewidth=1)
+    axes.plot(branch.parameter, amplitude, "--", color=colour, linewidth=1)
     label = f"branch {number}, {branch.periods} period{'s' * (branch.periods > 1)}"
-    left.plot(branch.parameter, np.where(branch.stable, amplitude, np.nan), color=colour, linewidth=3, label=label)
+    axes.plot(branch.parameter, np.where(branch.stable, amplitude, np.nan), color=colour, linewidth=3, label=label)
     for point in branch.special:
         if point.kind in ("fold", "pitchfork", "period doubling"):
-            left.plot(point.parameter, amplitude[point.index], "ks", markersize=5)
-left.plot(sweep.axes["excitation.frequency"], 1e6 * sweep.amplitude_mean, ".", color="0.3", label="runs")
-left.set(
+            axes.plot(point.parameter, amplitude[point.index], "ks", markersize=5)
+axes.plot(sweep.axes["excitation.frequency"], 1e6 * sweep.amplitude_mean, ".", color="0.3", label="runs")
+axes.set(
     xlabel="excitation frequency (Hz)",
     ylabel="mean amplitude (µm)",
     title="solid: stable, dashed: not, squares: bifurcations",
 )
-left.legend(loc="upper left")
+axes.legend(loc="upper left")
 
 # %%
 # An orbit is stable while all of its multipliers are below one. ``neutral`` counts those that are one because the
 # body may be moved without a change, which come first.
 
+figure, axes = plt.subplots(figsize=(8, 3.6), layout="constrained")
 for number, branch in enumerate(found.branches):
     largest = np.abs(branch.multipliers[np.arange(len(branch.parameter)), branch.neutral])
-    right.plot(branch.parameter, largest, ".-", color=f"C{number}", label=f"branch {number}")
-right.axhline(1.0, color="0.5")
-right.set(xlabel="excitation frequency (Hz)", ylabel="largest multiplier, modulus (-)")
-right.legend(loc="upper left")
+    axes.plot(branch.parameter, largest, ".-", color=f"C{number}", label=f"branch {number}")
+axes.axhline(1.0, color="0.5")
+axes.set(xlabel="excitation frequency (Hz)", ylabel="largest multiplier, modulus (-)")
+axes.legend(loc="upper left")
 plt.show()
