@@ -28,6 +28,8 @@ from vanedamp.files.errors import VanedampError
 
 SCHEMA_VERSION = 1
 
+#: said each time: the default is that of the process, which other packages change
+_TRACK_ORDER = False
 #: name of a dimension without a coordinate in netCDF-4
 _NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable."
 #: where links stand for the files that processes have open
@@ -173,7 +175,7 @@ def save(
     """
     # in memory first: a write that fails within HDF5 ends the whole process, sooner or later
     image = io.BytesIO()
-    with h5py.File(image, "w") as file:
+    with h5py.File(image, "w", track_order=_TRACK_ORDER) as file:
         file.attrs["kind"] = kind
         file.attrs["schema_version"] = SCHEMA_VERSION
         for name, value in (attributes or {}).items():
@@ -184,7 +186,7 @@ def save(
         for dimension, length in lengths.items():
             if dimension not in file:
                 # a dimension without coordinate, marked as netCDF-4 marks it
-                file.create_dataset(dimension, data=np.zeros(length, np.float32))
+                file.create_dataset(dimension, data=np.zeros(length, np.float32), track_order=_TRACK_ORDER)
                 file[dimension].make_scale(f"{_NO_COORDINATE}{length:10d}")
             else:
                 file[dimension].make_scale(dimension)
@@ -303,10 +305,11 @@ def _dimension_lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
 def _create(file: h5py.File, name: str, variable: Variable) -> None:
     values = np.asarray(variable.values)
     if values.dtype.kind in "UO":
-        dataset = file.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype())
+        text = values.astype(object)
+        dataset = file.create_dataset(name, data=text, dtype=h5py.string_dtype(), track_order=_TRACK_ORDER)
     else:
         options = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size > 4096 else {}
-        dataset = file.create_dataset(name, data=values, **options)
+        dataset = file.create_dataset(name, data=values, track_order=_TRACK_ORDER, **options)
     dataset.attrs["units"] = variable.units
 
 
