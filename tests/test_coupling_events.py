@@ -13,10 +13,9 @@ from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_on
 @njit
 def search(order, k0, k1, k2, g, eigenvalue, end):
     """First root in (0, end), or inf: the engine's loop for one event function."""
-    awake = np.arange(len(g))
     t, steps, a = 0.0, 0, np.zeros((2, DEGREE + 1))
     while t < end:
-        noise, second, calm = expand(order, k0, k1, k2, g, eigenvalue, awake, t, a)
+        noise, second, calm = expand(order, k0, k1, k2, g, eigenvalue, len(g), t, a)
         step, found = advance_or_stop(a, noise, second, calm, end - t, 1e-15 * end)
         t += step
         if found:

@@ -18,7 +18,7 @@ from vanedamp.coupling.exact.contact_states import (
     resolve_contact_states,
     stop_attached_bodies,
 )
-from vanedamp.coupling.exact.energy_balance import account
+from vanedamp.coupling.exact.energy_balance import account, account_impact, account_spell
 from vanedamp.coupling.exact.event_functions import carry_over_period, hop_speed, next_event
 from vanedamp.coupling.exact.gap_kinematics import (
     SIMULTANEOUS,
@@ -109,6 +109,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
         _advance_motion(system, flows, st, scratch, tau)
         if event < 0:
             carry_over_period(st, watched, tau)
+            account_spell(system, flows, st, rec, scratch)
             st.counters[PERIOD] += 1
             st.time[0] = 0.0
             for r in range(len(st.last_impact)):
@@ -127,6 +128,8 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
         if outcome == NO_SOLUTION:
             return UNDECIDED
         deciding = outcome == STATES_OPEN
+        if deciding:
+            account_spell(system, flows, st, rec, scratch)
         if not deciding and not _within_walls(system, st):
             return ACCURACY_LOST
 
@@ -247,6 +250,12 @@ def _begin_subsystem(system, flows, st, scratch, s):
                 total += flows.project_slip[s, j, i] * scratch.slips[i]
         st.amplitude[j] = total
     _constant_forces(system, flows, st, scratch, s)
+    st.offset[0] = 0.0
+    for i in range(n):
+        st.offset[0] += system.response[i] * st.constant[i]
+    for i in range(len(st.change)):
+        st.change[i] = 0.0
+    st.counters[AWAKE] = flows.modes[s]
     _select_awake_modes(flows, st)
 
 
@@ -314,24 +323,45 @@ def _constant_forces(system, flows, st, scratch, s):
 
 @inlined
 def _select_awake_modes(flows, st):
-    """Set modes to zero whose acceleration is negligible beside the largest, but none that the excitation drives."""
+    """Put modes to sleep whose acceleration is negligible beside the largest, but none that the excitation drives.
+
+    Modes are in order of their rates: what is awake are the first counters[AWAKE] of them.
+    """
     s, e, largest, fastest = st.counters[FLOW], flows.driven.shape[1] - 1, 0.0, 0.0
+    for j in range(st.counters[AWAKE]):
+        c = st.amplitude[j]
+        size = abs(c.real) + abs(c.imag)
+        largest = max(largest, size * flows.acceleration[s, j])
+        fastest = max(fastest, size * flows.speed[s, j])
+    st.largest_speed[0] = fastest
+    last, count = flows.driven[s, e], flows.driven[s, e]
+    for j in range(last, st.counters[AWAKE]):
+        c = st.amplitude[j]
+        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > _ASLEEP * largest:
+            count = j + 1
+        else:
+            st.amplitude[j] = 0.0
+    st.counters[AWAKE] = count
+
+
+@inlined
+def _wake_modes(flows, st):
+    """Wake the modes that an impulse has set in motion. None goes to sleep before the period's end: it is in the spell."""
+    s, largest, fastest = st.counters[FLOW], 0.0, 0.0
     for j in range(flows.modes[s]):
         c = st.amplitude[j]
         size = abs(c.real) + abs(c.imag)
         largest = max(largest, size * flows.acceleration[s, j])
         fastest = max(fastest, size * flows.speed[s, j])
     st.largest_speed[0] = fastest
-    for h in range(e):
-        st.awake[h] = h
-    count, last = e, flows.driven[s, e]
-    for j in range(e, flows.modes[s]):
-        c = st.amplitude[j]
-        if j < last or (abs(c.real) + abs(c.imag)) * flows.acceleration[s, j] > _ASLEEP * largest:
-            st.awake[count] = j
-            count += 1
-        else:
-            st.amplitude[j] = 0.0
+    count = flows.modes[s]
+    while count > st.counters[AWAKE]:
+        c = st.amplitude[count - 1]
+        if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, count - 1] > _ASLEEP * largest:
+            break
+        count -= 1
+        st.amplitude[count] = 0.0
+        st.change[2 * count], st.change[2 * count + 1] = 0.0, 0.0
     st.counters[AWAKE] = count
 
 
@@ -339,12 +369,11 @@ def _select_awake_modes(flows, st):
 def amplitude_changes(flows, st, scratch, tau):
     """Set the changes of the awake modes' amplitudes over the segment."""
     s, e = st.counters[FLOW], flows.driven.shape[1] - 1
-    for a in range(st.counters[AWAKE]):
-        j = st.awake[a]
+    for j in range(st.counters[AWAKE]):
         z = flows.eigenvalue[s, j] * tau
         first = exp_minus_one(z)
-        scratch.gain[a] = st.amplitude[j] * first
-        scratch.bend[a] = st.amplitude[j] * exp_minus_line(z, first)
+        scratch.gain[j] = st.amplitude[j] * first
+        scratch.bend[j] = st.amplitude[j] * exp_minus_line(z, first)
     if flows.driven[s, e] > e:
         _add_driven_growth(
             flows.eigenvalue[s], flows.driven[s], flows.load[s], st.amplitude, scratch.gain, scratch.bend, tau
@@ -372,10 +401,9 @@ def _advance_motion(system, flows, st, scratch, tau):
         ):
             continue
         shift, speed = tau * (st.velocity[r] + 0.5 * st.free_acceleration[r] * tau), st.free_acceleration[r] * tau
-        for a in range(count):
-            j = st.awake[a]
-            shift += (flows.motion[s, r, j] * scratch.bend[a]).real
-            speed += (flows.velocity[s, r, j] * scratch.gain[a]).real
+        for j in range(count):
+            shift += (flows.motion[s, r, j] * scratch.bend[j]).real
+            speed += (flows.velocity[s, r, j] * scratch.gain[j]).real
         st.velocity[r] += speed
         if r < friction:
             st.ledger[FRICTION] -= st.applied_force[r] * shift
@@ -386,8 +414,11 @@ def _advance_motion(system, flows, st, scratch, tau):
     if st.counters[CLOSED_ROWS] > 0:
         _stay_together(system, st, scratch)
     measure_gaps(system, st)
-    for a in range(count):
-        st.amplitude[st.awake[a]] += scratch.gain[a]
+    for j in range(count):
+        gain = scratch.gain[j]
+        st.amplitude[j] += gain
+        st.change[2 * j] += gain.real
+        st.change[2 * j + 1] += gain.imag
     if tau > 0.0:
         for r in range(len(st.released)):
             st.released[r] = 0
@@ -412,8 +443,8 @@ def _add_contact_impulses(system, flows, st, scratch, tau):
     for r in range(system.friction_rows, len(st.state)):
         if st.state[r] == SPRUNG:
             st.contact_impulse[r] += st.constant_force[r] * tau
-            for a in range(st.counters[AWAKE]):
-                st.contact_impulse[r] += (flows.impulse[s, r, st.awake[a]] * scratch.gain[a]).real
+            for j in range(st.counters[AWAKE]):
+                st.contact_impulse[r] += (flows.impulse[s, r, j] * scratch.gain[j]).real
 
 
 @inlined
@@ -435,7 +466,7 @@ def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
     """
     n = len(st.constant)
     if order == POSITION and meaning == CLOSES and single_impact(system, st, rec, scratch, r):
-        _change_amplitudes(flows, st, scratch)
+        _change_amplitudes(system, flows, st, rec, scratch)
         return STATES_GO_ON
     keep_released(st, scratch)
     if order == POSITION and meaning != RECLOSES:
@@ -454,7 +485,7 @@ def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
         if not simultaneous_impacts(system, st, rec, scratch):
             return NO_SOLUTION
         if all_in_flight(system, st):
-            _change_amplitudes(flows, st, scratch)
+            _change_amplitudes(system, flows, st, rec, scratch)
             return STATES_GO_ON
         structure_state(flows, st, st.coordinates)
         _structure_jump(system, scratch)
@@ -476,14 +507,19 @@ def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
 
 
 @inlined
-def _change_amplitudes(flows, st, scratch):
+def _change_amplitudes(system, flows, st, rec, scratch):
     """Apply the impulses of the rows to the amplitudes, within the same subsystem."""
     s = st.counters[FLOW]
     for r in range(len(st.state)):
-        if scratch.impulse[r] != 0.0:
+        impulse = scratch.impulse[r]
+        if impulse != 0.0:
+            account_impact(system, flows, st, rec, r, impulse)
             for j in range(flows.driven[s, 0], flows.modes[s]):
-                st.amplitude[j] += flows.impulse_response[s, r, j] * scratch.impulse[r]
-    _select_awake_modes(flows, st)
+                jump = flows.impulse_response[s, r, j] * impulse
+                st.amplitude[j] += jump
+                st.change[2 * j] += jump.real
+                st.change[2 * j + 1] += jump.imag
+    _wake_modes(flows, st)
 
 
 @inlined

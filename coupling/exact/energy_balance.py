@@ -19,28 +19,20 @@ from vanedamp.coupling.numerics.codes import (
     WORK_MAP,
 )
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular
-from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.numerics.jit import inlined, kernel, summing
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, VISCOUS
 
 #: terms of the series for products with driven modes: the remainder is below 1e-16
 _TERMS = 11
 
-#: modal contributions below this fraction of the largest are neglected in the mean square
-_NEGLIGIBLE = 1e-9
-
 
 @inlined
 def account(system, flows, st, rec, scratch, tau):
-    """Add energy, harmonic, mean square, momentum and peak of the segment [0, tau], by closed-form integrals."""
-    s, period = st.counters[FLOW], st.counters[PERIOD]
-    constant = 0.0
-    for i in range(len(st.constant)):
-        constant += system.response[i] * st.constant[i]
-    felt = _gather_changes(flows, st, scratch, s)
-    _quadratic_forms(flows, st, rec, scratch, s, period, felt)
-    if flows.damped[s]:
-        _dashpot_loss(flows, st, scratch, s)
-    _linear_forms(system, flows, st, rec, scratch, s, period, tau, constant)
+    """Add what the segment [0, tau] has of its own: slow pairs of modes, parabolas of the bodies, the peak, samples."""
+    s, period, constant = st.counters[FLOW], st.counters[PERIOD], st.offset[0]
+    rec.square[period] += constant * constant * tau
+    if system.bodies > 0:
+        _free_bodies(system, flows, st, rec, scratch, s, period, tau)
     for i in range(flows.slow_count[s]):
         if flows.slow[s, i, 2] == CALM:
             rec.square[period] += _calm_square(flows, st, s, i, tau, constant)
@@ -52,146 +44,140 @@ def account(system, flows, st, rec, scratch, tau):
 
 
 @inlined
-def _gather_changes(flows, st, scratch, s):
-    """Set changes and sums of the awake amplitudes: the excitation, the modes that the response feels, the rest.
+def account_spell(system, flows, st, rec, scratch):
+    """Add energies, harmonic, mean square and momentum of the modes since the spell began, and begin the next one.
 
-    Returns the number of those that it feels, the excitation included.
+    A spell is a time in one subsystem and one period. Each integral is a form of the amplitudes at its end minus that
+    at its start, without the jumps of the form at impacts in between (`account_impact`). With c the amplitudes at the
+    start, c + d at the end, the difference of a quadratic form Q is d Q (2 c + d): it does not cancel.
     """
-    count, e, largest = st.counters[AWAKE], flows.driven.shape[1] - 1, 0.0
-    for a in range(count):
-        j = st.awake[a]
-        wave = flows.response[s, j] * st.amplitude[j]
-        scratch.wave[a] = wave
-        largest = max(largest, abs(wave.real) + abs(wave.imag))
-    felt, last = 0, count
-    for a in range(count):
-        wave = scratch.wave[a]
-        if a < e or abs(wave.real) + abs(wave.imag) > _NEGLIGIBLE * largest:
-            place = felt
-            felt += 1
-        else:
-            last -= 1
-            place = last
-        j = st.awake[a]
-        change = scratch.gain[a]
-        scratch.mode_order[place] = j
-        scratch.change[place] = change
-        scratch.total[place] = 2.0 * st.amplitude[j] + change
-    return felt
+    s, period, count, e = st.counters[FLOW], st.counters[PERIOD], st.counters[AWAKE], len(system.frequency)
+    change, total = st.change, scratch.total
+    for j in range(count):
+        total[2 * j] = 2.0 * st.amplitude[j].real - change[2 * j]
+        total[2 * j + 1] = 2.0 * st.amplitude[j].imag - change[2 * j + 1]
+    coupled = e if flows.uncoupled[s] else count
+    st.ledger[VISCOUS] += _quadratic_form(flows.loss[s], change, total, count, coupled)
+    rec.square[period] += _quadratic_form(flows.square[s], change, total, count, count)
+    if flows.damped[s]:
+        st.ledger[CONTACT] += _quadratic_form(flows.dashpot[s], change, total, count, count)
+    _linear_forms(system, flows, st, rec, scratch, s, period, count)
+    for i in range(2 * count):
+        change[i] = 0.0
+
+
+@summing
+def _quadratic_form(form, change, total, count, coupled):
+    """Return change Q total for `count` complex numbers by their real and imaginary parts.
+
+    Q (., .) is symmetric; numbers from `coupled` on are coupled to themselves and to those before.
+    """
+    result = 0.0
+    for j in range(count):
+        last = 2 * min(j, coupled)
+        row, other = form[2 * j], form[2 * j + 1]
+        dr, di, tr, ti = change[2 * j], change[2 * j + 1], total[2 * j], total[2 * j + 1]
+        on_total, on_change, other_total, other_change = 0.0, 0.0, 0.0, 0.0
+        for k in range(last):
+            on_total += row[k] * total[k]
+            on_change += row[k] * change[k]
+            other_total += other[k] * total[k]
+            other_change += other[k] * change[k]
+        at = 2 * j
+        on_total += row[at] * tr + row[at + 1] * ti
+        other_total += other[at] * tr + other[at + 1] * ti
+        result += (dr * on_total + di * other_total) + (tr * on_change + ti * other_change)
+    return result
 
 
 @inlined
-def _quadratic_forms(flows, st, rec, scratch, s, period, felt):
-    """Add viscous loss and squared response: quadratic forms at the segment's end minus those at its start.
-
-    With c the amplitudes at the start, c + d at the end, the difference is d Q (2 c + d): it does not cancel.
-    """
-    loss, square, e = 0.0, 0.0, flows.driven.shape[1] - 1
-    for a in range(st.counters[AWAKE]):
-        j = scratch.mode_order[a]
-        dr, di, tr, ti = scratch.change[a].real, scratch.change[a].imag, scratch.total[a].real, scratch.total[a].imag
-        form, other = flows.loss[s, j, j], flows.square[s, j, j]
-        loss += dr * (form[0] * tr + form[1] * ti) + di * (form[2] * tr + form[3] * ti)
-        square += dr * (other[0] * tr + other[1] * ti) + di * (other[2] * tr + other[3] * ti)
-        for b in range(a if a < felt or not flows.uncoupled[s] else e):
-            k = scratch.mode_order[b]
-            change, total = scratch.change[b], scratch.total[b]
-            er, ei, ur, ui = change.real, change.imag, total.real, total.imag
-            rr, ri, ir, ii = dr * ur + er * tr, dr * ui + ei * tr, di * ur + er * ti, di * ui + ei * ti
-            form, other = flows.loss[s, j, k], flows.square[s, j, k]
-            loss += form[0] * rr + form[1] * ri + (form[2] * ir + form[3] * ii)
-            square += other[0] * rr + other[1] * ri + (other[2] * ir + other[3] * ii)
-    st.ledger[VISCOUS] += loss
-    rec.square[period] += square
+def account_impact(system, flows, st, rec, r, impulse):
+    """Take the jump of all forms at an impulse on row r (N s) out of the spell, before the amplitudes jump."""
+    s, period, e = st.counters[FLOW], st.counters[PERIOD], len(system.frequency)
+    kick, maps, phase = flows.kick[s, r], flows.kick_maps[s, r], st.amplitude[0]
+    loss, square, contact = _kicks(kick, st.amplitude, flows.impulse_response[s, r], impulse, flows.modes[s])
+    st.ledger[VISCOUS] -= impulse * loss
+    st.ledger[CONTACT] -= impulse * contact
+    rec.square[period] -= impulse * (square + st.offset[0] * maps[MEAN_MAP // 2])
+    rec.harmonic[period] -= impulse * (phase.conjugate() * complex(maps[HARMONIC_MAP // 2], maps[HARMONIC_MAP // 2 + 1]))
+    rec.momentum[period] -= impulse * (phase.conjugate() * complex(maps[MOMENTUM_MAP // 2], maps[MOMENTUM_MAP // 2 + 1]))
+    for h in range(e):
+        phase = st.amplitude[h]
+        work = phase.real * maps[WORK_MAP // 2 + 2 * h] + phase.imag * maps[WORK_MAP // 2 + 2 * h + 1]
+        st.ledger[EXCITATION] -= impulse * work
 
 
-@kernel
-def _dashpot_loss(flows, st, scratch, s):
-    """Add the loss in the dashpots of closed contacts, a quadratic form like the viscous loss."""
-    loss = 0.0
-    for a in range(st.counters[AWAKE]):
-        j = scratch.mode_order[a]
-        dr, di, tr, ti = scratch.change[a].real, scratch.change[a].imag, scratch.total[a].real, scratch.total[a].imag
-        form = flows.dashpot[s, j, j]
-        loss += dr * (form[0] * tr + form[1] * ti) + di * (form[2] * tr + form[3] * ti)
-        for b in range(a):
-            k = scratch.mode_order[b]
-            change, total = scratch.change[b], scratch.total[b]
-            er, ei, ur, ui = change.real, change.imag, total.real, total.imag
-            rr, ri, ir, ii = dr * ur + er * tr, dr * ui + ei * tr, di * ur + er * ti, di * ui + ei * ti
-            form = flows.dashpot[s, j, k]
-            loss += form[0] * rr + form[1] * ri + (form[2] * ir + form[3] * ii)
-    st.ledger[CONTACT] += loss
+@summing
+def _kicks(kick, amplitude, response, impulse, count):
+    """Return the jumps of the three quadratic forms at an impulse, by its size."""
+    loss, square, contact = 0.0, 0.0, 0.0
+    for j in range(count):
+        tr = 2.0 * amplitude[j].real + impulse * response[j].real
+        ti = 2.0 * amplitude[j].imag + impulse * response[j].imag
+        loss += kick[0, 2 * j] * tr + kick[0, 2 * j + 1] * ti
+        square += kick[1, 2 * j] * tr + kick[1, 2 * j + 1] * ti
+        contact += kick[2, 2 * j] * tr + kick[2, 2 * j + 1] * ti
+    return loss, square, contact
 
 
 @inlined
-def _linear_forms(system, flows, st, rec, scratch, s, period, tau, constant):
+def _linear_forms(system, flows, st, rec, scratch, s, period, count):
     """Add harmonic, momentum, mean and work of the loads, by their linear maps of the amplitudes."""
-    work_r, work_i, harm_r, harm_i, mom_r, mom_i, mean, free = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    old_work_r, old_work_i, old_harm_r, old_harm_i, old_mom_r, old_mom_i = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for a in range(st.counters[AWAKE]):
-        j = scratch.mode_order[a]
-        dr, di, tr, ti = scratch.change[a].real, scratch.change[a].imag, scratch.total[a].real, scratch.total[a].imag
-        row, c = flows.linear[s, j], st.amplitude[j]
+    change, total = st.change, scratch.total
+    harm_r, harm_i, mom_r, mom_i, mean = 0.0, 0.0, 0.0, 0.0, 0.0
+    old_harm_r, old_harm_i, old_mom_r, old_mom_i = 0.0, 0.0, 0.0, 0.0
+    for j in range(count):
+        row, dr, di, tr, ti = flows.linear[s, j], change[2 * j], change[2 * j + 1], total[2 * j], total[2 * j + 1]
         harm_r += row[HARMONIC_MAP] * dr + row[HARMONIC_MAP + 1] * di
         harm_i += row[HARMONIC_MAP + 2] * dr + row[HARMONIC_MAP + 3] * di
         mom_r += row[MOMENTUM_MAP] * dr + row[MOMENTUM_MAP + 1] * di
         mom_i += row[MOMENTUM_MAP + 2] * dr + row[MOMENTUM_MAP + 3] * di
         mean += row[MEAN_MAP] * dr + row[MEAN_MAP + 1] * di
-        free += row[FREE_MOMENTUM_MAP] * c.real + row[FREE_MOMENTUM_MAP + 1] * c.imag
-        work_r += row[WORK_MAP] * dr + row[WORK_MAP + 1] * di
-        work_i += row[WORK_MAP + 2] * dr + row[WORK_MAP + 3] * di
         old_harm_r += row[HARMONIC_MAP] * tr + row[HARMONIC_MAP + 1] * ti
         old_harm_i += row[HARMONIC_MAP + 2] * tr + row[HARMONIC_MAP + 3] * ti
         old_mom_r += row[MOMENTUM_MAP] * tr + row[MOMENTUM_MAP + 1] * ti
         old_mom_i += row[MOMENTUM_MAP + 2] * tr + row[MOMENTUM_MAP + 3] * ti
-        old_work_r += row[WORK_MAP] * tr + row[WORK_MAP + 1] * ti
-        old_work_i += row[WORK_MAP + 2] * tr + row[WORK_MAP + 3] * ti
-    # mode 0: phase x + i y, with the sums and changes of both factors as in _quadratic_forms
-    change, total = scratch.change[0], scratch.total[0]
-    loads = total.real * work_r + total.imag * work_i + change.real * old_work_r + change.imag * old_work_i
-    harmonic = total.conjugate() * complex(harm_r, harm_i) + change.conjugate() * complex(old_harm_r, old_harm_i)
-    momentum = total.conjugate() * complex(mom_r, mom_i) + change.conjugate() * complex(old_mom_r, old_mom_i)
+    # mode 0: phase x + i y, with the sums and changes of both factors as in _quadratic_form
+    turned, both = complex(change[0], -change[1]), complex(total[0], -total[1])
+    harmonic = both * complex(harm_r, harm_i) + turned * complex(old_harm_r, old_harm_i)
+    momentum = both * complex(mom_r, mom_i) + turned * complex(old_mom_r, old_mom_i)
     # integral of exp(-i omega t)
-    flat = complex(0.0, 1.0 / system.omega) * change.conjugate()
-    st.ledger[EXCITATION] += 0.5 * loads
-    rec.harmonic[period] += 0.5 * harmonic + constant * flat
+    flat = complex(0.0, 1.0 / system.omega) * turned
+    rec.harmonic[period] += 0.5 * harmonic + st.offset[0] * flat
     rec.momentum[period] += 0.5 * momentum
-    rec.square[period] += constant * (mean + constant * tau)
-    for h in range(1, len(system.frequency)):
-        st.ledger[EXCITATION] += _work_of_harmonic(
-            flows.linear[s], st.counters[AWAKE], scratch.mode_order, scratch.change, scratch.total, h
-        )
-    if system.bodies > 0:
-        _free_bodies(system, flows, st, rec, scratch, s, period, tau, free)
-
-
-@kernel
-def _work_of_harmonic(linear, count, order, changes, totals, h):
-    """Return the work of the loads of harmonic h on the modes, as _linear_forms adds that of the first."""
-    on_x, on_y, old_x, old_y = 0.0, 0.0, 0.0, 0.0
-    for a in range(count):
-        row = linear[order[a], WORK_MAP + 4 * h : WORK_MAP + 4 * (h + 1)]
-        dr, di, tr, ti = changes[a].real, changes[a].imag, totals[a].real, totals[a].imag
-        on_x += row[0] * dr + row[1] * di
-        on_y += row[2] * dr + row[3] * di
-        old_x += row[0] * tr + row[1] * ti
-        old_y += row[2] * tr + row[3] * ti
-    change, total = changes[h], totals[h]
-    return 0.5 * (total.real * on_x + total.imag * on_y + change.real * old_x + change.imag * old_y)
+    rec.square[period] += st.offset[0] * mean
+    for h in range(len(system.frequency)):
+        st.ledger[EXCITATION] += _work_of_harmonic(flows.linear[s], change, total, count, h)
 
 
 @inlined
-def _free_bodies(system, flows, st, rec, scratch, s, period, tau, waves):
+def _work_of_harmonic(linear, change, total, count, h):
+    """Return the work of the loads of harmonic h on the modes."""
+    on_x, on_y, old_x, old_y, first = 0.0, 0.0, 0.0, 0.0, WORK_MAP + 4 * h
+    for j in range(count):
+        row, dr, di, tr, ti = linear[j], change[2 * j], change[2 * j + 1], total[2 * j], total[2 * j + 1]
+        on_x += row[first] * dr + row[first + 1] * di
+        on_y += row[first + 2] * dr + row[first + 3] * di
+        old_x += row[first] * tr + row[first + 1] * ti
+        old_y += row[first + 2] * tr + row[first + 3] * ti
+    x, y = 2 * h, 2 * h + 1
+    return 0.5 * (total[x] * on_x + total[y] * on_y + change[x] * old_x + change[y] * old_y)
+
+
+@inlined
+def _free_bodies(system, flows, st, rec, scratch, s, period, tau):
     """Add momentum and work of the polynomial part of the bodies' motion."""
-    n, speed, drift = system.modes, -waves, 0.0
+    n, speed, drift = system.modes, 0.0, 0.0
+    for j in range(st.counters[AWAKE]):
+        row, c = flows.linear[s, j], st.amplitude[j]
+        speed -= row[FREE_MOMENTUM_MAP] * c.real + row[FREE_MOMENTUM_MAP + 1] * c.imag
     for b in range(system.bodies):
         drift += system.mass[n + b] * st.coordinate_acceleration[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
             speed += system.mass[n + b] * st.velocity[b]
     for h in range(len(system.frequency)):
         rate = system.frequency[h]
-        flat = complex(0.0, 1.0 / rate) * scratch.change[h].conjugate()
+        flat = complex(0.0, 1.0 / rate) * scratch.gain[h].conjugate()
         momentum = speed * flat
         if drift != 0.0:
             # integral of t exp(-i omega t) = ((z - 1) (e^z - 1) + z)/(i omega)^2, z = -i omega tau
@@ -215,8 +201,7 @@ def _work_on_bodies(system, flows, st, scratch, s, h, tau, flat):
         drift += load * st.coordinate_acceleration[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
             own = st.velocity[b]
-            for a in range(st.counters[AWAKE]):
-                j = st.awake[a]
+            for j in range(st.counters[AWAKE]):
                 own -= (flows.velocity[s, b, j] * st.amplitude[j]).real
             speed += load * own
     # integral of t exp(-i omega t), as in _free_bodies
@@ -333,8 +318,7 @@ def _sample(system, flows, st, rec, s, tau, constant):
             p[k] = st.constant[k]
         for r in range(system.bodies):
             entry[1 + r] = st.displacement[r] + t * (st.velocity[r] + 0.5 * st.free_acceleration[r] * t)
-        for a in range(st.counters[AWAKE]):
-            j = st.awake[a]
+        for j in range(st.counters[AWAKE]):
             z = flows.eigenvalue[s, j] * t
             first = exp_minus_one(z)
             line = exp_minus_line(z, first)

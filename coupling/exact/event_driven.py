@@ -120,7 +120,7 @@ class EngineRun:
         if self.ended:
             return None
         state, s, n = self.state, int(self.state.counters[FLOW]), self.system.modes
-        awake = state.awake[: state.counters[AWAKE]]
+        awake = slice(state.counters[AWAKE])
         y = (self.flows.shape[s][:, awake] @ state.amplitude[awake]).real
         y[: len(state.constant)] += state.constant
         return InitialMotion(y[:n], y[n:], state.displacement, state.velocity)

@@ -54,7 +54,7 @@ def next_event(system, flows, st, watched):
     driven = _is_driven(flows, s)
     left = max(system.period - st.time[0], 0.0)
     shortest = RESOLUTION * system.period
-    eigenvalue, awake = flows.eigenvalue[s], st.awake[: st.counters[AWAKE]]
+    eigenvalue, awake = flows.eigenvalue[s], st.counters[AWAKE]
     count = _list_functions(system, flows, st, watched, s)
     st.counters[SEGMENTS] += 1
     while True:
@@ -169,8 +169,7 @@ def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, k):
         value, slope, watched.k2[k] = sign * st.velocity[r], sign * st.free_acceleration[r], 0.0
         watched.k0[k], watched.k1[k] = value, slope
     bound, curvature = 0.0, watched.k2[k]
-    for a in range(st.counters[AWAKE]):
-        j = st.awake[a]
+    for j in range(st.counters[AWAKE]):
         rate, g = flows.eigenvalue[s, j], flows.velocity[s, r, j] if order == VELOCITY else flows.motion[s, r, j]
         g *= sign * st.amplitude[j]
         once = rate * g
@@ -251,8 +250,7 @@ def _begin_function(st, watched, r, order, meaning, value, slope, bound, k):
 def _skip_root_at_start(system, flows, st, watched, s, r, order, sign, k):
     """Set the first safe step of a row whose force was at its bound: at rest without acceleration, its jerk decides."""
     jerk, snap = 0.0, 0.0
-    for a in range(st.counters[AWAKE]):
-        j = st.awake[a]
+    for j in range(st.counters[AWAKE]):
         rate, g = flows.eigenvalue[s, j], sign * flows.motion[s, r, j] * st.amplitude[j]
         square = rate.real * rate.real + rate.imag * rate.imag
         second = g * rate * rate
@@ -274,8 +272,7 @@ def hop_speed(system, flows, st, r):
     """Return the speed (m/s) with which a contact at rest would leave for a flight of CHATTER, from its force now."""
     s = st.counters[FLOW]
     force = st.constant_force[r]
-    for a in range(st.counters[AWAKE]):
-        j = st.awake[a]
+    for j in range(st.counters[AWAKE]):
         force += (flows.force[s, r, j] * st.amplitude[j]).real
     return max(0.0, force) * system.delassus[r, r] * 0.5 * CHATTER * system.period
 
@@ -287,8 +284,7 @@ def _add_reclosing(system, flows, st, watched, s, r, k):
     watched.row[k], watched.order[k], watched.meaning[k] = r, POSITION, RECLOSES
     watched.status[k], watched.no_root_before[k] = BOUNDED, 0.0
     acceleration = st.free_acceleration[r]
-    for a in range(st.counters[AWAKE]):
-        j = st.awake[a]
+    for j in range(st.counters[AWAKE]):
         velocity = flows.velocity[s, r, j] * st.amplitude[j]
         watched.g[k, j] = spring * flows.motion[s, r, j] * st.amplitude[j] + dashpot * velocity
         acceleration += (flows.eigenvalue[s, j] * velocity).real
@@ -310,8 +306,7 @@ def _add_force_bound(system, flows, st, watched, s, r, side, limit, k):
     """Add the distance of a closed row's force from its low (AT_LOW) or high (AT_HIGH) bound, unless it stays away."""
     sign = 1.0 if side == AT_LOW else -1.0
     constant, swing, value, slope, bound = sign * st.constant_force[r] + limit, 0.0, 0.0, 0.0, 0.0
-    for a in range(st.counters[AWAKE]):
-        j = st.awake[a]
+    for j in range(st.counters[AWAKE]):
         rate, g = flows.eigenvalue[s, j], sign * flows.force[s, r, j] * st.amplitude[j]
         watched.g[k, j] = g
         size = math.sqrt(g.real * g.real + g.imag * g.imag)
@@ -334,8 +329,7 @@ def _add_force_bound(system, flows, st, watched, s, r, side, limit, k):
     if _is_driven(flows, s):
         watched.no_root_before[k] = min(watched.no_root_before[k], 2.0 * system.period)  # as far as the bounds hold
     if st.released[r] == -side:
-        for a in range(st.counters[AWAKE]):
-            j = st.awake[a]
+        for j in range(st.counters[AWAKE]):
             rate = flows.eigenvalue[s, j]
             second = watched.g[k, j] * rate * rate
             curvature += second.real

@@ -20,18 +20,17 @@ def highest(system, flows, st, scratch, s, tau, constant, peak):
     fourth, size = 0.0, abs(constant)
     x0, v0, x1, v1 = constant, 0.0, constant, 0.0
     count = st.counters[AWAKE]
-    for a in range(count):
-        j = st.awake[a]
+    for j in range(count):
         rate = flows.eigenvalue[s, j]
         wave = flows.response[s, j] * st.amplitude[j]
-        scratch.wave[a], scratch.rate[a] = wave, rate
+        scratch.wave[j], scratch.rate[j] = wave, rate
         square = rate.real * rate.real + rate.imag * rate.imag
         part = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
         fourth += part * square * square
         size += part
         x0 += wave.real
         v0 += rate.real * wave.real - rate.imag * wave.imag
-        wave += flows.response[s, j] * scratch.gain[a]
+        wave += flows.response[s, j] * scratch.gain[j]
         x1 += wave.real
         v1 += rate.real * wave.real - rate.imag * wave.imag
     e = flows.driven.shape[1] - 1
@@ -49,13 +48,13 @@ def highest(system, flows, st, scratch, s, tau, constant, peak):
     h = 0.125 * system.period
     if fourth * min(h, tau) ** 4 <= 0.384 * size:
         pieces = math.ceil(tau / h)
-        for a in range(count):
-            scratch.step_factor[a] = flows.eighth_factor[s, st.awake[a]]
+        for j in range(count):
+            scratch.step_factor[j] = flows.eighth_factor[s, j]
     else:
         pieces = min(math.ceil(tau * math.sqrt(math.sqrt(fourth / (0.384 * size)))), 4096)
         h = tau / pieces
-        for a in range(count):
-            scratch.step_factor[a] = exp_minus_one(scratch.rate[a] * h) + 1.0
+        for j in range(count):
+            scratch.step_factor[j] = exp_minus_one(scratch.rate[j] * h) + 1.0
     return _search_grid(
         scratch.rate[:count], scratch.wave, scratch.step_factor, flows.driven[s], scratch.drive, scratch.growth,
         constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak,

@@ -83,7 +83,7 @@ def first_root_of_parabola(f, slope, curvature):
 
 
 @inlined
-def expand(order, k0, k1, k2, g, eigenvalue, awake, t, lower):
+def expand(order, k0, k1, k2, g, eigenvalue, count, t, lower):
     """Set the lower polynomials (2, DEGREE + 1) of an event function from time t on, by powers of the time since.
 
     The first is that of all modes; in the second, those much faster than the first mode count as if they were at their
@@ -106,8 +106,7 @@ def expand(order, k0, k1, k2, g, eigenvalue, awake, t, lower):
     elif order == VELOCITY:
         value += k1 * t
         noise += abs(k1 * t)
-    for i in range(len(awake)):
-        j = awake[i]
+    for j in range(count):
         rate, amplitude = eigenvalue[j], g[j]
         x, y, u, v = rate.real, rate.imag, amplitude.real, amplitude.imag
         if t > 0.0:

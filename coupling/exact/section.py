@@ -29,6 +29,5 @@ def structure_state(flows, st, y):
     s, n = st.counters[FLOW], len(st.constant)
     for i in range(2 * n):
         y[i] = st.constant[i] if i < n else 0.0
-        for a in range(st.counters[AWAKE]):
-            j = st.awake[a]
+        for j in range(st.counters[AWAKE]):
             y[i] += (flows.shape[s, i, j] * st.amplitude[j]).real

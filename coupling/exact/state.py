@@ -24,7 +24,9 @@ class State(NamedTuple):
     # changes in every segment
     counters: np.ndarray  # (COUNTERS,) int
     time: np.ndarray  # (1,) within the period, s
-    amplitude: np.ndarray  # (m,) complex modal amplitudes; the first e are the phases of the excitation's harmonics
+    amplitude: np.ndarray  # (m,) complex modal amplitudes; the first e are the phases of the excitation's harmonics, the
+    # first counters[AWAKE] are awake, the others zero
+    change: np.ndarray  # (2m,) real and imaginary parts of their changes since the spell began (exact.energy_balance)
     displacement: np.ndarray  # (r,) of each row, m; of a friction row's spring: its elongation
     low_word: np.ndarray  # (r,) of slips, sums of two doubles: the part beyond the last digit of `displacement`, m
     velocity: np.ndarray  # (r,) of each row, m/s
@@ -32,7 +34,6 @@ class State(NamedTuple):
     ledger: np.ndarray  # (6,) energies since the start, J
 
     # changes at impacts and at the start of a period
-    awake: np.ndarray  # (m,) int: the first counters[AWAKE] are the places of the modes that are awake
     largest_speed: np.ndarray  # (1,) bound of the speeds in the structure, m/s: round-off of a speed is relative to it
     last_impact: np.ndarray  # (r,) time of the last impact, counted from the period's start, s
 
@@ -47,6 +48,7 @@ class State(NamedTuple):
     # set when a subsystem begins
     coordinates: np.ndarray  # (2n,) p and p' of the structure at that time
     constant: np.ndarray  # (n,) constant part of p
+    offset: np.ndarray  # (1,) that of the response, m
     slip_constant: np.ndarray  # (b,) constant part of the displacements of bodies on springs, m
     constant_force: np.ndarray  # (r,) constant part of a closed row's force, N
     free_acceleration: np.ndarray  # (r,) constant acceleration of each row by its free bodies, m/s^2
@@ -86,9 +88,7 @@ class Scratch(NamedTuple):
     bend: np.ndarray  # (m,) the same less its tangent, for displacements
 
     # a segment: energy balance and peak
-    mode_order: np.ndarray  # (m,) int: places of the awake modes, those first that the response feels
-    change: np.ndarray  # (m,) changes of the amplitudes, in that order
-    total: np.ndarray  # (m,) sums of the amplitudes at both ends, in that order
+    total: np.ndarray  # (2m,) sums of the amplitudes at both ends of a spell
     wave: np.ndarray  # (m,) share of each awake mode in the response
     rate: np.ndarray  # (m,) its eigenvalue, 1/s
     step_factor: np.ndarray  # (m,) exp(rate t) for one step of a grid
@@ -129,12 +129,12 @@ def new_state(system: System, modes: int, initial: InitialMotion) -> State:
         counters=np.zeros(COUNTERS, np.int64),
         time=np.zeros(1),
         amplitude=np.zeros(modes, complex),
+        change=np.zeros(2 * modes),
         displacement=np.array(initial.displacement),
         low_word=np.zeros(r),
         velocity=np.array(initial.velocity),
         contact_impulse=np.zeros(r),
         ledger=np.zeros(len(ENERGIES)),
-        awake=np.zeros(modes, np.int64),
         largest_speed=np.zeros(1),
         last_impact=np.full(r, -np.inf),
         state=np.where(np.arange(r) < system.friction_rows, COAST, OPEN),
@@ -144,6 +144,7 @@ def new_state(system: System, modes: int, initial: InitialMotion) -> State:
         capture_speed=np.zeros(r),
         coordinates=np.r_[initial.p, initial.p_rate],
         constant=np.zeros(n),
+        offset=np.zeros(1),
         slip_constant=np.zeros(b),
         constant_force=np.zeros(r),
         free_acceleration=np.zeros(r),
@@ -178,9 +179,7 @@ def new_scratch(system: System, modes: int) -> Scratch:
     return Scratch(
         gain=np.zeros(modes, complex),
         bend=np.zeros(modes, complex),
-        mode_order=np.zeros(modes, np.int64),
-        change=np.zeros(modes, complex),
-        total=np.zeros(modes, complex),
+        total=np.zeros(2 * modes),
         wave=np.zeros(modes, complex),
         rate=np.zeros(modes, complex),
         step_factor=np.zeros(modes, complex),

@@ -93,9 +93,11 @@ class Flows(NamedTuple):
     # the form at its start. Where the rate by which a product of two modes changes vanishes beside the frequency, the
     # form would cancel: such pairs are left out of the forms, and listed.
     linear: np.ndarray  # (s, m, WORK_MAP + 4 e): linear maps, by the columns of numerics.codes
-    loss: np.ndarray  # (s, m, m, 4): viscous loss of two modes, by their real and imaginary parts
-    dashpot: np.ndarray  # (s, m, m, 4): loss in the dashpots of contacts
-    square: np.ndarray  # (s, m, m, 4): squared response of two modes
+    loss: np.ndarray  # (s, 2m, 2m): viscous loss of two modes, by their real and imaginary parts in turns
+    dashpot: np.ndarray  # (s, 2m, 2m): loss in the dashpots of contacts
+    square: np.ndarray  # (s, 2m, 2m): squared response of two modes
+    kick: np.ndarray  # (s, r, 3, 2m): loss, square and dashpot of each mode and the change by a unit impulse on a row
+    kick_maps: np.ndarray  # (s, r, WORK_MAP/2 + 2 e): linear maps of that change
     damped: np.ndarray  # (s,) whether contacts with dashpots are closed
     uncoupled: np.ndarray  # (s,) whether damping couples no two free modes
     slow_count: np.ndarray  # (s,) number of entries in these lists
@@ -139,9 +141,11 @@ def empty_flows(system: System, capacity: int = 4) -> Flows:
         acceleration=np.zeros((s, m)),
         eighth_factor=np.zeros((s, m), complex),
         linear=np.zeros((s, m, WORK_MAP + 4 * e)),
-        loss=np.zeros((s, m, m, 4)),
-        dashpot=np.zeros((s, m, m, 4)),
-        square=np.zeros((s, m, m, 4)),
+        loss=np.zeros((s, 2 * m, 2 * m)),
+        dashpot=np.zeros((s, 2 * m, 2 * m)),
+        square=np.zeros((s, 2 * m, 2 * m)),
+        kick=np.zeros((s, r, 3, 2 * m)),
+        kick_maps=np.zeros((s, r, WORK_MAP // 2 + 2 * e)),
         damped=np.zeros(s, np.bool_),
         uncoupled=np.zeros(s, np.bool_),
         slow_count=np.zeros(s, np.int64),
@@ -246,7 +250,7 @@ def _fill(flows: Flows, system: System, s: int, subsystem: Subsystem) -> None:
     lift, drop, loads, free = subsystem.lift, subsystem.drop, subsystem.loads, subsystem.free
     damping, stiffness = subsystem.real.damping, np.diag(subsystem.real.frequency**2)
     modes, harmonic, driver, growth = _excite(system, damping, stiffness, loads @ system.load.T, subsystem.modes)
-    eigenvalue, shape, project = _one_of_each_pair(*modes)
+    eigenvalue, shape, project = _in_order(*_one_of_each_pair(*modes), len(driver))
     shape, project = np.kron(np.eye(2), lift) @ shape, project @ np.kron(np.eye(2), drop)
     felt = np.abs(np.vstack([functional, system.of_structure.response]))
     carried = np.abs(carrier).max(axis=0, initial=0.0)
@@ -438,7 +442,7 @@ def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: n
     for form, product in zip(forms[0], products, strict=True):
         for kind, other in ((SUM, load), (DIFFERENCE, load.conj())):
             product[kind], integral[kind] = _antiderivatives(product[kind], reciprocal[kind], load, other)
-        form[s, :m, :m] = _real_form(*integral)
+        form[s, : 2 * m, : 2 * m] = _real_form(*integral)
     flows.damped[s] = system.dashpot[sprung].any()
     flows.uncoupled[s] = system.proportional and not flows.closed_inverse[s].any() and not sprung.any() and m == n + e
     # calm modes hardly change over a period. They swing far out where they are quick to cross: the square of their sum
@@ -458,6 +462,17 @@ def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: n
     listed += [(j, 0, CALM, -1) for j in np.flatnonzero(calm)]
     flows.slow[s, : len(listed)] = np.array(listed).reshape(-1, 4)
     flows.slow_count[s] = len(listed)
+    _fill_kicks(flows, s)
+
+
+def _fill_kicks(flows: Flows, s: int) -> None:
+    """Set what a unit impulse on each row changes in the forms."""
+    m = flows.modes[s]
+    change = flows.impulse_response[s, :, :m].view(float)
+    for place, form in enumerate((flows.loss, flows.square, flows.dashpot)):
+        flows.kick[s, :, place, : 2 * m] = change @ form[s, : 2 * m, : 2 * m]
+    maps = flows.linear[s, :m].reshape(m, -1, 2)
+    flows.kick_maps[s] = change @ maps.swapaxes(1, 2).reshape(2 * m, -1)
 
 
 def _reciprocal(rate: np.ndarray, period: float, together: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -495,8 +510,10 @@ def _real_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _real_form(both: np.ndarray, mixed: np.ndarray) -> np.ndarray:
-    """Return coefficients (m, m, 4) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts."""
-    return 0.5 * _real_map(both, mixed) * [1, 1, -1, -1]
+    """Return the matrix (2m, 2m) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts in turns."""
+    m = len(both)
+    form = 0.5 * _real_map(both, mixed) * [1, 1, -1, -1]
+    return form.reshape(m, m, 2, 2).swapaxes(1, 2).reshape(2 * m, 2 * m)
 
 
 def _attachment(system: System, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -607,3 +624,11 @@ def _one_of_each_pair(
     """Return the upper one of each conjugate pair, with twice its vector: displacement = Re(vector c)."""
     keep = values.imag >= 0
     return values[keep], vectors[:, keep] * np.where(values.imag > 0, 2.0, 1.0)[keep], inverse[keep]
+
+
+def _in_order(
+    values: np.ndarray, vectors: np.ndarray, inverse: np.ndarray, driven: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return modes in order of their rates, behind the driven ones: quick ones decay first and sleep at the end."""
+    order = np.r_[:driven, driven + np.argsort(np.abs(values[driven:]), kind="stable")]
+    return values[order], vectors[:, order], inverse[order]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,10 @@ from vanedamp.files.errors import VanedampError
 ZERO = np.int64(0)
 
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
-_MARKS = ("@entry", "@kernel", "@inlined", "@intrinsic", "(NamedTuple)")
+_MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@intrinsic", "(NamedTuple)")
 _PACKAGE = Path(__file__).parents[2]
+# a product and a sum may be one instruction
+_CONTRACT = frozenset({"contract"})
 
 
 class CacheError(VanedampError):
@@ -52,9 +54,16 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _compile(function, no_cfunc_wrapper=True, no_cpython_wrapper=True, forceinline=True)
 
 
-def _compile(function: Callable[..., Any], **options: bool) -> Any:
+def summing(function: Callable[..., Any]) -> Any:
+    """Compile a function of the engine into its callers whose sums may be taken in any order, several terms at once."""
+    return _compile(
+        function, {"contract", "reassoc"}, no_cfunc_wrapper=True, no_cpython_wrapper=True, forceinline=True
+    )
+
+
+def _compile(function: Callable[..., Any], fastmath: Set[str] = _CONTRACT, **options: bool) -> Any:
     try:
-        compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)  # type: ignore[call-overload]
+        compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath=fastmath, **options)(function)  # type: ignore[call-overload]
     except RuntimeError as error:  # numba has found no folder that it can write to
         folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
         raise CacheError(

@@ -84,7 +84,7 @@ def begin(system, st, rec, log, work):
 
 
 @entry
-def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_events):
+def advance(system, flows, st, guards, rec, log, work, periods, max_events):
     """Advance to the end of `periods`. Returns a code."""
     while st.counters[PERIOD] < periods:
         if st.counters[FLOW] < 0:
@@ -116,7 +116,7 @@ def advance(system, flows, st, guards, rec, log, work, all_modes, periods, max_e
             return LOG_FULL
         if st.counters[PERIOD] == 0 and st.time[0] == 0.0:
             record_section(system, st, rec, _spring_energy(system, st))
-        tau, who = next_event(system, flows, st, guards, all_modes)
+        tau, who = next_event(system, flows, st, guards)
         if tau > 0.0:
             add_up(system, flows, st, rec, work, tau)
             _sample(system, flows, st, rec, work, tau)

@@ -42,7 +42,7 @@ _GROWN = 20.0
 
 
 @inlined
-def next_event(system, flows, st, guards, all_modes):
+def next_event(system, flows, st, guards):
     """Time to the next event and its function, to the period's end and -1, or to a time without an event and -2.
 
     The last where modes grow so much until the period's end that bounds for all of it say nothing.
@@ -52,7 +52,7 @@ def next_event(system, flows, st, guards, all_modes):
     if flows.growth[s] * left > _GROWN:
         left, last = 1.0 / flows.growth[s], -2
     shortest = RESOLUTION * system.period
-    eigenvalue, awake = flows.eigenvalue[s], all_modes[: flows.modes[s]]
+    eigenvalue, modes = flows.eigenvalue[s], flows.modes[s]
     grows = math.exp(flows.growth[s] * left)
     count = _watch(system, flows, st, guards, s, grows)
     st.counters[SEGMENTS] += 1
@@ -70,7 +70,7 @@ def next_event(system, flows, st, guards, all_modes):
         else:
             st.counters[EVALUATIONS] += 1
         noise, second, calm = expand(
-            guards.order[k], guards.k0[k], guards.k1[k], guards.k2[k], guards.g[k], eigenvalue, awake, tau,
+            guards.order[k], guards.k0[k], guards.k1[k], guards.k2[k], guards.g[k], eigenvalue, modes, tau,
             guards.lower,
         )  # fmt: skip
         if grows > 1.0:  # bounds of the derivatives hold for motions that decay

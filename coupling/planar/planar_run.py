@@ -59,7 +59,6 @@ class PlanarRun:
         self.linearisation = linearisation
         self.flows = empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
-        self.all_modes = np.arange(modes)
         self.state, self.guards = new_state(system, modes, initial, records), new_guards(system, modes)
         self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), LOG_WIDTH))
         self.chunks: list[np.ndarray] = []
@@ -75,8 +74,8 @@ class PlanarRun:
                 return Status.UNDECIDED
         while True:
             code = advance(
-                self.system, self.flows, self.state, self.guards, self.records, self.log, self.scratch,
-                self.all_modes, periods, self.max_events,
+                self.system, self.flows, self.state, self.guards, self.records, self.log, self.scratch, periods,
+                self.max_events,
             )  # fmt: skip
             if self.keep and counters[LOGGED]:
                 self.chunks.append(self.log[: counters[LOGGED]].copy())

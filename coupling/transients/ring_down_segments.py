@@ -74,10 +74,10 @@ class SliderSegment(Segment):
 
     def __init__(self, run: EngineRun, mode: int) -> None:
         st, flows, system, s = run.state, run.flows, run.system, int(run.state.counters[FLOW])
-        awake = st.awake[: int(st.counters[AWAKE])].copy()
+        awake = slice(int(st.counters[AWAKE]))
         n = system.modes
-        self._system, self.rate, self._amplitude = system, flows.eigenvalue[s, awake], st.amplitude[awake]
-        self._shape, self._motion = flows.shape[s][:n, awake], flows.motion[s][:, awake]
+        self._system, self.rate, self._amplitude = system, flows.eigenvalue[s, awake].copy(), st.amplitude[awake].copy()
+        self._shape, self._motion = flows.shape[s][:n, awake].copy(), flows.motion[s][:, awake].copy()
         y = (flows.shape[s][:, awake] @ self._amplitude).real
         self._p, self._p_rate = st.constant + y[:n], y[n:]
         self.wave = self._shape[mode] * self._amplitude

@@ -200,7 +200,7 @@ class Stepper:
     def segment(self) -> Segment:
         """The segment that begins now."""
         run, state = self.run, self.run.state
-        s, awake = state.counters[FLOW], state.awake[: state.counters[AWAKE]]
+        s, awake = state.counters[FLOW], np.arange(state.counters[AWAKE])
         flows, n = run.flows, len(state.constant)
         return Segment(
             system=run.system, begun=float(state.counters[PERIOD] * run.system.period + state.time[0]),
