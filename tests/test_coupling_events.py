@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from vanedamp.coupling.exact.event_functions import advance_or_stop
+from vanedamp.coupling.exact.event_functions import step_or_stop
 from vanedamp.coupling.exact.root_search import DEGREE, expand
 from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
@@ -15,8 +15,8 @@ def search(order, k0, k1, k2, g, eigenvalue, end):
     """First root in (0, end), or inf: the engine's loop for one event function."""
     t, steps, a = 0.0, 0, np.zeros((2, DEGREE + 1))
     while t < end:
-        noise, second, calm = expand(order, k0, k1, k2, g, eigenvalue, len(g), t, a)
-        step, found = advance_or_stop(a, noise, second, calm, end - t, 1e-15 * end)
+        noise, second, calm, fast = expand(order, k1, k2, g, eigenvalue, len(g), t, a)
+        step, found = step_or_stop(a, 1.0, k0, noise, second, calm, fast, end - t, 1e-15 * end)
         t += step
         if found:
             return t, steps

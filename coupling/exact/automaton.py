@@ -103,12 +103,12 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
             return EVENT_BUDGET
         if st.counters[LOGGED] + 2 * len(system.delassus) >= len(rec.log):
             return LOG_FULL
-        tau, event = next_event(system, flows, st, watched)
+        tau, event, side = next_event(system, flows, st, watched)
         amplitude_changes(flows, st, scratch, tau)
         account(system, flows, st, rec, scratch, tau)
         _advance_motion(system, flows, st, scratch, tau)
         if event < 0:
-            carry_over_period(st, watched, tau)
+            carry_over_period(system, st, watched, tau)
             account_spell(system, flows, st, rec, scratch)
             st.counters[PERIOD] += 1
             st.time[0] = 0.0
@@ -123,8 +123,9 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
         st.time[0] += tau
         _set_phases(system, st)
         outcome = _handle_event(
-            system, flows, st, rec, scratch, watched.row[event], watched.order[event], watched.meaning[event]
-        )
+            system, flows, st, rec, scratch, watched.row[event, side], watched.order[event],
+            watched.meaning[event, side],
+        )  # fmt: skip
         if outcome == NO_SOLUTION:
             return UNDECIDED
         deciding = outcome == STATES_OPEN

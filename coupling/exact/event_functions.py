@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.root_search import add_secular, expand, first_root_of_parabola, safe_step
+from vanedamp.coupling.exact.root_search import ROUND_OFF, add_secular, expand, first_root_of_parabola, safe_step
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
@@ -42,11 +42,13 @@ ADHESION = 1e-13
 #: Relative displacement and speed are zero at its end either way: the structure's motion is changed by the order of
 #: (2 pi CHATTER)^3 of it
 CHATTER = 3e-7
+#: in periods: what is known without a root at a period's start is left out from here on, at the price of exponentials
+_AHEAD = 0.02
 
 
 @inlined
 def next_event(system, flows, st, watched):
-    """Return the time to the next event and its event function, or to the period's end and -1.
+    """Return the time to the next event, its event function and its side, or to the period's end and -1.
 
     Results beyond the period's end are kept for the next segment (`carry_over_period`).
     """
@@ -54,74 +56,93 @@ def next_event(system, flows, st, watched):
     driven = _is_driven(flows, s)
     left = max(system.period - st.time[0], 0.0)
     shortest = RESOLUTION * system.period
-    eigenvalue, awake = flows.eigenvalue[s], st.counters[AWAKE]
     count = _list_functions(system, flows, st, watched, s)
     st.counters[SEGMENTS] += 1
     while True:
-        k, tau = -1, left
+        k, tau, longest = -1, left, system.period
         for i in range(count):
-            if watched.no_root_before[i] < tau:
-                k, tau = i, watched.no_root_before[i]
+            first = watched.no_root_before[i]
+            if first < tau:
+                k, tau = i, first
+            if watched.status[i] == ROOT:
+                longest = min(longest, first)
         if k < 0:
             st.counters[CARRIED] = count
-            return left, -1
+            return left, -1, 0
         if watched.status[k] == ROOT:
             st.counters[CARRIED] = 0
             # a root that a double cannot separate from the segment's start is at its start
-            return (tau if tau > shortest else 0.0), k
+            return (tau if tau > shortest else 0.0), k, watched.side[k]
         if watched.status[k] == BOUNDED:
             tau = 0.0  # where exponentials cost nothing
         else:
             st.counters[EVALUATIONS] += 1
-        noise, second, calm = expand(
-            watched.order[k], watched.k0[k], watched.k1[k], watched.k2[k], watched.g[k], eigenvalue, awake, tau,
-            watched.lower,
+        noise, second, calm, fast = expand(
+            watched.order[k], watched.k1[k], watched.k2[k], watched.g[k], flows.eigenvalue[s], st.counters[AWAKE], tau,
+            watched.taylor,
         )  # fmt: skip
         if driven:
             more, bound = add_secular(
-                watched.order[k], watched.drive[k], flows.driven[s], eigenvalue, tau, system.period, watched.lower
-            )
+                watched.order[k], watched.drive[k], flows.driven[s], flows.eigenvalue[s], tau, system.period,
+                watched.taylor,
+            )  # fmt: skip
             noise, second = noise + more, second + bound
             calm = calm + bound if calm >= 0.0 else calm
-        step, found = advance_or_stop(
-            watched.lower, max(noise, watched.noise[k]), second, calm, system.period, shortest
-        )
+        longest = max(longest - tau, shortest)
+        # the side that the motion approaches first: the other one is looked at until then
+        side = 1 if watched.sides[k] == 2 and watched.taylor[0, 1] > 0.0 else 0
+        step, found = step_or_stop(
+            watched.taylor, 1.0 - 2.0 * side, watched.k0[k, side], max(noise, watched.noise[k]), second, calm, fast,
+            longest, shortest,
+        )  # fmt: skip
+        if watched.sides[k] == 2:
+            other, root = step_or_stop(
+                watched.taylor, 2.0 * side - 1.0, watched.k0[k, 1 - side], max(noise, watched.noise[k]), second, calm,
+                fast, step, shortest,
+            )  # fmt: skip
+            if other < step:
+                step, found, side = other, root, 1 - side
+        watched.side[k] = side
         watched.status[k] = ROOT if found else EXPANDED
         watched.no_root_before[k] = tau + step if found else max(watched.no_root_before[k], tau + step)
 
 
 @inlined
-def carry_over_period(st, watched, tau):
+def carry_over_period(system, st, watched, tau):
     """Keep the results on the event functions over the end of a period, tau from the segment's start."""
     for k in range(st.counters[CARRIED]):
-        watched.no_root_before[k] = max(watched.no_root_before[k] - tau, 0.0)
-        if watched.status[k] == EXPANDED:
+        left = max(watched.no_root_before[k] - tau, 0.0)
+        watched.no_root_before[k] = left
+        if watched.status[k] == EXPANDED and left < _AHEAD * system.period:
             watched.status[k] = BOUNDED
 
 
 @inlined
-def advance_or_stop(lower, noise, second, calm, longest, shortest):
-    """Return a safe step from a point of an event function, and whether its root is at the end.
+def step_or_stop(taylor, sign, k0, noise, second, calm, fast, longest, shortest):
+    """Return a safe step from a point of an event function k0 + sign motion, and whether its root is at the end.
 
-    lower, second, calm: lower polynomials and bounds of second derivatives as returned by exact.root_search.expand.
+    taylor, noise, second, calm, fast: of the motion, as set and returned by exact.root_search.expand.
     """
-    a, slow = lower[0], lower[1]
-    f = a[0]
+    whole, slow = taylor[0], taylor[1]
+    noise += ROUND_OFF * abs(k0)
+    f, slope, bend = k0 + sign * whole[0], sign * whole[1], sign * whole[2]
     if f <= noise:
-        if a[1] < 0.0 or (a[1] <= second * shortest and a[2] < 0.0):
+        if slope < 0.0 or (slope <= second * shortest and bend < 0.0):
             return 0.0, True
         f = 0.0
     longest = max(longest, shortest)
     far = 0.0
-    if calm >= 0.0 and slow[0] > noise:
-        far, _ = safe_step(slow, slow[0], 0.0, calm, longest)
-        if far >= longest:
-            return far, False
-    step, found = safe_step(a, f, noise, second, longest)
+    if calm >= 0.0:
+        above = k0 + sign * slow[0] - fast
+        if above > noise:
+            far, _ = safe_step(slow, sign, above, 0.0, calm, longest)
+            if far >= longest:
+                return far, False
+    step, found = safe_step(whole, sign, f, noise, second, longest)
     if far > step:
         return far, False
     if step < shortest:
-        falls = a[1] < 0.0 and f <= 2.0 * shortest * (second * shortest - a[1])
+        falls = slope < 0.0 and f <= 2.0 * shortest * (second * shortest - slope)
         return (0.0, True) if falls else (shortest, False)
     return step, found
 
@@ -129,24 +150,41 @@ def advance_or_stop(lower, noise, second, calm, longest, shortest):
 @inlined
 def _list_functions(system, flows, st, watched, s):
     """Set up the event functions of the segment. Return their number."""
-    count = ZERO
+    count, r = ZERO, ZERO
     for r in range(system.friction_rows):
         state = st.state[r]
         if state == STICK or state == SPRUNG:
-            for side in (AT_LOW, AT_HIGH):
-                count = _add_force_bound(system, flows, st, watched, s, r, side, system.limit[r], count)
+            count = _add_force_bounds(system, flows, st, watched, s, r, system.limit[r], True, count)
         elif state == SLIP_LEFT or state == SLIP_RIGHT:
-            count = _add_motion(system, flows, st, watched, s, r, VELOCITY, float(state), STOPS, count)
-    for r in range(system.friction_rows, len(st.state)):
+            count = _add_motion(system, flows, st, watched, s, r, VELOCITY, float(state), STOPS, False, count)
+    r = system.friction_rows
+    while r < len(st.state):
         state = st.state[r]
         if state == CLOSED or state == SPRUNG:
-            count = _add_force_bound(system, flows, st, watched, s, r, AT_LOW, 0.0, count)
+            count = _add_force_bounds(system, flows, st, watched, s, r, 0.0, False, count)
         elif state == OPEN and not _surely_opens(system, st, r):
-            count = _add_motion(system, flows, st, watched, s, r, POSITION, 1.0, CLOSES, count)
+            both = _both_sides_open(system, st, r)
+            count = _add_motion(system, flows, st, watched, s, r, POSITION, 1.0, CLOSES, both, count)
+            r += both
         elif state == LEAVING:
-            count = _add_motion(system, flows, st, watched, s, r, POSITION, -1.0, OPENS, count)
+            count = _add_motion(system, flows, st, watched, s, r, POSITION, -1.0, OPENS, False, count)
             count = _add_reclosing(system, flows, st, watched, s, r, count)
+        r += 1
     return count
+
+
+@inlined
+def _both_sides_open(system, st, r):
+    """Whether gap r and the next one are those on both sides of a body, and both can close."""
+    after = r + 1
+    if after == len(st.state) or st.state[after] != OPEN or system.left_body[r] >= 0 or system.right_body[after] >= 0:
+        return False
+    if not (system.moves_with_floor[r] and system.moves_with_floor[after]):
+        return False
+    body = system.right_body[r]
+    if body < 0 or system.left_body[after] != body or st.released[r] != 0 or st.released[after] != 0:
+        return False
+    return not _surely_opens(system, st, after)
 
 
 @inlined
@@ -160,14 +198,13 @@ def _surely_opens(system, st, r):
 
 
 @inlined
-def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, k):
-    """Add the gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign."""
+def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, both, k):
+    """Add the gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign; both: and the gap behind it."""
     if order == POSITION:
         value, slope, watched.k2[k] = sign * st.displacement[r], sign * st.velocity[r], sign * st.free_acceleration[r]
-        watched.k0[k], watched.k1[k] = value, slope
     else:
         value, slope, watched.k2[k] = sign * st.velocity[r], sign * st.free_acceleration[r], 0.0
-        watched.k0[k], watched.k1[k] = value, slope
+    watched.k0[k, 0], watched.k1[k] = value, slope
     bound, curvature = 0.0, watched.k2[k]
     for j in range(st.counters[AWAKE]):
         rate, g = flows.eigenvalue[s, j], flows.velocity[s, r, j] if order == VELOCITY else flows.motion[s, r, j]
@@ -186,11 +223,20 @@ def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, k):
             slope += first
         curvature += second
         bound += largest
-    _begin_function(st, watched, r, order, meaning, value, slope, bound - watched.k2[k], k)
-    if _is_driven(flows, s):
-        watched.no_root_before[k] = min(watched.no_root_before[k], 2.0 * system.period)  # as far as the bounds hold
     if meaning == CLOSES or meaning == OPENS:
         st.capture_speed[r] = max(0.0, -curvature) * 0.5 * CHATTER * system.period
+    sides = 1
+    if both:
+        sides, watched.k0[k, 1] = 2, st.displacement[r + 1]
+        st.capture_speed[r + 1] = max(0.0, curvature) * 0.5 * CHATTER * system.period
+    if _begin_function(st, watched, r, order, meaning, sides, k):
+        watched.no_root_before[k] = _bounded_step(value, slope, bound - watched.k2[k])
+        if both:
+            watched.row[k, 1], watched.meaning[k, 1] = r + 1, CLOSES
+            other = _bounded_step(watched.k0[k, 1], -slope, bound + watched.k2[k])
+            watched.no_root_before[k] = min(watched.no_root_before[k], other)
+    if _is_driven(flows, s):
+        watched.no_root_before[k] = min(watched.no_root_before[k], 2.0 * system.period)  # as far as the bounds hold
     if st.released[r] != 0:
         _skip_root_at_start(system, flows, st, watched, s, r, order, sign, k)
     return k + 1
@@ -235,15 +281,22 @@ def _set_growth(
 
 
 @inlined
-def _begin_function(st, watched, r, order, meaning, value, slope, bound, k):
-    """Begin event function k: -bound bounds its second derivative from below. Results carried over are kept."""
-    carried = k < st.counters[CARRIED]
-    if carried and watched.row[k] == r and watched.order[k] == order and watched.meaning[k] == meaning:
-        return
-    watched.row[k], watched.order[k], watched.meaning[k], watched.noise[k] = r, order, meaning, 0.0
-    watched.status[k], watched.no_root_before[k] = BOUNDED, 0.0
+def _begin_function(st, watched, r, order, meaning, sides, k):
+    """Begin event function k. Return False where results on it have been carried over: they are kept."""
+    same = watched.row[k, 0] == r and watched.order[k] == order and watched.meaning[k, 0] == meaning
+    if k < st.counters[CARRIED] and same and watched.sides[k] == sides:
+        return False
+    watched.row[k, 0], watched.order[k], watched.meaning[k, 0], watched.sides[k] = r, order, meaning, sides
+    watched.noise[k], watched.status[k], watched.no_root_before[k] = 0.0, BOUNDED, 0.0
+    return True
+
+
+@inlined
+def _bounded_step(value, slope, bound):
+    """Return the time before which a function has no root whose second derivative is nowhere below -bound."""
     if value > 0.0 or (value == 0.0 and slope > 0.0):
-        watched.no_root_before[k] = first_root_of_parabola(value, slope, -bound)
+        return first_root_of_parabola(value, slope, -bound)
+    return 0.0
 
 
 @kernel
@@ -281,14 +334,14 @@ def hop_speed(system, flows, st, r):
 def _add_reclosing(system, flows, st, watched, s, r, k):
     """Add the spring force that a compliant contact that has ended would have: it closes again where that pushes."""
     spring, dashpot = system.spring[r], system.dashpot[r]
-    watched.row[k], watched.order[k], watched.meaning[k] = r, POSITION, RECLOSES
+    watched.row[k, 0], watched.order[k], watched.meaning[k, 0], watched.sides[k] = r, POSITION, RECLOSES, 1
     watched.status[k], watched.no_root_before[k] = BOUNDED, 0.0
     acceleration = st.free_acceleration[r]
     for j in range(st.counters[AWAKE]):
         velocity = flows.velocity[s, r, j] * st.amplitude[j]
         watched.g[k, j] = spring * flows.motion[s, r, j] * st.amplitude[j] + dashpot * velocity
         acceleration += (flows.eigenvalue[s, j] * velocity).real
-    watched.k0[k] = spring * st.displacement[r] + dashpot * st.velocity[r]
+    watched.k0[k, 0] = spring * st.displacement[r] + dashpot * st.velocity[r]
     watched.k1[k] = spring * st.velocity[r] + dashpot * acceleration
     watched.k2[k] = spring * st.free_acceleration[r]
     if _is_driven(flows, s):
@@ -302,30 +355,55 @@ def _add_reclosing(system, flows, st, watched, s, r, k):
 
 
 @inlined
-def _add_force_bound(system, flows, st, watched, s, r, side, limit, k):
-    """Add the distance of a closed row's force from its low (AT_LOW) or high (AT_HIGH) bound, unless it stays away."""
-    sign = 1.0 if side == AT_LOW else -1.0
-    constant, swing, value, slope, bound = sign * st.constant_force[r] + limit, 0.0, 0.0, 0.0, 0.0
+def _add_force_bounds(system, flows, st, watched, s, r, limit, both, k):
+    """Add the distance of a closed row's force from its low bound -limit, and from its high one if it has both.
+
+    Bounds that the force never comes near are not watched.
+    """
+    swing, value, slope, bound = 0.0, 0.0, 0.0, 0.0
     for j in range(st.counters[AWAKE]):
-        rate, g = flows.eigenvalue[s, j], sign * flows.force[s, r, j] * st.amplitude[j]
+        rate, g = flows.eigenvalue[s, j], flows.force[s, r, j] * st.amplitude[j]
         watched.g[k, j] = g
         size = math.sqrt(g.real * g.real + g.imag * g.imag)
         swing += size
         value += g.real
         slope += rate.real * g.real - rate.imag * g.imag
         bound += size * (rate.real * rate.real + rate.imag * rate.imag)
-    curvature, third = 0.0, 0.0
-    if _is_driven(flows, s):  # a force that grows is always watched
+    low, high, driven = limit + st.constant_force[r], limit - st.constant_force[r], _is_driven(flows, s)
+    # a force that grows is always watched
+    near_low, near_high = driven or low <= swing, both and (driven or high <= swing)
+    if near_low and near_high and st.released[r] == 0:
+        return _add_force(system, flows, st, watched, s, r, AT_LOW, 2, low, high, value, slope, bound, k)
+    if near_low:
+        k = _add_force(system, flows, st, watched, s, r, AT_LOW, 1, low, high, value, slope, bound, k)
+        if near_high:
+            for j in range(st.counters[AWAKE]):
+                watched.g[k, j] = watched.g[k - 1, j]
+    if near_high:
+        for j in range(st.counters[AWAKE]):
+            watched.g[k, j] = -watched.g[k, j]
+        k = _add_force(system, flows, st, watched, s, r, AT_HIGH, 1, high, low, -value, -slope, bound, k)
+    return k
+
+
+@kernel
+def _add_force(system, flows, st, watched, s, r, side, sides, near, far, value, slope, bound, k):
+    """Add the distance `near` + motion of a row's force from a bound, and `far` - motion from the other of two."""
+    curvature, third, sign = 0.0, 0.0, 1.0 if side == AT_LOW else -1.0
+    if _is_driven(flows, s):
         first, curvature, second_bound, third = _add_drive(system, flows, st, watched, s, r, 0.0, 0.0, sign, k)
         slope += first
         bound += second_bound
-    elif constant > swing:
-        return k  # the force never comes near its bound: nothing to watch
     if st.state[r] == SPRUNG and r >= system.friction_rows:
         # bodies that touch without force, as in a free flight side by side, are not parted by round-off
-        constant += ADHESION * system.spring[r] * system.free_travel[r]
-    watched.k0[k], watched.k1[k], watched.k2[k] = constant, 0.0, 0.0
-    _begin_function(st, watched, r, FORCE, side, constant + value, slope, bound, k)
+        near += ADHESION * system.spring[r] * system.free_travel[r]
+    watched.k0[k, 0], watched.k0[k, 1], watched.k1[k], watched.k2[k] = near, far, 0.0, 0.0
+    if _begin_function(st, watched, r, FORCE, side, sides, k):
+        watched.no_root_before[k] = _bounded_step(near + value, slope, bound)
+        if sides == 2:
+            watched.row[k, 1], watched.meaning[k, 1] = r, AT_HIGH
+            other = _bounded_step(far - value, -slope, bound)
+            watched.no_root_before[k] = min(watched.no_root_before[k], other)
     if _is_driven(flows, s):
         watched.no_root_before[k] = min(watched.no_root_before[k], 2.0 * system.period)  # as far as the bounds hold
     if st.released[r] == -side:

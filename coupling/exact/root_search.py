@@ -1,7 +1,7 @@
 """Guaranteed search for the first root of an event function.
 
 Event functions are  k0 + k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t)  with Re lambda_j <= 0, and positive until the
-event. With the exponentials at a point come all derivatives there, and bounds of the derivatives at all later times:
+event. Two that differ by the sign of their motion, as the gaps on both sides of a body, share its expansion. With the exponentials at a point come all derivatives there, and bounds of the derivatives at all later times:
 the sums of |g_j exp(lambda_j t)| |lambda_j|^p. The function stays above its Taylor polynomial less the bound of its
 remainder: a step that ends before the first root of this lower polynomial provably holds no root. Steps are as long as
 a few radians of the fastest motion, and where the remainder is round-off the polynomial's root is the function's. No
@@ -23,10 +23,10 @@ from vanedamp.coupling.numerics.jit import inlined, kernel
 DEGREE = 10
 _OVER_FACTORIAL = tuple(1.0 / math.factorial(p) for p in range(DEGREE + 1))
 
-# round-off of a sum, relative to the sum of its terms' sizes
-_ROUND_OFF = 4.0 * 2.0**-52
+#: round-off of a sum, relative to the sum of its terms' sizes
+ROUND_OFF = 4.0 * 2.0**-52
 # a step that long, in units of (second bound / last bound)^(1 / (DEGREE - 2)), leaves out a few thousandths
-_REACH = 3.0
+_REACH = 3.6
 # modes faster than this times the first, squared, are fast
 _FAST = 4.0
 # Newton's iteration: a correction below this share leaves an error of its square
@@ -34,13 +34,13 @@ _CONVERGED = 1e-8
 
 
 @kernel
-def add_secular(order, drive, driven, eigenvalue, t, period, lower):
-    """Add Re sum_j drive_j D_j(t) to the lower polynomials of `expand`.
+def add_secular(order, drive, driven, eigenvalue, t, period, taylor):
+    """Add Re sum_j drive_j D_j(t) to the polynomials of `expand`.
 
     drive: (m,) of the modes from driven[h] to driven[h + 1], which harmonic h drives. Returns the round-off and a bound
     of the second derivative.
     """
-    whole, slow, noise, second = lower[0], lower[1], 0.0, 0.0
+    whole, slow, noise, second = taylor[0], taylor[1], 0.0, 0.0
     for h in range(len(driven) - 1):
         excitation = eigenvalue[h]
         first = exp_minus_one(excitation * t)
@@ -64,9 +64,9 @@ def add_secular(order, drive, driven, eigenvalue, t, period, lower):
                     polynomial[p] += now.real * _OVER_FACTORIAL[p]
             left_out = secular_bound(d, rate, excitation, period, DEGREE) * _OVER_FACTORIAL[DEGREE]
             for polynomial in (whole, slow):
-                polynomial[DEGREE] -= left_out
+                polynomial[DEGREE] += left_out
             second += secular_bound(d, rate, excitation, period, 2)
-    return _ROUND_OFF * noise, second
+    return ROUND_OFF * noise, second
 
 
 @inlined
@@ -83,29 +83,33 @@ def first_root_of_parabola(f, slope, curvature):
 
 
 @inlined
-def expand(order, k0, k1, k2, g, eigenvalue, count, t, lower):
-    """Set the lower polynomials (2, DEGREE + 1) of an event function from time t on, by powers of the time since.
+def expand(order, k1, k2, g, eigenvalue, count, t, taylor):
+    """Set the Taylor polynomials (2, DEGREE + 1) of a motion from time t on, by powers of the time since.
 
-    The first is that of all modes; in the second, those much faster than the first mode count as if they were at their
-    lowest all the time: less sharp close to a root, but good for long steps far from it.
-    Returns the round-off of the value, a bound of the second derivative, and that of the slow modes (-1: all are).
-    order POSITION: exponentials as exp(z) - 1 - z, so that k0 and k1 are value and slope at zero exactly; VELOCITY:
-    exp(z) - 1 with k0 the value and k1 the constant slope; FORCE: exp(z), k0 only.
+    The motion is k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t) of the first `count` modes. Its remainder is no larger
+    than the last coefficient times its power. The first polynomial is that of all modes; the second leaves out those
+    much faster than the first mode: less sharp close to a root, but good for long steps far from it.
+    Returns the round-off of the value, a bound of the second derivative, that of the slow modes (-1: all are), and the
+    size of the fast modes.
+    order POSITION: exponentials as exp(z) - 1 - z, so that there is no motion at the start, and its rate is k1 exactly;
+    VELOCITY: exp(z) - 1 with the constant slope k1; FORCE: exp(z) only.
     """
-    value, slope, noise = k0, k1, abs(k0)
-    whole, slow = lower[0], lower[1]
-    for p in range(2, DEGREE + 1):
-        whole[p], slow[p] = 0.0, 0.0
-    second, last, fast_value, fast_slope, fast_second, fast_last = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    limit = _FAST * (eigenvalue[0].real * eigenvalue[0].real + eigenvalue[0].imag * eigenvalue[0].imag)
+    value, slope, noise = 0.0, k1, 0.0
+    c2, c3, c4, c5, c6, c7, c8, c9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    second, last = 0.0, 0.0
     if order == POSITION:
         value += t * (k1 + 0.5 * k2 * t)
         slope += k2 * t
         noise += abs(k1 * t) + abs(k2 * t * t)
-        slow[2], second = k2, abs(k2)
+        c2, second = k2, abs(k2)
     elif order == VELOCITY:
         value += k1 * t
         noise += abs(k1 * t)
+    whole, slow = taylor[0], taylor[1]
+    for p in range(DEGREE + 1):
+        whole[p] = 0.0
+    fast_value, fast_slope, fast_second, fast_last, fast_size = 0.0, 0.0, 0.0, 0.0, 0.0
+    limit = _FAST * (eigenvalue[0].real * eigenvalue[0].real + eigenvalue[0].imag * eigenvalue[0].imag)
     for j in range(count):
         rate, amplitude = eigenvalue[j], g[j]
         x, y, u, v = rate.real, rate.imag, amplitude.real, amplitude.imag
@@ -130,117 +134,164 @@ def expand(order, k0, k1, k2, g, eigenvalue, count, t, lower):
             noise += abs(u) + abs(v)
         # derivatives of Re exp(lambda t) obey the recurrence of the characteristic polynomial
         twice, square = 2.0 * x, x * x + y * y
-        before, now = u, x * u - y * v
+        d1 = x * u - y * v
         if order != POSITION:
-            slope += now
+            slope += d1
+        d2 = twice * d1 - square * u
+        d3 = twice * d2 - square * d1
+        d4 = twice * d3 - square * d2
+        d5 = twice * d4 - square * d3
+        d6 = twice * d5 - square * d4
+        d7 = twice * d6 - square * d5
+        d8 = twice * d7 - square * d6
+        d9 = twice * d8 - square * d7
         size = (abs(u) + abs(v)) * square
         if square <= limit:
-            for p in range(2, DEGREE):
-                before, now = now, twice * now - square * before
-                slow[p] += now
+            c2, c3, c4, c5, c6, c7, c8, c9 = c2 + d2, c3 + d3, c4 + d4, c5 + d5, c6 + d6, c7 + d7, c8 + d8, c9 + d9
             second += size
             last += size * (square * square) * (square * square)
         else:
-            fast_value += u + abs(u) + abs(v)
-            fast_slope += now
-            for p in range(2, DEGREE):
-                before, now = now, twice * now - square * before
-                whole[p] += now
+            fast_value += u
+            fast_size += abs(u) + abs(v)
+            fast_slope += d1
+            whole[2] += d2
+            whole[3] += d3
+            whole[4] += d4
+            whole[5] += d5
+            whole[6] += d6
+            whole[7] += d7
+            whole[8] += d8
+            whole[9] += d9
             fast_second += size
             fast_last += size * (square * square) * (square * square)
-    slow[DEGREE], whole[DEGREE] = -last, -fast_last
+    slow[2], slow[3], slow[4], slow[5], slow[6], slow[7], slow[8], slow[9] = c2, c3, c4, c5, c6, c7, c8, c9
+    slow[DEGREE], whole[DEGREE] = last, fast_last
     for p in range(2, DEGREE + 1):
         slow[p] *= _OVER_FACTORIAL[p]
         whole[p] = slow[p] + whole[p] * _OVER_FACTORIAL[p]
     whole[0], whole[1] = value, slope
     slow[0], slow[1] = value - fast_value, slope - fast_slope
-    return _ROUND_OFF * noise, second + fast_second, second if fast_second > 0.0 else -1.0
+    return ROUND_OFF * noise, second + fast_second, second if fast_second > 0.0 else -1.0, fast_size
 
 
 @inlined
-def _value_and_slope(a, h):
-    value, slope = a[DEGREE], 0.0
-    for p in range(DEGREE - 1, -1, -1):
-        slope = slope * h + value
-        value = value * h + a[p]
-    return value, slope
+def _value(a, sign, f, h):
+    """Return the lower polynomial of f + sign (motion - its value) at h."""
+    h2 = h * h
+    h4 = h2 * h2
+    h8 = h4 * h4
+    low = a[1] * h + (a[2] + a[3] * h) * h2
+    middle = (a[4] + a[5] * h) + (a[6] + a[7] * h) * h2
+    return f + (sign * (low + middle * h4 + (a[8] + a[9] * h) * h8) - a[10] * (h2 * h8))
 
 
 @inlined
-def _stays_above(a, f, h):
+def _slope(a, sign, h):
+    """Return the slope of that polynomial at h."""
+    h2 = h * h
+    h4 = h2 * h2
+    low = (a[1] + 2.0 * a[2] * h) + (3.0 * a[3] + 4.0 * a[4] * h) * h2
+    high = (5.0 * a[5] + 6.0 * a[6] * h) + (7.0 * a[7] + 8.0 * a[8] * h) * h2
+    return sign * (low + (high + 9.0 * a[9] * h4) * h4) - 10.0 * a[10] * (h * h4 * h4)
+
+
+@inlined
+def _weight(a, sign, p):
+    c = sign * a[p]
+    return c + (p - 2.0) * max(c, 0.0)
+
+
+@inlined
+def _stays_above(a, sign, f, h):
     """Whether the polynomial with f for its constant term has no root on [0, h), given that it is not negative at h.
 
     It is the chord from 0 to h less s (h - s) times its second divided difference over 0, h and s, which must not
     exceed f/h^2: exact for parabolas.
     """
-    total = 0.0
-    for p in range(DEGREE, 1, -1):
-        total = total * h + (a[p] * (p - 1.0) if a[p] > 0.0 else a[p])
-    return total * h * h <= f
+    h2 = h * h
+    h4 = h2 * h2
+    low = (_weight(a, sign, 2) + _weight(a, sign, 3) * h) + (_weight(a, sign, 4) + _weight(a, sign, 5) * h) * h2
+    high = (_weight(a, sign, 6) + _weight(a, sign, 7) * h) + (_weight(a, sign, 8) + _weight(a, sign, 9) * h) * h2
+    return (low + high * h4 - a[10] * (h4 * h4)) * h2 <= f
 
 
 @inlined
-def _step_by_parabola(a, f, h):
+def _departs(a, sign, h):
+    """Whether the polynomial, not negative at 0, rises from there and has no root on (0, h]: that without constant,
+    divided by the time, by the same argument as in `_stays_above`."""
+    h2 = h * h
+    h4 = h2 * h2
+    c3, c4, c5, c6 = sign * a[3], sign * a[4], sign * a[5], sign * a[6]
+    c7, c8, c9 = sign * a[7], sign * a[8], sign * a[9]
+    end = _value(a, sign, 0.0, h)
+    low = (c3 + (c4 + max(c4, 0.0)) * h) + ((c5 + 2.0 * max(c5, 0.0)) + (c6 + 3.0 * max(c6, 0.0)) * h) * h2
+    high = ((c7 + 4.0 * max(c7, 0.0)) + (c8 + 5.0 * max(c8, 0.0)) * h) + (c9 + 6.0 * max(c9, 0.0)) * h2
+    return end > 0.0 and (low + high * h4 - a[10] * (h * h2 * h4)) * h2 <= sign * a[1]
+
+
+@inlined
+def _step_by_parabola(a, sign, f, h):
     """Return a step of at most h without root, with positive coefficients after the second taken as zero."""
-    lowest = 0.0
-    for p in range(DEGREE, 2, -1):
-        lowest = (lowest + min(a[p], 0.0)) * h
-    return min(h, first_root_of_parabola(f, a[1], 2.0 * (a[2] + lowest)))
+    h2 = h * h
+    h4 = h2 * h2
+    c3, c4, c5, c6 = min(sign * a[3], 0.0), min(sign * a[4], 0.0), min(sign * a[5], 0.0), min(sign * a[6], 0.0)
+    c7, c8, c9 = min(sign * a[7], 0.0), min(sign * a[8], 0.0), min(sign * a[9], 0.0)
+    lowest = (c3 * h + (c4 + c5 * h) * h2) + ((c6 + c7 * h) + (c8 + c9 * h) * h2) * h4 - a[10] * (h4 * h4)
+    return min(h, first_root_of_parabola(f, sign * a[1], 2.0 * (sign * a[2] + lowest)))
 
 
 @kernel
-def safe_step(a, f, noise, second, longest):
-    """Return a step without root from the start of a lower polynomial of value f >= 0, and whether a root follows.
+def safe_step(a, sign, f, noise, second, longest):
+    """Return a step without root of f + sign (motion - its value), f >= 0, and whether a root follows.
 
-    A root follows at the end of the step if the remainder of the polynomial there is below the round-off.
+    a: Taylor polynomial of the motion (`expand`). A root follows at the end of the step if the remainder of the
+    polynomial there is below the round-off.
     """
-    if f + longest * (a[1] - 0.5 * second * longest) > 0.0:
+    slope = sign * a[1]
+    if f + longest * (slope - 0.5 * second * longest) > 0.0:
         return longest, False
     reach = longest
-    if a[DEGREE] < 0.0:
-        eighth = second * _OVER_FACTORIAL[DEGREE] / -a[DEGREE]
+    if a[DEGREE] > 0.0:
+        eighth = second * _OVER_FACTORIAL[DEGREE] / a[DEGREE]
         reach = min(longest, _REACH * math.sqrt(math.sqrt(math.sqrt(eighth))))
-    end, _ = _value_and_slope(a, reach)
-    if end >= 0.0 and (_stays_above(a, f, reach) or _step_by_parabola(a, f, reach) >= reach):
+    if slope > 0.0 and _departs(a, sign, reach):
         return reach, False
-    root = min(reach, first_root_of_parabola(f, a[1], 2.0 * a[2]))
+    if _value(a, sign, f, reach) >= 0.0 and (
+        _stays_above(a, sign, f, reach) or _step_by_parabola(a, sign, f, reach) >= reach
+    ):
+        return reach, False
+    root = min(reach, first_root_of_parabola(f, slope, 2.0 * sign * a[2]))
     for _ in range(8):
         if root <= 0.0:
             break
-        value, slope = _value_and_slope(a, root)
-        value += f - a[0]
-        if slope >= 0.0:
+        falls = _slope(a, sign, root)
+        if falls >= 0.0:
             break
-        change = -value / slope
+        change = -_value(a, sign, f, root) / falls
         better = root + change
         if not 0.0 < better <= reach:
             break
         root = better
-        if abs(change) < _CONVERGED * root:
-            left_out = -a[DEGREE]
-            for _ in range(DEGREE):
-                left_out *= root
-            if left_out <= noise and _stays_above(a, f, root):
-                return root, True
-            break
         if abs(change) < 1e-3 * root:
-            left_out = -a[DEGREE]
-            for _ in range(DEGREE):
-                left_out *= root
-            if left_out > noise:
+            r2 = root * root
+            r4 = r2 * r2
+            if a[DEGREE] * (r4 * r4 * r2) > noise:
+                break
+            if abs(change) < _CONVERGED * root:
+                if _stays_above(a, sign, f, root):
+                    return root, True
                 break
     # short of the lower polynomial's root: from there the function's own is seen
     h = root * (1.0 - 1e-5)
-    value, _ = _value_and_slope(a, h)
-    if value + f - a[0] >= 0.0 and _stays_above(a, f, h):
+    if _value(a, sign, f, h) >= 0.0 and _stays_above(a, sign, f, h):
         return h, False
     # the best of the parabolas below it: over the rest of the reach, and beyond its own minimum
     best, h = 0.0, reach
-    if a[1] < 0.0 < a[2] and -2.0 * a[1] < a[2] * reach:
-        best = _step_by_parabola(a, f, -2.0 * a[1] / a[2])
+    if slope < 0.0 < sign * a[2] and -2.0 * slope < sign * a[2] * reach:
+        best = _step_by_parabola(a, sign, f, -2.0 * a[1] / a[2])
     for _ in range(12):
         if h <= best:
             break
-        best = max(best, _step_by_parabola(a, f, h))
+        best = max(best, _step_by_parabola(a, sign, f, h))
         h *= 0.5
     return best, False

@@ -58,14 +58,16 @@ class State(NamedTuple):
 class EventFunctions(NamedTuple):
     """The event functions that are watched in a segment.
 
-    Each is k0 + k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t) and the growth of driven modes (exact.root_search).
+    Each is k0 + k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t) and the growth of driven modes (exact.root_search), and of
+    two sides: another constant less the same motion.
     """
 
     # set at the start of a segment
-    row: np.ndarray  # (k,) int: the row that it belongs to
+    row: np.ndarray  # (k, 2) int: the row of each side
     order: np.ndarray  # (k,) int: POSITION, VELOCITY or FORCE
-    meaning: np.ndarray  # (k,) int: event at its root, AT_LOW, AT_HIGH, STOPS, CLOSES, OPENS or RECLOSES
-    k0: np.ndarray  # (k,) constant
+    meaning: np.ndarray  # (k, 2) int: event at a side's root, AT_LOW, AT_HIGH, STOPS, CLOSES, OPENS or RECLOSES
+    sides: np.ndarray  # (k,) int: 1, or 2 where the motion is bounded on both sides
+    k0: np.ndarray  # (k, 2) constant of each side
     k1: np.ndarray  # (k,) slope of its polynomial
     k2: np.ndarray  # (k,) second derivative of its polynomial
     noise: np.ndarray  # (k,) round-off of its value at the start, apart from that of k0
@@ -75,9 +77,10 @@ class EventFunctions(NamedTuple):
     # changes in the search
     status: np.ndarray  # (k,) int: knowledge of its roots, BOUNDED, EXPANDED or ROOT
     no_root_before: np.ndarray  # (k,) time before which no root can lie; its first root once that is known, s
+    side: np.ndarray  # (k,) int: side of that root
 
     # scratch
-    lower: np.ndarray  # (2, DEGREE + 1) lower polynomials of one of them
+    taylor: np.ndarray  # (2, DEGREE + 1) polynomials of the motion of one of them
 
 
 class Scratch(NamedTuple):
@@ -158,10 +161,11 @@ def new_event_functions(system: System, modes: int) -> EventFunctions:
     """Return room for two event functions a row."""
     k = 2 * len(system.delassus)
     return EventFunctions(
-        row=np.zeros(k, np.int64),
+        row=np.zeros((k, 2), np.int64),
         order=np.zeros(k, np.int64),
-        meaning=np.zeros(k, np.int64),
-        k0=np.zeros(k),
+        meaning=np.zeros((k, 2), np.int64),
+        sides=np.ones(k, np.int64),
+        k0=np.zeros((k, 2)),
         k1=np.zeros(k),
         k2=np.zeros(k),
         noise=np.zeros(k),
@@ -169,7 +173,8 @@ def new_event_functions(system: System, modes: int) -> EventFunctions:
         drive=np.zeros((k, modes), complex),
         status=np.zeros(k, np.int64),
         no_root_before=np.zeros(k),
-        lower=np.zeros((2, DEGREE + 1)),
+        side=np.zeros(k, np.int64),
+        taylor=np.zeros((2, DEGREE + 1)),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.event_functions import RESOLUTION, advance_or_stop
+from vanedamp.coupling.exact.event_functions import RESOLUTION, step_or_stop
 from vanedamp.coupling.exact.root_search import DEGREE, expand, first_root_of_parabola
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
@@ -69,14 +69,15 @@ def next_event(system, flows, st, guards):
             tau = 0.0
         else:
             st.counters[EVALUATIONS] += 1
-        noise, second, calm = expand(
-            guards.order[k], guards.k0[k], guards.k1[k], guards.k2[k], guards.g[k], eigenvalue, modes, tau,
-            guards.lower,
-        )  # fmt: skip
+        noise, second, calm, fast = expand(
+            guards.order[k], guards.k1[k], guards.k2[k], guards.g[k], eigenvalue, modes, tau, guards.taylor
+        )
         if grows > 1.0:  # bounds of the derivatives hold for motions that decay
             second, calm = second * grows, -1.0
-            guards.lower[0, DEGREE] *= grows
-        step, found = advance_or_stop(guards.lower, max(noise, guards.noise[k]), second, calm, system.period, shortest)
+            guards.taylor[0, DEGREE] *= grows
+        step, found = step_or_stop(
+            guards.taylor, 1.0, guards.k0[k], max(noise, guards.noise[k]), second, calm, fast, system.period, shortest
+        )
         guards.status[k] = ROOT if found else EXPANDED
         guards.no_root_before[k] = tau + step if found else max(guards.no_root_before[k], tau + step)
 

@@ -61,7 +61,7 @@ class Guards(NamedTuple):
     noise: np.ndarray
     no_root_before: np.ndarray  # s
     g: np.ndarray  # (k, m) complex
-    lower: np.ndarray  # (2, DEGREE + 1) scratch
+    taylor: np.ndarray  # (2, DEGREE + 1) scratch
 
 
 class Scratch(NamedTuple):
@@ -123,7 +123,7 @@ def new_guards(system: PlanarSystem, modes: int) -> Guards:
     return Guards(
         unit=np.zeros(k, np.int64), order=np.zeros(k, np.int64), what=np.zeros(k, np.int64),
         status=np.zeros(k, np.int64), k0=np.zeros(k), k1=np.zeros(k), k2=np.zeros(k), noise=np.zeros(k),
-        no_root_before=np.zeros(k), g=np.zeros((k, modes), complex), lower=np.zeros((2, DEGREE + 1)),
+        no_root_before=np.zeros(k), g=np.zeros((k, modes), complex), taylor=np.zeros((2, DEGREE + 1)),
     )  # fmt: skip
 
 

@@ -74,7 +74,7 @@ def _search(system: Any, flows: Any, st: Any, functions: Any, times: int) -> flo
     tau = 0.0
     for _ in range(times):
         st.counters[CARRIED] = 0  # what is known from the period before would save it
-        tau, _ = next_event(system, flows, st, functions)
+        tau, _, _ = next_event(system, flows, st, functions)
     return tau
 
 
