@@ -63,7 +63,7 @@ def summing(function: Callable[..., Any]) -> Any:
 
 def _compile(function: Callable[..., Any], fastmath: Set[str] = _CONTRACT, **options: bool) -> Any:
     try:
-        compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath=fastmath, **options)(function)  # type: ignore[call-overload]
+        compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath=set(fastmath), **options)(function)  # type: ignore[call-overload]
     except RuntimeError as error:  # numba has found no folder that it can write to
         folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
         raise CacheError(
