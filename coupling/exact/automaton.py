@@ -65,7 +65,7 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular
-from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.numerics.jit import entry, inlined, kernel, summing
 from vanedamp.coupling.response.records import FRICTION
 
 #: differences below this share of their terms are round-off
@@ -401,10 +401,9 @@ def _advance_motion(system, flows, st, scratch, tau):
             r < friction and (state == STICK or state == HELD)
         ):
             continue
-        shift, speed = tau * (st.velocity[r] + 0.5 * st.free_acceleration[r] * tau), st.free_acceleration[r] * tau
-        for j in range(count):
-            shift += (flows.motion[s, r, j] * scratch.bend[j]).real
-            speed += (flows.velocity[s, r, j] * scratch.gain[j]).real
+        shift, speed = _row_change(flows.motion[s, r], flows.velocity[s, r], scratch.bend, scratch.gain, count)
+        shift += tau * (st.velocity[r] + 0.5 * st.free_acceleration[r] * tau)
+        speed += st.free_acceleration[r] * tau
         st.velocity[r] += speed
         if r < friction:
             st.ledger[FRICTION] -= st.applied_force[r] * shift
@@ -423,6 +422,16 @@ def _advance_motion(system, flows, st, scratch, tau):
     if tau > 0.0:
         for r in range(len(st.released)):
             st.released[r] = 0
+
+
+@summing
+def _row_change(motion, velocity, bend, gain, count):
+    """Return what the modes add to displacement and velocity of a row."""
+    shift, speed = 0.0, 0.0
+    for j in range(count):
+        shift += motion[j].real * bend[j].real - motion[j].imag * bend[j].imag
+        speed += velocity[j].real * gain[j].real - velocity[j].imag * gain[j].imag
+    return shift, speed
 
 
 @inlined

@@ -167,10 +167,8 @@ def _work_of_harmonic(linear, change, total, count, h):
 @inlined
 def _free_bodies(system, flows, st, rec, scratch, s, period, tau):
     """Add momentum and work of the polynomial part of the bodies' motion."""
-    n, speed, drift = system.modes, 0.0, 0.0
-    for j in range(st.counters[AWAKE]):
-        row, c = flows.linear[s, j], st.amplitude[j]
-        speed -= row[FREE_MOMENTUM_MAP] * c.real + row[FREE_MOMENTUM_MAP + 1] * c.imag
+    n, drift = system.modes, 0.0
+    speed = -_free_momentum(flows.linear[s], st.amplitude, st.counters[AWAKE])
     for b in range(system.bodies):
         drift += system.mass[n + b] * st.coordinate_acceleration[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
@@ -190,6 +188,16 @@ def _free_bodies(system, flows, st, rec, scratch, s, period, tau):
             st.ledger[EXCITATION] += load.real * momentum.real + load.imag * momentum.imag
         else:
             st.ledger[EXCITATION] += _work_on_bodies(system, flows, st, scratch, s, h, tau, flat)
+
+
+@summing
+def _free_momentum(linear, amplitude, count):
+    """Return the momentum of the free bodies in the modes."""
+    total = 0.0
+    for j in range(count):
+        row, c = linear[j], amplitude[j]
+        total += row[FREE_MOMENTUM_MAP] * c.real + row[FREE_MOMENTUM_MAP + 1] * c.imag
+    return total
 
 
 @kernel

@@ -32,7 +32,7 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.numerics.exponentials import secular_bound
-from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
+from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel, summing
 
 #: shortest step in periods: the resolution of a double within a period
 RESOLUTION = 1e-15
@@ -117,7 +117,7 @@ def carry_over_period(system, st, watched, tau):
             watched.status[k] = BOUNDED
 
 
-@inlined
+@kernel
 def step_or_stop(taylor, sign, k0, noise, second, calm, fast, longest, shortest):
     """Return a safe step from a point of an event function k0 + sign motion, and whether its root is at the end.
 
@@ -205,17 +205,13 @@ def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, both, k)
     else:
         value, slope, watched.k2[k] = sign * st.velocity[r], sign * st.free_acceleration[r], 0.0
     watched.k0[k, 0], watched.k1[k] = value, slope
-    bound, curvature = 0.0, watched.k2[k]
-    for j in range(st.counters[AWAKE]):
-        rate, g = flows.eigenvalue[s, j], flows.velocity[s, r, j] if order == VELOCITY else flows.motion[s, r, j]
-        g *= sign * st.amplitude[j]
-        once = rate * g
-        watched.g[k, j] = g
-        if order == VELOCITY:
-            slope += once.real
-        else:
-            curvature += rate.real * once.real - rate.imag * once.imag
-        bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
+    functional = flows.velocity[s, r] if order == VELOCITY else flows.motion[s, r]
+    first, curvature, bound = _set_motion(
+        functional, st.amplitude, flows.eigenvalue[s], sign, watched.g[k], st.counters[AWAKE]
+    )
+    if order == VELOCITY:
+        slope, curvature = slope + first, 0.0
+    curvature += watched.k2[k]
     if _is_driven(flows, s):
         on_motion, on_velocity = (0.0, sign) if order == VELOCITY else (sign, 0.0)
         first, second, largest, _ = _add_drive(system, flows, st, watched, s, r, on_motion, on_velocity, 0.0, k)
@@ -240,6 +236,20 @@ def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, both, k)
     if st.released[r] != 0:
         _skip_root_at_start(system, flows, st, watched, s, r, order, sign, k)
     return k + 1
+
+
+@summing
+def _set_motion(functional, amplitude, eigenvalue, sign, g, count):
+    """Set the amplitudes of a motion's exponentials. Return its first two derivatives and a bound of the second."""
+    first, second, bound = 0.0, 0.0, 0.0
+    for j in range(count):
+        rate, part = eigenvalue[j], sign * (functional[j] * amplitude[j])
+        g[j] = part
+        once = rate * part
+        first += once.real
+        second += rate.real * once.real - rate.imag * once.imag
+        bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
+    return first, second, bound
 
 
 @inlined
@@ -360,15 +370,9 @@ def _add_force_bounds(system, flows, st, watched, s, r, limit, both, k):
 
     Bounds that the force never comes near are not watched.
     """
-    swing, value, slope, bound = 0.0, 0.0, 0.0, 0.0
-    for j in range(st.counters[AWAKE]):
-        rate, g = flows.eigenvalue[s, j], flows.force[s, r, j] * st.amplitude[j]
-        watched.g[k, j] = g
-        size = math.sqrt(g.real * g.real + g.imag * g.imag)
-        swing += size
-        value += g.real
-        slope += rate.real * g.real - rate.imag * g.imag
-        bound += size * (rate.real * rate.real + rate.imag * rate.imag)
+    swing, value, slope, bound = _set_force(
+        flows.force[s, r], st.amplitude, flows.eigenvalue[s], watched.g[k], st.counters[AWAKE]
+    )
     low, high, driven = limit + st.constant_force[r], limit - st.constant_force[r], _is_driven(flows, s)
     # a force that grows is always watched
     near_low, near_high = driven or low <= swing, both and (driven or high <= swing)
@@ -384,6 +388,21 @@ def _add_force_bounds(system, flows, st, watched, s, r, limit, both, k):
             watched.g[k, j] = -watched.g[k, j]
         k = _add_force(system, flows, st, watched, s, r, AT_HIGH, 1, high, low, -value, -slope, bound, k)
     return k
+
+
+@summing
+def _set_force(functional, amplitude, eigenvalue, g, count):
+    """Set the amplitudes of a force's exponentials. Return its swing, value, slope and a bound of its curvature."""
+    swing, value, slope, bound = 0.0, 0.0, 0.0, 0.0
+    for j in range(count):
+        rate, part = eigenvalue[j], functional[j] * amplitude[j]
+        g[j] = part
+        size = math.sqrt(part.real * part.real + part.imag * part.imag)
+        swing += size
+        value += part.real
+        slope += rate.real * part.real - rate.imag * part.imag
+        bound += size * (rate.real * rate.real + rate.imag * rate.imag)
+    return swing, value, slope, bound
 
 
 @kernel

@@ -6,7 +6,7 @@ import math
 
 from vanedamp.coupling.numerics.codes import AWAKE
 from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound
-from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.numerics.jit import inlined, kernel, summing
 
 
 @inlined
@@ -17,22 +17,11 @@ def highest(system, flows, st, scratch, s, tau, constant, peak):
     derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is refined by Newton.
     Where interpolant and bound stay below the peak so far there is nothing to find.
     """
-    fourth, size = 0.0, abs(constant)
-    x0, v0, x1, v1 = constant, 0.0, constant, 0.0
     count = st.counters[AWAKE]
-    for j in range(count):
-        rate = flows.eigenvalue[s, j]
-        wave = flows.response[s, j] * st.amplitude[j]
-        scratch.wave[j], scratch.rate[j] = wave, rate
-        square = rate.real * rate.real + rate.imag * rate.imag
-        part = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
-        fourth += part * square * square
-        size += part
-        x0 += wave.real
-        v0 += rate.real * wave.real - rate.imag * wave.imag
-        wave += flows.response[s, j] * scratch.gain[j]
-        x1 += wave.real
-        v1 += rate.real * wave.real - rate.imag * wave.imag
+    x0, v0, x1, v1, size, fourth = _ends(
+        flows.response[s], flows.eigenvalue[s], st.amplitude, scratch.gain, scratch.wave, count
+    )
+    x0, x1, size = constant + x0, constant + x1, abs(constant) + size
     e = flows.driven.shape[1] - 1
     if flows.driven[s, e] > e:
         more = _set_drive(
@@ -54,11 +43,33 @@ def highest(system, flows, st, scratch, s, tau, constant, peak):
         pieces = min(math.ceil(tau * math.sqrt(math.sqrt(fourth / (0.384 * size)))), 4096)
         h = tau / pieces
         for j in range(count):
-            scratch.step_factor[j] = exp_minus_one(scratch.rate[j] * h) + 1.0
+            scratch.step_factor[j] = exp_minus_one(flows.eigenvalue[s, j] * h) + 1.0
     return _search_grid(
-        scratch.rate[:count], scratch.wave, scratch.step_factor, flows.driven[s], scratch.drive, scratch.growth,
+        flows.eigenvalue[s, :count], scratch.wave, scratch.step_factor, flows.driven[s], scratch.drive, scratch.growth,
         constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak,
     )  # fmt: skip
+
+
+@summing
+def _ends(response, eigenvalue, amplitude, gain, waves, count):
+    """Set each mode's share of the response. Return response and speed of the modes at both ends, and bounds.
+
+    The bounds are those of the response and of its fourth derivative.
+    """
+    x0, v0, x1, v1, size, fourth = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(count):
+        rate, wave = eigenvalue[j], response[j] * amplitude[j]
+        waves[j] = wave
+        square = rate.real * rate.real + rate.imag * rate.imag
+        part = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
+        fourth += part * (square * square)
+        size += part
+        x0 += wave.real
+        v0 += rate.real * wave.real - rate.imag * wave.imag
+        wave += response[j] * gain[j]
+        x1 += wave.real
+        v1 += rate.real * wave.real - rate.imag * wave.imag
+    return x0, v0, x1, v1, size, fourth
 
 
 @kernel
@@ -87,14 +98,10 @@ def _search_grid(rates, waves, turns, driven, drives, growths, constant, x0, v0,
             growths[j], _ = secular(rates[j], rates[k], h)
     end, end_slope = x1, v1
     for i in range(pieces):
-        x1, v1 = constant, 0.0
         if i == pieces - 1:
             x1, v1, h = end, end_slope, tau - i * h
         else:
-            for a in range(count):
-                wave, rate = waves[a] * turns[a], rates[a]
-                x1 += wave.real
-                v1 += rate.real * wave.real - rate.imag * wave.imag
+            x1, v1 = _next_point(rates, waves, turns, constant)
             for k in range(e):
                 for j in range(driven[k], driven[k + 1]):
                     x1 += (drives[j] * growths[j]).real
@@ -104,13 +111,24 @@ def _search_grid(rates, waves, turns, driven, drives, growths, constant, x0, v0,
             peak = max(peak, _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h))
         x0, v0 = x1, v1
         if i < pieces - 1:
-            for a in range(count):
-                waves[a] *= turns[a]
+            for j in range(count):
+                waves[j] *= turns[j]
             for k in range(e):
                 for j in range(driven[k], driven[k + 1]):
                     waves[j] += drives[j] * growths[j]
                     drives[j] *= turns[k]
     return peak
+
+
+@summing
+def _next_point(rates, waves, turns, constant):
+    """Return response and speed of the modes a step of the grid later."""
+    x, v = constant, 0.0
+    for j in range(len(rates)):
+        wave, rate = waves[j] * turns[j], rates[j]
+        x += wave.real
+        v += rate.real * wave.real - rate.imag * wave.imag
+    return x, v
 
 
 @inlined
@@ -140,19 +158,7 @@ def _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h):
         t = h * v0 / (v0 - v1)
     x = x0
     for _ in range(8):
-        # derivatives at t by the recurrence of the modes' characteristic polynomials
-        x, v, w, third, fourth, fifth, sixth = constant, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for a in range(len(rates)):
-            rate, wave = rates[a], waves[a]
-            part = wave + wave * exp_minus_one(rate * t)
-            twice, square = 2.0 * rate.real, rate.real * rate.real + rate.imag * rate.imag
-            d0, d1 = part.real, rate.real * part.real - rate.imag * part.imag
-            d2 = twice * d1 - square * d0
-            d3 = twice * d2 - square * d1
-            d4 = twice * d3 - square * d2
-            x, v, w, third, fourth = x + d0, v + d1, w + d2, third + d3, fourth + d4
-            fifth += twice * d4 - square * d3
-            sixth += (abs(part.real) + abs(part.imag)) * square * square * square
+        x, v, w, third, fourth, fifth, sixth = _derivatives(rates, waves, constant, t)
         for k in range(len(driven) - 1):
             excitation = rates[k]
             for j in range(driven[k], driven[k + 1]):
@@ -189,3 +195,24 @@ def _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h):
         else:
             t = 0.5 * (lo + hi)
     return abs(x)
+
+
+@summing
+def _derivatives(rates, waves, constant, t):
+    """Return the response of the modes and its derivatives after a time t, and a bound of the sixth.
+
+    By the recurrence of the modes' characteristic polynomials.
+    """
+    x, v, w, third, fourth, fifth, sixth = constant, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(len(rates)):
+        rate, wave = rates[j], waves[j]
+        part = wave + wave * exp_minus_one(rate * t)
+        twice, square = 2.0 * rate.real, rate.real * rate.real + rate.imag * rate.imag
+        d0, d1 = part.real, rate.real * part.real - rate.imag * part.imag
+        d2 = twice * d1 - square * d0
+        d3 = twice * d2 - square * d1
+        d4 = twice * d3 - square * d2
+        x, v, w, third, fourth = x + d0, v + d1, w + d2, third + d3, fourth + d4
+        fifth += twice * d4 - square * d3
+        sixth += (abs(part.real) + abs(part.imag)) * (square * square * square)
+    return x, v, w, third, fourth, fifth, sixth

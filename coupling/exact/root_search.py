@@ -17,7 +17,7 @@ import math
 
 from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular, secular_bound
-from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.numerics.jit import inlined, kernel, summing
 
 #: degree of the lower polynomial; its last coefficient is that of the bound
 DEGREE = 10
@@ -82,7 +82,7 @@ def first_root_of_parabola(f, slope, curvature):
     return 2.0 * f / (math.sqrt(square) - slope)
 
 
-@inlined
+@summing
 def expand(order, k1, k2, g, eigenvalue, count, t, taylor):
     """Set the Taylor polynomials (2, DEGREE + 1) of a motion from time t on, by powers of the time since.
 
@@ -96,19 +96,17 @@ def expand(order, k1, k2, g, eigenvalue, count, t, taylor):
     """
     value, slope, noise = 0.0, k1, 0.0
     c2, c3, c4, c5, c6, c7, c8, c9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    second, last = 0.0, 0.0
+    f2, f3, f4, f5, f6, f7, f8, f9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    second, last, fast_value, fast_slope, fast_second, fast_last, fast_size = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if order == POSITION:
         value += t * (k1 + 0.5 * k2 * t)
         slope += k2 * t
         noise += abs(k1 * t) + abs(k2 * t * t)
-        c2, second = k2, abs(k2)
     elif order == VELOCITY:
         value += k1 * t
         noise += abs(k1 * t)
-    whole, slow = taylor[0], taylor[1]
-    for p in range(DEGREE + 1):
-        whole[p] = 0.0
-    fast_value, fast_slope, fast_second, fast_last, fast_size = 0.0, 0.0, 0.0, 0.0, 0.0
+    # what of exp(z) the order leaves out
+    line, one = 1.0 if order == POSITION else 0.0, 0.0 if order == FORCE else 1.0
     limit = _FAST * (eigenvalue[0].real * eigenvalue[0].real + eigenvalue[0].imag * eigenvalue[0].imag)
     for j in range(count):
         rate, amplitude = eigenvalue[j], g[j]
@@ -116,27 +114,19 @@ def expand(order, k1, k2, g, eigenvalue, count, t, taylor):
         if t > 0.0:
             z = complex(x * t, y * t)
             first = exp_minus_one(z)
+            beyond = exp_minus_line(z, first) if order == POSITION else first
+            part, other = u * beyond.real - v * beyond.imag, u * beyond.imag + v * beyond.real
             du, dv = u * first.real - v * first.imag, u * first.imag + v * first.real
-            if order == POSITION:
-                line = exp_minus_line(z, first)
-                part, other = u * line.real - v * line.imag, u * line.imag + v * line.real
-                slope += x * du - y * dv
-            elif order == VELOCITY:
-                part, other = du, dv
-            else:
-                part, other = u + du, v + dv
-            value += part
-            noise += abs(part) + abs(other)
-            u += du
-            v += dv
-        elif order == FORCE:
-            value += u
-            noise += abs(u) + abs(v)
+            slope += line * (x * du - y * dv)
+            u, v = u + du, v + dv
+            part, other = part + (1.0 - one) * amplitude.real, other + (1.0 - one) * amplitude.imag
+        else:
+            part, other = (1.0 - one) * u, (1.0 - one) * v
+        value += part
+        noise += abs(part) + abs(other)
         # derivatives of Re exp(lambda t) obey the recurrence of the characteristic polynomial
         twice, square = 2.0 * x, x * x + y * y
         d1 = x * u - y * v
-        if order != POSITION:
-            slope += d1
         d2 = twice * d1 - square * u
         d3 = twice * d2 - square * d1
         d4 = twice * d3 - square * d2
@@ -145,33 +135,39 @@ def expand(order, k1, k2, g, eigenvalue, count, t, taylor):
         d7 = twice * d6 - square * d5
         d8 = twice * d7 - square * d6
         d9 = twice * d8 - square * d7
+        slope += (1.0 - line) * d1
         size = (abs(u) + abs(v)) * square
-        if square <= limit:
-            c2, c3, c4, c5, c6, c7, c8, c9 = c2 + d2, c3 + d3, c4 + d4, c5 + d5, c6 + d6, c7 + d7, c8 + d8, c9 + d9
-            second += size
-            last += size * (square * square) * (square * square)
-        else:
-            fast_value += u
-            fast_size += abs(u) + abs(v)
-            fast_slope += d1
-            whole[2] += d2
-            whole[3] += d3
-            whole[4] += d4
-            whole[5] += d5
-            whole[6] += d6
-            whole[7] += d7
-            whole[8] += d8
-            whole[9] += d9
-            fast_second += size
-            fast_last += size * (square * square) * (square * square)
-    slow[2], slow[3], slow[4], slow[5], slow[6], slow[7], slow[8], slow[9] = c2, c3, c4, c5, c6, c7, c8, c9
-    slow[DEGREE], whole[DEGREE] = last, fast_last
-    for p in range(2, DEGREE + 1):
-        slow[p] *= _OVER_FACTORIAL[p]
-        whole[p] = slow[p] + whole[p] * _OVER_FACTORIAL[p]
-    whole[0], whole[1] = value, slope
-    slow[0], slow[1] = value - fast_value, slope - fast_slope
-    return ROUND_OFF * noise, second + fast_second, second if fast_second > 0.0 else -1.0, fast_size
+        largest = size * (square * square) * (square * square)
+        # never one sum less the other: they differ by powers of the rates
+        fast = 1.0 if square > limit else 0.0
+        calm = 1.0 - fast
+        second, last = second + calm * size, last + calm * largest
+        c2, c3, c4, c5 = c2 + calm * d2, c3 + calm * d3, c4 + calm * d4, c5 + calm * d5
+        c6, c7, c8, c9 = c6 + calm * d6, c7 + calm * d7, c8 + calm * d8, c9 + calm * d9
+        fast_value, fast_slope = fast_value + fast * u, fast_slope + fast * d1
+        fast_size, fast_second, fast_last = (
+            fast_size + fast * (abs(u) + abs(v)), fast_second + fast * size, fast_last + fast * largest
+        )  # fmt: skip
+        f2, f3, f4, f5 = f2 + fast * d2, f3 + fast * d3, f4 + fast * d4, f5 + fast * d5
+        f6, f7, f8, f9 = f6 + fast * d6, f7 + fast * d7, f8 + fast * d8, f9 + fast * d9
+    whole, slow = taylor[0], taylor[1]
+    if order == POSITION:
+        c2, second = c2 + k2, second + abs(k2)
+    _set(
+        whole, value, slope, c2 + f2, c3 + f3, c4 + f4, c5 + f5, c6 + f6, c7 + f7, c8 + f8, c9 + f9, last + fast_last
+    )
+    if fast_second == 0.0:
+        return ROUND_OFF * noise, second, -1.0, 0.0
+    _set(slow, value - fast_value, slope - fast_slope, c2, c3, c4, c5, c6, c7, c8, c9, last)
+    return ROUND_OFF * noise, second + fast_second, second, fast_size
+
+
+@inlined
+def _set(a, value, slope, c2, c3, c4, c5, c6, c7, c8, c9, last):
+    """Set the coefficients of a Taylor polynomial from its derivatives, the last one a bound."""
+    a[0], a[1], a[2], a[3], a[4] = value, slope, c2 * (1 / 2), c3 * (1 / 6), c4 * (1 / 24)
+    a[5], a[6], a[7], a[8] = c5 * (1 / 120), c6 * (1 / 720), c7 * (1 / 5040), c8 * (1 / 40320)
+    a[9], a[10] = c9 * (1 / 362880), last * (1 / 3628800)
 
 
 @inlined

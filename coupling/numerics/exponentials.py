@@ -1,21 +1,90 @@
-"""Exponentials without cancellation: exp(z) - 1, exp(z) - 1 - z, and the growth of a driven mode."""
+"""Exponentials without cancellation: exp(z) - 1, exp(z) - 1 - z, and the growth of a driven mode.
+
+They have no branch and call nothing, so that a loop over modes takes several at once. Polynomials of sine and cosine:
+fdlibm (Sun Microsystems, 1993); what the reductions leave out is below the round-off of z itself.
+"""
 
 from __future__ import annotations
 
 import math
 
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, overload
+
 from vanedamp.coupling.numerics.jit import inlined, kernel
+
+# a sum with it has no digits behind the point left: it rounds to the nearest whole number
+_TO_WHOLE = 1.5 * 2.0**52
+# pi/2 and ln 2 in parts: their products with numbers of up to 23 digits are exact
+_HALF_PI = tuple(float.fromhex(part) for part in ("0x1.921fb54p+0", "0x1.10b46118p-30", "0x1.313198a2e0370p-61"))
+_LN_2 = tuple(float.fromhex(part) for part in ("0x1.62e42feep-1", "0x1.a39ef35793c76p-33"))
+_S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
+_S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
+_C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
+_C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
+# e^x is 0 or inf to doubles beyond
+_LEAST, _MOST = -708.0, 709.0
 
 
 @inlined
 def exp_minus_one(z):
-    """Return exp(z) - 1 of a complex number with full relative accuracy, Re z <= 0."""
-    sine, cosine = math.sin(0.5 * z.imag), math.cos(0.5 * z.imag)
+    """Return exp(z) - 1 of a complex number with full relative accuracy."""
+    # half the angle, as a multiple of pi/2 and a rest
+    half = 0.5 * z.imag
+    turns = (half * (2.0 / math.pi) + _TO_WHOLE) - _TO_WHOLE
+    rest = ((half - turns * _HALF_PI[0]) - turns * _HALF_PI[1]) - turns * _HALF_PI[2]
+    u = rest * rest
+    w = u * u
+    s = (_S1 + u * _S2) + w * ((_S3 + u * _S4) + w * (_S5 + u * _S6))
+    s = rest + rest * (u * s)
+    c = (_C1 + u * _C2) + w * ((_C3 + u * _C4) + w * (_C5 + u * _C6))
+    top = 1.0 - 0.5 * u
+    c = top + (((1.0 - top) - 0.5 * u) + w * c)
+    quarter = turns - 4.0 * ((0.25 * turns + _TO_WHOLE) - _TO_WHOLE)  # -2 to 2
+    odd = abs(quarter) == 1.0
+    sine, cosine = (c if odd else s), (s if odd else c)
+    sine = -sine if quarter < 0.0 or quarter == 2.0 else sine
+    cosine = -cosine if quarter > 0.0 or quarter == -2.0 else cosine
     turn = 2.0 * sine * sine
-    if z.real == 0.0:
-        return complex(-turn, 2.0 * sine * cosine)
-    growth = math.expm1(z.real)
+    # e^x - 1 = 2^k (e^r - 1) + (2^k - 1)
+    x = min(max(z.real, _LEAST), _MOST)
+    k = (x * (1.0 / math.log(2.0)) + _TO_WHOLE) - _TO_WHOLE
+    r = (x - k * _LN_2[0]) - k * _LN_2[1]
+    u = r * r
+    w = u * u
+    tail = ((1 / 6 + r * (1 / 24)) + u * (1 / 120 + r * (1 / 720))) + w * (
+        ((1 / 5040 + r * (1 / 40320)) + u * (1 / 362880 + r * (1 / 3628800)))
+        + w * (1 / 39916800 + r * (1 / 479001600) + u * (1 / 6227020800))
+    )
+    scale = power_of_two(k)
+    growth = scale * (r + u * (0.5 + r * tail)) + (scale - 1.0)
     return complex(growth * (1.0 - turn) - turn, (1.0 + growth) * 2.0 * sine * cosine)
+
+
+def power_of_two(k):
+    """Return 2^k of a whole number k from -1022 to 1023, a float."""
+    return math.ldexp(1.0, int(k))
+
+
+@overload(power_of_two, inline="always")
+def _power_compiled(k):
+    return lambda k: _float_of_exponent(k)
+
+
+@intrinsic
+def _float_of_exponent(typing_context, k):
+    """Return the float with this exponent: its bits."""
+
+    def code(context, builder, signature, values):
+        integer = ir.IntType(64)
+        # with 2^52 + 1023 added, the last bits of the sum are those of the exponent
+        exponent = builder.fadd(values[0], ir.Constant(ir.DoubleType(), 2.0**52 + 1023.0))
+        return builder.bitcast(
+            builder.shl(builder.bitcast(exponent, integer), ir.Constant(integer, 52)), ir.DoubleType()
+        )
+
+    return types.float64(types.float64), code
 
 
 @inlined
