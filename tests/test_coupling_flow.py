@@ -87,7 +87,7 @@ def by_flow(system, closed, flows, loads, q, qd, times):
     n, m = system.modes, flows.modes[0]
     p, rate = np.r_[q[:n], qd[:n]], flows.eigenvalue[0, :m]
     constant = (flows.static[0] @ loads + flows.constrained[0] @ q[:n])[:n]
-    shape = flows.shape[0, :, :m]
+    shape = flows.shape[0, :m].T
     amplitude = np.r_[1.0, flows.project[0, 1:m] @ (p - np.r_[constant, np.zeros(n)] - shape[:, 0].real)]
     coordinates, displacement, force = [], [], []
     drift = system.of_bodies.J @ flows.body_acceleration[0] @ loads[n:]

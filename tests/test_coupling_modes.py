@@ -62,7 +62,7 @@ def error_of_flow(system, contacts, time):
     closed = system.friction_rows + np.array(contacts)
     flows = add_flow(empty_flows(system), system, np.isin(np.arange(len(system.delassus)), closed))
     n, b, m = system.modes, system.bodies, flows.modes[0]
-    rate, shape = flows.eigenvalue[0, 1:m], flows.shape[0, :, 1:m]
+    rate, shape = flows.eigenvalue[0, 1:m], flows.shape[0, 1:m].T
     slips = flows.motion[0, :b, 1:m]
     shape = np.vstack([shape[:n], slips, shape[n:], slips * rate])
     on_structure, on_slips = flows.project[0, 1:m], flows.project_slip[0, 1:m]

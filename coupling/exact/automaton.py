@@ -232,7 +232,7 @@ def _begin_subsystem(system, flows, st, scratch, s):
     for i in range(2 * n):
         scratch.coordinates[i] = y[i]
         for h in range(e):
-            scratch.coordinates[i] -= (flows.shape[s, i, h] * st.amplitude[h]).real
+            scratch.coordinates[i] -= (flows.shape[s, h, i] * st.amplitude[h]).real
         if i < n:
             scratch.coordinates[i] -= st.constant[i]
     if sprung:

@@ -334,7 +334,7 @@ def _sample(system, flows, st, rec, s, tau, constant):
             for r in range(system.bodies):
                 entry[1 + r] += (flows.motion[s, r, j] * st.amplitude[j] * line).real
             for k in range(len(p)):
-                p[k] += (flows.shape[s, k, j] * st.amplitude[j] * (1.0 + first)).real
+                p[k] += (flows.shape[s, j, k] * st.amplitude[j] * (1.0 + first)).real
         for h in range(len(system.frequency)):
             for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
                 growth, beyond = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, h], t)
@@ -343,4 +343,4 @@ def _sample(system, flows, st, rec, s, tau, constant):
                 for r in range(system.bodies):
                     entry[1 + r] += (flows.motion[s, r, j] * drive * beyond).real
                 for k in range(len(p)):
-                    p[k] += (flows.shape[s, k, j] * drive * growth).real
+                    p[k] += (flows.shape[s, j, k] * drive * growth).real

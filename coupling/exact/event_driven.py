@@ -121,7 +121,7 @@ class EngineRun:
             return None
         state, s, n = self.state, int(self.state.counters[FLOW]), self.system.modes
         awake = slice(state.counters[AWAKE])
-        y = (self.flows.shape[s][:, awake] @ state.amplitude[awake]).real
+        y = (state.amplitude[awake] @ self.flows.shape[s, awake]).real
         y[: len(state.constant)] += state.constant
         return InitialMotion(y[:n], y[n:], state.displacement, state.velocity)
 

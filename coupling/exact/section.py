@@ -5,7 +5,7 @@ from __future__ import annotations
 from vanedamp.coupling.exact.compliant_contacts import spring_energy
 from vanedamp.coupling.exact.gap_kinematics import rigid
 from vanedamp.coupling.numerics.codes import AWAKE, FLOW, PERIOD, SPRUNG
-from vanedamp.coupling.numerics.jit import inlined, summing
+from vanedamp.coupling.numerics.jit import inlined
 from vanedamp.coupling.response.recorder import put_section
 
 
@@ -28,15 +28,8 @@ def structure_state(flows, st, y):
     """Set y to (p, p') at the segment's start."""
     s, n = st.counters[FLOW], len(st.constant)
     for i in range(2 * n):
-        y[i] = _sum_of_modes(flows.shape[s, i], st.amplitude, st.counters[AWAKE])
-    for i in range(n):
-        y[i] += st.constant[i]
-
-
-@summing
-def _sum_of_modes(functional, amplitude, count):
-    """Return a functional of the amplitudes."""
-    total = 0.0
-    for j in range(count):
-        total += functional[j].real * amplitude[j].real - functional[j].imag * amplitude[j].imag
-    return total
+        y[i] = st.constant[i] if i < n else 0.0
+    for j in range(st.counters[AWAKE]):
+        c, shape = st.amplitude[j], flows.shape[s, j]
+        for i in range(2 * n):
+            y[i] += shape[i].real * c.real - shape[i].imag * c.imag

@@ -61,7 +61,7 @@ class Flows(NamedTuple):
     attached: np.ndarray  # (s, b) whether rigid rows hold a body to the structure
 
     # functionals of the amplitudes c
-    shape: np.ndarray  # (s, 2n, m): (p, p') = constant + Re(shape c)
+    shape: np.ndarray  # (s, m, 2n): (p, p') = constant + Re(c shape)
     motion: np.ndarray  # (s, r, m): displacement of each row
     velocity: np.ndarray  # (s, r, m): its rate
     force: np.ndarray  # (s, r, m): force of each closed row
@@ -119,7 +119,7 @@ def empty_flows(system: System, capacity: int = 4) -> Flows:
         eigenvalue=np.zeros((s, m), complex),
         sprung=np.zeros(s, np.bool_),
         attached=np.zeros((s, b), np.bool_),
-        shape=np.zeros((s, 2 * n, m), complex),
+        shape=np.zeros((s, m, 2 * n), complex),
         motion=np.zeros((s, r, m), complex),
         velocity=np.zeros((s, r, m), complex),
         force=np.zeros((s, r, m), complex),
@@ -265,7 +265,7 @@ def _fill(flows: Flows, system: System, s: int, subsystem: Subsystem) -> None:
     growing = shape[: n + b, :driven] @ (growth[:, None] * (driver[:, None] == range(e)))
     full = np.hstack([np.vstack([harmonic, 1j * system.frequency * harmonic + growing]), shape])
     structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
-    flows.shape[s, :, :m] = full[structure]
+    flows.shape[s, :m] = full[structure].T
     flows.excited[s] = full[xi, :e]
     flows.project[s, e:m], flows.project_slip[s, e:m] = project[:, structure], project[:, xi]
     flows.impulse_response[s, :, e:m] = system.of_structure.J @ project[:, n + b : 2 * n + b].T

@@ -191,7 +191,7 @@ class Walk:
         run, st, dynamics, system = self.run, self.run.state, self._dynamics, self._dynamics.system
         n, b, s = system.modes, system.bodies, int(st.counters[FLOW])
         m = int(run.flows.modes[s])
-        y = (run.flows.shape[s, :, :m] @ st.amplitude[:m]).real
+        y = (st.amplitude[:m] @ run.flows.shape[s, :m]).real
         y[:n] += st.constant
         slip = st.displacement[:b] + st.low_word[:b]
         parts = dynamics.scale * y, slip, st.velocity[:b], st.displacement[dynamics.springs]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vanedamp.coupling.numerics.jit import entry, inlined
+from vanedamp.coupling.numerics.jit import entry, inlined, summing
 from vanedamp.coupling.response.records import STORED
 
 
@@ -20,20 +20,16 @@ def put_section(system, records, period, p, p_rate, slip, slip_velocity, springs
     springs of rows, J; ledger: (6,) J, whose stored energy is set.
     """
     n, b, entry, part = system.modes, system.bodies, records.section[period], records.parts[period]
-    x, rate, energy, momentum = 0.0, 0.0, springs, 0.0
+    x, rate, energy = _structure(system.response, system.stiffness, p, p_rate)
+    energy, momentum = energy + springs, 0.0
     for h in range(len(system.table)):
         x += system.table[h].real
         rate -= system.frequency[h] * system.table[h].imag
-    for i in range(n):
-        x += system.response[i] * p[i]
-        rate += system.response[i] * p_rate[i]
-        energy += 0.5 * (p_rate[i] * p_rate[i] + system.stiffness[i] * p[i] * p[i])
     part[0] = energy
     for k in range(b):
-        velocity, height = slip_velocity[k], slip[k]
-        for i in range(n):
-            velocity += system.floor[k, i] * p_rate[i]
-            height += system.floor[k, i] * p[i]
+        velocity, height = slip_velocity[k] + _dot(system.floor[k], p_rate), slip[k]
+        if system.weight[n + k] != 0.0:
+            height += _dot(system.floor[k], p)
         momentum += system.mass[n + k] * velocity
         part[1 + k] = 0.5 * system.mass[n + k] * velocity * velocity - system.weight[n + k] * height
         energy += part[1 + k]
@@ -42,6 +38,25 @@ def put_section(system, records, period, p, p_rate, slip, slip_velocity, springs
     ledger[STORED] = energy
     for i in range(len(ledger)):
         records.ledger[period, i] = ledger[i]
+
+
+@summing
+def _structure(response, stiffness, p, p_rate):
+    """Return the response of the modes, its rate, and the energy of the structure."""
+    x, rate, energy = 0.0, 0.0, 0.0
+    for i in range(len(p)):
+        x += response[i] * p[i]
+        rate += response[i] * p_rate[i]
+        energy += 0.5 * (p_rate[i] * p_rate[i] + stiffness[i] * p[i] * p[i])
+    return x, rate, energy
+
+
+@summing
+def _dot(a, b):
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
 
 
 @entry

@@ -77,8 +77,8 @@ class SliderSegment(Segment):
         awake = slice(int(st.counters[AWAKE]))
         n = system.modes
         self._system, self.rate, self._amplitude = system, flows.eigenvalue[s, awake].copy(), st.amplitude[awake].copy()
-        self._shape, self._motion = flows.shape[s][:n, awake].copy(), flows.motion[s][:, awake].copy()
-        y = (flows.shape[s][:, awake] @ self._amplitude).real
+        self._shape, self._motion = flows.shape[s, awake, :n].T.copy(), flows.motion[s][:, awake].copy()
+        y = (self._amplitude @ flows.shape[s, awake]).real
         self._p, self._p_rate = st.constant + y[:n], y[n:]
         self.wave = self._shape[mode] * self._amplitude
         self.powers = np.array([self._p[mode], self._p_rate[mode], 0.0])

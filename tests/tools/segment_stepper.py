@@ -211,7 +211,7 @@ class Stepper:
             harmonic=np.clip(np.searchsorted(flows.driven[s], awake, "right") - 1, 0, len(flows.driven[s]) - 2),
             load=flows.load[s, awake],
             motion=flows.motion[s][:, awake], velocity_row=flows.velocity[s][:, awake],
-            force=flows.force[s][:, awake], shape=flows.shape[s, : 2 * n][:, awake],
+            force=flows.force[s][:, awake], shape=flows.shape[s, awake].T,
         )  # fmt: skip
 
 
