@@ -6,12 +6,15 @@ generous: whoever meets one has most likely slipped by some powers of ten.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.optimisation.study import Study
-from vanedamp.studies.workers import available_cores
+
+if TYPE_CHECKING:
+    from vanedamp.studies.optimisation.study import Study
 
 #: s of a run, beside its periods
 _RUN = 2.5e-3
@@ -40,6 +43,8 @@ def check_run(scene: Scene, samples: int = 0) -> None:
 
 def check_sweep(scene: Scene, workers: int | None) -> None:
     """Refuse a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
+    from vanedamp.studies.workers import available_cores
+
     points, count = scene.points, workers or available_cores()
     seconds = sweep_seconds(scene, count)
     if points > MOST_POINTS:
@@ -53,6 +58,8 @@ def check_sweep(scene: Scene, workers: int | None) -> None:
 
 def check_optimise(study: Study, workers: int | None) -> None:
     """Refuse an optimisation that takes a month. Raises InputError."""
+    from vanedamp.studies.workers import available_cores
+
     scenes, count = scenes_of(study), workers or available_cores()
     check_run(study.scene)
     _check_time("optimise", f"{scenes:.3g} scenes on {count} workers", scenes * run_seconds(study.scene) / count)
