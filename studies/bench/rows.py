@@ -48,7 +48,8 @@ class Rows:
         except OSError as error:
             raise InputError(f"--output {folder}: cannot be made ({error.strerror})") from error
         self.file, self._name, self._inputs = folder / f"bench_{name}.partial", name, inputs
-        self._expected, self._left, self._taken = dict(expected), dict(expected), []
+        self._expected, self._left = dict(expected), dict(expected)
+        self._taken: list[dict[str, Any]] = []
         #: what the rows took by the clock, those of before included
         self.seconds = 0.0
         self._weight = 0.0  # what the rows that were measured should have taken
