@@ -90,7 +90,7 @@ class _Entry(JITCodeLibrary):
         return [name for name in names if name.startswith(_ENVIRONMENT) and lookup_environment(name) is not None]
 
     def _optimize_final_module(self) -> None:
-        """Optimise the code, in which nobody else calls the functions below: what they do not use is not handed over."""
+        """Optimise the code, in which nobody else calls the functions below: arguments of no use are not handed over."""
         for function in self._final_module.functions:
             if function.is_declaration or function.name in self._own:
                 continue

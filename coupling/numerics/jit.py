@@ -1,8 +1,8 @@
 """The decorators of compiled functions.
 
-Kept on disk between processes (those that Python calls: they hold the others); divisions by zero give inf as in C; a product and a sum may be one instruction; no
-reference counting, which would cost more than the arithmetic: a compiled function allocates nothing and works in the
-arrays that it is given (exact.state.Scratch).
+Those that Python calls are kept on disk between processes, with the code of those that they call. Divisions by zero
+give inf as in C; a product and a sum may be one instruction; no reference counting, which would cost more than the
+arithmetic: a compiled function allocates nothing and works in the arrays that it is given (exact.state.Scratch).
 """
 
 from __future__ import annotations
