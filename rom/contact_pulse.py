@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 # half periods of body and wall on the contact after which it counts as ended, and samples of its force in each
 _LONGEST, _LOOKS = 6, 300
@@ -66,6 +65,8 @@ def pulse(squares: np.ndarray, row: np.ndarray, collision: Collision, frequency_
     end = float(times[-1])
     if ended.size:
         first = int(ended[0])
+        from scipy.optimize import brentq
+
         end = float(times[1]) if first == 0 else float(brentq(at, times[first], times[first + 1]))
     turned = rates - 2j * math.pi * frequency_hz
     # (exp(z end) - 1) / z, which is end where z vanishes

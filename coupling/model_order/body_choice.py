@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from vanedamp.coupling.methods.registry import final_state, run_of, why_no_restart
 from vanedamp.coupling.response.evaluation import Run
@@ -255,7 +255,7 @@ def _error(slider: Run, periods: int, settled: int, blocks: Sequence[Run], toler
         other = float(batches.mean())
         if not other > 0.0:
             return 0.0, 0.0  # nothing moves
-        width = student.ppf(0.975, len(batches) - 1) * batches.std(ddof=1) / math.sqrt(len(batches))
+        width = stdtrit(len(batches) - 1, 0.975) * batches.std(ddof=1) / math.sqrt(len(batches))
         error, confidence = mean / other - 1.0, math.hypot(own, mean / other * width) / other
         if abs(error) - confidence > tolerance:
             break

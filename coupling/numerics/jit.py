@@ -1,77 +1,93 @@
 """The decorators of compiled functions.
 
-Cached on disk between processes; divisions by zero give inf as in C; a product and a sum may be one instruction; no
-reference counting, which would cost more than the arithmetic: a compiled function allocates nothing and works in the
-arrays that it is given (exact.state.Scratch).
+Those that Python calls are kept on disk between processes, with the code of those that they call. Divisions by zero
+give inf as in C; a product and a sum may be one instruction; no reference counting, which would cost more than the
+arithmetic: a compiled function allocates nothing and works in the arrays that it is given (exact.state.Scratch).
 """
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Set
-from functools import cache
+from collections.abc import Callable
+from functools import cache, update_wrapper
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import config, njit
+from numba import config, njit, types
+from numba.extending import typeof_impl
 
+from vanedamp.coupling.numerics.code_library import ENTRY, KERNEL
 from vanedamp.files.errors import VanedampError
 
 #: start of a counter: numba would compile the callees of a literal 0 again
 ZERO = np.int64(0)
 
+_OPTIONS: dict[str, Any] = {
+    "error_model": "numpy", "_nrt": False, "fastmath": {"contract"}, "no_cfunc_wrapper": True,
+}  # fmt: skip
+
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
 _MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@intrinsic", "(NamedTuple)")
 _PACKAGE = Path(__file__).parents[2]
-# a product and a sum may be one instruction
-_CONTRACT = frozenset({"contract"})
 
 
 class CacheError(VanedampError):
     """Compiled functions have no folder to be kept in: every process would compile them again, for a minute."""
 
 
+class Entry:
+    """A compiled function that Python calls, kept on disk; as a kernel, in `kernel`, compiled functions call it."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        update_wrapper(self, function)
+        self.kernel = kernel(function)
+        self._compiled = _kept(function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it, compiled for the types of these arguments."""
+        return self._compiled(*arguments)
+
+
+@typeof_impl.register(Entry)
+def _type_of_entry(function, context):
+    return types.Dispatcher(function.kernel)
+
+
 def entry(function: Callable[..., Any]) -> Any:
-    """Compile a function of the engine that Python calls."""
-    return _compile(function, no_cfunc_wrapper=True)
+    """Compile a function of the engine that Python calls, and compiled functions may."""
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
+        return function
+    return Entry(function)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function of the engine that only compiled functions may call.
-
-    Unpacking the records' arrays for Python would take longer to compile than most functions themselves.
-    """
-    return _compile(function, no_cfunc_wrapper=True, no_cpython_wrapper=True)
-
-
-def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a function of the engine into its callers, compiled ones: for functions that every segment runs.
-
-    A call hands over every array of its records, some 5 kB: it costs as much as a few exponentials.
-    """
-    return _compile(function, no_cfunc_wrapper=True, no_cpython_wrapper=True, forceinline=True)
+    """Compile a function of the engine that only compiled functions may call, as a part of them."""
+    return njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=KERNEL)(function)
 
 
 def summing(function: Callable[..., Any]) -> Any:
-    """Compile a function of the engine into its callers whose sums may be taken in any order, several terms at once."""
-    return _compile(
-        function, {"contract", "reassoc"}, no_cfunc_wrapper=True, no_cpython_wrapper=True, forceinline=True
+    """Compile a kernel whose sums may be taken in any order, several terms at once."""
+    return njit(**_OPTIONS | {"fastmath": {"contract", "reassoc"}}, no_cpython_wrapper=True, pipeline_class=KERNEL)(
+        function
     )
 
 
-def _compile(function: Callable[..., Any], fastmath: Set[str] = _CONTRACT, **options: bool) -> Any:
+#: a kernel as well: LLVM compiles short ones into all callers, and long ones into the only caller or not at all
+inlined = kernel
+
+
+def _kept(function: Callable[..., Any]) -> Any:
+    """Compile a function that Python calls, and keep it on disk."""
     try:
-        compiled = njit(cache=True, error_model="numpy", _nrt=False, fastmath=set(fastmath), **options)(function)  # type: ignore[call-overload]
+        compiled = njit(**_OPTIONS, cache=True, pipeline_class=ENTRY)(function)  # type: ignore[call-overload]
     except RuntimeError as error:  # numba has found no folder that it can write to
         folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
         raise CacheError(
             f"compiled functions have no folder that can be written to, of {folders} and the user's cache: "
             "set NUMBA_CACHE_DIR to one"
         ) from error
-    if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
-        return compiled
     kept = compiled._cache._cache_file
     # numba dates a cached function by its own file only, but it holds the code of the functions that it calls
     kept._source_stamp = _sources(Path(function.__code__.co_filename))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 #: batches of the method of batch means
 _BATCHES = 10
@@ -46,4 +46,4 @@ def mean_confidence(series: np.ndarray) -> float | None:
     if size < 2:
         return None
     means = series[-size * _BATCHES :].reshape(_BATCHES, size).mean(axis=1)
-    return float(student.ppf(0.975, _BATCHES - 1) * means.std(ddof=1) / np.sqrt(_BATCHES))
+    return float(stdtrit(_BATCHES - 1, 0.975) * means.std(ddof=1) / np.sqrt(_BATCHES))

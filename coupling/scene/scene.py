@@ -372,6 +372,8 @@ class Scene(Displayed):
 
     def save(self, path: str | Path) -> None:
         """Write the TOML file that `load` reads; files beside it, such as a reduced model's, are relative to it."""
+        from vanedamp.files.toml_output import toml
+
         with replacing(path) as temporary:
             temporary.write_text(toml(relative(self.to_dict(), path)), encoding="utf-8")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq
 
 #: speeds over a range unless the caller says how many
 _EVEN = 65
@@ -23,6 +22,8 @@ def crossings(
 
     even: speeds over the range, between two of which each natural frequency meets the line once at most.
     """
+    from scipy.optimize import brentq
+
     speeds = np.linspace(low, high, even)
     above = np.array([natural(float(speed)) - line(float(speed)) for speed in speeds])
     found = []

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.optimize import minimize_scalar
 
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
@@ -104,6 +103,8 @@ class LinearResponse:
 
     def _refined(self, grid: np.ndarray, heights: np.ndarray, top: int) -> tuple[float, float]:
         """Return height and frequency of the maximum around a point of the grid; that point at an edge."""
+        from scipy.optimize import minimize_scalar
+
         found = float(heights[top]), float(grid[top])
         if 0 < top < len(grid) - 1:
             refined = minimize_scalar(
@@ -167,6 +168,8 @@ def peak_along(response: Callable[[float], LinearResponse], order: float, low: f
 
     def natural(speed: float) -> np.ndarray:
         return np.sort(response(speed).resonances()[0])
+
+    from scipy.optimize import minimize_scalar
 
     best = max((amplitude(speed), speed, 0.0) for speed in (low, high))
     for speed, width in _resonances(response, natural, order, low, high):

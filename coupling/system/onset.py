@@ -11,7 +11,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
@@ -35,6 +34,8 @@ def onset(room: float, friction: float, pull: float, omega: float) -> Onset:
 
     friction: mu N/m, that holds it, and pull, along the cavity: accelerations, m/s^2.
     """
+    from scipy.optimize import brentq
+
     slip = max(friction - abs(pull), 0.0) / omega**2
     if pull:  # downhill to the wall, which it leaves as the wall runs away from it
         return Onset(slip, (friction + abs(pull)) / omega**2)
@@ -45,6 +46,8 @@ def onset(room: float, friction: float, pull: float, omega: float) -> Onset:
 
 def swing(reach: float, slip: float) -> float:
     """Return the amplitude, m, of a body's slip on a level floor of amplitude `reach`, m; slip: where it begins, m."""
+    from scipy.optimize import brentq
+
     if reach <= slip:
         return 0.0
     if reach >= NEVER_STICKS * slip:

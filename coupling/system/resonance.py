@@ -7,7 +7,6 @@ from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
@@ -152,6 +151,8 @@ def _sine(scene: Scene, basis: ModalBasis, response: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=64)
 def _resonance(stiffness_: bytes, damping_: bytes, response_: bytes, force_: bytes, mode: int) -> tuple[float, float]:
     """Return frequency (Hz) and height (m/N) of a mode's resonance: once for all frequencies of a sweep."""
+    from scipy.optimize import minimize_scalar
+
     stiffness, response, force = np.frombuffer(stiffness_), np.frombuffer(response_), np.frombuffer(force_, complex)
     damping = np.frombuffer(damping_).reshape(len(stiffness), -1)
     resonance = np.sqrt(stiffness[mode])

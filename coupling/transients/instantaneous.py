@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from vanedamp.coupling.transients.ring_down_segments import Segment
 
@@ -211,6 +211,6 @@ def bins(amplitude: np.ndarray, values: np.ndarray, edges: np.ndarray, stride: i
         apart = own[::stride]
         spread = np.nan
         if len(apart) > 1:
-            spread = student.ppf(0.975, len(apart) - 1) * apart.std(ddof=1) / np.sqrt(len(apart))
+            spread = stdtrit(len(apart) - 1, 0.975) * apart.std(ddof=1) / np.sqrt(len(apart))
         rows.append([len(own), own.mean() if len(own) else np.nan, spread, np.median(own) if len(own) else np.nan])
     return Bins(edges[:-1], edges[1:], *np.reshape(rows, (-1, 4)).T)

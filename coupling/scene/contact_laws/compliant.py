@@ -7,7 +7,6 @@ from dataclasses import field
 from typing import ClassVar, Literal
 
 from pydantic.dataclasses import dataclass
-from scipy.optimize import brentq
 
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element, spring_on_wall
 from vanedamp.files.toml_input import STRICT, InputError, Positive
@@ -57,6 +56,8 @@ def damping_ratio(restitution: float) -> float:
     restitution = exp(-(pi - 2 a) tan a) with damping ratio sin a, down to exp(-2) at critical damping; below, the same
     with hyperbolic functions: exp(-2 z acosh(z)/sqrt(z^2 - 1)). Raises InputError outside (0, 1].
     """
+    from scipy.optimize import brentq
+
     if not 0 < restitution <= 1:
         raise InputError(f"restitution: a contact with a dashpot needs a value above 0, up to 1 (got {restitution:g})")
     loss = -math.log(restitution)

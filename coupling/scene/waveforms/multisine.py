@@ -15,7 +15,6 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
-from scipy.optimize import brentq, minimize
 
 from vanedamp.coupling.scene.sines import peaks
 from vanedamp.coupling.scene.waveform import Waveform
@@ -109,6 +108,8 @@ def _crest(order: np.ndarray, size: np.ndarray, phase: np.ndarray) -> float:
 
 def _between(order: np.ndarray, size: np.ndarray, one: np.ndarray, other: np.ndarray, target: float) -> np.ndarray:
     """Return phases on the way from one set to another with a crest factor between theirs, or equal to one of them."""
+    from scipy.optimize import brentq
+
     way = (other - one + np.pi) % (2 * np.pi) - np.pi
 
     def missed(share: float) -> float:
@@ -122,6 +123,8 @@ def _between(order: np.ndarray, size: np.ndarray, one: np.ndarray, other: np.nda
 
 def _flatter(order: np.ndarray, size: np.ndarray, random: np.ndarray) -> Iterator[np.ndarray]:
     """Yield phases whose crest factors are lower and lower as a rule: Schroeder's, then those of growing norms."""
+    from scipy.optimize import minimize
+
     power = size**2 / (size**2).sum()
     phase = -2 * np.pi * np.concatenate([[0.0], np.cumsum(np.cumsum(power))[:-1]])
     yield phase

@@ -6,12 +6,16 @@ generous: whoever meets one has most likely slipped by some powers of ten.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.optimisation.study import Study
-from vanedamp.studies.workers import available_cores
+from vanedamp.studies.terminal import duration
+
+if TYPE_CHECKING:
+    from vanedamp.studies.optimisation.study import Study
 
 #: s of a run, beside its periods
 _RUN = 2.5e-3
@@ -40,11 +44,13 @@ def check_run(scene: Scene, samples: int = 0) -> None:
 
 def check_sweep(scene: Scene, workers: int | None) -> None:
     """Refuse a sweep of more points than anyone needs, or that takes a month. Raises InputError."""
+    from vanedamp.studies.workers import available_cores
+
     points, count = scene.points, workers or available_cores()
     seconds = sweep_seconds(scene, count)
     if points > MOST_POINTS:
         raise InputError(
-            f"sweep: {points:.3g} points take {_duration(seconds)} on {count} workers and {_amount(_POINT * points)}; "
+            f"sweep: {points:.3g} points take {duration(seconds)} on {count} workers and {_amount(_POINT * points)}; "
             f"at most {MOST_POINTS}: take fewer values an axis, or several sweeps"
         )
     check_run(scene)
@@ -53,6 +59,8 @@ def check_sweep(scene: Scene, workers: int | None) -> None:
 
 def check_optimise(study: Study, workers: int | None) -> None:
     """Refuse an optimisation that takes a month. Raises InputError."""
+    from vanedamp.studies.workers import available_cores
+
     scenes, count = scenes_of(study), workers or available_cores()
     check_run(study.scene)
     _check_time("optimise", f"{scenes:.3g} scenes on {count} workers", scenes * run_seconds(study.scene) / count)
@@ -90,13 +98,9 @@ def run_seconds(scene: Scene) -> float:
 def _check_time(key: str, what: str, seconds: float) -> None:
     if seconds > MOST_SECONDS:
         raise InputError(
-            f"{key}: {what} take about {_duration(seconds)}; at most {_duration(MOST_SECONDS)}: take fewer points, "
+            f"{key}: {what} take about {duration(seconds)}; at most {duration(MOST_SECONDS)}: take fewer points, "
             "periods or steps"
         )
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds / 86400:.3g} days" if seconds > 86400 else f"{seconds / 3600:.2g} h"
 
 
 def _amount(size: float) -> str:

@@ -1,0 +1,150 @@
+"""Code of compiled functions, linked as they are lowered and optimised once, in the function that Python calls.
+
+numba optimises every function, emits machine code for it, and links what comes out into its callers, where all of it is
+optimised and emitted again: half of a first run's time for code that nobody calls. And it keeps with each function of
+its cache the intermediate code of all that is below it, for callers that would inline it, which takes longer to load
+than the machine code.
+
+numba takes another compiler by a documented way (`pipeline_class`), and that one another library of code, whose methods
+are numba's own but not documented. Where a version of numba lacks one of them, numba's compiler is taken:
+slower, with the same results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.environment import lookup_environment
+from numba.core.typed_passes import NopythonTypeInference
+
+_METHODS = (
+    "finalize", "get_pointer_to_function", "serialize_using_object_code", "_get_compiled_object",
+    "_get_module_for_linking", "_optimize_final_module", "codegen",
+)  # fmt: skip
+_ENVIRONMENT = "_ZN08NumbaEnv"
+
+
+class _Kernel(JITCodeLibrary):
+    """Code of a function that only compiled functions call: it stays as it was lowered."""
+
+    def finalize(self) -> None:
+        """Leave the code to the callers."""
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return 0: there is no machine code."""
+        return 0
+
+    @property
+    def codegen(self) -> _Kernel:
+        """This library, which takes the function's environment: there is no machine code to hold it."""
+        return self
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Leave the environment to the callers."""
+
+    def lowered(self) -> Any:
+        """Return the module of this function alone."""
+        return super()._get_module_for_linking()
+
+    def _get_module_for_linking(self) -> Any:
+        """Return the module of this function with all that it calls, for a library of numba's own."""
+        module = self.lowered().clone()
+        for library in _below(self):
+            module.link_in(_module(library), preserve=True)
+        return module
+
+
+class _Entry(JITCodeLibrary):
+    """Code of a function that Python calls, with that of all functions below it."""
+
+    def finalize(self) -> None:
+        """Link everything, optimise it, and make machine code."""
+        self._own = [function.name for function in self._final_module.functions if not function.is_declaration]
+        for library in _below(self):
+            self._final_module.link_in(_module(library), preserve=True)
+        self._linking_libraries = []
+        super().finalize()
+        for name in self._environments():
+            self.codegen.set_env(name, lookup_environment(name))  # type: ignore[attr-defined]  # of numba's JITCPUCodegen
+
+    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
+        """Return the machine code, and the names that it defines in place of the intermediate code.
+
+        They are variables there, so that numba refuses to link what is not there.
+        """
+        self._ensure_finalized()
+        names = "\n".join(f'@"{name}" = global i8 0' for name in [*self._own, *self._environments()])
+        return self.name, "object", (self._get_compiled_object(), llvm.parse_assembly(names).as_bitcode())
+
+    def _environments(self) -> list[str]:
+        """Return the names of the environments in the code."""
+        names = [variable.name for variable in self._final_module.global_variables]
+        return [name for name in names if name.startswith(_ENVIRONMENT) and lookup_environment(name) is not None]
+
+    def _optimize_final_module(self) -> None:
+        """Optimise the code, in which nobody else calls the functions below: so that unused arguments go."""
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.name not in self._own:
+                function.linkage = llvm.Linkage.internal
+        super()._optimize_final_module()
+
+
+def _below(library: Any) -> Iterator[Any]:
+    """Yield the libraries below one, each once."""
+    seen, waiting = {library}, list(library._linking_libraries)
+    while waiting:
+        other = waiting.pop()
+        if other in seen:
+            continue
+        seen.add(other)
+        yield other
+        if isinstance(other, _Kernel):  # others hold what they call
+            waiting += other._linking_libraries
+
+
+def _module(library: Any) -> Any:
+    return library.lowered() if isinstance(library, _Kernel) else library._get_module_for_linking()
+
+
+def _compiler(library: type[JITCodeLibrary], name: str) -> type[CompilerBase]:
+    """Return numba's compiler, with its code in a library of this class."""
+
+    @register_pass(mutates_CFG=False, analysis_only=True)
+    class Take(FunctionPass):
+        """Choose the library before the code is lowered."""
+
+        _name = f"vanedamp_{name}"
+
+        def __init__(self) -> None:
+            super().__init__()
+
+        def run_pass(self, state: Any) -> bool:
+            """Set the library, as the lowering would."""
+            if state.library is None:
+                state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
+                state.library.enable_object_caching()
+            return False
+
+    class Chosen(CompilerBase):
+        """numba's compiler but for the library."""
+
+        def define_pipelines(self) -> list[Any]:
+            """Return numba's pipeline with the choice of the library in it."""
+            passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+            passes.add_pass_after(Take, NopythonTypeInference)
+            passes.finalize()
+            return [passes]
+
+    return Chosen
+
+
+if all(hasattr(JITCodeLibrary, name) for name in _METHODS):
+    ENTRY, KERNEL = _compiler(_Entry, "entry"), _compiler(_Kernel, "kernel")
+else:
+    ENTRY = KERNEL = Compiler
