@@ -50,7 +50,12 @@ class _Kernel(JITCodeLibrary):
 
     def lowered(self) -> Any:
         """Return the module of this function alone."""
-        return super()._get_module_for_linking()
+        module = super()._get_module_for_linking()
+        for function in module.functions:
+            # what is called by a module that is linked later would be left out
+            if function.linkage == llvm.Linkage.linkonce_odr:
+                function.linkage = llvm.Linkage.weak_odr
+        return module
 
     def _get_module_for_linking(self) -> Any:
         """Return the module of this function with all that it calls, for a library of numba's own."""
