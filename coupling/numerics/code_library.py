@@ -26,8 +26,6 @@ _METHODS = (
     "finalize", "get_pointer_to_function", "serialize_using_object_code", "_get_compiled_object",
     "_get_module_for_linking", "_optimize_final_module", "codegen",
 )  # fmt: skip
-#: instructions of a function that is a part of every caller; of longer ones LLVM decides
-_SMALL = 500
 _ENVIRONMENT = "_ZN08NumbaEnv"
 
 
@@ -70,10 +68,11 @@ class _Entry(JITCodeLibrary):
         self._own = [function.name for function in self._final_module.functions if not function.is_declaration]
         for library in _below(self):
             self._final_module.link_in(_module(library), preserve=True)
+            self._reload_init.update(library._reload_init)
         self._linking_libraries = []
         super().finalize()
         for name in self._environments():
-            self._codegen.set_env(name, lookup_environment(name))
+            self.codegen.set_env(name, lookup_environment(name))  # type: ignore[attr-defined]  # of numba's JITCPUCodegen
 
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
         """Return the machine code, and the names that it defines in place of the intermediate code.
@@ -90,13 +89,10 @@ class _Entry(JITCodeLibrary):
         return [name for name in names if name.startswith(_ENVIRONMENT) and lookup_environment(name) is not None]
 
     def _optimize_final_module(self) -> None:
-        """Optimise the code, in which nobody else calls the functions below: arguments of no use are not handed over."""
+        """Optimise the code, in which nobody else calls the functions below: so that unused arguments go."""
         for function in self._final_module.functions:
-            if function.is_declaration or function.name in self._own:
-                continue
-            function.linkage = llvm.Linkage.internal
-            if b"noinline" not in function.attributes and _size(function) <= _SMALL:
-                function.add_function_attribute("alwaysinline")
+            if not function.is_declaration and function.name not in self._own:
+                function.linkage = llvm.Linkage.internal
         super()._optimize_final_module()
 
 
@@ -111,10 +107,6 @@ def _below(library: Any) -> Iterator[Any]:
         yield other
         if isinstance(other, _Kernel):  # others hold what they call
             waiting += other._linking_libraries
-
-
-def _size(function: Any) -> int:
-    return sum(1 for block in function.blocks for _ in block.instructions)
 
 
 def _module(library: Any) -> Any:

@@ -57,15 +57,17 @@ def _type_of_entry(function, context):
 
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function of the engine that Python calls, and compiled functions may."""
-    return function if config.DISABLE_JIT else Entry(function)  # type: ignore[attr-defined]  # plain Python, for a debugger
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]  # plain Python, for a debugger
+        return function
+    return Entry(function)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function of the engine that only compiled functions may call, as a part of them."""
-    return njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=KERNEL)(function)  # type: ignore[call-overload]
+    return njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=KERNEL)(function)
 
 
-#: a kernel as well: small ones are compiled into all callers, and long ones where LLVM finds it worth its while
+#: a kernel as well: LLVM compiles short ones into all callers, and long ones into the only caller or not at all
 inlined = kernel
 
 
