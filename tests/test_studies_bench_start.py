@@ -8,17 +8,16 @@ import sys
 import pytest
 from PIL import Image
 
-from tests.tools.input_files import SCENE
 from vanedamp.studies.bench.start import measure
-from vanedamp.studies.bench.start.measure import Effort, imports_of, print_summary, run_start
+from vanedamp.studies.bench.start.measure import Effort, imports_of, print_summary, run_start, small_scene
 
 
 @pytest.mark.parametrize(
     "arguments", [["--help"], ["run", "scene.toml", "-o", "response.h5", "--json", "response.json"]]
 )
 def test_commands_import_nothing_that_they_do_not_use(arguments, tmp_path):
-    """scipy's statistics and optimisation, and processes, take longer to import than a small run."""
-    (tmp_path / "scene.toml").write_text(SCENE)
+    """scipy's statistics and optimisation, and pools of processes, take longer to import than a small run."""
+    small_scene().save(tmp_path / "scene.toml")
     done = subprocess.run(
         [
             sys.executable, "-c",

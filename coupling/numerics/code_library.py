@@ -21,6 +21,7 @@ from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
+from numba.core.types import BaseNamedTuple
 
 _METHODS = (
     "finalize", "get_pointer_to_function", "serialize_using_object_code", "_get_compiled_object",
@@ -113,8 +114,11 @@ def _module(library: Any) -> Any:
     return library.lowered() if isinstance(library, _Kernel) else library._get_module_for_linking()
 
 
-def _compiler(library: type[JITCodeLibrary], name: str) -> type[CompilerBase]:
-    """Return numba's compiler, with its code in a library of this class."""
+def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) -> type[CompilerBase]:
+    """Return numba's compiler, with its code in a library of this class.
+
+    inline: compile functions without records into all callers.
+    """
 
     @register_pass(mutates_CFG=False, analysis_only=True)
     class Take(FunctionPass):
@@ -130,6 +134,8 @@ def _compiler(library: type[JITCodeLibrary], name: str) -> type[CompilerBase]:
             if state.library is None:
                 state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
                 state.library.enable_object_caching()
+            if inline:
+                state.flags.forceinline = not any(isinstance(kind, BaseNamedTuple) for kind in state.args)
             return False
 
     class Chosen(CompilerBase):
@@ -147,5 +153,6 @@ def _compiler(library: type[JITCodeLibrary], name: str) -> type[CompilerBase]:
 
 if all(hasattr(JITCodeLibrary, name) for name in _METHODS):
     ENTRY, KERNEL = _compiler(_Entry, "entry"), _compiler(_Kernel, "kernel")
+    INLINED = _compiler(_Kernel, "inlined", inline=True)
 else:
-    ENTRY = KERNEL = Compiler
+    ENTRY = KERNEL = INLINED = Compiler

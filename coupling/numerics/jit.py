@@ -18,7 +18,7 @@ import numpy as np
 from numba import config, njit, types
 from numba.extending import typeof_impl
 
-from vanedamp.coupling.numerics.code_library import ENTRY, KERNEL
+from vanedamp.coupling.numerics.code_library import ENTRY, INLINED, KERNEL
 from vanedamp.files.errors import VanedampError
 
 #: start of a counter: numba would compile the callees of a literal 0 again
@@ -67,8 +67,12 @@ def kernel(function: Callable[..., Any]) -> Any:
     return njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=KERNEL)(function)
 
 
-#: a kernel as well: LLVM compiles short ones into all callers, and long ones into the only caller or not at all
-inlined = kernel
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a kernel into its callers if it takes no records: for functions of numbers that every segment runs.
+
+    Whether a function of records is a part of its callers is left to LLVM, or the engine would compile for minutes.
+    """
+    return njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=INLINED)(function)
 
 
 def _kept(function: Callable[..., Any]) -> Any:
