@@ -73,7 +73,7 @@ class _Entry(JITCodeLibrary):
         self._linking_libraries = []
         super().finalize()
         for name in self._environments():
-            self.codegen.set_env(name, lookup_environment(name))  # type: ignore[attr-defined]  # of numba's JITCPUCodegen
+            self.codegen.set_env(name, lookup_environment(name))
 
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
         """Return the machine code, and the names that it defines in place of the intermediate code.

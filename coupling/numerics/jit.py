@@ -27,6 +27,7 @@ ZERO = np.int64(0)
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy", "_nrt": False, "fastmath": {"contract"}, "no_cfunc_wrapper": True,
 }  # fmt: skip
+_NOT_FROM_PYTHON = _OPTIONS | {"no_cpython_wrapper": True}
 
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
 _MARKS = ("@entry", "@kernel", "@inlined", "@intrinsic", "(NamedTuple)")
@@ -64,7 +65,7 @@ def entry(function: Callable[..., Any]) -> Any:
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function of the engine that only compiled functions may call, as a part of them."""
-    return njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=KERNEL)(function)
+    return njit(**_NOT_FROM_PYTHON, pipeline_class=KERNEL)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
@@ -72,13 +73,13 @@ def inlined(function: Callable[..., Any]) -> Any:
 
     Whether a function of records is a part of its callers is left to LLVM, or the engine would compile for minutes.
     """
-    return njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=INLINED)(function)
+    return njit(**_NOT_FROM_PYTHON, pipeline_class=INLINED)(function)
 
 
 def _kept(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls, and keep it on disk."""
     try:
-        compiled = njit(**_OPTIONS, cache=True, pipeline_class=ENTRY)(function)  # type: ignore[call-overload]
+        compiled = njit(**_OPTIONS, cache=True, pipeline_class=ENTRY)(function)
     except RuntimeError as error:  # numba has found no folder that it can write to
         folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
         raise CacheError(

@@ -11,7 +11,6 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -37,7 +36,7 @@ COMMANDS = {
 }
 #: packages whose imports are told apart; the others are one
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "vanedamp")
-_WORKER = ["-X", "importtime", "-m", "vanedamp.studies.bench.start.worker", "scene.toml", "response.h5"]
+_WORKER = ["-m", "vanedamp.studies.bench.start.worker", "scene.toml", "response.h5"]
 _ROOT = Path(__file__).parents[3]
 
 
@@ -83,7 +82,7 @@ def run_start(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
         rounds = [
             rows.take(_row(turn), partial(_round, place, turn), tell=_round_text) for turn in range(effort.rounds)
         ]
-    result = {
+    result: dict[str, Any] = {
         "machine": machine() | {"clock": "processor time of processes"}, "effort": asdict(effort), "unit": UNIT,
         "compilation": first, "seconds": _spreads([taken["seconds"] for taken in rounds]),
         "ratio": _spreads([_over(taken["seconds"], taken["seconds"][UNIT]) for taken in rounds]),
@@ -118,22 +117,22 @@ def _round(place: Path, turn: int) -> dict[str, Any]:
     """Return the processor time (s) of every process, in a new order, and the parts of a run in one of its own."""
     order = np.random.default_rng(turn).permutation(list(COMMANDS))
     seconds = {str(name): _seconds(COMMANDS[str(name)], place) for name in order}
-    done = _process(_WORKER, place)
-    parts: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    parts: dict[str, float] = json.loads(_process(_WORKER, place).stdout.splitlines()[-1])
+    told = _process(["-X", "importtime", *COMMANDS["vanedamp run"]], place).stderr
     return {
-        "seconds": {name: seconds[name] for name in COMMANDS}, "parts": parts, "imports": imports_of(done.stderr),
+        "seconds": {name: seconds[name] for name in COMMANDS}, "parts": parts, "imports": imports_of(told),
     }  # fmt: skip
 
 
 def imports_of(text: str) -> dict[str, float]:
     """Return the seconds of imports by package from what `python -X importtime` writes."""
-    total: Counter[str] = Counter(dict.fromkeys((*PACKAGES, "others"), 0.0))
+    total = dict.fromkeys((*PACKAGES, "others"), 0.0)
     for line in text.splitlines():
         if line.startswith("import time:") and line.split("|")[0].split(":")[1].strip().isdigit():
             own, _, name = line.removeprefix("import time:").split("|")
             package = name.strip().split(".")[0]
             total[package if package in PACKAGES else "others"] += 1e-6 * int(own)
-    return dict(total)
+    return total
 
 
 def _seconds(arguments: Sequence[str], place: Path, variables: Mapping[str, str] | None = None) -> float:
@@ -149,7 +148,7 @@ def _process(
 ) -> subprocess.CompletedProcess[str]:
     """Run Python in a folder with these variables of the environment; bytecode is kept, as for every user."""
     paths = os.pathsep.join([str(_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = os.environ | {"PYTHONPATH": paths, "OMP_NUM_THREADS": "1"} | (variables or {})
+    environment = dict(os.environ) | {"PYTHONPATH": paths, "OMP_NUM_THREADS": "1"} | dict(variables or {})
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     return subprocess.run(
         [sys.executable, *arguments], cwd=place, env=environment, capture_output=True, text=True, check=True

@@ -12,12 +12,11 @@ from time import process_time
 
 
 def main(scene_file: str, output: str) -> None:
-    """Do what `vanedamp run` does, part by part."""
+    """Do what `vanedamp run` does, part by part, but for the command line."""
     marks = [0.0, process_time()]
     from vanedamp.coupling.engine import simulate
     from vanedamp.coupling.scene.scene import Scene
     from vanedamp.files.provenance import versions
-    from vanedamp.studies.commands.support import budget, messages, outputs, scenes  # noqa: F401  # as the command does
 
     marks.append(process_time())
     scene = Scene.load(scene_file)
