@@ -139,6 +139,9 @@ else
     pip --no-deps -r requirements.txt
     pip --no-deps --no-build-isolation -e .
 fi
+say "compiling the engine"
+$venv/bin/python -c 'from vanedamp.coupling.sweep.sweep import warm_up; warm_up()' ||
+    say "that failed; the first run compiles it"
 echo "$wanted" >$stamp
 $venv/bin/python - >&2 <<'END'
 import platform

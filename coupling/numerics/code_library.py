@@ -21,6 +21,7 @@ from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
+from numba.core.types import BaseNamedTuple
 
 _METHODS = (
     "finalize", "get_pointer_to_function", "serialize_using_object_code", "_get_compiled_object",
@@ -73,10 +74,11 @@ class _Entry(JITCodeLibrary):
         self._own = [function.name for function in self._final_module.functions if not function.is_declaration]
         for library in _below(self):
             self._final_module.link_in(_module(library), preserve=True)
+            self._reload_init.update(library._reload_init)
         self._linking_libraries = []
         super().finalize()
         for name in self._environments():
-            self.codegen.set_env(name, lookup_environment(name))  # type: ignore[attr-defined]  # of numba's JITCPUCodegen
+            self.codegen.set_env(name, lookup_environment(name))
 
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
         """Return the machine code, and the names that it defines in place of the intermediate code.
@@ -117,8 +119,11 @@ def _module(library: Any) -> Any:
     return library.lowered() if isinstance(library, _Kernel) else library._get_module_for_linking()
 
 
-def _compiler(library: type[JITCodeLibrary], name: str) -> type[CompilerBase]:
-    """Return numba's compiler, with its code in a library of this class."""
+def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) -> type[CompilerBase]:
+    """Return numba's compiler, with its code in a library of this class.
+
+    inline: compile functions without records into all callers.
+    """
 
     @register_pass(mutates_CFG=False, analysis_only=True)
     class Take(FunctionPass):
@@ -134,6 +139,8 @@ def _compiler(library: type[JITCodeLibrary], name: str) -> type[CompilerBase]:
             if state.library is None:
                 state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
                 state.library.enable_object_caching()
+            if inline:
+                state.flags.forceinline = not any(isinstance(kind, BaseNamedTuple) for kind in state.args)
             return False
 
     class Chosen(CompilerBase):
@@ -151,5 +158,6 @@ def _compiler(library: type[JITCodeLibrary], name: str) -> type[CompilerBase]:
 
 if all(hasattr(JITCodeLibrary, name) for name in _METHODS):
     ENTRY, KERNEL = _compiler(_Entry, "entry"), _compiler(_Kernel, "kernel")
+    INLINED = _compiler(_Kernel, "inlined", inline=True)
 else:
-    ENTRY = KERNEL = Compiler
+    ENTRY = KERNEL = INLINED = Compiler

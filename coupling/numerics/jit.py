@@ -18,7 +18,7 @@ import numpy as np
 from numba import config, njit, types
 from numba.extending import typeof_impl
 
-from vanedamp.coupling.numerics.code_library import ENTRY, KERNEL
+from vanedamp.coupling.numerics.code_library import ENTRY, INLINED, KERNEL
 from vanedamp.files.errors import VanedampError
 
 #: start of a counter: numba would compile the callees of a literal 0 again
@@ -27,6 +27,7 @@ ZERO = np.int64(0)
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy", "_nrt": False, "fastmath": {"contract"}, "no_cfunc_wrapper": True,
 }  # fmt: skip
+_NOT_FROM_PYTHON = _OPTIONS | {"no_cpython_wrapper": True}
 
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
 _MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@intrinsic", "(NamedTuple)")
@@ -64,24 +65,26 @@ def entry(function: Callable[..., Any]) -> Any:
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function of the engine that only compiled functions may call, as a part of them."""
-    return njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=KERNEL)(function)
+    return njit(**_NOT_FROM_PYTHON, pipeline_class=KERNEL)(function)
 
 
 def summing(function: Callable[..., Any]) -> Any:
     """Compile a kernel whose sums may be taken in any order, several terms at once."""
-    return njit(**_OPTIONS | {"fastmath": {"contract", "reassoc"}}, no_cpython_wrapper=True, pipeline_class=KERNEL)(
-        function
-    )
+    return njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=KERNEL)(function)
 
 
-#: a kernel as well: LLVM compiles short ones into all callers, and long ones into the only caller or not at all
-inlined = kernel
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a kernel into its callers if it takes no records: for functions of numbers that every segment runs.
+
+    Whether a function of records is a part of its callers is left to LLVM, or the engine would compile for minutes.
+    """
+    return njit(**_NOT_FROM_PYTHON, pipeline_class=INLINED)(function)
 
 
 def _kept(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls, and keep it on disk."""
     try:
-        compiled = njit(**_OPTIONS, cache=True, pipeline_class=ENTRY)(function)  # type: ignore[call-overload]
+        compiled = njit(**_OPTIONS, cache=True, pipeline_class=ENTRY)(function)
     except RuntimeError as error:  # numba has found no folder that it can write to
         folders = f"NUMBA_CACHE_DIR ({config.CACHE_DIR or 'not set'}), {Path(__file__).with_name('__pycache__')}"  # type: ignore[attr-defined]
         raise CacheError(

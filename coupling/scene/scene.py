@@ -36,7 +36,6 @@ from vanedamp.files.toml_input import (
     read_toml,
     validate,
 )
-from vanedamp.files.toml_output import toml
 
 
 @dataclass(frozen=True, config=STRICT)
