@@ -32,6 +32,14 @@ _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies.bench")
 #: a row that takes longer is announced, s
 _PATIENCE = 20.0
 
+#: takes a row by its name: measures it, or has it
+Take = Callable[[str, Callable[[], Any]], Any]
+
+
+def at_once(_row: str, measure: Callable[[], Any]) -> Any:
+    """Take a row by measuring it, without a benchmark around it."""
+    return measure()
+
 
 class Rows:
     """Rows of one run of a benchmark."""

@@ -8,7 +8,6 @@ reduction only lies between the two.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -24,6 +23,7 @@ from vanedamp.rom.interface import Interface
 from vanedamp.studies.bench.engine.inside import time_of_a_period
 from vanedamp.studies.bench.methods.full_mesh_run import explicit_run, glued_frequencies_hz
 from vanedamp.studies.bench.methods.scenes import Cluster
+from vanedamp.studies.bench.rows import Take, at_once
 from vanedamp.studies.bench.timing import Clock, in_turns, spread
 
 #: periods over which models are compared, before chaos parts them, and the body's speed at the start (m/s)
@@ -40,12 +40,6 @@ CURVE_ROWS = {"curve: reduced model": 60.0} | {
     f"curve: whole mesh {where}": 60.0
     for where in ("below the onset", "above the onset", "before the peak", "at the peak", "after the peak")
 }
-#: takes a row by its name: measures it, or has it
-Take = Callable[[str, Callable[[], Any]], Any]
-
-
-def _at_once(_row: str, measure: Callable[[], Any]) -> Any:
-    return measure()
 
 
 @dataclass(frozen=True)
@@ -63,7 +57,7 @@ class CurveEffort:
     points: int = 25
 
 
-def ladder(folder: Path, counts: tuple[int, ...], rounds: int, seed: int, take: Take = _at_once) -> dict[str, Any]:
+def ladder(folder: Path, counts: tuple[int, ...], rounds: int, seed: int, take: Take = at_once) -> dict[str, Any]:
     """Measure reduced models by the exact engine, and the whole mesh by central differences.
 
     Error: largest of the first periods' peaks against the finest reduced model, relative. take: rows LADDER_ROWS.
@@ -110,7 +104,7 @@ def _whole_mesh(cluster: Cluster, finest: Scene, best: np.ndarray) -> dict[str, 
     }  # fmt: skip
 
 
-def curve(folder: Path, effort: CurveEffort = CurveEffort(), take: Take = _at_once) -> dict[str, Any]:
+def curve(folder: Path, effort: CurveEffort = CurveEffort(), take: Take = at_once) -> dict[str, Any]:
     """Measure fixed frequency, onset and damped peak: reduced model by the exact engine, and whole mesh.
 
     take: rows CURVE_ROWS.
