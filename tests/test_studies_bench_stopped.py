@@ -12,6 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 #: benchmarks with the files that they leave
 FILES = {
+    "limits": {f"bench_limits.{ending}" for ending in ("json", "csv")},
     "modal": {f"bench_modal.{ending}" for ending in ("json", "csv", "png")},
     "bodies": {
         "bench_bodies_motion.png", *(f"bench_bodies.{ending}" for ending in ("json", "csv", "png")),
@@ -42,7 +43,7 @@ def rows_of(lines):
     return [line for line in lines if line.startswith("[") and line.endswith((" left)", " s)", " min)"))]
 
 
-@pytest.mark.parametrize("name", [n if n == "stability" else pytest.param(n, marks=pytest.mark.slow) for n in FILES])
+@pytest.mark.parametrize("name", [n if n == "limits" else pytest.param(n, marks=pytest.mark.slow) for n in FILES])
 def test_killed_it_goes_on(name, tmp_path):
     out = tmp_path / "out"
     with begin(name, out) as process:

@@ -167,7 +167,8 @@ def _solver_text(row: Mapping[str, Any]) -> str:
     if row["status"] != "ok":
         return str(row["status"])
     parts = ", ".join(f"{part} {value['cpu_s']:.2f} s" for part, value in _timed(row).items())
-    return f"{parts}, {row['peak_bytes'] / 1e9:.2f} GB"
+    solves = f", {row['solves']} solves" if "solves" in row else ""
+    return f"{parts}{solves}, {row['peak_bytes'] / 1e9:.2f} GB"
 
 
 def _timed(row: Mapping[str, Any]) -> dict[str, Any]:
