@@ -29,6 +29,7 @@ from vanedamp.studies.bench.timing import machine
 from vanedamp.studies.terminal import duration
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies.bench")
+_FIELDS = {"name", "inputs", "software", "machine", "seconds", "value"}
 #: a row that takes longer is announced, s
 _PATIENCE = 20.0
 
@@ -134,8 +135,9 @@ class Rows:
             return []
         try:
             rows: list[dict[str, Any]] = json.loads(self.file.read_text(encoding="utf-8"))
-            assert all({"name", "inputs", "software", "machine", "seconds", "value"} <= set(row) for row in rows)
-        except (OSError, ValueError, TypeError, AssertionError):
+            if not all(set(row) >= _FIELDS for row in rows):
+                raise ValueError
+        except (OSError, ValueError, TypeError):
             raise InputError(f"{self.file}: no rows of a benchmark; remove it to begin anew") from None
         return rows
 

@@ -160,7 +160,6 @@ def run_doubling(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     """Measure, write bench_doubling.json, .csv and .png into a folder, and return the content of the JSON."""
     from vanedamp.studies.bench.doubling.figures import doubling_figure
 
-    branch = Branch()
     variants = {
         label: {"method": name, **variant.options} for label, (name, variant) in charted().items() if label in METHODS
     }
@@ -173,6 +172,7 @@ def run_doubling(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
         row: _COST * (1 + solver["steps_per_period"] / 200) for row, (_, solver) in jobs.items()
     }
     rows = Rows(folder, "doubling", asdict(effort), expected | {f"diagram: {name}": 10.0 for name in solvers})
+    branch = Branch()
     engine = rows.take("exact engine", partial(_engine, branch, effort), tell=_hertz)
     points = [
         rows.take(row, partial(_point, branch, effort, engine["exact_by_runs"], label, solver), tell=_hertz)

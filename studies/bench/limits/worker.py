@@ -8,6 +8,7 @@ waits for the one before), multiply_add (of doubles, in a product of matrices), 
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -15,14 +16,13 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
-from vanedamp.studies.bench.engine.hand_written_loop import _exp
-
 
 @njit(error_model="numpy")
 def _exponentials(count: int) -> complex:
     z = complex(1.0, 0.0)
     for _ in range(count):
-        z = _exp(complex(-1e-3, 0.3 + 0.1 * z.imag))
+        size, angle = math.exp(-1e-3 * z.real), 0.3 + 0.1 * z.imag
+        z = complex(size * math.cos(angle), size * math.sin(angle))
     return z
 
 
