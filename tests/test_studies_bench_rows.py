@@ -114,9 +114,9 @@ def test_time_is_announced_from_what_rows_took(tmp_path, capsys, monkeypatch):
     rows.leave_out("third", "too dear")
     out = capsys.readouterr().out.splitlines()
     assert "about 11 min where it was tried" in out[0]
-    assert out[1] == "[  1/3] first  (30 s, about 22 min left)"
-    assert out[2] == "[  2/3] second: about 2 min ..."
-    assert out[3] == "[  2/3] second  (60 s, about 12 min left)"
+    assert out[1] == "[  1/3] first  (30 s, about 14 min left)"
+    assert out[2] == "[  2/3] second: about 78 s ..."
+    assert out[3] == "[  2/3] second  (60 s, about 11 min left)"
     assert out[4] == "[  3/3] third: left out, too dear"
 
 

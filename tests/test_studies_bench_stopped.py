@@ -22,7 +22,7 @@ FILES = {
     "stability": {f"stability.{ending}" for ending in ("json", "csv", "png")},
     "doubling": {f"bench_doubling.{ending}" for ending in ("json", "csv", "png")},
     "ladder": {
-        "ladder.json", "ladder_rom.h5", "auto.csv", "bodies.csv",
+        "ladder.json", "ladder_rom.h5", "auto_beam.h5", "auto_cluster.h5", "auto.csv", "bodies.csv",
         *(f"ladder_{part}.png" for part in ("bar", "cluster", "auto", "bodies")),
     },
 }  # fmt: skip

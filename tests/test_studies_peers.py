@@ -76,6 +76,19 @@ def test_an_excitation_with_several_harmonics(name, setting):
     np.testing.assert_allclose(run.peak, simulate(scene).peak, rtol=1e-2)
 
 
+@pytest.mark.parametrize(("name", "setting"), [("Exudyn", 1000), ("SUNDIALS CVODE", 1e-6)])
+def test_soft_walls(name, setting):
+    """Over the first periods, before chaos parts the runs."""
+    needs(name)
+    soft = {"contact": {"law": "compliant", "stiffness": 1e7}, "time.periods": 2, "time.transient": 0}
+    scene = method_scenes.double().replace(soft)
+    exact = simulate(scene)
+    assert exact.impacts_per_period > 1
+    run = peers.run_peer(name, scene, 2, setting)
+    assert run.status == "ok"
+    np.testing.assert_allclose(run.peak, exact.peak, rtol=5e-3)
+
+
 def test_a_soft_wall_is_refused_with_the_reason():
     needs("Siconos")
     scene = method_scenes.single().replace({"contact": {"law": "compliant", "stiffness": 1e8}})

@@ -30,6 +30,8 @@ from vanedamp.studies.terminal import duration
 
 _PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies.bench")
 _FIELDS = {"name", "inputs", "software", "machine", "seconds", "value"}
+#: share of the expected time by which rows are taken to be as expected
+_PRIOR = 0.05
 #: a row that takes longer is announced, s
 _PATIENCE = 20.0
 
@@ -121,8 +123,9 @@ class Rows:
             self.file.unlink(missing_ok=True)
 
     def _pace(self) -> float:
-        """Return time over expected time of the rows so far."""
-        return self.seconds / self._weight if self._weight else 1.0
+        """Return time over expected time of the rows so far; the first few do not say it all."""
+        prior = _PRIOR * sum(self._expected.values())
+        return (self.seconds + prior) / (self._weight + prior) if prior else 1.0
 
     def _time_left(self) -> str:
         return f", about {duration(self._pace() * sum(self._left.values()))} left" if self._left else ""

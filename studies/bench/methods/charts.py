@@ -41,8 +41,8 @@ _FLOOR = 1e-13
 DEAR, _ONE = "too dear for a mean", 1e-4
 #: start of the status of a run that would have taken too long
 DROPPED = "dropped: "
-#: about what a row takes, s: a run of a scene that repeats, of another; the times
-_RUN, _MEAN, _TIMES = 0.6, 4.0, 40.0
+#: about what a row takes, s: a run of a scene that repeats, of another; of that by tolerance; the times
+_RUN, _MEAN, _DEAR_MEAN, _TIMES = 0.1, 0.8, 10.0, 6.0
 Key = tuple[str, float]
 
 
@@ -91,9 +91,10 @@ class Chart:
         """Return the rows in their order, and about what each takes, s."""
         run = _RUN if self.repeats else _MEAN
         settings = [*_settings(self.effort), *_peer_settings(self.effort)]
-        return {self._row("reference"): 2.0 * run} | {self._row(*key): run for key in settings} | {
-            self._row("times"): _TIMES
-        }  # fmt: skip
+        rows = {self._row("reference"): 2.0} | dict.fromkeys((self._row(*key) for key in settings), run)
+        if not self.repeats:
+            rows |= {self._row(*key): _DEAR_MEAN for key in settings if key[1] == _ONE}
+        return rows | {self._row("times"): _TIMES}
 
     def measure(self, rows: Rows, number: int) -> dict[str, Any]:
         """Return times and errors of every method. number: of the chart, for the order of the turns."""

@@ -103,9 +103,9 @@ def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
 def _expected(effort: Effort) -> dict[str, float]:
     """Return the rows in their order, and about what each takes, s."""
     runs = effort.frequencies * len(_STARTS) * effort.periods
-    expected = {_BAR: 3.0 * len(effort.bar_modes)}
-    expected |= {_row(law, modes): 2e-5 * runs * (1 + 0.2 * modes) for law in LAWS for modes in effort.modes}
-    expected |= {_TIMES: 20.0} | dict.fromkeys(trial_rows(effort.trials), 0.03 * effort.trial_periods)
+    expected = {_BAR: 0.3 * len(effort.bar_modes)}
+    expected |= {_row(law, modes): 1e-5 * runs * (1 + 0.2 * modes) for law in LAWS for modes in effort.modes}
+    expected |= {_TIMES: 5.0} | dict.fromkeys(trial_rows(effort.trials), 0.03 * effort.trial_periods)
     return expected | dict.fromkeys(body_rows(effort.body_trials), 0.01 * effort.body_periods)
 
 
