@@ -106,7 +106,8 @@ def test_work_precision_leaves_its_results(tmp_path, capsys):
         assert list(chart["absent"]) == ["SUNDIALS CVODE"]
         assert not cvode
     work_precision.print_summary(result)
-    assert "exact engine is" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "exact engine is" in out and "| Moreau-Jean, 1000 " in out
 
 
 def test_command_writes_the_maps(tmp_path, capsys, monkeypatch):

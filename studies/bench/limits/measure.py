@@ -19,6 +19,7 @@ from typing import Any
 from vanedamp.files.store import replacing, write_csv, write_json
 from vanedamp.studies.bench.limits.worker import LIMITS
 from vanedamp.studies.bench.rows import Rows
+from vanedamp.studies.bench.tables import seconds_text, table
 from vanedamp.studies.bench.timing import machine
 from vanedamp.studies.workers import run_module
 
@@ -65,7 +66,7 @@ def run_limits(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     tasks[_FILE] = partial(_byte_of_file, folder, effort.file)
     tasks |= {_START.format(name): partial(_start, code, effort.starts) for name, code in STARTS.items()}
     rows = Rows(folder, "limits", asdict(effort), dict.fromkeys(tasks, 4.0))
-    seconds = {name: rows.take(name, task, tell=_text) for name, task in tasks.items()}
+    seconds = {name: rows.take(name, task, tell=seconds_text) for name, task in tasks.items()}
     result = {
         "machine": machine() | {"clock": "CPU time of the process, one thread; files and starts by the clock"},
         "effort": asdict(effort), "seconds": seconds, "wall_time_s": rows.seconds,
@@ -80,19 +81,12 @@ def print_summary(result: Mapping[str, Any]) -> None:
     """Print the limits as rates, too."""
     seconds = result["seconds"]
     rates = {
-        "multiply_add": f"{2e-9 / seconds[_WORDS['multiply_add']]:.3g} Gflop/s",
-        "byte": f"{1e-9 / seconds[_WORDS['byte']]:.3g} GB/s",
+        _WORDS["multiply_add"]: f"{2e-9 / seconds[_WORDS['multiply_add']]:.3g} Gflop/s",
+        _WORDS["byte"]: f"{1e-9 / seconds[_WORDS['byte']]:.3g} GB/s",
+        _FILE: f"{1e-9 / seconds[_FILE]:.3g} GB/s",
     }
-    print(f"one core: {rates['multiply_add']}, {rates['byte']} from memory; files {1e-6 / seconds[_FILE]:.3g} MB/s")
-    ratio = seconds[_WORDS["exponential"]] / seconds[_WORDS["product"]]
-    print(f"a complex exponential takes {ratio:.3g} complex products")
-
-
-def _text(seconds: float) -> str:
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-12:.3g} ps"
+    rows = ((name, seconds_text(value), rates.get(name, "")) for name, value in seconds.items())
+    print(table(("operation", "time", "rate"), rows))
 
 
 def _process(name: str, size: int) -> float:

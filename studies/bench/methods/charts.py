@@ -38,7 +38,7 @@ _SAMPLES, _LEAST = 10, 40
 #: error of a state that is as good as zero
 _FLOOR = 1e-13
 #: status of a run that was left out, and the one tolerance for means
-DEAR, _ONE = "too dear for a mean", 1e-4
+DEAR, ONE = "too dear for a mean", 1e-4
 #: start of the status of a run that would have taken too long
 DROPPED = "dropped: "
 #: about what a row takes, s: a run of a scene that repeats, of another; of that by tolerance; the times
@@ -93,7 +93,7 @@ class Chart:
         settings = [*_settings(self.effort), *_peer_settings(self.effort)]
         rows = {self._row("reference"): 2.0} | dict.fromkeys((self._row(*key) for key in settings), run)
         if not self.repeats:
-            rows |= {self._row(*key): _DEAR_MEAN for key in settings if key[1] == _ONE}
+            rows |= {self._row(*key): _DEAR_MEAN for key in settings if key[1] == ONE}
         return rows | {self._row("times"): _TIMES}
 
     def measure(self, rows: Rows, number: int) -> dict[str, Any]:
@@ -161,7 +161,7 @@ class Chart:
         if self.repeats:
             return False
         if _by_tolerance(method):
-            return setting != _ONE
+            return setting != ONE
         solver = self._variant(key).solver if method not in PEERS else None
         steps = solver.smallest_steps if isinstance(solver, SteppingOptions) else 0
         return steps * self.effort.means > self.effort.dearest

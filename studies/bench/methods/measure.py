@@ -10,8 +10,9 @@ from typing import Any
 
 from vanedamp.files.store import write_csv, write_json
 from vanedamp.studies.bench.methods import full_mesh_comparison, scenes
-from vanedamp.studies.bench.methods.charts import FULL, QUICK, SEED, Chart, Effort
+from vanedamp.studies.bench.methods.charts import FULL, ONE, QUICK, SEED, Chart, Effort
 from vanedamp.studies.bench.rows import Rows
+from vanedamp.studies.bench.tables import seconds_text, table
 from vanedamp.studies.bench.timing import machine
 
 __all__ = ["FULL", "QUICK", "Effort", "print_summary", "run_work_precision"]
@@ -47,12 +48,39 @@ def run_work_precision(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
 
 
 def print_summary(result: Mapping[str, Any]) -> None:
-    """Print for every chart whether the exact engine is on its Pareto front."""
-    for name, chart in result["charts"].items():
+    """Print time a period and error of every method at its middle setting, and where the exact engine is not best."""
+    charts = result["charts"]
+    methods = dict.fromkeys(point["method"] for chart in charts.values() for point in chart["points"])
+    lines = []
+    for method in methods:
+        setting = _middle(next(chart for chart in charts.values()), method)
+        cells = (_cell(chart, method, setting) for chart in charts.values())
+        lines.append((f"{method}, {setting:g}" if setting else method, *cells))
+    print(table(("time a period, error", *charts), lines))
+    for name, chart in charts.items():
         better = chart["dominated_by"]
         print(
             f"{name}: the exact engine is {'on the front' if not better else 'not on the front: ' + ', '.join(better)}"
         )
+        for reason in chart["absent"].values():
+            print(f"  without {reason}")
+
+
+def _middle(chart: Mapping[str, Any], method: str) -> float:
+    """Return the setting of a method that charts are told by: a tolerance of 1e-4, or 1000 steps, or near it."""
+    settings = [point["setting"] for point in chart["points"] if point["method"] == method] or [0.0]
+    return float(min(settings, key=lambda setting: abs(setting - (1000 if setting >= 1 else ONE))))
+
+
+def _cell(chart: Mapping[str, Any], method: str, setting: float) -> str:
+    """Return time a period and error of a point, or what its run came to."""
+    mine = (point for point in chart["points"] if (point["method"], point["setting"]) == (method, setting))
+    point = next(mine, None)
+    if point is None:
+        return ""
+    if point["time"] is None:
+        return str(point["status"])
+    return f"{seconds_text(point['time']['median'])}, {point['error']:.1e}"
 
 
 def _charts(effort: Effort, folder: Path) -> list[Chart]:

@@ -25,6 +25,7 @@ from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.vane_cluster import build
 from vanedamp.studies.bench.modes.solvers import COUNT, NAMES, OURS
 from vanedamp.studies.bench.rows import Contest, Rows
+from vanedamp.studies.bench.tables import table
 from vanedamp.studies.bench.timing import machine
 from vanedamp.studies.workers import run_module
 
@@ -191,16 +192,15 @@ def _write(result: Mapping[str, Any], folder: Path) -> None:
 
 def print_summary(result: Mapping[str, Any]) -> None:
     """Print times, memory and ratios."""
+    lines = []
     for entry in result["sizes"]:
-        assembly = entry["assembly"]
-        if assembly["status"] != "ok":
-            print(f"element size {entry['element_size']} m: assembly {assembly['status']}")
-            continue
-        print(f"{assembly['dofs']} degrees of freedom: assembly {assembly['assembly']['cpu_s']:.2f} s, "
-              f"{assembly['peak_bytes'] / 1e9:.2f} GB")  # fmt: skip
-        for name, run in entry["solvers"].items():
-            ratio = f", ours / this {entry['ratio'][name]['modes']:.2f}" if name in entry["ratio"] else ""
-            print(f"  {NAMES[name]:34} {_solver_text(run)}{ratio}")
+        dofs, ratios = f"{entry['assembly'].get('dofs', 0):,}", entry["ratio"]
+        lines.append((dofs, "assembly", _assembly_text(entry["assembly"]), ""))
+        lines += [
+            (dofs, NAMES[name], _solver_text(run), f"{ratios[name]['modes']:.2f}" if name in ratios else "")
+            for name, run in entry["solvers"].items()
+        ]
+    print(table(("degrees of freedom", "solver", "processor time and peak memory", "ours / this"), lines))
     for name, reason in result["absent"].items():
         print(f"not measured: {NAMES[name]} ({reason})")
     behind = [f"{name} at {dofs}" for name, dofs in result["ahead"]["behind"]]
