@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 #: benchmarks with the files that they leave
 FILES = {
     "limits": {f"bench_limits.{ending}" for ending in ("json", "csv")},
+    "engine": {"bench_engine.json", "bench_engine.csv", "bench_one_mode.png", "bench_scaling.png"},
     "modal": {f"bench_modal.{ending}" for ending in ("json", "csv", "png")},
     "bodies": {
         "bench_bodies_motion.png", *(f"bench_bodies.{ending}" for ending in ("json", "csv", "png")),
