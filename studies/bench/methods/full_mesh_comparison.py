@@ -35,9 +35,9 @@ _CURVE = (61, 1000)
 
 
 #: rows in their order, and about what each takes, s
-LADDER_ROWS = {"ladder: reduced models": 30.0, "ladder: whole mesh": 60.0}
-CURVE_ROWS = {"curve: reduced model": 60.0} | {
-    f"curve: whole mesh {where}": 60.0
+LADDER_ROWS = {"ladder: reduced models": 6.0, "ladder: whole mesh": 10.0}
+CURVE_ROWS = {"curve: reduced model": 8.0} | {
+    f"curve: whole mesh {where}": 25.0
     for where in ("below the onset", "above the onset", "before the peak", "at the peak", "after the peak")
 }
 
