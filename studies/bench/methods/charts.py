@@ -201,7 +201,7 @@ class Chart:
         if point["status"] != "ok":
             return point
         # a method may fail later than in the periods that are compared
-        point["status"] = simulate(scene.replace({"time.periods": _lengths(key, self.effort)[1]})).status.value
+        point["status"] = status_after(scene, _lengths(key, self.effort)[1])
         if self.repeats:
             samples = np.column_stack([response.displacement, response.body_displacement])
             return point | {"error": _state_error(samples, self.exact), "floor": _FLOOR}
@@ -236,6 +236,11 @@ class Chart:
                 clocks[str(i)] = partial(time_of_a_period, self._variant(key), lengths)
         turns = np.random.default_rng([SEED, number])
         return [values.tolist() for values in in_turns(clocks, self.effort.rounds, turns).values()]
+
+
+def status_after(scene: Scene, periods: int) -> str:
+    """Return the status of a run of that length: whether it fails, not whether so few periods have settled."""
+    return simulate(scene.replace({"time.periods": periods, "time.transient": 0})).status.value
 
 
 def _settings(effort: Effort) -> list[Key]:
