@@ -12,6 +12,7 @@ import pytest
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.bench import rows as bench_rows
 from vanedamp.studies.bench.rows import Contest, Rows
+from vanedamp.studies.bench.tables import seconds_text, table
 from vanedamp.studies.terminal import duration
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -114,9 +115,9 @@ def test_time_is_announced_from_what_rows_took(tmp_path, capsys, monkeypatch):
     rows.leave_out("third", "too dear")
     out = capsys.readouterr().out.splitlines()
     assert "about 11 min where it was tried" in out[0]
-    assert out[1] == "[  1/3] first  (30 s, about 22 min left)"
-    assert out[2] == "[  2/3] second: about 2 min ..."
-    assert out[3] == "[  2/3] second  (60 s, about 12 min left)"
+    assert out[1] == "[  1/3] first  (30 s, about 14 min left)"
+    assert out[2] == "[  2/3] second: about 78 s ..."
+    assert out[3] == "[  2/3] second  (60 s, about 11 min left)"
     assert out[4] == "[  3/3] third: left out, too dear"
 
 
@@ -149,3 +150,10 @@ def test_losers_by_far_are_dropped():
 )  # fmt: skip
 def test_durations_in_words(seconds, words):
     assert duration(seconds) == words
+
+
+def test_tables_are_markdown():
+    assert table(("method", "time"), [("exact", seconds_text(2.71e-6)), ("other", seconds_text(0.0125))]) == (
+        "| method | time    |\n| ------ | ------- |\n| exact  | 2.71 us |\n| other  | 12.5 ms |"
+    )
+    assert [seconds_text(value) for value in (3.9e-11, 1.0, 20.0)] == ["39 ps", "1 s", "20 s"]

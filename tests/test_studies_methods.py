@@ -8,7 +8,10 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from vanedamp.coupling.engine import simulate
 from vanedamp.studies.bench.methods import measure as work_precision
+from vanedamp.studies.bench.methods import scenes as method_scenes
+from vanedamp.studies.bench.methods.charts import status_after
 from vanedamp.studies.bench.methods.peers import PEERS
 from vanedamp.studies.bench.stability import limits as stability
 from vanedamp.studies.bench.stability.macro_step import macro_step
@@ -106,7 +109,14 @@ def test_work_precision_leaves_its_results(tmp_path, capsys):
         assert list(chart["absent"]) == ["SUNDIALS CVODE"]
         assert not cvode
     work_precision.print_summary(result)
-    assert "exact engine is" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "exact engine is" in out and "| Moreau-Jean, 1000 " in out
+
+
+def test_timed_runs_are_not_judged_by_what_so_few_periods_have_settled():
+    scene = method_scenes.by(method_scenes.single(), method="solve_ivp", rtol=1e-4)
+    assert simulate(scene.replace({"time.periods": 3, "time.transient": 1})).status == "not_steady"
+    assert status_after(scene, 3) == "ok"
 
 
 def test_command_writes_the_maps(tmp_path, capsys, monkeypatch):

@@ -8,7 +8,6 @@ are medians over the rounds.
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -25,8 +24,8 @@ from vanedamp.studies.bench.engine import scenes
 from vanedamp.studies.bench.engine.hand_written_loop import ImpactOscillator, complete_loop, lean_loop, plain_loop
 from vanedamp.studies.bench.engine.inside import awake_modes, time_of_a_period, time_of_parts
 from vanedamp.studies.bench.engine.reference_solutions import solve_with_events, truth
+from vanedamp.studies.bench.rows import Rows
 from vanedamp.studies.bench.timing import Clock, format_spread, in_turns, machine, seconds, spread
-from vanedamp.studies.terminal import progress
 
 _SEED = 20_260_101
 _TOLERANCES = (1e-5, 1e-7, 1e-9, 1e-11)
@@ -34,6 +33,8 @@ _TOLERANCES = (1e-5, 1e-7, 1e-9, 1e-11)
 _RTOL = 1e-9
 _COUNTS = (1, 2, 4, 8)
 _HARD = "two impacts a period"
+#: about what a row takes for each of its rounds, s
+_ROW = 1.5
 #: frequencies and gaps, relative to those of the one-mode scene, that have few and many impacts and evaluations
 _VARIED = [(1.0, 200.0), *((f, g) for g in (0.5, 1.0) for f in (0.974, 0.984, 0.992, 1.0, 1.01))]
 
@@ -62,23 +63,41 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
 
     Raises InputError without mpmath.
     """
-    started = time.perf_counter()
-    rng = np.random.default_rng(_SEED)
-    result: dict[str, Any] = {"machine": machine(), "seed": _SEED, "effort": asdict(effort)}
-    parts = {"one_mode": _one_mode, "modes": _modes, "bodies": _bodies, "costs": _costs}
-    with progress("bench") as report:
-        for done, (name, part) in enumerate(parts.items()):
-            report(done, len(parts))
-            result[name] = part(effort, rng)
-    result["wall_time_s"] = time.perf_counter() - started
+    tasks: dict[str, Callable[[np.random.Generator], dict[str, Any]]] = {
+        "one mode": partial(_one_mode, effort),
+        **{_use_row(use): partial(_use, effort, use) for use in scenes.USES},
+        "bodies": partial(_bodies, effort), "costs": partial(_costs, effort),
+    }  # fmt: skip
+    rows = Rows(folder, "engine", asdict(effort), dict.fromkeys(tasks, _ROW * effort.rounds))
+    done = {
+        name: rows.take(name, partial(task, np.random.default_rng([_SEED, number])), tell=_told)
+        for number, (name, task) in enumerate(tasks.items())
+    }
+    result: dict[str, Any] = {
+        "machine": machine(), "seed": _SEED, "effort": asdict(effort), "one_mode": done["one mode"],
+        "modes": _modes(effort, {use: done[_use_row(use)] for use in scenes.USES}),
+        "bodies": done["bodies"], "costs": done["costs"], "wall_time_s": rows.seconds,
+    }  # fmt: skip
     from vanedamp.studies.bench.engine.figures import one_mode_figure, scaling_figure
 
-    folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "bench_engine.json", result)
     _write_csv(result, folder / "bench_engine.csv")
     one_mode_figure(result, folder / "bench_one_mode.png")
     scaling_figure(result, folder / "bench_scaling.png")
+    rows.finish()
     return result
+
+
+def _use_row(use: str) -> str:
+    return f"modes, {use}"
+
+
+def _told(row: Mapping[str, Any]) -> str:
+    """Return a row's time of a period: of the engine, or from the fewest to the most modes or bodies, of all parts."""
+    if "timed" in row:
+        return f"{1e6 * sum(row['timed'].values()):.3g} us a period"
+    times = row["time"] if isinstance(row["time"], list) else [row["time"]["engine"]]
+    return " to ".join(dict.fromkeys(f"{1e6 * times[end]['median']:.3g}" for end in (0, -1))) + " us a period"
 
 
 def print_summary(result: Mapping[str, Any]) -> None:
@@ -133,33 +152,36 @@ def _one_mode(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _modes(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
-    """Measure time against the number of modes, for bodies that do not, seldom and often wake them."""
-    uses: dict[str, dict[str, Any]] = {}
+def _use(effort: Effort, use: str, rng: np.random.Generator) -> dict[str, Any]:
+    """Measure time against the number of modes, for a body that does not, seldom or often wakes them."""
+    lengths = effort.hard if use == _HARD else effort.calm
     with tempfile.TemporaryDirectory() as folder:
-        for use in scenes.USES:
-            reduced = [scenes.reduced(Path(folder), count, use) for count in effort.modes]
-            lengths = effort.hard if use == _HARD else effort.calm
-            clocks: dict[str, Clock] = {
-                str(count): partial(time_of_a_period, scene, lengths)
-                for count, scene in zip(effort.modes, reduced, strict=True)
-            }
-            times = in_turns(clocks, effort.rounds, rng)
-            first, last = (times[str(count)] for count in (effort.modes[0], effort.modes[-1]))
-            windows = [
-                simulate(scene.replace({"time.periods": lengths[1], "time.transient": lengths[0]})) for scene in reduced
-            ]
-            uses[use] = {
-                "time": [spread(values) for values in times.values()],
-                "ratio": spread(last / first),
-                "awake": [awake_modes(scene, *lengths) for scene in reduced],
-                "impacts_per_period": [response.impacts_per_period for response in windows],
-                "status": [response.status.value for response in windows],
-            }
+        reduced = [scenes.reduced(Path(folder), count, use) for count in effort.modes]
+        clocks: dict[str, Clock] = {
+            str(count): partial(time_of_a_period, scene, lengths)
+            for count, scene in zip(effort.modes, reduced, strict=True)
+        }
+        times = in_turns(clocks, effort.rounds, rng)
+        windows = [
+            simulate(scene.replace({"time.periods": lengths[1], "time.transient": lengths[0]})) for scene in reduced
+        ]
+        awake = [awake_modes(scene, *lengths) for scene in reduced]
+    first, last = (times[str(count)] for count in (effort.modes[0], effort.modes[-1]))
+    return {
+        "time": [spread(values) for values in times.values()],
+        "ratio": spread(last / first),
+        "awake": awake,
+        "impacts_per_period": [response.impacts_per_period for response in windows],
+        "status": [response.status.value for response in windows],
+    }
+
+
+def _modes(effort: Effort, uses: Mapping[str, Any]) -> dict[str, Any]:
+    """Return times against the number of modes, and what one more costs an impact."""
     hard = uses[_HARD]
     change = hard["time"][-1]["median"] - hard["time"][0]["median"]
     per_mode = change / (effort.modes[-1] - effort.modes[0]) / hard["impacts_per_period"][-1]
-    return {"counts": list(effort.modes), "uses": uses, "per_mode_and_impact": per_mode}
+    return {"counts": list(effort.modes), "uses": dict(uses), "per_mode_and_impact": per_mode}
 
 
 def _bodies(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:

@@ -58,7 +58,7 @@ class _Units:
     """Scales of length (m), time (s), mass (kg) and force (N)."""
 
     def __init__(self, equations: Coupled) -> None:
-        gaps = equations.times.travel[np.isfinite(equations.times.travel)]
+        gaps = equations.system.free_travel[np.isfinite(equations.system.free_travel)]
         self.length, self.time, self.mass = (
             float(gaps.min()),
             equations.system.period,
