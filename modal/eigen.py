@@ -189,7 +189,7 @@ def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.n
     size, spare = pencil.mass.shape[0], _SPARE
     while True:
         asked = min(count + spare, size)
-        values, vectors = petsc.nearest_eigenpairs(*pencil, asked, floor)
+        values, vectors = petsc.nearest_eigenpairs(*pencil, count, floor, spare=asked - count)
         gaps = np.diff(values[count - 1 :]) / (values[count:] - floor)
         if asked == size or gaps.max() > _GAP:
             break
