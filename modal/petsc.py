@@ -136,7 +136,7 @@ def nearest_eigenpairs(
     elif parallel.COMM.size > 1:
         values, vectors = _on_all_ranks("nearest", (stiffness, mass), wanted, shift)
     else:
-        with _shifted(stiffness, mass, shift, direct) as factors:
+        with shifted(stiffness, mass, shift, direct) as factors:
             try:
                 values, vectors = eigenpairs(factors.solve_rows, mass, count, shift, spare=spare)
             except NotConvergedError as error:
@@ -146,8 +146,13 @@ def nearest_eigenpairs(
     return values[order], vectors[order]
 
 
-def _shifted(stiffness: sparse.csr_array, mass: sparse.csr_array, shift: float, direct: str | None) -> Factorization:
-    """Return K - shift M, factorised: by CHOLMOD where that is there and the matrix is positive definite."""
+def shifted(
+    stiffness: sparse.csr_array, mass: sparse.csr_array, shift: float, direct: str | None = None
+) -> Factorization:
+    """Return K - shift M, factorised: by CHOLMOD where that is there and the matrix is positive definite.
+
+    direct: PETSc's name of another solver. Raises SolverError for a singular matrix.
+    """
     matrix = sparse.csr_array(stiffness - shift * mass) if shift else stiffness
     if direct is None and shift <= 0.0 and PETSc.Sys.hasExternalPackage("suitesparse"):
         with contextlib.suppress(SolverError):
