@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 
 import pytest
 
@@ -56,6 +57,71 @@ def test_solvers_that_need_less_time_are_named(ratio, told, folder, capsys):
     entry["ratio"]["superlu"]["modes"] = ratio
     print_summary(result | {"ahead": bench_modal._ahead(result["sizes"])})
     assert capsys.readouterr().out.splitlines()[-1].startswith(told)
+
+
+SOLVERS = ["slepc", "superlu", "superlu_default"]
+
+
+def faked(calls, stop_at=None):
+    """Measurements without work: the default SuperLU takes 5.4 times the best's time, the other fails at size two."""
+
+    def process(_limit, task, *files):
+        calls.append(task)
+        if len(calls) == stop_at:
+            raise KeyboardInterrupt
+        if task == "assemble":
+            Path(files[1]).touch()
+            return {"status": "ok", "assembly": {"cpu_s": 1.0, "wall_s": 1.0}, "dofs": 10_000, "peak_bytes": 2}
+        if task == "superlu" and calls.count("slepc") > 3:
+            return {"status": "ended by signal 9 (out of memory?)"}
+        spent = {"slepc": 1.0, "superlu": 2.0, "superlu_default": 6.0}[task] + 0.125 * calls.count(task)
+        clocks = {part: {"cpu_s": spent, "wall_s": spent} for part in ("factorisation", "modes")}
+        return clocks | {"status": "ok", "peak_bytes": 3, "loaded_bytes": 1, "solves": 20, "eigenvalues": [1.0] * 10}
+
+    return process
+
+
+@pytest.fixture
+def three(monkeypatch, tmp_path):
+    """Run the benchmark of three solvers at two sizes on given measurements, in a folder of that name."""
+    monkeypatch.setattr(bench_modal, "_solvers", lambda: (SOLVERS, {}))
+    monkeypatch.setattr(bench_modal, "build", lambda *_: None)
+
+    def run(process, folder):
+        monkeypatch.setattr(bench_modal, "_process", process)
+        return run_bench(tmp_path / folder, Effort((0.004, 0.003), 3, 100.0))
+
+    return run
+
+
+def test_solvers_that_have_lost_by_far_are_left_out(three, capsys, tmp_path):
+    result = three(faked(calls := []), "out")
+    # the loser has one round; who fails has none after it
+    assert calls == ["assemble", *SOLVERS, *(2 * SOLVERS[:2]), "assemble", *SOLVERS[:2], "slepc", "slepc"]
+    first, second = result["sizes"]
+    assert [first["solvers"][name]["rounds"] for name in SOLVERS] == [3, 3, 1]
+    assert second["solvers"]["superlu_default"]["status"].startswith("dropped: 5.4 times the best's time at 10,000")
+    assert result["dropped"]["superlu"] == "ended by signal 9 (out of memory?) at 10,000 degrees of freedom"
+    assert first["solvers"]["slepc"]["modes"]["cpu_s"] == 1.25 and first["solvers"]["slepc"]["solves"] == 20
+    assert "0.004 m, eigsh, SuperLU (default), round 2: left out, 5.4 times" in capsys.readouterr().out
+    assert (tmp_path / "out" / "bench_modal.png").is_file()
+
+
+@pytest.mark.parametrize("stop_at", [1, 4, 9, 12])
+def test_stopped_it_goes_on_to_the_same_results(stop_at, three, tmp_path):
+    three(faked([]), "whole")
+    with pytest.raises(KeyboardInterrupt):
+        three(faked(calls := [], stop_at), "stopped")
+    calls.pop()
+    three(faked(calls), "stopped")
+    made = {name: json.loads((tmp_path / name / "bench_modal.json").read_text()) for name in ("whole", "stopped")}
+    for result in made.values():
+        del result["wall_time_s"], result["machine"]["load"]
+    assert made["whole"] == made["stopped"]
+    assert calls.count("slepc") == 6
+    assert sorted(file.name for file in (tmp_path / "stopped").iterdir()) == [
+        f"bench_modal.{ending}" for ending in ("csv", "json", "png")
+    ]
 
 
 def test_what_takes_too_long_is_told():

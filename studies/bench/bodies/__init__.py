@@ -11,8 +11,10 @@ SUMMARY = "a block that tilts and lifts beside the slider: responses, tilts, cos
 
 def run(folder: Path, quick: bool) -> None:
     """Measure, write results and figures, print a summary."""
-    from vanedamp.studies.bench.bodies import methods
-    from vanedamp.studies.bench.bodies.measure import FULL, QUICK, print_summary, run_bodies
+    from vanedamp.studies.bench.bodies import measure, methods
 
-    print_summary(run_bodies(folder, QUICK if quick else FULL))
-    methods.print_methods(methods.run_methods(folder, methods.QUICK if quick else methods.FULL))
+    responses, compared = (part.QUICK if quick else part.FULL for part in (measure, methods))
+    # both are announced before the first begins
+    rows, of_methods = measure.announced(folder, responses), methods.announced(folder, compared)
+    measure.print_summary(measure.run_bodies(folder, responses, rows))
+    methods.print_methods(methods.run_methods(folder, compared, of_methods))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.store import write_csv, write_json
 from vanedamp.files.toml_input import validate
+from vanedamp.studies.bench.rows import Rows
 from vanedamp.studies.bench.timing import machine
-from vanedamp.studies.terminal import progress
 
 #: kg, N/m, m of the rigid model of the cluster; share of the body's mass; gap over the undamped amplitude
 MASS, STIFFNESS, DAMPING, AMPLITUDE, SHARE, GAP = 0.15696, 3.6046e7, 0.002, 7e-5, 0.02, 0.5
@@ -67,33 +68,46 @@ def body_scene(ratio: float, shape: str, periods: int, transient: int, **body: A
     )  # fmt: skip
 
 
-def run_bodies(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
+def announced(folder: Path, effort: Effort = FULL) -> Rows:
+    """Announce the rows, one a frequency and shape."""
+    seconds = 1.5e-5 * effort.periods
+    names = [_row(ratio, shape) for ratio in effort.ratios for shape in SHAPES]
+    return Rows(folder, "bodies", asdict(effort), dict.fromkeys(names, seconds))
+
+
+def run_bodies(folder: Path, effort: Effort = FULL, rows: Rows | None = None) -> dict[str, Any]:
     """Measure, write bench_bodies.json, .csv and .png into a folder, and return the content of the JSON.
 
-    bench_bodies_motion.png has frames of the block at its peak.
+    bench_bodies_motion.png has frames of the block at its peak. rows: where they were announced before.
     """
     from vanedamp.studies.bench.bodies.figures import bodies_figure
     from vanedamp.studies.bench.bodies.motion_figure import block_motion, motion_figure
 
-    started, rows = time.perf_counter(), []
+    rows = rows or announced(folder, effort)
     for shape in SHAPES:
         simulate(body_scene(1.0, shape, 2, 0))  # loads compiled functions
-    with progress("bench") as report:
-        for number, ratio in enumerate(effort.ratios):
-            report(number, len(effort.ratios))
-            for shape in SHAPES:
-                rows.append(_point(ratio, shape, effort))
-    result = {
-        "machine": machine(), "effort": asdict(effort), "points": rows, "wall_time_s": time.perf_counter() - started
-    }  # fmt: skip
-    folder.mkdir(parents=True, exist_ok=True)
+    points = [
+        rows.take(_row(ratio, shape), partial(_point, ratio, shape, effort), tell=_text)
+        for ratio in effort.ratios
+        for shape in SHAPES
+    ]
+    result = {"machine": machine(), "effort": asdict(effort), "points": points, "wall_time_s": rows.seconds}
     write_json(folder / "bench_bodies.json", result)
-    write_csv(folder / "bench_bodies.csv", _COLUMNS, [[row[name] for name in _COLUMNS] for row in rows])
-    bodies_figure(rows, folder / "bench_bodies.png")
-    peak = max((row for row in rows if row["shape"] == "block"), key=lambda row: row["amplitude"])
+    write_csv(folder / "bench_bodies.csv", _COLUMNS, [[row[name] for name in _COLUMNS] for row in points])
+    bodies_figure(points, folder / "bench_bodies.png")
+    peak = max((row for row in points if row["shape"] == "block"), key=lambda row: row["amplitude"])
     motion = block_motion(body_scene(peak["ratio"], "block", effort.periods, effort.transient))
     motion_figure(motion, folder / "bench_bodies_motion.png")
+    rows.finish()
     return result
+
+
+def _row(ratio: float, shape: str) -> str:
+    return f"{shape} at {ratio:g} of the natural frequency"
+
+
+def _text(point: Mapping[str, Any]) -> str:
+    return f"amplitude {point['amplitude']:.3f}, {point['impacts_per_period']:.2f} impacts a period"
 
 
 def _point(ratio: float, shape: str, effort: Effort) -> dict[str, Any]:

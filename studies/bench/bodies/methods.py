@@ -7,9 +7,10 @@ corners hit almost together parts at once for steps that cannot tell them apart.
 
 from __future__ import annotations
 
-import time
+import itertools
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +23,16 @@ from vanedamp.files.store import write_csv, write_json
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.bench.bodies.measure import SHAPES, body_scene
 from vanedamp.studies.bench.engine.inside import time_of_a_period
-from vanedamp.studies.bench.methods.peers import PEERS, run_peer
+from vanedamp.studies.bench.methods.peers import PEERS, run_peer, version
 from vanedamp.studies.bench.methods.scenes import by, charted
+from vanedamp.studies.bench.rows import Rows
 from vanedamp.studies.bench.timing import machine
-from vanedamp.studies.terminal import progress
 
 #: periods and samples by which motions are compared, and the coefficients of friction
 PERIODS, SAMPLES, FRICTION = 2, 10, (0.4, 0.0)
 #: tolerance of the reference that checks the exact engine
 _TIGHT = 1e-12
+_PRICE = "price of a block"
 _COLUMNS = ("friction", "method", "setting", "status", "error", "low", "high", "seconds_per_period")
 
 
@@ -55,33 +57,68 @@ def block_scene(start: int, friction: float, periods: int = PERIODS) -> Scene:
     return body_scene(1.0, "block", periods, 0, lift=8e-5, tilt=2e-3 * (1 + 0.05 * start), friction=friction)
 
 
-def run_methods(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure, write bench_bodies_methods.json, .csv and .png into a folder, and return the content of the JSON."""
+def announced(folder: Path, effort: Effort = FULL) -> Rows:
+    """Announce the rows, one a method, setting and coefficient of friction, and the price of a block."""
+    names = [_row(friction, label, solver) for friction in FRICTION for label, solver in _variants(effort)]
+    return Rows(folder, "bodies_methods", asdict(effort), dict.fromkeys(names, 0.2 * effort.starts) | {_PRICE: 10.0})
+
+
+def run_methods(folder: Path, effort: Effort = FULL, rows: Rows | None = None) -> dict[str, Any]:
+    """Measure, write bench_bodies_methods.json, .csv and .png into a folder, and return the content of the JSON.
+
+    rows: where they were announced before.
+    """
     from vanedamp.studies.bench.bodies.figures import methods_figure
 
-    started, points, absent = time.perf_counter(), [], {}
-    variants = _variants(effort)
-    with progress("bench methods") as report:
-        for turn, friction in enumerate(FRICTION):
-            exact = [simulate_block(block_scene(start, friction))[1] for start in range(effort.starts)]
-            for number, (label, solver) in enumerate(variants):
-                report(turn * len(variants) + number, len(FRICTION) * len(variants))
-                if label in absent:
-                    continue
-                try:
-                    points.append({"friction": friction} | _point(label, solver, friction, exact, effort))
-                except InputError as refused:
-                    absent[label] = str(refused)
+    rows = rows or announced(folder, effort)
+    points: list[dict[str, Any]] = []
+    absent: dict[str, str] = {}
+
+    @cache
+    def exact(friction: float) -> list[np.ndarray]:
+        return [simulate_block(block_scene(start, friction))[1] for start in range(effort.starts)]
+
+    def measured(friction: float, label: str, solver: dict[str, Any]) -> dict[str, Any]:
+        try:
+            return _point(label, solver, friction, exact(friction), effort)
+        except InputError as refused:
+            return {"absent": str(refused)}
+
+    for friction, (label, solver) in itertools.product(FRICTION, _variants(effort)):
+        row = _row(friction, label, solver)
+        if label in absent:
+            rows.leave_out(row, absent[label])
+            continue
+        inputs = asdict(effort) | ({"version": version(label)} if label in PEERS else {})
+        point = rows.take(row, partial(measured, friction, label, solver), inputs=inputs, tell=_text)
+        if "absent" in point:
+            absent[label] = point["absent"]
+        else:
+            points.append({"friction": friction} | point)
     result = {
         "machine": machine(), "effort": asdict(effort), "points": points, "absent": absent,
-        "price": _price(effort), "wall_time_s": time.perf_counter() - started,
+        "price": rows.take(_PRICE, partial(_price, effort)), "wall_time_s": rows.seconds,
     }  # fmt: skip
-    folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "bench_bodies_methods.json", result)
-    rows = [["" if row[name] is None else row[name] for name in _COLUMNS] for row in points]
-    write_csv(folder / "bench_bodies_methods.csv", _COLUMNS, rows)
+    table = [["" if row[name] is None else row[name] for name in _COLUMNS] for row in points]
+    write_csv(folder / "bench_bodies_methods.csv", _COLUMNS, table)
     methods_figure(result, folder / "bench_bodies_methods.png")
+    rows.finish()
     return result
+
+
+def _row(friction: float, label: str, solver: Mapping[str, Any]) -> str:
+    return f"friction {friction:g}: {label}, {_setting(solver):g}"
+
+
+def _setting(solver: Mapping[str, Any]) -> float:
+    """Return the setting of a method's table, or a peer's."""
+    setting: float = solver.get("setting", solver.get("rtol", solver.get("steps_per_period", 0)))
+    return setting
+
+
+def _text(point: Mapping[str, Any]) -> str:
+    return point.get("absent") or (point["status"] if point["error"] is None else f"error {point['error']:.2g}")
 
 
 def simulate_block(scene: Scene) -> tuple[str, np.ndarray]:
@@ -114,7 +151,7 @@ def _point(
     label: str, solver: dict[str, Any], friction: float, exact: list[np.ndarray], effort: Effort
 ) -> dict[str, Any]:
     """Return status, error and cost. Raises InputError where a method or a peer does not take the scene."""
-    setting = solver.get("setting", solver.get("rtol", solver.get("steps_per_period", 0)))
+    setting = _setting(solver)
     errors, seconds, status = [], 0.0, Status.OK.value
     for start, reference in enumerate(exact):
         scene = block_scene(start, friction)

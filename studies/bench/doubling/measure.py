@@ -28,8 +28,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import finite, write_csv, write_json
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.bench.methods.scenes import charted
+from vanedamp.studies.bench.rows import Rows
 from vanedamp.studies.bench.timing import machine
-from vanedamp.studies.terminal import progress
 
 #: kg, N/m, N of the rigid model and its force; m/s^2
 MASS, STIFFNESS, RATIO, FORCE, GRAVITY = 0.15696, 3.6046e7, 0.002, 0.2, 9.81
@@ -52,6 +52,8 @@ STEADY = 2335.0
 #: passages with their derivative of which one is timed
 _PASSAGES = 100
 _COLUMNS = ("method", "steps", "doubling", "error", "unsteady", "seconds_per_period")
+#: about what a method's doubling takes at the coarsest steps, s
+_COST = 2.0
 METHODS = ("Moreau-Jean", "penalty, central differences")
 
 
@@ -158,34 +160,55 @@ def run_doubling(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     """Measure, write bench_doubling.json, .csv and .png into a folder, and return the content of the JSON."""
     from vanedamp.studies.bench.doubling.figures import doubling_figure
 
-    started, branch = time.perf_counter(), Branch()
+    branch = Branch()
     variants = {
         label: {"method": name, **variant.options} for label, (name, variant) in charted().items() if label in METHODS
     }
-    points: list[dict[str, Any]] = []
-    with progress("bench doubling") as report:
-        by_runs = doubling(branch, effort)
-        assert by_runs is not None
-        jobs = [(label, options, steps) for label, options in variants.items() for steps in effort.steps]
-        for done, (label, options, steps) in enumerate(jobs):
-            report(done, len(jobs) + 1)
-            points.append(_point(branch, effort, by_runs, label, options | {"steps_per_period": steps}))
-        report(len(jobs), len(jobs) + 1)
-        diagram = _diagram(branch, effort, variants)
-    exact = exact_doubling(branch.map, branch.state(STEADY))
+    jobs = {
+        f"{label}, {steps} steps": (label, options | {"steps_per_period": steps})
+        for label, options in variants.items() for steps in effort.steps
+    }  # fmt: skip
+    solvers = _coarse(effort, variants)
+    expected = {"exact engine": 20.0} | {
+        row: _COST * (1 + solver["steps_per_period"] / 200) for row, (_, solver) in jobs.items()
+    }
+    rows = Rows(folder, "doubling", asdict(effort), expected | {f"diagram: {name}": 10.0 for name in solvers})
+    engine = rows.take("exact engine", partial(_engine, branch, effort), tell=_hertz)
+    points = [
+        rows.take(row, partial(_point, branch, effort, engine["exact_by_runs"], label, solver), tell=_hertz)
+        for row, (label, solver) in jobs.items()
+    ]
+    diagram = [
+        rows.take(f"diagram: {name}", partial(_settled, branch, effort, name, solver))
+        for name, solver in solvers.items()
+    ]
     result = finite({
-        "machine": machine(), "effort": asdict(effort), "reference": DOUBLING, "exact": exact, "exact_by_runs": by_runs,
-        "exact_error": abs(exact - DOUBLING) / DOUBLING, "exact_tolerance": CLOSE / DOUBLING,
-        "exact_seconds_per_period": _seconds(partial(branch.settle, STEADY, effort.periods), effort.periods),
-        "seconds_per_passage": _seconds(partial(_pass, branch.map, branch.state(STEADY)), _PASSAGES),
-        "unsteady": branch.alternation(STEADY, effort.periods),
-        "points": points, "diagram": diagram, "wall_time_s": time.perf_counter() - started,
+        "machine": machine(), "effort": asdict(effort), "reference": DOUBLING, **engine,
+        "exact_tolerance": CLOSE / DOUBLING, "points": points, "diagram": diagram, "wall_time_s": rows.seconds,
     })  # fmt: skip
-    folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "bench_doubling.json", result)
     write_csv(folder / "bench_doubling.csv", _COLUMNS, ([point[name] for name in _COLUMNS] for point in points))
     doubling_figure(result, folder / "bench_doubling.png")
+    rows.finish()
     return result
+
+
+def _engine(branch: Branch, effort: Effort) -> dict[str, Any]:
+    """Return the doubling by the exact engine's derivative and by its runs, and what both cost."""
+    by_runs = doubling(branch, effort)
+    assert by_runs is not None
+    exact = exact_doubling(branch.map, branch.state(STEADY))
+    return {
+        "exact": exact, "exact_by_runs": by_runs, "exact_error": abs(exact - DOUBLING) / DOUBLING,
+        "exact_seconds_per_period": _seconds(partial(branch.settle, STEADY, effort.periods), effort.periods),
+        "seconds_per_passage": _seconds(partial(_pass, branch.map, branch.state(STEADY)), _PASSAGES),
+        "unsteady": branch.alternation(STEADY, effort.periods),
+    }  # fmt: skip
+
+
+def _hertz(row: Mapping[str, Any]) -> str:
+    found = row.get("exact_by_runs", row.get("doubling"))
+    return "at every frequency" if found is None else f"{found:.3f} Hz"
 
 
 def _point(branch: Branch, effort: Effort, exact: float, label: str, solver: Mapping[str, Any]) -> dict[str, Any]:
@@ -211,22 +234,24 @@ def _seconds(run: Callable[[], object], periods: int) -> float:
     return (time.thread_time() - begun) / periods
 
 
-def _diagram(branch: Branch, effort: Effort, variants: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the heights (m) of the last 32 periods over the frequency, of the exact engine and of coarse steps."""
-    solvers: dict[str, dict[str, Any]] = {"exact engine": {}}
-    for (label, options), steps in zip(variants.items(), effort.coarse, strict=True):
-        solvers[f"{label}, {steps} steps"] = dict(options) | {"steps_per_period": steps}
-    frequencies = np.linspace(*DRAWN, effort.frequencies)
-    return [
-        {
-            "method": label, "frequency": frequencies.tolist(),
-            "height": [
-                (branch.settle(frequency, effort.periods, **solver).slip[-32:, 0] + GAP / 2).tolist()
-                for frequency in frequencies.tolist()
-            ],
-        }
-        for label, solver in solvers.items()
-    ]  # fmt: skip
+def _coarse(effort: Effort, variants: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the [solver] tables whose settled heights are drawn, by name: the exact engine's and of coarse steps."""
+    return {"exact engine": {}} | {
+        f"{label}, {steps} steps": dict(options) | {"steps_per_period": steps}
+        for (label, options), steps in zip(variants.items(), effort.coarse, strict=True)
+    }
+
+
+def _settled(branch: Branch, effort: Effort, name: str, solver: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the heights (m) of the last 32 periods over the frequency."""
+    frequencies = np.linspace(*DRAWN, effort.frequencies).tolist()
+    return {
+        "method": name, "frequency": frequencies,
+        "height": [
+            (branch.settle(frequency, effort.periods, **solver).slip[-32:, 0] + GAP / 2).tolist()
+            for frequency in frequencies
+        ],
+    }  # fmt: skip
 
 
 def print_summary(result: Mapping[str, Any]) -> None:

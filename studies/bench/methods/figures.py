@@ -58,8 +58,11 @@ def _chart(axes: Axes, name: str, chart: Mapping[str, Any], styles: Mapping[str,
             times, errors, marker + "-", color=colour, markersize=14 if marker == "*" else 5, label=method,
             zorder=3 if marker == "*" else 2,
         )  # fmt: skip
-    failed = sum(point["status"] not in ("ok", "too dear for a mean") for point in chart["points"])
+    statuses = [point["status"] for point in chart["points"] if point["status"] not in ("ok", "too dear for a mean")]
+    dropped = sum(status.startswith("dropped: ") for status in statuses)
+    failed = len(statuses) - dropped
     note = f"{failed} runs failed, and said so" if failed else ""
+    note += ("; " if note and dropped else "") + (f"{dropped} left out, too long" if dropped else "")
     if not chart["repeats"]:
         floor = chart["points"][0]["floor"]
         axes.axhspan(1e-14, floor, color="#e2e8f0", zorder=0)

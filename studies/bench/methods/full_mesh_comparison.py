@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,12 @@ import numpy as np
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.linear_response import receptance
+from vanedamp.modal.matrices import SystemMatrices
+from vanedamp.rom.interface import Interface
 from vanedamp.studies.bench.engine.inside import time_of_a_period
 from vanedamp.studies.bench.methods.full_mesh_run import explicit_run, glued_frequencies_hz
 from vanedamp.studies.bench.methods.scenes import Cluster
+from vanedamp.studies.bench.rows import Take, at_once
 from vanedamp.studies.bench.timing import Clock, in_turns, spread
 
 #: periods over which models are compared, before chaos parts them, and the body's speed at the start (m/s)
@@ -29,6 +32,14 @@ _FIRST, _START = 3, 0.3
 _GOOD = 0.02
 #: frequencies and periods of the forced response whose cost is extrapolated
 _CURVE = (61, 1000)
+
+
+#: rows in their order, and about what each takes, s
+LADDER_ROWS = {"ladder: reduced models": 30.0, "ladder: whole mesh": 60.0}
+CURVE_ROWS = {"curve: reduced model": 60.0} | {
+    f"curve: whole mesh {where}": 60.0
+    for where in ("below the onset", "above the onset", "before the peak", "at the peak", "after the peak")
+}
 
 
 @dataclass(frozen=True)
@@ -46,69 +57,116 @@ class CurveEffort:
     points: int = 25
 
 
-def ladder(folder: Path, counts: tuple[int, ...], rounds: int, rng: np.random.Generator) -> dict[str, Any]:
+def ladder(folder: Path, counts: tuple[int, ...], rounds: int, seed: int, take: Take = at_once) -> dict[str, Any]:
     """Measure reduced models by the exact engine, and the whole mesh by central differences.
 
-    Error: largest of the first periods' peaks against the finest reduced model, relative.
+    Error: largest of the first periods' peaks against the finest reduced model, relative. take: rows LADDER_ROWS.
     """
     cluster = Cluster(folder)
-    finest = cluster.scene(counts[-1]).replace({"damper.0.velocity": _START})
-    variants = {count: finest.replace({"structure.modes": count}) for count in counts}
-    clocks: dict[str, Clock] = {str(n): partial(time_of_a_period, scene, (500, 2000)) for n, scene in variants.items()}
-    times = in_turns(clocks, rounds, rng)
-    peaks = {
-        n: simulate(scene.replace({"time.periods": _FIRST, "time.transient": 0})).peak for n, scene in variants.items()
-    }
-    best = peaks[counts[-1]]
-    errors = [float(np.abs(peak / best - 1).max()) for peak in peaks.values()]
-    full = explicit_run(*cluster.elements(), finest, 2 * math.pi * finest.frequency, _FIRST)
+    reduced, whole = LADDER_ROWS
+
+    @cache
+    def finest() -> Scene:
+        return cluster.scene(counts[-1]).replace({"damper.0.velocity": _START})
+
+    models = take(reduced, lambda: _reduced_models(finest(), counts, rounds, seed))
+    full = take(whole, lambda: _whole_mesh(cluster, finest(), np.array(models["best"])))
+    errors = models["error"]
     # the least number of modes from which on all models are good enough
     enough = counts[max((i + 1 for i, error in enumerate(errors) if error > _GOOD), default=0)]
-    per_period = full.seconds_per_step * full.steps
+    factor = full["time"] / models["time"][counts.index(enough)]["median"]
     return {
-        "modes": list(counts), "time": [spread(values) for values in times.values()], "error": errors,
-        "full": {
-            "free_dofs": full.size, "steps": full.steps, "time": per_period,
-            "error": float(np.abs(full.peak / best - 1).max()), "curve": list(_CURVE),
-            "curve_days": full.curve_seconds(_CURVE[1], _CURVE[0]) / 86400,
-        },
-        "speed_up": {"modes": enough, "factor": per_period / float(np.median(times[str(enough)]))},
+        "modes": list(counts), "time": models["time"], "error": errors, "full": full,
+        "speed_up": {"modes": enough, "factor": factor},
     }  # fmt: skip
 
 
-def curve(folder: Path, effort: CurveEffort = CurveEffort()) -> dict[str, Any]:
-    """Measure fixed frequency, onset and damped peak: reduced model by the exact engine, and whole mesh."""
-    cluster = Cluster(folder / "coarse", effort.size, lumped=True)
-    scene = cluster.scene(effort.modes)
-    gap = 0.5 * _amplitude(scene)  # half the peak, with an onset well below the resonance
-    scene = scene.replace(
-        {"cavity.0.gap": gap, "time.periods": effort.periods, "time.transient": effort.dropped}
-    )  # fmt: skip
-    matrices, interface = cluster.elements()
-    free, glued = glued_frequencies_hz(matrices, interface, scene)
-    ours = [_peak_of(scene, fixed) for fixed in (False, True)]
-    onset = _onset(scene, ours[1], ours[0])
-    at, amplitudes = _damped(scene, ours[1], ours[0], effort.points)
+def _reduced_models(finest: Scene, counts: tuple[int, ...], rounds: int, seed: int) -> dict[str, Any]:
+    """Return time a period and error of the models with these numbers of modes, and the finest's peaks, m."""
+    variants = {count: finest.replace({"structure.modes": count}) for count in counts}
+    clocks: dict[str, Clock] = {str(n): partial(time_of_a_period, scene, (500, 2000)) for n, scene in variants.items()}
+    times = in_turns(clocks, rounds, np.random.default_rng(seed))
+    first = {"time.periods": _FIRST, "time.transient": 0}
+    peaks = [simulate(scene.replace(first)).peak for scene in variants.values()]
+    return {
+        "time": [spread(values) for values in times.values()], "best": peaks[-1].tolist(),
+        "error": [float(np.abs(peak / peaks[-1] - 1).max()) for peak in peaks],
+    }  # fmt: skip
 
-    def mesh(frequency: float) -> tuple[float, int, float]:
-        excited = scene.replace({"excitation.frequency": frequency})
-        run = explicit_run(matrices, interface, excited, 2 * math.pi * ours[0], effort.periods)
+
+def _whole_mesh(cluster: Cluster, finest: Scene, best: np.ndarray) -> dict[str, Any]:
+    """Return steps, time a period and error of the whole mesh, and what a damped curve would take."""
+    full = explicit_run(*cluster.elements(), finest, 2 * math.pi * finest.frequency, _FIRST)
+    return {
+        "free_dofs": full.size, "steps": full.steps, "time": full.seconds_per_step * full.steps,
+        "error": float(np.abs(full.peak / best - 1).max()), "curve": list(_CURVE),
+        "curve_days": full.curve_seconds(_CURVE[1], _CURVE[0]) / 86400,
+    }  # fmt: skip
+
+
+def curve(folder: Path, effort: CurveEffort = CurveEffort(), take: Take = at_once) -> dict[str, Any]:
+    """Measure fixed frequency, onset and damped peak: reduced model by the exact engine, and whole mesh.
+
+    take: rows CURVE_ROWS.
+    """
+    reduced, *of_mesh = CURVE_ROWS
+    coarse = _Coarse(folder / "coarse", effort)
+    ours = take(reduced, coarse.reduced)
+    below, above = (
+        take(row, partial(coarse.mesh, ours["onset_hz"] * (1 + side * effort.wide)))
+        for row, side in zip(of_mesh[:2], (-1, 1), strict=True)
+    )
+    best = min(max(int(np.argmax(ours["amplitude"])), 1), effort.points - 2)
+    at = ours["at_hz"][best - 1 : best + 2]
+    damped = [take(row, partial(coarse.mesh, frequency)) for row, frequency in zip(of_mesh[2:], at, strict=True)]
+    return ours | {
+        "modes": effort.modes, "periods": effort.periods, "time": damped[0]["time"], "onset_within": effort.wide,
+        "impacts_below_above": [below["impacts"], above["impacts"]],
+        "peak_hz": at, "peak": ours["amplitude"][best - 1 : best + 2], "mesh_peak": [run["mean"] for run in damped],
+        "peak_error": max(run["mean"] for run in damped) / max(ours["amplitude"]) - 1,
+    }  # fmt: skip
+
+
+class _Coarse:
+    """The coarse mesh and its reduced model."""
+
+    def __init__(self, folder: Path, effort: CurveEffort) -> None:
+        self._cluster, self._effort = Cluster(folder, effort.size, lumped=True), effort
+
+    @cached_property
+    def scene(self) -> Scene:
+        """A gap of half the peak, with an onset well below the resonance."""
+        effort, scene = self._effort, self._cluster.scene(self._effort.modes)
+        return scene.replace({
+            "cavity.0.gap": 0.5 * _amplitude(scene), "time.periods": effort.periods, "time.transient": effort.dropped
+        })  # fmt: skip
+
+    @cached_property
+    def elements(self) -> tuple[SystemMatrices, Interface]:
+        """The mesh."""
+        return self._cluster.elements()
+
+    def reduced(self) -> dict[str, Any]:
+        """Return frequencies without and with the body fixed, of both; onset and damped curve of the reduced model."""
+        scene = self.scene
+        free, glued = glued_frequencies_hz(*self.elements, scene)
+        ours = [_peak_of(scene, fixed) for fixed in (False, True)]
+        at, amplitudes = _damped(scene, ours[1], ours[0], self._effort.points)
+        return {
+            "free_dofs": len(self.elements[0].free), "free_hz": [ours[0], free], "fixed_hz": [ours[1], glued],
+            "fixed_error": glued / ours[1] - 1, "onset_hz": _onset(scene, ours[1], ours[0]),
+            "undamped": _amplitude(scene), "at_hz": at.tolist(), "amplitude": amplitudes.tolist(),
+        }  # fmt: skip
+
+    def mesh(self, frequency: float) -> dict[str, Any]:
+        """Return mean amplitude (m) and impacts of the whole mesh at a frequency (Hz), and its time a period, s."""
+        effort, scene = self._effort, self.scene.replace({"excitation.frequency": frequency})
+        run = explicit_run(*self.elements, scene, 2 * math.pi * _peak_of(self.scene, False), effort.periods)
         late = slice(effort.dropped, None)
-        return float(run.peak[late].mean()), int(run.impacts[late].sum()), run.seconds_per_step * run.steps
-
-    below, above = mesh(onset * (1 - effort.wide)), mesh(onset * (1 + effort.wide))
-    best = int(np.argmax(amplitudes))
-    near = range(max(best - 1, 0), min(best + 2, len(at)))
-    damped = [mesh(float(at[i])) for i in near]
-    return {
-        "free_dofs": len(matrices.free), "modes": effort.modes, "periods": effort.periods, "time": damped[0][2],
-        "free_hz": [ours[0], free], "fixed_hz": [ours[1], glued], "fixed_error": glued / ours[1] - 1,
-        "onset_hz": onset, "onset_within": effort.wide, "impacts_below_above": [below[1], above[1]],
-        "peak_hz": [float(at[i]) for i in near], "peak": [float(amplitudes[i]) for i in near],
-        "mesh_peak": [mean for mean, _, _ in damped],
-        "peak_error": max(mean for mean, _, _ in damped) / float(amplitudes.max()) - 1,
-        "undamped": _amplitude(scene), "at_hz": at.tolist(), "amplitude": amplitudes.tolist(),
-    }  # fmt: skip
+        return {
+            "mean": float(run.peak[late].mean()), "impacts": int(run.impacts[late].sum()),
+            "time": run.seconds_per_step * run.steps,
+        }  # fmt: skip
 
 
 def _amplitude(scene: Scene) -> float:

@@ -64,6 +64,14 @@ PEERS = {
 }
 
 
+def version(name: str) -> str | None:
+    """Return the version of a peer, None where it is not installed."""
+    try:
+        return str(getattr(import_module(PEERS[name].needs), "__version__", "unknown"))
+    except ImportError:
+        return None
+
+
 def run_peer(name: str, scene: Scene, periods: int, setting: float, samples: int = 0) -> PeerRun:
     """Run a scene over a number of periods, with samples of each.
 
@@ -72,10 +80,8 @@ def run_peer(name: str, scene: Scene, periods: int, setting: float, samples: int
     peer = PEERS[name]
     if scene.planar and not peer.planar:
         raise InputError(f"{name}: this set-up takes sliders without springs only")
-    try:
-        import_module(peer.needs)
-    except ImportError:
-        raise InputError(f"{name}: not installed; {peer.remedy}") from None
+    if version(name) is None:
+        raise InputError(f"{name}: not installed; {peer.remedy}")
     run: Callable[[Scene, int, float, int], PeerRun] = import_module(
         f"vanedamp.studies.bench.methods.{peer.module}"
     ).run

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +25,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.files.store import write_csv
 from vanedamp.files.toml_input import validate
+from vanedamp.studies.bench.rows import Take, at_once
 
 #: kg, N/m, m: the paper's cluster as one mode, and its undamped amplitude
 MASS, STIFFNESS, AMPLITUDE = 0.15696, 3.6046e7, 7e-5
@@ -89,14 +91,17 @@ class Verdict:
         return self.choice_cost / self.block_cost
 
 
-def run_body_trial(
-    folder: Path, seed: int, count: int, periods: int, report: Callable[[int, int], None]
-) -> list[Verdict]:
-    """Return verdicts of a number of scenes, written to bodies.csv of the folder."""
+def body_rows(count: int) -> list[str]:
+    """Return the rows of a trial in their order, one a scene."""
+    return [f"slider or block, scene {index}" for index in range(1, count + 1)]
+
+
+def run_body_trial(folder: Path, seed: int, count: int, periods: int, take: Take = at_once) -> list[Verdict]:
+    """Return verdicts of a number of scenes, written to bodies.csv of the folder. take: rows body_rows."""
     verdicts: list[Verdict] = []
-    for index, scene in enumerate(draw(seed, count)):
-        verdicts += judge_trial(scene, str(index + 1), periods)
-        report(index + 1, count)
+    for index, (row, scene) in enumerate(zip(body_rows(count), draw(seed, count), strict=True), 1):
+        judged = take(row, partial(_judged, scene, str(index), periods))
+        verdicts += [Verdict(**item) for item in judged]
     names = list(asdict(verdicts[0]))
     rows = [[*asdict(item).values(), item.kept, item.missed, item.cost] for item in verdicts]
     write_csv(folder / "bodies.csv", [*names, "kept", "missed", "cost"], rows)
@@ -134,6 +139,10 @@ def _scene(generator: np.random.Generator) -> Scene:
         },
         "trial",
     )  # fmt: skip
+
+
+def _judged(scene: Scene, name: str, periods: int) -> list[dict[str, Any]]:
+    return [asdict(verdict) for verdict in judge_trial(scene, name, periods)]
 
 
 def judge_trial(scene: Scene, name: str, periods: int) -> list[Verdict]:

@@ -10,8 +10,8 @@ Newton's law has no limit, and a massless boundary without loss is another conta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,20 +22,20 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.store import finite, write_json
-from vanedamp.files.toml_input import InputError, validate
+from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
 from vanedamp.studies.bench.engine.inside import time_of_a_period
 from vanedamp.studies.bench.model_order.bar_on_wall import LAWS as BAR_LAWS
 from vanedamp.studies.bench.model_order.bar_on_wall import bounce
 from vanedamp.studies.bench.model_order.body_trial import SEED as BODY_SEED
-from vanedamp.studies.bench.model_order.body_trial import print_body_trial, run_body_trial
+from vanedamp.studies.bench.model_order.body_trial import body_rows, print_body_trial, run_body_trial
 from vanedamp.studies.bench.model_order.body_trial import summary as body_summary
 from vanedamp.studies.bench.model_order.scenes import SEED
 from vanedamp.studies.bench.model_order.structures import cluster_model
-from vanedamp.studies.bench.model_order.trial import print_trial, run_trial, summary
+from vanedamp.studies.bench.model_order.trial import print_trial, run_trial, summary, trial_rows
+from vanedamp.studies.bench.rows import Rows, Take, at_once
 from vanedamp.studies.bench.timing import Clock, in_turns, machine
-from vanedamp.studies.terminal import progress
 
 #: contact tables of the cluster's scenes; stiffness: shorter contacts than the first 25 modes can follow
 LAWS: dict[str, dict[str, Any]] = {
@@ -54,6 +54,7 @@ _AMPLITUDE = 3e-5
 _STARTS = (0.0, 0.3)
 # rounds of the clocks, and between which periods of a run they measure
 _ROUNDS, _LENGTHS = 3, (50, 150)
+_BAR, _TIMES = "bar on a wall", "cluster: times"
 
 
 @dataclass(frozen=True)
@@ -80,20 +81,14 @@ QUICK = Effort(1, (1, 2, 3, 6, 12), 3, 1200, (1, 2, 4, 8), {"cluster": 1, "beam"
 
 def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
     """Measure, and write ladder.json with its figures to the folder, made if need be."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--output {folder}: cannot be made ({error.strerror})") from error
+    rows = Rows(folder, "ladder", asdict(effort), _expected(effort))
     file = folder / "ladder_rom.h5"
     cluster_model(effort.degree, max(effort.modes)).save(file)
-    result: dict[str, Any] = {"machine": machine(), "bar": bar_errors(effort.bar_modes)}
-    with progress("laws") as report:
-        result["cluster"] = cluster_curves(file, effort, report)
-    with progress("automatic choice") as report:
-        result["auto"] = summary(run_trial(folder, SEED, effort.trials, effort.trial_periods, report))
-    with progress("bodies") as report:
-        verdicts = run_body_trial(folder, BODY_SEED, effort.body_trials, effort.body_periods, report)
-        result["bodies"] = body_summary(verdicts) | {"periods": effort.body_periods}
+    result: dict[str, Any] = {"machine": machine(), "bar": rows.take(_BAR, partial(bar_errors, effort.bar_modes))}
+    result["cluster"] = cluster_curves(file, effort, rows.take)
+    result["auto"] = summary(run_trial(folder, SEED, effort.trials, effort.trial_periods, rows.take))
+    verdicts = run_body_trial(folder, BODY_SEED, effort.body_trials, effort.body_periods, rows.take)
+    result["bodies"] = body_summary(verdicts) | {"periods": effort.body_periods}
     write_json(folder / "ladder.json", finite(result))
     from vanedamp.studies.bench.model_order.figures import auto_figure, bar_figure, bodies_figure, cluster_figure
 
@@ -101,7 +96,21 @@ def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
     cluster_figure(result["cluster"], folder / "ladder_cluster.png")
     auto_figure(result["auto"], folder / "ladder_auto.png")
     bodies_figure(result["bodies"], folder / "ladder_bodies.png")
+    rows.finish()
     return result
+
+
+def _expected(effort: Effort) -> dict[str, float]:
+    """Return the rows in their order, and about what each takes, s."""
+    runs = effort.frequencies * len(_STARTS) * effort.periods
+    expected = {_BAR: 3.0 * len(effort.bar_modes)}
+    expected |= {_row(law, modes): 2e-5 * runs * (1 + 0.2 * modes) for law in LAWS for modes in effort.modes}
+    expected |= {_TIMES: 20.0} | dict.fromkeys(trial_rows(effort.trials), 0.03 * effort.trial_periods)
+    return expected | dict.fromkeys(body_rows(effort.body_trials), 0.01 * effort.body_periods)
+
+
+def _row(law: str, modes: int) -> str:
+    return f"cluster, {law}, {modes} modes"
 
 
 def bar_errors(counts: tuple[int, ...]) -> dict[str, Any]:
@@ -115,35 +124,32 @@ def bar_errors(counts: tuple[int, ...]) -> dict[str, Any]:
     }
 
 
-def cluster_curves(file: Path, effort: Effort, report: Callable[[int, int], None]) -> dict[str, Any]:
+def cluster_curves(file: Path, effort: Effort, take: Take = at_once) -> dict[str, Any]:
     """Measure mean amplitudes over the frequencies, their error and cost, for each law and number of natural modes."""
     model = ReducedModel.load(file)
     first = float(model.natural_frequencies_hz[0])
     mass = 1.0 / float((massless(model, 1).row("shroud") ** 2)[0])
     frequencies = first * np.linspace(0.975, 1.005, effort.frequencies)
-    curves: dict[str, Any] = {}
-    clocks: dict[str, Clock] = {}
+
+    def scenes(law: str, modes: int) -> list[Scene]:
+        return [_scene(file, modes, LAWS[law], mass, frequency, effort) for frequency in frequencies]
+
     warm_up()
-    done, total = 0, len(LAWS) * len(effort.modes)
-    for law, contact in LAWS.items():
-        entry = curves[law] = {"amplitude": [], "confidence": [], "status": []}
-        for modes in effort.modes:
-            scenes = [_scene(file, modes, contact, mass, frequency, effort) for frequency in frequencies]
-            runs = [[simulate(_from(scene, start)) for start in _STARTS] for scene in scenes]
-            entry["amplitude"].append([float(np.mean([run.amplitude_mean for run in pair])) for pair in runs])
-            entry["confidence"].append([
-                float(np.linalg.norm([run.amplitude_mean_confidence or 0.0 for run in pair])) / len(pair)
-                for pair in runs
-            ])  # fmt: skip
-            entry["status"].append([run.status.value for pair in runs for run in pair])
-            middle = scenes[len(scenes) // 2].replace({"time.periods": _LENGTHS[1], "time.transient": 0})
-            clocks[f"{law}/{modes}"] = partial(time_of_a_period, middle, _LENGTHS)
-            done += 1
-            report(done, total)
-    times = in_turns(clocks, _ROUNDS, np.random.default_rng(0))
+    curves: dict[str, Any] = {}
+    for law in LAWS:
+        points = [take(_row(law, modes), partial(_point, scenes(law, modes))) for modes in effort.modes]
+        curves[law] = {
+            "amplitude": [point["amplitude"] for point in points],
+            "confidence": [point["confidence"] for point in points],
+            "status": [point["status"] for point in points],
+        }
+    middle = {
+        f"{law}/{modes}": scenes(law, modes)[len(frequencies) // 2] for law in LAWS for modes in effort.modes
+    }  # fmt: skip
+    times = take(_TIMES, partial(_times, middle))
     finest = np.array(curves[REFERENCE]["amplitude"][-1])
     for law, entry in curves.items():
-        entry["seconds_per_period"] = [float(np.median(times[f"{law}/{modes}"])) for modes in effort.modes]
+        entry["seconds_per_period"] = [times[f"{law}/{modes}"] for modes in effort.modes]
         deviations = (np.array(entry["amplitude"]) - finest) / _AMPLITUDE
         entry["error"] = np.sqrt(np.mean(deviations**2, axis=1)).tolist()
         entry["peak_error"] = (np.max(entry["amplitude"], axis=1) / _AMPLITUDE - finest.max() / _AMPLITUDE).tolist()
@@ -151,6 +157,28 @@ def cluster_curves(file: Path, effort: Effort, report: Callable[[int, int], None
         "modes": list(effort.modes), "frequencies_hz": frequencies.tolist(), "undamped": _AMPLITUDE, "laws": curves,
         "periods": effort.periods, "reference": {"law": REFERENCE, "modes": effort.modes[-1]},
     }  # fmt: skip
+
+
+def _point(scenes: Sequence[Scene]) -> dict[str, Any]:
+    """Return mean amplitudes, their confidences (m) and the status of all runs of one law and number of modes."""
+    runs = [[simulate(_from(scene, start)) for start in _STARTS] for scene in scenes]
+    return {
+        "amplitude": [float(np.mean([run.amplitude_mean for run in pair])) for pair in runs],
+        "confidence": [
+            float(np.linalg.norm([run.amplitude_mean_confidence or 0.0 for run in pair])) / len(pair) for pair in runs
+        ],
+        "status": [run.status.value for pair in runs for run in pair],
+    }  # fmt: skip
+
+
+def _times(scenes: Mapping[str, Scene]) -> dict[str, float]:
+    """Return the seconds a period of scenes, medians over the rounds."""
+    clocks: dict[str, Clock] = {}
+    for name, scene in scenes.items():
+        long = scene.replace({"time.periods": _LENGTHS[1], "time.transient": 0})
+        clocks[name] = partial(time_of_a_period, long, _LENGTHS)
+    times = in_turns(clocks, _ROUNDS, np.random.default_rng(0))
+    return {name: float(np.median(values)) for name, values in times.items()}
 
 
 def _from(scene: Scene, start: float) -> Scene:

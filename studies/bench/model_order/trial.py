@@ -7,7 +7,7 @@ per period, within runs and in turns.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -21,6 +21,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import write_csv
 from vanedamp.studies.bench.engine.inside import time_of_a_period
 from vanedamp.studies.bench.model_order.scenes import Trial, trials
+from vanedamp.studies.bench.rows import Take, at_once
 from vanedamp.studies.bench.timing import in_turns
 
 TOLERANCES = (0.1, 0.03, 0.01)
@@ -61,19 +62,30 @@ class Verdict:
         return self.cost / self.cheapest_cost
 
 
-def run_trial(
-    folder: Path, seed: int, counts: dict[str, int], periods: int, report: Callable[[int, int], None]
-) -> list[Verdict]:
-    """Return verdicts of a number of scenes of each structure, written to auto.csv of the folder."""
+def trial_rows(counts: Mapping[str, int]) -> list[str]:
+    """Return the rows of a trial in their order, one a scene."""
+    structures = [structure for structure, count in counts.items() for _ in range(count)]
+    return [f"automatic choice, {structure} {index}" for index, structure in enumerate(structures, 1)]
+
+
+def run_trial(folder: Path, seed: int, counts: dict[str, int], periods: int, take: Take = at_once) -> list[Verdict]:
+    """Return verdicts of a number of scenes of each structure, written to auto.csv of the folder.
+
+    take: rows trial_rows.
+    """
     drawn = trials(folder, seed, counts)
     verdicts: list[Verdict] = []
-    for index, trial in enumerate(drawn):
-        verdicts += judge(trial, f"{trial.structure} {index + 1}", periods)
-        report(index + 1, len(drawn))
+    for index, (row, trial) in enumerate(zip(trial_rows(counts), drawn, strict=True), 1):
+        judged = take(row, partial(_judged, trial, f"{trial.structure} {index}", periods))
+        verdicts += [Verdict(**item) for item in judged]
     names = list(asdict(verdicts[0]))
     rows = [[*asdict(item).values(), item.kept, item.ratio] for item in verdicts]
     write_csv(folder / "auto.csv", [*names, "kept", "ratio"], rows)
     return verdicts
+
+
+def _judged(trial: Trial, name: str, periods: int) -> list[dict[str, Any]]:
+    return [asdict(verdict) for verdict in judge(trial, name, periods)]
 
 
 def judge(trial: Trial, name: str, periods: int) -> list[Verdict]:

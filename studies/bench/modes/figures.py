@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ def modal_figure(result: Mapping[str, Any], path: Path) -> None:
 
     figure, panels = subplots(1, 3, size=(14, 4.6))
     titles = ("factorisation", f"{COUNT} modes with it", "peak memory")
-    colours = dict(zip(NAMES, (BLUE, GREY, RED, GOLD, GREEN), strict=True))
+    colours = dict(zip(NAMES, itertools.cycle((BLUE, GREY, RED, GOLD, GREEN)), strict=False))
     sizes = [entry for entry in result["sizes"] if entry["assembly"]["status"] == "ok"]
     for axes, title, part in zip(panels, titles, ("factorisation", "modes", "peak_bytes"), strict=True):
         for name, label in NAMES.items():
@@ -24,8 +25,10 @@ def modal_figure(result: Mapping[str, Any], path: Path) -> None:
                 for e in sizes
                 if e["solvers"].get(name, {}).get("status") == "ok"
             ]
+            # why the line of a solver ends
+            told = f"{label}, dropped" if name in result["dropped"] else label
             values = [f[part] / 1e9 if part == "peak_bytes" else f[part]["cpu_s"] for _, f in done]
-            axes.loglog([dofs for dofs, _ in done], values, "o-", color=colours[name], label=label)
+            axes.loglog([dofs for dofs, _ in done], values, "o-", color=colours[name], label=told)
         axes.set_title(title)
         dofs = [entry["assembly"]["dofs"] for entry in sizes]
         axes.set_xticks(dofs, [f"{count:,}" for count in dofs])

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import tempfile
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -21,6 +20,7 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.store import finite, write_csv, write_json
+from vanedamp.studies.bench.rows import Rows
 from vanedamp.studies.bench.stability.macro_step import largest_stable
 from vanedamp.studies.bench.stability.maps import MAPS, MapEffort
 from vanedamp.studies.bench.stability.scenes import (
@@ -38,7 +38,6 @@ from vanedamp.studies.bench.stability.scenes import (
     unsteady,
 )
 from vanedamp.studies.bench.timing import machine
-from vanedamp.studies.terminal import progress
 
 
 @dataclass(frozen=True)
@@ -51,14 +50,15 @@ class Effort:
     maps: MapEffort | None = None
 
 
+#: about what a part takes for each of its points, and a map, s
+_PART, _MAP = 1.0, 60.0
+
 FULL = Effort(9, 40, (0, 1, 2, 5, 10, 20, 50), MapEffort())
 QUICK = Effort(2, 4, (0, 1, 2))
 
 
 def run_stability(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     """Measure; write stability.json, .csv and figures into a folder. Returns what the JSON holds."""
-    started = time.perf_counter()
-    folder.mkdir(parents=True, exist_ok=True)
     parts: dict[str, Callable[[Effort], dict[str, Any]]] = {
         "explicit": explicit_limit,
         "contact pair": contact_limit,
@@ -69,17 +69,14 @@ def run_stability(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
         "restitution": restitution_and_modes,
         "chatter": chatter_end,
     }
-    result: dict[str, Any] = {"machine": machine(), "effort": asdict(effort), "parts": {}}
-    with progress("stability") as report:
-        for done, (name, part) in enumerate(parts.items()):
-            report(done, len(parts) + len(MAPS))
-            result["parts"][name] = part(effort)
-        if effort.maps is not None:
-            result["maps"] = {}
-            for done, (name, make) in enumerate(MAPS.items()):
-                report(len(parts) + done, len(parts) + len(MAPS))
-                result["maps"][name] = make(effort.maps)
-    result = finite(result | {"wall_time_s": time.perf_counter() - started})
+    maps = MAPS if effort.maps is not None else {}
+    expected = dict.fromkeys(parts, _PART * effort.points) | {_map_row(name): _MAP for name in maps}
+    rows = Rows(folder, "stability", asdict(effort), expected)
+    result: dict[str, Any] = {"machine": machine(), "effort": asdict(effort)}
+    result["parts"] = {name: rows.take(name, partial(part, effort), tell=_edge) for name, part in parts.items()}
+    if effort.maps is not None:
+        result["maps"] = {name: rows.take(_map_row(name), partial(make, effort.maps)) for name, make in maps.items()}
+    result = finite(result | {"wall_time_s": rows.seconds})
     write_json(folder / "stability.json", result)
     points = (
         (name, curve, x, y)
@@ -95,7 +92,12 @@ def run_stability(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     stability_figure(result, folder / "stability.png")
     if "maps" in result:
         maps_figure(result["maps"], folder / "stability_maps.png")
+    rows.finish()
     return result
+
+
+def _map_row(name: str) -> str:
+    return f"map of {name}"
 
 
 def _write_maps(maps: Mapping[str, Any], path: Path) -> None:
@@ -113,15 +115,19 @@ def _write_maps(maps: Mapping[str, Any], path: Path) -> None:
 def print_summary(result: Mapping[str, Any]) -> None:
     """Print how far each measured edge lies from its limit."""
     for name, part in result["parts"].items():
-        if "limit" in part["curves"]:
-            ratio = np.array(part["curves"]["measured"]) / np.array(part["curves"]["limit"])
-            print(f"{name:16} measured / analytic limit {ratio.min():.3f} to {ratio.max():.3f}")
-        else:
-            print(f"{name:16} {part['summary']}")
+        print(f"{name:16} {_edge(part)}")
     for name, mapped in result.get("maps", {}).items():
         ratio = np.array(mapped["edge"], float) / np.array(mapped["limit"], float)
         known = ratio[np.isfinite(ratio)]
         print(f"map of {name}: edge / analytic limit {known.min():.3f} to {known.max():.3f}, {len(known)} columns")
+
+
+def _edge(part: Mapping[str, Any]) -> str:
+    """Return what a part has found, in words."""
+    if "limit" not in part["curves"]:
+        return str(part["summary"])
+    ratio = np.array(part["curves"]["measured"]) / np.array(part["curves"]["limit"])
+    return f"measured / analytic limit {ratio.min():.3f} to {ratio.max():.3f}"
 
 
 def explicit_limit(effort: Effort) -> dict[str, Any]:
