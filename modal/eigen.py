@@ -157,12 +157,12 @@ def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
 
 
 def factorize(matrix: sparse.csr_array) -> Factorization:
-    """Factorise a regular symmetric matrix, such as the stiffness of the free DOFs (MUMPS, LDL^T).
+    """Factorise a regular symmetric matrix, such as the stiffness of the free DOFs (CHOLMOD, or MUMPS' LDL^T).
 
     The result solves for right-hand sides (n,) or (n, k) with `.solve`; `.destroy()` or the end of a `with` block
     frees it. Raises SolverError for a singular matrix.
     """
-    return Factorization(matrix)
+    return petsc.factorized(matrix)
 
 
 def static_shape(matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:

@@ -19,8 +19,6 @@ from vanedamp.modal.algebra import symmetric_part
 #: the inverse of K - shift M applied to rows (k, n)
 Solve = Callable[[np.ndarray], np.ndarray]
 
-#: right-hand sides of one solve: fewer make each dearer, more make more of them
-BLOCK = 4
 _RESTARTS = 100
 # directions are dropped below this share of their block, and made orthogonal once more below the other
 _DEPENDENT, _LOSING = 1e-14, 1e-6
@@ -30,9 +28,14 @@ class NotConvergedError(ArithmeticError):
     """Fewer eigenpairs than asked for have converged."""
 
 
+def block(count: int) -> int:
+    """Return the right-hand sides of one solve for `count` eigenpairs: fewer make each dearer, more make more of them."""
+    return min(max(count // 4, 4), 12)
+
+
 def directions(count: int) -> int:
     """Return the most vectors that are kept for `count` eigenpairs; smaller problems are solved densely."""
-    return 2 * count + 12 * BLOCK
+    return 2 * count + 12 * block(count)
 
 
 def eigenpairs(
@@ -48,18 +51,18 @@ def eigenpairs(
 
     n must be greater than `directions(count + spare)`. Raises NotConvergedError.
     """
-    wanted = count + spare
+    wanted, width = count + spare, block(count)
     limits = np.r_[np.full(count, tolerance), np.full(spare, tolerance**0.5)]
     space = _Space(mass, directions(wanted))
-    space.append(solve(_product(mass, np.random.default_rng(0).standard_normal((BLOCK, space.size)))))
+    space.append(solve(_product(mass, np.random.default_rng(0).standard_normal((width, space.size)))))
     for _ in range(_RESTARTS):
-        while space.count <= space.most - BLOCK:
+        while space.count <= space.most - width:
             leak = space.extend(solve)
             values, turns = space.ritz(wanted)
             residuals = np.linalg.norm(leak @ turns[-leak.shape[1] :], axis=0)
             if len(values) == wanted and np.all(residuals <= limits * np.abs(values)):
                 return shift + 1.0 / values, turns.T @ space.vectors[: len(turns)]
-        space.restart(wanted + 2 * BLOCK)
+        space.restart(wanted + 2 * width)
     raise NotConvergedError(f"{np.count_nonzero(residuals <= limits * np.abs(values))} of {wanted} modes converged")
 
 
@@ -71,6 +74,7 @@ class _Space:
 
     def __init__(self, mass: Any, most: int) -> None:
         self.size, self.most, self.count, self.block = mass.shape[0], most, 0, 0
+        self._before = 0  # first of the rows that the operator couples with the last block
         self.vectors, self.inertia = np.empty((most, self.size)), np.empty((most, self.size))
         self.projected = np.zeros((most, most))
         self._mass = mass
@@ -89,7 +93,7 @@ class _Space:
             shares = shares @ (turn * scale[:, None] * root)
             if values[kept].min(initial=1.0) > _LOSING:
                 break
-            rows = self._orthogonal(rows)[0]
+            rows = self._orthogonal(rows, 0)[0]
         self.block = len(rows)
         start, self.count = self.count, self.count + self.block
         self.vectors[start : self.count], self.inertia[start : self.count] = rows, inertia
@@ -98,9 +102,10 @@ class _Space:
     def extend(self, solve: Solve) -> np.ndarray:
         """Apply the operator to the last block and append what is new; return its shares (j, b) in the new rows."""
         count, last = self.count, slice(self.count - self.block, self.count)
-        rows, shares = self._orthogonal(solve(self.inertia[last]))
+        rows, shares = self._orthogonal(solve(self.inertia[last]), self._before)
         self.projected[:count, last] = shares
         self.projected[last, :count] = shares.T
+        self._before = last.start
         return self.append(rows).T
 
     def ritz(self, wanted: int) -> tuple[np.ndarray, np.ndarray]:
@@ -120,15 +125,18 @@ class _Space:
             rows[len(values) : len(values) + self.block] = last
         self.projected[:] = 0.0
         self.projected[np.arange(len(values)), np.arange(len(values))] = values
-        self.count = len(values) + self.block
+        self.count, self._before = len(values) + self.block, 0
 
-    def _orthogonal(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rows (b, n) without their components along the space, and these (k, b)."""
+    def _orthogonal(self, rows: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return rows (b, n) without their components along the space, and these (k, b).
+
+        first: of the rows of the space along which the components are more than round-off.
+        """
         found = np.zeros((self.count, len(rows)))
-        for _ in range(2):  # is enough (Parlett 1980, The Symmetric Eigenvalue Problem, section 6-9)
-            shares = self.inertia[: self.count] @ rows.T
-            rows = rows - shares.T @ self.vectors[: self.count]
-            found += shares
+        for start in (first, 0):  # twice is enough (Parlett 1980, The Symmetric Eigenvalue Problem, section 6-9)
+            shares = self.inertia[start : self.count] @ rows.T
+            rows = rows - shares.T @ self.vectors[start : self.count]
+            found[start:] += shares
         return rows, found
 
 

@@ -115,19 +115,13 @@ def negative_eigenvalues(matrix: sparse.csr_array) -> int:
 
 
 def nearest_eigenpairs(
-    stiffness: sparse.csr_array,
-    mass: sparse.csr_array,
-    count: int,
-    shift: float,
-    direct: str | None = None,
-    spare: int = 0,
+    stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float, spare: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return eigenvalues (m,) ascending and vectors (m, n) of K x = lambda M x nearest to a shift.
 
-    direct: PETSc's name of the solver that factorises; left out, CHOLMOD where the shift is below the spectrum,
-    otherwise MUMPS. spare: more pairs than `count`, whose vectors have half the digits. Block Lanczos on one rank,
-    Krylov-Schur (Stewart 2001, SIAM J. Matrix Anal. Appl. 23) on MUMPS on several. Raises SolverError when fewer
-    converge than were asked for.
+    spare: more pairs than `count`, whose vectors have half the digits. Block Lanczos on one rank, Krylov-Schur (Stewart
+    2001, SIAM J. Matrix Anal. Appl. 23) on MUMPS on several. Raises SolverError when fewer converge than were asked
+    for.
     """
     wanted = count + spare
     if mass.shape[0] <= directions(wanted):
@@ -136,7 +130,8 @@ def nearest_eigenpairs(
     elif parallel.COMM.size > 1:
         values, vectors = _on_all_ranks("nearest", (stiffness, mass), wanted, shift)
     else:
-        with shifted(stiffness, mass, shift, direct) as factors:
+        matrix = sparse.csr_array(stiffness - shift * mass) if shift else stiffness
+        with factorized(matrix, definite=shift <= 0.0) as factors:
             try:
                 values, vectors = eigenpairs(factors.solve_rows, mass, count, shift, spare=spare)
             except NotConvergedError as error:
@@ -146,18 +141,15 @@ def nearest_eigenpairs(
     return values[order], vectors[order]
 
 
-def shifted(
-    stiffness: sparse.csr_array, mass: sparse.csr_array, shift: float, direct: str | None = None
-) -> Factorization:
-    """Return K - shift M, factorised: by CHOLMOD where that is there and the matrix is positive definite.
+def factorized(matrix: sparse.csr_array, definite: bool = True) -> Factorization:
+    """Return a matrix, factorised by CHOLMOD where that is there and the matrix is positive definite, or by MUMPS.
 
-    direct: PETSc's name of another solver. Raises SolverError for a singular matrix.
+    definite: whether it may be. Raises SolverError for a singular matrix.
     """
-    matrix = sparse.csr_array(stiffness - shift * mass) if shift else stiffness
-    if direct is None and shift <= 0.0 and PETSc.Sys.hasExternalPackage("suitesparse"):
+    if definite and PETSc.Sys.hasExternalPackage("suitesparse") and np.all(matrix.diagonal() > 0.0):
         with contextlib.suppress(SolverError):
             return Factorization(matrix, "cholmod")
-    return Factorization(matrix, direct or "mumps")
+    return Factorization(matrix)
 
 
 def interval_eigenpairs(

@@ -9,6 +9,7 @@ from vanedamp.modal import lanczos
 from vanedamp.modal.lanczos import NotConvergedError, directions, eigenpairs
 
 SIZE = 600
+COPIES = lanczos.block(10)
 
 
 def rod(size=SIZE):
@@ -50,9 +51,9 @@ def test_shift_inside_the_spectrum():
 def test_all_copies_of_multiple_eigenvalues():
     """Equal rods beside each other: as many copies as right-hand sides in a block."""
     stiffness, mass, exact = rod()
-    stiffness, mass = (sparse.csr_matrix(sparse.kron(sparse.eye(lanczos.BLOCK), each)) for each in (stiffness, mass))
+    stiffness, mass = (sparse.csr_matrix(sparse.kron(sparse.eye(COPIES), each)) for each in (stiffness, mass))
     values, vectors = eigenpairs(inverse(stiffness, mass, 0.0), mass, 10)
-    assert values == pytest.approx(np.repeat(exact[:3], lanczos.BLOCK)[:10], rel=1e-10)
+    assert values == pytest.approx(np.repeat(exact[:3], COPIES)[:10], rel=1e-10)
     check(stiffness, mass, values, vectors)
 
 
@@ -65,7 +66,7 @@ def test_a_full_space_restarts_with_what_it_has(monkeypatch):
         return solve(rows)
 
     solve = inverse(stiffness, mass, 0.0)
-    monkeypatch.setattr(lanczos, "directions", lambda count: count + 4 * lanczos.BLOCK)
+    monkeypatch.setattr(lanczos, "directions", lambda count: count + 4 * COPIES)
     values, vectors = eigenpairs(counted, mass, 12)
     assert sum(solves) > lanczos.directions(12)
     assert values == pytest.approx(exact[:12], rel=1e-10)
@@ -94,6 +95,6 @@ def test_a_space_that_is_invariant_at_once():
 def test_too_little_time(monkeypatch):
     stiffness, mass, _ = rod()
     monkeypatch.setattr(lanczos, "_RESTARTS", 1)
-    monkeypatch.setattr(lanczos, "directions", lambda count: count + lanczos.BLOCK)
+    monkeypatch.setattr(lanczos, "directions", lambda count: count + COPIES)
     with pytest.raises(NotConvergedError, match="of 12 modes converged"):
         eigenpairs(inverse(stiffness, mass, 0.0), mass, 12)

@@ -47,7 +47,7 @@ def assemble(mesh: str, output: str) -> Result:
 
 def lanczos(matrices: Path, count: int) -> Result:
     """Solve by block Lanczos on CHOLMOD, as `vanedamp modal` does on one rank."""
-    return _block_lanczos(matrices, count, None)
+    return _block_lanczos(matrices, count, "cholmod")
 
 
 def mumps(matrices: Path, count: int) -> Result:
@@ -55,7 +55,7 @@ def mumps(matrices: Path, count: int) -> Result:
     return _block_lanczos(matrices, count, "mumps")
 
 
-def _block_lanczos(matrices: Path, count: int, direct: str | None) -> Result:
+def _block_lanczos(matrices: Path, count: int, direct: str) -> Result:
     from vanedamp.modal import petsc
     from vanedamp.modal.eigen import SPARE
     from vanedamp.modal.lanczos import eigenpairs
@@ -68,7 +68,7 @@ def _block_lanczos(matrices: Path, count: int, direct: str | None) -> Result:
 
     with clocked(result, "modes"):
         with clocked(result, "factorisation"):
-            factors = petsc.shifted(stiffness, mass, 0.0, direct)
+            factors = petsc.Factorization(stiffness, direct)
         with clocked(result, "iteration"):
             values, vectors = eigenpairs(solve, mass, count, spare=SPARE)
     _finish(result, stiffness, mass, values[:count], vectors[:count])
