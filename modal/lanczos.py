@@ -1,4 +1,4 @@
-"""Block Lanczos for K x = lambda M x, with shift and invert: eigenpairs from solves of several right-hand sides at once.
+"""Block Lanczos for K x = lambda M x, with shift and invert: eigenpairs from solves of several right-hand sides.
 
 A triangular solve waits for memory, not for arithmetic: four right-hand sides cost little more than one. Blocks also
 find several copies of a multiple eigenvalue. Grimes, Lewis and Simon (1994), SIAM J. Matrix Anal. Appl. 15(1); here all
@@ -29,13 +29,13 @@ class NotConvergedError(ArithmeticError):
 
 
 def block(count: int) -> int:
-    """Return the right-hand sides of one solve for `count` eigenpairs: fewer make each dearer, more make more of them."""
+    """Return how many right-hand sides a solve has for `count` eigenpairs: fewer cost more each, more are more work."""
     return min(max(count // 4, 4), 12)
 
 
 def directions(count: int) -> int:
     """Return the most vectors that are kept for `count` eigenpairs; smaller problems are solved densely."""
-    return 2 * count + 12 * block(count)
+    return 2 * count + 16 * block(count)
 
 
 def eigenpairs(

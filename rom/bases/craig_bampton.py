@@ -96,7 +96,7 @@ def basis_of(
     constraint = held.constraint
     if interface.full.size:
         constraint = constraint @ _characteristic(constraint, stiffness, mass, labels, characteristic)
-    fixed = _fixed_interface_modes(held, mass, boundary.shape, modes)
+    fixed = _fixed_interface_modes(held, mass, boundary.shape[1], modes)
     return Basis(constraint, _quasi_static_blocks(held, mass, constraint, fixed, quasi_static), fixed)
 
 
@@ -227,13 +227,13 @@ class _Bordered:
         return self._factor.solve(np.concatenate([load, np.zeros((self.count, *load.shape[1:]))]))[: self.size]
 
 
-def _fixed_interface_modes(held: _Held, mass: sparse.csr_array, shape: tuple[int, int], modes: int) -> np.ndarray:
-    """Return mass-normalised modes (n, modes), by frequency; shape: of the held functionals (n, b).
+def _fixed_interface_modes(held: _Held, mass: sparse.csr_array, count: int, modes: int) -> np.ndarray:
+    """Return mass-normalised modes (n, modes), by frequency; count: of the held functionals.
 
     The inverse of the held stiffness maps into W^T q = 0 and is self-adjoint in the inner product of the mass, so that
     Lanczos on it finds the held modes and never sees the interface; small structures are solved densely.
     """
-    size, count = shape
+    size = mass.shape[0]
     if not 0 <= modes <= size - count:
         raise ReductionError(
             f"modes: expected 0 to {size - count} (the structure has no more with its interface held), not {modes}"

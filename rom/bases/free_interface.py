@@ -20,7 +20,7 @@ from scipy import linalg, sparse
 from vanedamp.modal.algebra import column_signs, symmetric_part
 from vanedamp.modal.lanczos import NotConvergedError, directions
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.rom.bases.projection import Factorize, ReductionError, Solver, project, motions_left, superlu
+from vanedamp.rom.bases.projection import Factorize, ReductionError, Solver, motions_left, project, superlu
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.krylov import krylov, lowest_modes
 from vanedamp.rom.reduced import ReducedModel

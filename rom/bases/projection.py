@@ -17,7 +17,6 @@ from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.interface import Interface, rigid_basis
 from vanedamp.rom.reduced import ReducedModel
 
-
 # of the squared frequency of uniform strains: a motion below it does not strain
 _RIGID = 1e-9
 

@@ -44,8 +44,7 @@ def modes(path: Path, count: int) -> dict[str, Any]:
     result |= {"peak_bytes": peak_memory(), "solves": count * _ROUNDS, "factor_nonzeros": int(inverse.nze)}
     free = np.array(list(space.FreeDofs()), dtype=bool)
     result["residual"] = max(
-        _residual(stiffness.mat, mass.mat, value, vector, free)
-        for value, vector in zip(values, vectors, strict=False)
+        _residual(stiffness.mat, mass.mat, value, vector, free) for value, vector in zip(values, vectors, strict=False)
     )
     return result | {"eigenvalues": [float(value) for value in values][:count]}
 
