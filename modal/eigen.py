@@ -26,8 +26,8 @@ __all__ = [
 _KIND = "modes"
 # of the lowest straining eigenvalue: below every elastic mode, far enough from the rigid ones to factorise safely
 _SHIFT = -1e-4
-# modes beyond those asked for, among which the gap is sought where they are counted; the least gap, relative
-_SPARE = 3
+#: modes beyond those asked for, among which the gap is sought where they are counted; the least gap, relative
+SPARE = 3
 _GAP = 1e-6
 # more modes than this are found faster slice by slice
 _SLICE = 50
@@ -157,12 +157,12 @@ def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
 
 
 def factorize(matrix: sparse.csr_array) -> Factorization:
-    """Factorise a regular symmetric matrix, such as the stiffness of the free DOFs (MUMPS, LDL^T).
+    """Factorise a regular symmetric matrix, such as the stiffness of the free DOFs (CHOLMOD, or MUMPS' LDL^T).
 
     The result solves for right-hand sides (n,) or (n, k) with `.solve`; `.destroy()` or the end of a `with` block
     frees it. Raises SolverError for a singular matrix.
     """
-    return Factorization(matrix)
+    return petsc.factorized(matrix)
 
 
 def static_shape(matrices: SystemMatrices, load: np.ndarray) -> np.ndarray:
@@ -186,10 +186,10 @@ class _Pencil(NamedTuple):
 
 def _lowest(pencil: _Pencil, count: int, floor: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest eigenpairs, proved complete by the inertia in a gap of the spectrum above them."""
-    size, spare = pencil.mass.shape[0], _SPARE
+    size, spare = pencil.mass.shape[0], SPARE
     while True:
         asked = min(count + spare, size)
-        values, vectors = petsc.nearest_eigenpairs(*pencil, asked, floor)
+        values, vectors = petsc.nearest_eigenpairs(*pencil, count, floor, spare=asked - count)
         gaps = np.diff(values[count - 1 :]) / (values[count:] - floor)
         if asked == size or gaps.max() > _GAP:
             break

@@ -226,18 +226,27 @@ class Solid:
         equivalent = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
         return np.array(fenicsx.evaluate(equivalent, fenicsx.discontinuous_space(self.domain, 1)).x.array)
 
-    def stress_components(self, displacement: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
+    def stress_components(self, displacements: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
         """Return stresses xx, yy, zz, xy, yz, zx (6, k), Pa, of displacements (N,), where `von_mises` has its values.
 
-        points: indices of the places wanted; default: all. They are linear in the displacements.
+        Of several displacements (m, N) the stresses (m, 6, k). points: indices of the places wanted; default: all. They
+        are linear in the displacements.
         """
-        if np.shape(displacement) != (3 * len(fenicsx.node_coordinates(self.space)),):
-            raise ElasticityError(f"displacement: shape {np.shape(displacement)} is not that of this mesh and degree")
-        stress = self.stress(fenicsx.field(self.space, displacement))
+        given = np.atleast_2d(displacements)
+        if np.ndim(displacements) > 2 or given.shape[1] != 3 * len(fenicsx.node_coordinates(self.space)):
+            raise ElasticityError(f"displacement: shape {np.shape(displacements)} is not that of this mesh and degree")
         space = fenicsx.discontinuous_space(self.domain, 1)
+        cells = None if points is None else fenicsx.cells_of(self.domain, space, np.asarray(points))
+        places = slice(None) if points is None else np.asarray(points)
+        moved = fenicsx.field(self.space, given[0])
+        stress = self.stress(moved)
         pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-        values = [np.array(fenicsx.evaluate(stress[pair], space).x.array) for pair in pairs]
-        return np.array(values) if points is None else np.array(values)[:, points]
+        components = [fenicsx.evaluator(stress[pair], space, cells) for pair in pairs]
+        found = []
+        for displacement in given:
+            moved.x.array[:] = displacement
+            found.append([np.array(component().x.array[places]) for component in components])
+        return np.array(found[0] if np.ndim(displacements) == 1 else found)
 
     def stress_points(self) -> np.ndarray:
         """Return the places (k, 3), m, of the values of `von_mises`."""

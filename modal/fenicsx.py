@@ -249,11 +249,30 @@ def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
 
 def evaluate(expression: Any, space: Any) -> Any:
     """Return the function of a space that takes the values of a UFL expression at the space's own points."""
+    return evaluator(expression, space)()
+
+
+def evaluator(expression: Any, space: Any, cells: np.ndarray | None = None) -> Callable[[], Any]:
+    """Return what `evaluate` is of an expression whose functions change: called, it takes their values as they are.
+
+    cells: those in which the values are wanted; default: all.
+    """
     points = space.element.interpolation_points
     function = fem.Function(space)
     with _compiling():
-        function.interpolate(fem.Expression(expression, points() if callable(points) else points))
-    return function
+        compiled = fem.Expression(expression, points() if callable(points) else points)
+
+    def values() -> Any:
+        function.interpolate(compiled, *([] if cells is None else [cells]))
+        return function
+
+    return values
+
+
+def cells_of(domain: Domain, space: Any, dofs: np.ndarray) -> np.ndarray:
+    """Return the sorted cells (int32) that have any of the DOFs of a discontinuous space."""
+    table = _array(space.dofmap.list).reshape(domain.mesh.topology.index_map(3).size_local, -1)
+    return np.flatnonzero(np.isin(table, dofs).any(axis=1)).astype(np.int32)
 
 
 def write_fields(space: Any, fields: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> None:

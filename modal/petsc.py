@@ -1,8 +1,8 @@
 """Sparse symmetric algebra on PETSc and SLEPc: a factorisation and an eigenvalue solver for scipy matrices.
 
-Both lean on MUMPS' LDL^T; the lowest modes of a held structure on CHOLMOD, whose single solves are quicker. All PETSc
-objects are destroyed before a function returns or when its context ends. Under MPI all ranks share eigenvalue problems
-and inertia counts (see `parallel`), on MUMPS; a Factorization stays on its own rank.
+Both lean on MUMPS' LDL^T; the lowest modes of a held structure on CHOLMOD, whose solves are quicker, and on block
+Lanczos. All PETSc objects are destroyed before a function returns or when its context ends. Under MPI all ranks share
+eigenvalue problems (SLEPc) and inertia counts (see `parallel`), on MUMPS; a Factorization stays on its own rank.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
-from scipy import sparse
+from scipy import linalg, sparse
 from slepc4py import SLEPc
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal import parallel
+from vanedamp.modal.lanczos import NotConvergedError, directions, eigenpairs
 
 # a round trip through a well-posed finite element matrix loses 5 to 8 digits, through a singular one all of them
 _ROUND_TRIP = 1e-2
@@ -43,16 +44,21 @@ class Factorization:
 
     def __init__(self, matrix: sparse.csr_array, direct: str = "mumps") -> None:
         self.size = int(matrix.shape[0])
-        self._matrix = _petsc_matrix(matrix)
-        self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-        try:
-            self._ksp.setOperators(self._matrix)
+        # only the factor is kept: what it is made of has its size in the largest structures
+        with contextlib.ExitStack() as stack:
+            given = stack.enter_context(_petsc(_upper_triangle(matrix)))
+            ksp = stack.enter_context(_petsc(PETSc.KSP().create(PETSc.COMM_SELF)))
+            ksp.setOperators(given)
             if direct == "mumps":
-                _configure_direct(self._ksp)
+                _configure_direct(ksp)
             else:
-                _set_direct(self._ksp, direct)
-            self._ksp.setUp()
-            self._factor = self._ksp.getPC().getFactorMatrix()
+                _set_direct(ksp, direct)
+            try:
+                ksp.setUp()
+            except PETSc.Error as error:
+                raise SolverError(f"{direct}: {' '.join(str(error).split())}") from error
+            self._factor = ksp.getPC().getFactorMatrix()
+        try:
             self._check(matrix, self._factor.getMumpsInfog(1) if direct == "mumps" else 0)
         except BaseException:
             self.destroy()
@@ -63,23 +69,24 @@ class Factorization:
         values = np.asarray(rhs, dtype=float)
         if values.ndim not in (1, 2) or values.shape[0] != self.size:
             raise SolverError(f"rhs: expected shape ({self.size},) or ({self.size}, k), not {values.shape}")
-        columns = np.array(values.reshape(self.size, -1), order="F")
+        return np.ascontiguousarray(self.solve_rows(values.reshape(self.size, -1).T).T).reshape(values.shape)
+
+    def solve_rows(self, rows: np.ndarray) -> np.ndarray:
+        """Return the solutions (k, n) for right-hand sides (k, n)."""
+        columns = np.asfortranarray(rows.T)
         solution = np.zeros_like(columns, order="F")
-        given = PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)
-        found = PETSc.Mat().createDense(columns.shape, array=solution, comm=PETSc.COMM_SELF)
-        try:
+        with (
+            _petsc(PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)) as given,
+            _petsc(PETSc.Mat().createDense(columns.shape, array=solution, comm=PETSc.COMM_SELF)) as found,
+        ):
             given.assemble()
             found.assemble()
             self._factor.matSolve(given, found)
-            return np.array(found.getDenseArray(), order="C").reshape(values.shape)
-        finally:
-            given.destroy()
-            found.destroy()
+            return np.array(found.getDenseArray().T, order="C")
 
     def destroy(self) -> None:
         """Free the memory of the factors."""
-        self._ksp.destroy()
-        self._matrix.destroy()
+        self._factor.destroy()
 
     def __enter__(self) -> Factorization:
         return self
@@ -108,18 +115,41 @@ def negative_eigenvalues(matrix: sparse.csr_array) -> int:
 
 
 def nearest_eigenpairs(
-    stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float, direct: str | None = None
+    stiffness: sparse.csr_array, mass: sparse.csr_array, count: int, shift: float, spare: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return eigenvalues (count,) ascending and vectors (count, n) of K x = lambda M x nearest to a shift.
+    """Return eigenvalues (m,) ascending and vectors (m, n) of K x = lambda M x nearest to a shift.
 
-    Krylov-Schur with shift and invert (Stewart 2001, SIAM J. Matrix Anal. Appl. 23). direct: PETSc's name of the solver
-    that factorises; left out, CHOLMOD where the shift is below the spectrum and the matrix on one rank, otherwise
-    MUMPS. Raises SolverError when fewer converge than were asked for.
+    spare: more pairs than `count`, whose vectors have half the digits. Block Lanczos on one rank, Krylov-Schur (Stewart
+    2001, SIAM J. Matrix Anal. Appl. 23) on MUMPS on several. Raises SolverError when fewer converge than were asked
+    for.
     """
-    values, vectors = _on_all_ranks("nearest", (stiffness, mass), count, shift, direct)
-    nearest = np.argsort(np.abs(values - shift), kind="stable")[:count]
+    wanted = count + spare
+    if mass.shape[0] <= directions(wanted):
+        values, vectors = linalg.eigh(stiffness.toarray(), mass.toarray())
+        vectors = vectors.T
+    elif parallel.COMM.size > 1:
+        values, vectors = _on_all_ranks("nearest", (stiffness, mass), wanted, shift)
+    else:
+        matrix = sparse.csr_array(stiffness - shift * mass) if shift else stiffness
+        with factorized(matrix, definite=shift <= 0.0) as factors:
+            try:
+                values, vectors = eigenpairs(factors.solve_rows, mass, count, shift, spare=spare)
+            except NotConvergedError as error:
+                raise SolverError(str(error)) from error
+    nearest = np.argsort(np.abs(values - shift), kind="stable")[:wanted]
     order = nearest[np.argsort(values[nearest], kind="stable")]
     return values[order], vectors[order]
+
+
+def factorized(matrix: sparse.csr_array, definite: bool = True) -> Factorization:
+    """Return a matrix, factorised by CHOLMOD where that is there and the matrix is positive definite, or by MUMPS.
+
+    definite: whether it may be. Raises SolverError for a singular matrix.
+    """
+    if definite and PETSc.Sys.hasExternalPackage("suitesparse") and np.all(matrix.diagonal() > 0.0):
+        with contextlib.suppress(SolverError):
+            return Factorization(matrix, "cholmod")
+    return Factorization(matrix)
 
 
 def interval_eigenpairs(
@@ -172,26 +202,14 @@ def _inertia(stack: contextlib.ExitStack, operators: list[Any]) -> int:
 
 
 def _nearest(
-    stack: contextlib.ExitStack, operators: list[Any], count: int, shift: float, direct: str | None
+    stack: contextlib.ExitStack, operators: list[Any], count: int, shift: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    def prepared(direct: str) -> Any:
-        eps = _eigenproblem(stack, operators)
-        eps.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        eps.setTarget(shift)
-        eps.setDimensions(count)
-        eps.getST().setShift(shift)
-        _set_direct(eps.getST().getKSP(), direct)
-        return eps
-
-    eps = None
-    if direct is None and shift <= 0.0 and parallel.COMM.size == 1 and PETSc.Sys.hasExternalPackage("suitesparse"):
-        eps = prepared("cholmod")
-        try:
-            eps.setUp()
-        except PETSc.Error:  # singular
-            eps.reset()
-            eps = None
-    eps = eps or prepared(direct or "mumps")
+    eps = _eigenproblem(stack, operators)
+    eps.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    eps.setTarget(shift)
+    eps.setDimensions(count)
+    eps.getST().setShift(shift)
+    _set_direct(eps.getST().getKSP())
     _solve(eps)
     if eps.getConverged() < count:
         raise SolverError(f"{eps.getConverged()} of {count} modes converged in {eps.getIterationNumber()} iterations")
@@ -253,12 +271,13 @@ def _petsc(created: Any) -> Iterator[Any]:
         created.destroy()
 
 
-def _petsc_matrix(matrix: sparse.csr_array) -> Any:
-    """Return a PETSc matrix on this rank only from a symmetric CSR one; the caller destroys it."""
-    csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), np.array(matrix.data))
-    created = PETSc.Mat().createAIJ(size=matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
-    created.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    return created
+def _upper_triangle(matrix: sparse.csr_array) -> Any:
+    """Return the upper triangle of a symmetric CSR matrix as a symmetric one of PETSc; the caller destroys it."""
+    matrix = matrix if matrix.has_sorted_indices else matrix.sorted_indices()
+    kept = matrix.indices >= np.repeat(np.arange(matrix.shape[0], dtype=np.int32), np.diff(matrix.indptr))
+    ends = np.r_[0, np.cumsum(kept, dtype=PETSc.IntType)][matrix.indptr]
+    csr = (ends.astype(PETSc.IntType), matrix.indices[kept].astype(PETSc.IntType), matrix.data[kept])
+    return PETSc.Mat().createSBAIJ(size=matrix.shape, bsize=1, csr=csr, comm=PETSc.COMM_SELF)
 
 
 def _distributed(matrix: sparse.csr_array | None) -> Any:

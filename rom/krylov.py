@@ -12,13 +12,11 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from vanedamp.modal.algebra import orthonormal
+from vanedamp.modal.lanczos import eigenpairs
 
 Solve = Callable[[np.ndarray], np.ndarray]
-#: vectors that Lanczos keeps, at least and for each mode
-_LEAST_DIRECTIONS = 20
 
 
 def krylov(
@@ -48,21 +46,12 @@ def krylov(
     return blocks
 
 
-def directions(modes: int) -> int:
-    """Return the number of vectors that `lowest_modes` works with; structures of that size are solved densely."""
-    return max(2 * modes + 1, _LEAST_DIRECTIONS)
+def lowest_modes(mass: sparse.csr_array, modes: int, solve: Solve, shift: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest eigenvalues (m,) ascending and vectors (n, m) of K x = lambda M x by block Lanczos.
 
-
-def lowest_modes(
-    stiffness: sparse.csr_array, mass: sparse.csr_array, modes: int, solve: Solve, shift: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest eigenvalues (m,) ascending and vectors (n, m) of K x = lambda M x by Lanczos.
-
-    solve: (K + shift M)^-1 applied to a vector, or its inverse in a subspace, where the vectors then lie. Raises
-    ArpackError where it does not converge.
+    solve: (K + shift M)^-1 applied to loads (n, b), or its inverse in a subspace, where the vectors then lie. n must be
+    greater than modal.lanczos.directions(modes). Raises modal.lanczos.NotConvergedError.
     """
-    start = solve(np.random.default_rng(0).standard_normal(mass.shape[0]))
-    inverse = LinearOperator(stiffness.shape, matvec=solve, dtype=float)
-    values, vectors = eigsh(stiffness, modes, mass, sigma=-shift, OPinv=inverse, v0=start, ncv=directions(modes))
+    values, rows = eigenpairs(lambda loads: solve(loads.T).T, mass, modes, -shift)
     order = np.argsort(values)
-    return values[order], vectors[:, order]
+    return values[order], np.ascontiguousarray(rows[order].T)

@@ -1,10 +1,11 @@
 """Craig-Bampton reduction of small structures: closed forms and dense linear algebra."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from scipy import linalg
+from scipy import linalg, sparse
 
 from tests.tools.reduction_errors import (
     captured_mass,
@@ -15,6 +16,7 @@ from tests.tools.reduction_errors import (
 )
 from tests.tools.small_structures import rod, truss
 from vanedamp.modal.matrices import Patch, SystemMatrices
+from vanedamp.rom.bases import craig_bampton
 from vanedamp.rom.bases.craig_bampton import reduce
 from vanedamp.rom.bases.projection import ReductionError
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
@@ -56,6 +58,26 @@ def test_contact_mass_of_a_rod(modes):
     # every printed digit, and within 1e-3 of it before rounding
     assert f"{truncated(rod_model(), modes).contact_mass('tip'):.{digits}f}" == table[modes]
     assert expected == pytest.approx(float(table[modes]), abs=1e-3)
+
+
+def test_both_factorisations_give_one_model(structure, interface, monkeypatch):
+    """That of the stiffness itself, and the bordered one, which structures take that supports hold badly."""
+    own = reduce(structure, interface, 5, quasi_static=1)
+    assert craig_bampton._held(
+        structure, interface, *interface.restrict(structure), craig_bampton.superlu
+    ).error < 1e-10  # fmt: skip
+    monkeypatch.setattr(craig_bampton, "_EXACT", 0.0)
+    bordered = reduce(structure, interface, 5, quasi_static=1)
+    assert bordered.natural_frequencies_hz == pytest.approx(own.natural_frequencies_hz, rel=1e-9)
+    assert bordered.static_stiffness == pytest.approx(own.static_stiffness, rel=1e-8, abs=1e-8)
+
+
+def test_weak_supports_leave_the_digits_of_the_interface(structure, interface):
+    """Springs to the ground 1e-13 of the structure's stiffness: the way over the unheld structure would lose all."""
+    free = replace(structure, fixed=np.empty(0, int))
+    weak = replace(free, stiffness=free.stiffness + 1e-13 * abs(free.stiffness).max() * sparse.eye(free.size))
+    expected, found = (reduce(each, interface, 5).natural_frequencies_hz[6:] for each in (free, weak))
+    assert found == pytest.approx(expected, rel=1e-6)
 
 
 def test_rod_in_closed_form():

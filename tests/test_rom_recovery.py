@@ -65,6 +65,15 @@ def test_stress_components_are_those_of_von_mises(block):
     assert von_mises(components) == pytest.approx(structure.solid.von_mises(modes.shapes[0]), rel=1e-9)
 
 
+def test_stress_components_of_several_displacements_at_places(block):
+    structure, modes, _ = block
+    places = np.array([200, 7, 8])
+    several = structure.solid.stress_components(modes.shapes[:3], places)
+    assert several.shape == (3, 6, 3)
+    for shape, found in zip(modes.shapes, several, strict=False):
+        assert np.array_equal(found, structure.solid.stress_components(shape)[:, places])
+
+
 def test_static_stress_of_a_cantilever(block):
     """Bending stress 6 F l / (w t^2) of a beam, at the hot spot near the clamp (Gere, Mechanics of Materials)."""
     _, _, model = block

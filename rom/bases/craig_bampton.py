@@ -1,14 +1,15 @@
 """Craig-Bampton reduction onto generalised interface coordinates.
 
 Craig and Bampton (1968), AIAA J. 6(7), hold DOFs; here functionals W^T q = u are held, such as the mean displacement
-of a patch. One factorisation of the stiffness bordered by W,
+of a patch. One factorisation serves constraint modes and the shift-invert iteration for fixed-interface modes
+K phi = omega^2 M phi + W force, W^T phi = 0. Where the supports hold the structure it is that of the stiffness:
+
+    constraint modes  C = K^-1 W (W^T K^-1 W)^-1,   held response  q = (1 - C W^T) K^-1 load.
+
+A structure that only its interface holds has that of the stiffness bordered by W, so that it needs no shift:
 
     [K    W] [q     ]   [load]
-    [W^T  0] [-force] = [u   ]
-
-serves constraint modes (load = 0, u = the unit vectors) and, with u = 0, the shift-invert iteration for fixed-interface
-modes K phi = omega^2 M phi + W force, W^T phi = 0. It is regular whenever the interface holds the structure, so that
-free structures need no shift.
+    [W^T  0] [-force] = [u   ].
 
 Loads on a patch strain its neighbourhood, which fixed-interface modes describe slowly. The quasi-static modes
 K^-1 M psi, interface held, say how the structure lags behind its constraint modes to first order in omega^2: one each,
@@ -17,21 +18,25 @@ from the same factors (Craig and Hale 1988, J. Guidance 11(6), block-Krylov comp
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import contextlib
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import ArpackError
 
+from vanedamp.files.errors import VanedampError
 from vanedamp.modal.algebra import column_signs, orthogonal, orthonormal, symmetric_part
+from vanedamp.modal.lanczos import NotConvergedError, directions
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.rom.bases.projection import Factorize, ReductionError, project, superlu
+from vanedamp.rom.bases.projection import Factorize, ReductionError, motions_left, project, superlu
 from vanedamp.rom.interface import Interface
-from vanedamp.rom.krylov import directions, krylov, lowest_modes
+from vanedamp.rom.krylov import krylov, lowest_modes
 from vanedamp.rom.reduced import ReducedModel
 
 # a round trip through a well-posed matrix loses 5 to 8 digits, through a singular one all of them
 _ROUND_TRIP = 1e-2
+# the same for a structure that its supports hold
+_EXACT = 1e-6
 # share of a quasi-static mode's inertia that must be its own for the reduced mass to stay well conditioned
 _OWN_SHARE = 1e-10
 # lowest eigenvalue of the mass of fields of unit norm that a factorisation stands
@@ -87,11 +92,11 @@ def basis_of(
     """Return the basis of `reduce`, with arguments and errors of that, from one factorisation."""
     stiffness, mass, vectors = interface.restrict(matrices)
     boundary, labels = _boundary(interface, vectors)
-    held = _Held(stiffness, boundary, factorize)
-    constraint = held.constraint_modes()
+    held = _held(matrices, interface, stiffness, mass, boundary, factorize)
+    constraint = held.constraint
     if interface.full.size:
         constraint = constraint @ _characteristic(constraint, stiffness, mass, labels, characteristic)
-    fixed = _fixed_interface_modes(held, stiffness, mass, modes)
+    fixed = _fixed_interface_modes(held, mass, boundary.shape[1], modes)
     return Basis(constraint, _quasi_static_blocks(held, mass, constraint, fixed, quasi_static), fixed)
 
 
@@ -99,12 +104,12 @@ def reduced_model(
     matrices: SystemMatrices, interface: Interface, parts: Basis, origin: dict[str, Any], keep_recovery: bool = False
 ) -> ReducedModel:
     """Return the model that a basis makes of a structure; origin: entries of its provenance."""
-    stiffness, mass, _ = interface.restrict(matrices)
     basis = np.hstack([parts.constraint, *parts.blocks, parts.fixed])
+    full = interface.motions @ basis
     return project(
         matrices, interface,
-        mass=symmetric_part(basis.T @ (mass @ basis)),
-        stiffness=symmetric_part(basis.T @ (stiffness @ basis)),
+        mass=symmetric_part(full.T @ (matrices.mass @ full)),
+        stiffness=symmetric_part(full.T @ (matrices.stiffness @ full)),
         basis=basis,
         selection=np.eye(len(interface.labels), basis.shape[1]),
         blocks=parts.blocks,
@@ -152,14 +157,61 @@ def _characteristic(
     return np.hstack([static, (modes - static @ (labels @ modes))[:, news]])
 
 
-class _Held:
-    """The stiffness with the interface held, factorised."""
+class _Held(Protocol):
+    """The stiffness with the interface held, factorised: constraint modes (n, k), and responses to loads."""
+
+    constraint: np.ndarray
+
+    def solve(self, load: np.ndarray) -> np.ndarray:
+        """Return displacements (n,) or (n, m) under loads of that shape, interface held."""
+
+
+def _held(
+    matrices: SystemMatrices,
+    interface: Interface,
+    stiffness: sparse.csr_array,
+    mass: sparse.csr_array,
+    vectors: np.ndarray,
+    factorize: Factorize,
+) -> _Held:
+    """Return the held stiffness by the way that is quickest: its own factors where the supports hold the structure."""
+    if motions_left(matrices, interface, stiffness, mass)[0] == 0:
+        with contextlib.suppress(VanedampError):
+            held = _Supported(stiffness, vectors, factorize)
+            if held.error < _EXACT:
+                return held
+    return _Bordered(stiffness, vectors, factorize)
+
+
+class _Supported:
+    """A structure that its supports hold: from the factors of its own stiffness.
+
+    The response with the interface held is the one without, less the constraint modes' share in it. That cancels digits
+    where the supports are much softer than the structure; `error` says how exact it is, relative to 1.
+    """
+
+    def __init__(self, stiffness: sparse.csr_array, vectors: np.ndarray, factorize: Factorize) -> None:
+        self._factor, self._vectors = factorize(stiffness), vectors
+        flexible = self._factor.solve(vectors)
+        self.constraint = linalg.solve(symmetric_part(vectors.T @ flexible), flexible.T, assume_a="pos").T
+        known = np.random.default_rng(0).standard_normal(len(vectors))
+        known -= self.constraint @ (vectors.T @ known)
+        self.error = float(np.abs(self.solve(stiffness @ known) - known).max() / np.abs(known).max())
+
+    def solve(self, load: np.ndarray) -> np.ndarray:
+        """Return displacements (n,) or (n, m) under loads of that shape, interface held."""
+        response = self._factor.solve(load)
+        return np.asarray(response - self.constraint @ (self._vectors.T @ response))
+
+
+class _Bordered:
+    """A structure that only its interface holds, or that it holds much better: from factors of the bordered matrix."""
 
     def __init__(self, stiffness: sparse.csr_array, vectors: np.ndarray, factorize: Factorize) -> None:
         self.size, self.count = vectors.shape
         # functionals in the scale of the stiffness keep the pivots comparable
-        self._scale = abs(stiffness.diagonal()).mean() / np.linalg.norm(vectors, axis=0)
-        border = sparse.csr_array(vectors * self._scale)
+        scale = abs(stiffness.diagonal()).mean() / np.linalg.norm(vectors, axis=0)
+        border = sparse.csr_array(vectors * scale)
         bordered = sparse.csr_array(sparse.bmat([[stiffness, border], [border.T, None]]))
         self._factor = factorize(bordered)
         known = np.random.default_rng(0).standard_normal(bordered.shape[0])
@@ -167,39 +219,36 @@ class _Held:
             raise ReductionError(
                 "the structure can move with its interface held: support it or add interface coordinates"
             )
-
-    def constraint_modes(self) -> np.ndarray:
-        """Return displacements (n, k) of least strain energy for a unit displacement of every interface coordinate."""
-        given = np.vstack([np.zeros((self.size, self.count)), np.diag(self._scale)])
-        return self._factor.solve(given)[: self.size]
+        given = np.vstack([np.zeros((self.size, self.count)), np.diag(scale)])
+        self.constraint = self._factor.solve(given)[: self.size]
 
     def solve(self, load: np.ndarray) -> np.ndarray:
         """Return displacements (n,) or (n, m) under loads of that shape, interface held."""
         return self._factor.solve(np.concatenate([load, np.zeros((self.count, *load.shape[1:]))]))[: self.size]
 
 
-def _fixed_interface_modes(held: _Held, stiffness: sparse.csr_array, mass: sparse.csr_array, modes: int) -> np.ndarray:
-    """Return mass-normalised modes (n, modes), by frequency.
+def _fixed_interface_modes(held: _Held, mass: sparse.csr_array, count: int, modes: int) -> np.ndarray:
+    """Return mass-normalised modes (n, modes), by frequency; count: of the held functionals.
 
     The inverse of the held stiffness maps into W^T q = 0 and is self-adjoint in the inner product of the mass, so that
     Lanczos on it finds the held modes and never sees the interface; small structures are solved densely.
     """
-    most = held.size - held.count
-    if not 0 <= modes <= most:
+    size = mass.shape[0]
+    if not 0 <= modes <= size - count:
         raise ReductionError(
-            f"modes: expected 0 to {most} (the structure has no more with its interface held), not {modes}"
+            f"modes: expected 0 to {size - count} (the structure has no more with its interface held), not {modes}"
         )
     if modes == 0:
-        return np.empty((held.size, 0))
-    if directions(modes) < most:
+        return np.empty((size, 0))
+    if directions(modes) < size - count:
         try:
-            shapes = lowest_modes(stiffness, mass, modes, held.solve)[1]
-        except ArpackError as error:
-            raise ReductionError(f"modes: not all {modes} fixed-interface modes converged ({error})") from error
+            shapes = lowest_modes(mass, modes, held.solve)[1]
+        except NotConvergedError as error:
+            raise ReductionError(f"modes: {error}") from error
     else:
         inertia = mass.toarray()
-        flexibility = inertia @ held.solve(np.eye(held.size)) @ inertia
-        wanted = [held.size - modes, held.size - 1]
+        flexibility = inertia @ held.solve(np.eye(size)) @ inertia
+        wanted = [size - modes, size - 1]
         shapes = linalg.eigh(symmetric_part(flexibility), inertia, subset_by_index=wanted)[1][:, ::-1]
     return shapes * column_signs(shapes)
 

@@ -16,18 +16,17 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import ArpackError
 
-from vanedamp.modal.algebra import affine_fields, column_signs, ritz_values, symmetric_part
+from vanedamp.modal.algebra import column_signs, symmetric_part
+from vanedamp.modal.lanczos import NotConvergedError, directions
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.rom.bases.projection import Factorize, ReductionError, Solver, project, superlu
-from vanedamp.rom.interface import Interface, rigid_basis
-from vanedamp.rom.krylov import directions, krylov, lowest_modes
+from vanedamp.rom.bases.projection import Factorize, ReductionError, Solver, motions_left, project, superlu
+from vanedamp.rom.interface import Interface
+from vanedamp.rom.krylov import krylov, lowest_modes
 from vanedamp.rom.reduced import ReducedModel
 
 # of the squared frequency of uniform strains: small beside those of modes, far above round-off of the factorisation
 _SHIFT = 1e-4
-_RIGID = 1e-9
 _ROUNDS = 200
 _CONVERGED = 1e-12
 # share of the static response that the modes have left, below which an attachment mode is round-off
@@ -50,7 +49,7 @@ def reduce_free(
     """
     stiffness, mass, vectors = interface.restrict(matrices)
     size = mass.shape[0]
-    rigid, strain = _rigid_motions(matrices, interface, stiffness, mass)
+    rigid, strain = motions_left(matrices, interface, stiffness, mass)
     if not max(rigid, int(blocks == 0)) <= modes <= size:
         raise ReductionError(
             f"modes: expected {max(rigid, int(blocks == 0))} (the rigid motions count) to {size}, not {modes}"
@@ -74,20 +73,6 @@ def reduce_free(
     )  # fmt: skip
 
 
-def _rigid_motions(
-    matrices: SystemMatrices, interface: Interface, stiffness: sparse.csr_array, mass: sparse.csr_array
-) -> tuple[int, float]:
-    """Return the number of rigid motions that the supports leave, and the squared frequency of uniform strains."""
-    scale = ritz_values(matrices.stiffness, matrices.mass, affine_fields(matrices.coordinates))[-1]
-    motions = rigid_basis(matrices.coordinates - matrices.coordinates.mean(axis=0))
-    if matrices.fixed.size:
-        motions = motions @ linalg.null_space(motions[matrices.fixed], rcond=1e-9)
-    if motions.shape[1] == 0:
-        return 0, float(scale)
-    values = ritz_values(stiffness, mass, interface.motions.T @ motions)
-    return int(np.count_nonzero(values < _RIGID * scale)), float(scale)
-
-
 def _natural_modes(
     shifted: Solver, stiffness: sparse.csr_array, mass: sparse.csr_array, modes: int, shift: float, rigid: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -97,9 +82,9 @@ def _natural_modes(
         return np.empty(0), np.empty((size, 0))
     if directions(modes) < size:
         try:
-            squares, shapes = lowest_modes(stiffness, mass, modes, shifted.solve, shift)
-        except ArpackError as error:
-            raise ReductionError(f"modes: not all {modes} natural modes converged ({error})") from error
+            squares, shapes = lowest_modes(mass, modes, shifted.solve, shift)
+        except NotConvergedError as error:
+            raise ReductionError(f"modes: {error}") from error
     else:
         squares, shapes = linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=[0, modes - 1])
     if np.any(squares[rigid:] <= 0.0):

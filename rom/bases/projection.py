@@ -8,13 +8,17 @@ from typing import Any, Protocol
 
 import numpy as np
 import scipy
-from scipy import sparse
+from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.modal.algebra import affine_fields, ritz_values
 from vanedamp.modal.matrices import SystemMatrices
-from vanedamp.rom.interface import Interface
+from vanedamp.rom.interface import Interface, rigid_basis
 from vanedamp.rom.reduced import ReducedModel
+
+# of the squared frequency of uniform strains: a motion below it does not strain
+_RIGID = 1e-9
 
 
 class ReductionError(VanedampError):
@@ -89,3 +93,17 @@ def project(
         recovery=recovery if keep_recovery else None,
         coordinates=matrices.coordinates if keep_recovery else None,
     )
+
+
+def motions_left(
+    matrices: SystemMatrices, interface: Interface, stiffness: sparse.csr_array, mass: sparse.csr_array
+) -> tuple[int, float]:
+    """Return the number of rigid motions that the supports leave, and the squared frequency of uniform strains."""
+    scale = ritz_values(matrices.stiffness, matrices.mass, affine_fields(matrices.coordinates))[-1]
+    motions = rigid_basis(matrices.coordinates - matrices.coordinates.mean(axis=0))
+    if matrices.fixed.size:
+        motions = motions @ linalg.null_space(np.linalg.qr(motions[matrices.fixed], mode="r"), rcond=1e-9)
+    if motions.shape[1] == 0:
+        return 0, float(scale)
+    values = ritz_values(stiffness, mass, interface.motions.T @ motions)
+    return int(np.count_nonzero(values < _RIGID * scale)), float(scale)

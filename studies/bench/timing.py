@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -60,3 +62,19 @@ def machine() -> dict[str, Any]:
         "clock": "CPU time of the thread",
         "versions": versions(),
     }
+
+
+@contextmanager
+def clocked(result: dict[str, Any], name: str) -> Iterator[None]:
+    """Enter the seconds that a block takes, by the clock and of the process, under a name into a result."""
+    wall, processor = time.perf_counter(), time.process_time()
+    yield
+    result[name] = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - processor}
+
+
+def peak_memory() -> int:
+    """Return the peak resident memory of this process, bytes."""
+    import resource
+
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return used if sys.platform == "darwin" else 1024 * used

@@ -394,10 +394,10 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, mo
                 raise InputError(f"hot spots: {len(picked)} are all that lie 2 % of the structure's size apart")
             picked.append(int(np.argmax(stress)))
             stress[np.linalg.norm(places - places[picked[-1]], axis=1) < apart] = 0.0
-    values = np.array([solid.stress_components(column, np.array(picked)) for column in model.recovery.T])
+    values = solid.stress_components(model.recovery.T, np.array(picked))
     residual = None
     if model.residual_recovery is not None:
-        static = np.array([solid.stress_components(column, np.array(picked)) for column in model.residual_recovery.T])
+        static = solid.stress_components(model.residual_recovery.T, np.array(picked))
         residual = {f"hot{index + 1}": static[:, :, index].T for index in range(len(picked))}
     stresses = {f"hot{index + 1}": values[:, :, index].T for index in range(len(picked))}
     spots_at = {f"hot{index + 1}": places[place].tolist() for index, place in enumerate(picked)}

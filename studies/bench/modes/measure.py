@@ -1,4 +1,4 @@
-"""Time and memory of ten modes: SLEPc beside scipy's eigsh, on the factorisations each can have, on the same matrices.
+"""Time and memory of ten modes: block Lanczos beside scipy's eigsh and NGSolve, on the same matrices or mesh.
 
 Every measurement runs in a process of its own, on one thread; processor time counts, since what else the machine does
 counts less in it than in time by the clock.

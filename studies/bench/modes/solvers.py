@@ -4,11 +4,14 @@ from __future__ import annotations
 
 COUNT = 10
 #: what `vanedamp modal` runs on one rank
-OURS = "slepc"
+OURS = "lanczos"
 NAMES = {
-    "slepc": "SLEPc, CHOLMOD",
-    "mumps": "SLEPc, MUMPS",
+    "lanczos": "block Lanczos, CHOLMOD",
+    "mumps": "block Lanczos, MUMPS",
     "superlu": "eigsh, SuperLU (symmetric mode)",
     "superlu_default": "eigsh, SuperLU (default)",
     "cholmod": "eigsh, CHOLMOD",
+    "ngsolve": "NGSolve, LOBPCG",
 }
+#: of the material, SI units
+YOUNG, POISSON, DENSITY = 2.0e11, 0.3, 8190.0

@@ -3,25 +3,26 @@
     python -m vanedamp.studies.bench.modes.worker assemble MESH OUTPUT.npz
     python -m vanedamp.studies.bench.modes.worker SOLVER MATRICES.npz COUNT
 
-prints one line of JSON: seconds by the clock and of the processor, peak resident memory, frequencies.
+prints one line of JSON: seconds by the clock and of the processor, apart for factorisation and iteration, right-hand
+sides solved, residual, peak resident memory, eigenvalues. NGSolve reads the mesh beside the matrices, and assembles.
 """
 
 from __future__ import annotations
 
 import json
-import resource
 import sys
-import time
 from collections.abc import Callable
-from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
+from vanedamp.studies.bench.modes.solvers import DENSITY, POISSON, YOUNG
+from vanedamp.studies.bench.timing import clocked, peak_memory
+
 TOLERANCE = 1e-11
-YOUNG, POISSON, DENSITY = 2.0e11, 0.3, 8190.0
 Result = dict[str, Any]
 
 
@@ -31,9 +32,9 @@ def assemble(mesh: str, output: str) -> Result:
 
     solid = Solid(mesh, {"default": Material(YOUNG, POISSON, DENSITY)})
     solid.assemble({"clamp": "xyz"}, 0.0)
-    before = _peak()
+    before = peak_memory()
     result: Result = {}
-    with _clock(result, "assembly"):
+    with clocked(result, "assembly"):
         matrices = solid.assemble({"clamp": "xyz"}, 0.0)
     free = matrices.free
     stiffness, mass = (matrix[free][:, free] for matrix in (matrices.stiffness, matrices.mass))
@@ -41,96 +42,116 @@ def assemble(mesh: str, output: str) -> Result:
     np.savez(
         output, **{f"k_{n}": getattr(stiffness, n) for n in _PARTS}, **{f"m_{n}": getattr(mass, n) for n in _PARTS}
     )
-    return result | {"dofs": int(free.size), "nonzeros": int(stiffness.nnz), "peak_bytes": max(before, _peak())}
+    return result | {"dofs": int(free.size), "nonzeros": int(stiffness.nnz), "peak_bytes": max(before, peak_memory())}
 
 
-def slepc(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
-    """Solve by SLEPc's Krylov-Schur on CHOLMOD, as `vanedamp modal` does on one rank."""
-    return _krylov_schur("cholmod", stiffness, mass, count)
+def lanczos(matrices: Path, count: int) -> Result:
+    """Solve by block Lanczos on CHOLMOD, as `vanedamp modal` does on one rank."""
+    return _block_lanczos(matrices, count, "cholmod")
 
 
-def mumps(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
-    """Solve by SLEPc's Krylov-Schur on MUMPS, as `vanedamp modal` does on several ranks."""
-    return _krylov_schur("mumps", stiffness, mass, count)
+def mumps(matrices: Path, count: int) -> Result:
+    """Solve by block Lanczos on MUMPS, as `vanedamp modal` does where there is no CHOLMOD."""
+    return _block_lanczos(matrices, count, "mumps")
 
 
-def _krylov_schur(direct: str, stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
+def _block_lanczos(matrices: Path, count: int, direct: str) -> Result:
     from vanedamp.modal import petsc
+    from vanedamp.modal.eigen import SPARE
+    from vanedamp.modal.lanczos import eigenpairs
 
-    result: Result = {}
-    with _clock(result, "factorisation"), petsc.Factorization(stiffness, direct):
-        pass
-    with _clock(result, "modes"):
-        values, _ = petsc.nearest_eigenpairs(stiffness, mass, count, 0.0, direct)
-    return result | {"eigenvalues": values.tolist()}
+    stiffness, mass, result = _load(matrices)
+
+    def solve(rows: np.ndarray) -> np.ndarray:
+        result["solves"] += len(rows)
+        return factors.solve_rows(rows)
+
+    with clocked(result, "modes"):
+        with clocked(result, "factorisation"):
+            factors = petsc.Factorization(stiffness, direct)
+        with clocked(result, "iteration"):
+            values, vectors = eigenpairs(solve, mass, count, spare=SPARE)
+    _finish(result, stiffness, mass, values[:count], vectors[:count])
+    factors.destroy()
+    # that no mode is missed, which the others do not prove: the inertia between the spare modes
+    with clocked(result, "proof"):
+        below = petsc.negative_eigenvalues(sparse.csr_array(stiffness - 0.5 * values[-2:].sum() * mass))
+    if below != len(values) - 1:
+        raise ArithmeticError(f"{len(values) - 1} of {below} modes found")
+    return result | {"proof_peak_bytes": peak_memory()}
 
 
-def superlu(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
+def superlu(matrices: Path, count: int) -> Result:
     """Solve by scipy's eigsh on SuperLU, with the ordering and pivoting for symmetric matrices."""
     options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-    return _arpack(lambda: splu(sparse.csc_matrix(stiffness), **options).solve, mass, count)
+    return _arpack(matrices, count, lambda matrix: splu(matrix, **options).solve)
 
 
-def superlu_default(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
+def superlu_default(matrices: Path, count: int) -> Result:
     """Solve by scipy's eigsh with sigma only: SuperLU with its default ordering."""
-    return _arpack(lambda: splu(sparse.csc_matrix(stiffness)).solve, mass, count)
+    return _arpack(matrices, count, lambda matrix: splu(matrix).solve)
 
 
-def cholmod(stiffness: sparse.csr_array, mass: sparse.csr_array, count: int) -> Result:
-    """Solve by scipy's eigsh on CHOLMOD by scikit-sparse, supernodal, the best of its orderings."""
+def cholmod(matrices: Path, count: int) -> Result:
+    """Solve by scipy's eigsh on CHOLMOD by scikit-sparse, supernodal; METIS where AMD leaves much to do."""
     from sksparse.cholmod import cholesky
 
-    return _arpack(lambda: cholesky(sparse.csc_matrix(stiffness), mode="supernodal"), mass, count)
+    return _arpack(matrices, count, lambda matrix: cholesky(matrix, mode="supernodal"))
 
 
-SOLVERS: dict[str, Callable[[sparse.csr_array, sparse.csr_array, int], Result]] = {
-    "slepc": slepc, "mumps": mumps, "superlu": superlu, "superlu_default": superlu_default, "cholmod": cholmod,
+def ngsolve(matrices: Path, count: int) -> Result:
+    """Solve by NGSolve alone, on the mesh beside the matrices."""
+    from vanedamp.studies.bench.modes.peer_ngsolve import modes
+
+    return modes(matrices.with_name("cluster.msh"), count)
+
+
+SOLVERS: dict[str, Callable[[Path, int], Result]] = {
+    "lanczos": lanczos, "mumps": mumps, "superlu": superlu, "superlu_default": superlu_default, "cholmod": cholmod,
+    "ngsolve": ngsolve,
 }  # fmt: skip
 _PARTS = ("data", "indices", "indptr")
 
 
-def _arpack(factorise: Callable[[], Any], mass: sparse.csr_array, count: int) -> Result:
-    """Solve by implicitly restarted Lanczos on a factorisation; both are timed."""
-    result: Result = {}
-    with _clock(result, "modes"):
-        with _clock(result, "factorisation"):
-            solve = factorise()
-        size = mass.shape[0]
-        inverse = LinearOperator((size, size), solve, dtype=float)
-        values = eigsh(inverse, count, mass, sigma=0.0, OPinv=inverse, tol=TOLERANCE)[0]
-    return result | {"eigenvalues": np.sort(values).tolist()}
+def _arpack(matrices: Path, count: int, factorise: Callable[[Any], Any]) -> Result:
+    """Solve by implicitly restarted Lanczos on a factorisation."""
+    stiffness, mass, result = _load(matrices)
+
+    def solve(load: np.ndarray) -> np.ndarray:
+        result["solves"] += 1
+        return np.asarray(factor(load))
+
+    with clocked(result, "modes"):
+        with clocked(result, "factorisation"):
+            factor = factorise(sparse.csc_matrix(stiffness))
+        with clocked(result, "iteration"):
+            inverse = LinearOperator(mass.shape, solve, dtype=float)
+            values, vectors = eigsh(inverse, count, mass, sigma=0.0, OPinv=inverse, tol=TOLERANCE)
+    _finish(result, stiffness, mass, values, vectors.T)
+    return result
 
 
-def _load(path: str) -> tuple[sparse.csr_array, sparse.csr_array]:
+def _load(path: Path) -> tuple[sparse.csr_array, sparse.csr_array, Result]:
+    """Return stiffness and mass, and the result so far: the memory that they and the interpreter take."""
     with np.load(path) as file:
         shape = (file["k_indptr"].size - 1,) * 2
         first, second = (sparse.csr_array(tuple(file[f"{n}_{p}"] for p in _PARTS), shape=shape) for n in "km")
-    return first, second
+    return first, second, {"solves": 0, "loaded_bytes": peak_memory()}
 
 
-@contextmanager
-def _clock(result: Result, name: str) -> Any:
-    wall, processor = time.perf_counter(), time.process_time()
-    yield
-    result[name] = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - processor}
-
-
-def _peak() -> int:
-    """Return the peak resident memory of this process, bytes."""
-    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return used if sys.platform == "darwin" else 1024 * used
+def _finish(result: Result, stiffness: Any, mass: Any, values: np.ndarray, vectors: np.ndarray) -> None:
+    """Add the peak memory so far, eigenvalues and the largest residual |K x - lambda M x| / (lambda |M x|)."""
+    result["peak_bytes"] = peak_memory()
+    inertia = (mass @ vectors.T).T
+    defects = np.linalg.norm((stiffness @ vectors.T).T - values[:, None] * inertia, axis=1)
+    result["residual"] = float((defects / values / np.linalg.norm(inertia, axis=1)).max())
+    result["eigenvalues"] = np.sort(values).tolist()
 
 
 def main(arguments: list[str]) -> None:
     """Measure and print one line of JSON."""
-    task, *rest = arguments
-    if task == "assemble":
-        print(json.dumps(assemble(*rest)))
-        return
-    stiffness, mass = _load(rest[0])
-    loaded = _peak()
-    result = SOLVERS[task](stiffness, mass, int(rest[1]))
-    print(json.dumps(result | {"loaded_bytes": loaded, "peak_bytes": _peak()}))
+    task, first, second = arguments
+    print(json.dumps(assemble(first, second) if task == "assemble" else SOLVERS[task](Path(first), int(second))))
 
 
 if __name__ == "__main__":
