@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing.context import BaseContext
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
@@ -19,6 +20,8 @@ from vanedamp.studies.interrupts import uninterrupted_children
 #: folder that holds the package vanedamp
 _ROOT = Path(__file__).parents[2]
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+#: what the server of workers loads before it forks the first one
+_PRELOADED = "vanedamp.studies.preloaded"
 
 
 class WorkerPool(Executor):
@@ -51,12 +54,34 @@ class WorkerPool(Executor):
         self.shutdown(cancel_futures=kind is not None)
 
     def _new(self) -> ProcessPoolExecutor:
-        # fresh processes: a fork of one that holds MPI or threads is not safe
-        context = multiprocessing.get_context("spawn")
         with uninterrupted_children():  # a semaphore that was made and not noted yet is warned of at the end
             return ProcessPoolExecutor(
-                self._max_workers, mp_context=context, initializer=_begin, initargs=(self._niceness,)
+                self._max_workers, mp_context=_context(), initializer=_begin, initargs=(self._niceness,)
             )
+
+
+def _context() -> BaseContext:
+    """Return how workers begin: not as a fork of this process, which may hold MPI or threads.
+
+    On Linux they are forks of a server that holds neither, and that has the engine in its memory, which they share.
+    Elsewhere the system's libraries may have threads of their own, and each worker begins anew.
+    """
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    from multiprocessing import forkserver
+
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([_PRELOADED])
+    before = dict(os.environ)
+    try:
+        for name in _THREADS:  # every worker has a core of its own, and a library that is told so starts no thread
+            os.environ.setdefault(name, "1")
+        forkserver.ensure_running()
+    finally:
+        for name in _THREADS:
+            if name not in before:
+                del os.environ[name]
+    return context
 
 
 def _begin(niceness: int) -> None:
