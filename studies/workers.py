@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.context import BaseContext
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -54,6 +55,7 @@ class WorkerPool(Executor):
         self.shutdown(cancel_futures=kind is not None)
 
     def _new(self) -> ProcessPoolExecutor:
+        resource_tracker.ensure_running()  # its start ends with interrupts unblocked, for the server to come as well
         with uninterrupted_children():  # a semaphore that was made and not noted yet is warned of at the end
             return ProcessPoolExecutor(
                 self._max_workers, mp_context=_context(), initializer=_begin, initargs=(self._niceness,)
