@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 #: seconds between two lines in a log
 _PATIENCE = 30.0
+_UNITS = (("days", 86_400.0), ("h", 3600.0), ("min", 60.0))
 
 
 @contextmanager
@@ -47,3 +48,10 @@ class _Lines:
         rate = (done - self.before) / (now - self.started)
         left = f", {rate:.3g} a second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
         print(f"vanedamp: {self.title}: {done} of {total}{left}", file=sys.stderr, flush=True)
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words, in the unit that suits it."""
+    unit, size = next((pair for pair in _UNITS if seconds > 1.5 * pair[1]), ("s", 1.0))
+    count = seconds / size
+    return f"{count:.2g} {unit}" if count < 10.0 else f"{count:.0f} {unit}"

@@ -7,7 +7,8 @@ A benchmark is a package (or any module) with
     NAME                if it is not the folder's
     ORDER               place in --help
 
-Import what is heavy inside `run`. What several benchmarks need is in the files of this folder.
+Import what is heavy inside `run`. Measure in `rows.Rows`: they are announced, printed as they come, and gone on
+from after a stop. What several benchmarks need is in the files of this folder.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.optimisation.study import Study
+from vanedamp.studies.terminal import duration
 from vanedamp.studies.workers import available_cores
 
 #: s of a run, beside its periods
@@ -44,7 +45,7 @@ def check_sweep(scene: Scene, workers: int | None) -> None:
     seconds = sweep_seconds(scene, count)
     if points > MOST_POINTS:
         raise InputError(
-            f"sweep: {points:.3g} points take {_duration(seconds)} on {count} workers and {_amount(_POINT * points)}; "
+            f"sweep: {points:.3g} points take {duration(seconds)} on {count} workers and {_amount(_POINT * points)}; "
             f"at most {MOST_POINTS}: take fewer values an axis, or several sweeps"
         )
     check_run(scene)
@@ -90,13 +91,9 @@ def run_seconds(scene: Scene) -> float:
 def _check_time(key: str, what: str, seconds: float) -> None:
     if seconds > MOST_SECONDS:
         raise InputError(
-            f"{key}: {what} take about {_duration(seconds)}; at most {_duration(MOST_SECONDS)}: take fewer points, "
+            f"{key}: {what} take about {duration(seconds)}; at most {duration(MOST_SECONDS)}: take fewer points, "
             "periods or steps"
         )
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds / 86400:.3g} days" if seconds > 86400 else f"{seconds / 3600:.2g} h"
 
 
 def _amount(size: float) -> str:

@@ -1,0 +1,151 @@
+"""Rows of a benchmark: printed as they come, kept, gone on from; losers are left out. No test asserts a time."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.bench import rows as bench_rows
+from vanedamp.studies.bench.rows import Contest, Rows
+from vanedamp.studies.terminal import duration
+
+ROOT = Path(__file__).resolve().parent.parent
+#: a benchmark of five rows, which is killed once in the middle of the third where a file asks for it
+BENCHMARK = """
+import os, signal, sys
+from pathlib import Path
+from vanedamp.files.store import write_json
+from vanedamp.studies.bench.rows import Rows
+from vanedamp.studies.figures import save, subplots
+
+folder, order = Path(sys.argv[1]), Path(sys.argv[2])
+
+
+def measured(number):
+    with open(folder.parent / "measured", "a") as stream:
+        stream.write(str(number))
+    if number == 3 and order.exists():
+        order.unlink()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"square": number**2, "root": number**0.5, "pair": (1, 2)}
+
+
+rows = Rows(folder, "squares", {"rounds": 1}, {str(number): 0.01 for number in range(1, 6)})
+found = [rows.take(str(n), lambda n=n: measured(n), tell=lambda row: f"square {row['square']}") for n in range(1, 6)]
+write_json(folder / "bench_squares.json", found)
+figure, axes = subplots(size=(3, 2))
+axes.plot([row["root"] for row in found])
+save(figure, folder / "bench_squares.png")
+rows.finish()
+"""
+
+
+def run(folder, order):
+    """The benchmark in a process of its own, its output in a pipe."""
+    script = folder.parent / "benchmark.py"
+    script.write_text(BENCHMARK)
+    return subprocess.run(
+        [sys.executable, str(script), str(folder), str(order)], env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def test_killed_in_the_middle_it_goes_on_to_the_same_files(tmp_path):
+    for name in ("whole", "stopped"):
+        (tmp_path / name).mkdir()
+    whole, stopped = tmp_path / "whole" / "out", tmp_path / "stopped" / "out"
+    assert run(whole, tmp_path / "none").returncode == 0
+    (order := tmp_path / "die").touch()
+    killed = run(stopped, order)
+    assert killed.returncode == -signal.SIGKILL
+    # what was printed before the kill has left the process: nothing waits in a buffer
+    lines = killed.stdout.splitlines()
+    assert lines[0].startswith("squares: 5 rows") and [line[:14] for line in lines[1:]] == [
+        "[  1/5] 1: squ", "[  2/5] 2: squ",
+    ]  # fmt: skip
+    assert [row["name"] for row in json.loads((stopped / "bench_squares.partial").read_text())] == ["1", "2"]
+    again = run(stopped, order)
+    assert again.returncode == 0, again.stderr
+    assert ["kept" in line for line in again.stdout.splitlines()[1:]] == [True, True, False, False, False]
+    assert (stopped.parent / "measured").read_text() == "123345"
+    assert {file.name for file in stopped.iterdir()} == {"bench_squares.json", "bench_squares.png"}
+    for file in whole.iterdir():
+        assert (stopped / file.name).read_bytes() == file.read_bytes()
+
+
+def taken(folder, inputs, measured):
+    rows = Rows(folder, "one", inputs, {"row": 1.0, "last": 1.0})
+
+    def measure():
+        measured.append(1)
+        return len(measured)
+
+    return rows, rows.take("row", measure)
+
+
+def test_rows_of_other_inputs_software_and_machines_are_measured_again(tmp_path, monkeypatch, capsys):
+    measured = []
+    assert [taken(tmp_path, {"n": 1}, measured)[1] for _ in range(2)] == [1, 1]
+    assert taken(tmp_path, {"n": 2}, measured)[1] == 2
+    rows, value = taken(tmp_path, {"n": 1}, measured)
+    assert value == 1
+    monkeypatch.setattr(bench_rows, "software", lambda: {"code": "another"})
+    capsys.readouterr()
+    assert taken(tmp_path, {"n": 1}, measured)[1] == 3
+    assert "2 rows of" in capsys.readouterr().out
+    monkeypatch.setattr(bench_rows, "_identity", lambda: {"processor": "another"})
+    assert taken(tmp_path, {"n": 1}, measured)[1] == 4
+    # a finished run takes its own rows with it and leaves those of others
+    rows.finish()
+    assert [row["inputs"] for row in json.loads(rows.file.read_text())] == [{"n": 2}]
+
+
+def test_time_is_announced_from_what_rows_took(tmp_path, capsys, monkeypatch):
+    clock = iter([0.0, 30.0, 30.0, 90.0])
+    monkeypatch.setattr(bench_rows.time, "perf_counter", lambda: next(clock))
+    rows = Rows(tmp_path, "slow", {}, {"first": 15.0, "second": 60.0, "third": 600.0})
+    rows.take("first", dict)
+    rows.take("second", dict)
+    rows.leave_out("third", "too dear")
+    out = capsys.readouterr().out.splitlines()
+    assert "about 11 min where it was tried" in out[0]
+    assert out[1] == "[  1/3] first  (30 s, about 22 min left)"
+    assert out[2] == "[  2/3] second: about 2 min ..."
+    assert out[3] == "[  2/3] second  (60 s, about 12 min left)"
+    assert out[4] == "[  3/3] third: left out, too dear"
+
+
+def test_file_that_holds_no_rows_is_told(tmp_path):
+    for text in ("no rows", '[{"name": 1}]', '{"name": 1}', "3"):
+        (tmp_path / "bench_x.partial").write_text(text)
+        with pytest.raises(InputError, match="no rows of a benchmark; remove it"):
+            Rows(tmp_path, "x", {}, {})
+
+
+def test_folder_that_cannot_be_made_is_told(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="cannot be made"):
+        Rows(tmp_path / "file" / "out", "x", {}, {})
+
+
+def test_losers_by_far_are_dropped():
+    contest = Contest("ours", factor=5.0, limit=100.0)
+    contest.judge("30,000", {"ours": 12.0, "best": 2.0, "slow": 10.1, "dear": 9.0}, growth=10.0)
+    assert contest.dropped == {"slow": "5.0 times the best's time at 30,000"}
+    contest.judge("100,000", {"ours": 120.0, "best": 8.0, "dear": 30.0}, growth=4.0)
+    assert contest.dropped["dear"] == "30 s at 100,000, thus about 2 min here; at most 1.7 min"
+    assert set(contest.dropped) == {"slow", "dear"}
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.034, "0.034 s"), (12.4, "12 s"), (90.0, "90 s"), (91.0, "1.5 min"), (5400.0, "90 min"), (7200.0, "2 h"),
+     (3 * 86400.0, "3 days")],
+)  # fmt: skip
+def test_durations_in_words(seconds, words):
+    assert duration(seconds) == words
