@@ -15,7 +15,8 @@ from typing import Any
 from vanedamp.files.store import StoreError, Variable, clear_leftovers, digest, load, save
 from vanedamp.files.toml_input import InputError
 
-_SHARE = 100
+#: time between two writes over the time of a write
+SHARE = 100
 
 
 class CheckpointFile:
@@ -78,7 +79,7 @@ class CheckpointFile:
             raise StoreError(f"{error}; {finished}, {kept}; make room and run the same command again") from error
         self._unsaved = False
         ended = time.perf_counter()
-        self._next = ended + _SHARE * (ended - started)
+        self._next = ended + SHARE * (ended - started)
 
 
 def clear(path: str | Path) -> None:

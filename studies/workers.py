@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
@@ -114,18 +114,21 @@ def workers(count: int | None) -> Iterator[Executor | None]:
         yield pool
 
 
-def run_module(module: str, *arguments: str, threads: int | None = None, **options: Any) -> CompletedProcess[str]:
+def run_module(
+    module: str, *arguments: str, threads: int | None = None, launcher: Sequence[str] = (),
+    variables: Mapping[str, str] | None = None, **options: Any,
+) -> CompletedProcess[str]:  # fmt: skip
     """Run a module of ours in a process of its own and wait for its end.
 
-    threads: of each numerical library, left to them by default; options: those of subprocess.run. Raises
-    subprocess.TimeoutExpired.
+    threads: of each numerical library, left to them by default; launcher: a command before it, such as mpirun;
+    variables: of the environment, in addition; options: those of subprocess.run. Raises subprocess.TimeoutExpired.
     """
-    environment = dict(os.environ)
+    environment = dict(os.environ) | dict(variables or {})
     if threads is not None:
         environment |= dict.fromkeys(_THREADS, str(threads))
     paths = [str(_ROOT), *filter(None, [environment.get("PYTHONPATH")])]
     return subprocess.run(
-        [sys.executable, "-m", module, *arguments], env=environment | {"PYTHONPATH": os.pathsep.join(paths)},
+        [*launcher, sys.executable, "-m", module, *arguments], env=environment | {"PYTHONPATH": os.pathsep.join(paths)},
         capture_output=True, text=True, check=False, **options,
     )  # fmt: skip
 

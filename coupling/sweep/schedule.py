@@ -30,12 +30,12 @@ class SweepError(VanedampError):
 _Entry = tuple[Task, Sequence[int]]
 
 
-def _run(
+def run_tasks(
     grid: Grid | PointList, finished: SweepTable, executor: Executor | None
 ) -> Iterator[tuple[Task, Sequence[int], TaskResult]]:
     """Yield tasks as they are done, each with the rest of its chain, and its result."""
     workers = _workers(executor)
-    size = _TaskSize(finished, workers)
+    size = TaskSize(finished, workers)
     source, ready = tasks_of(grid, finished, size), deque[_Entry]()
     running: dict[Future[TaskResult], _Entry] = {}
     try:
@@ -58,7 +58,7 @@ def _run(
             future.cancel()
 
 
-class _TaskSize:
+class TaskSize:
     """How many points the next task takes: by the time of those before, and few at the end."""
 
     def __init__(self, finished: SweepTable, workers: int) -> None:
