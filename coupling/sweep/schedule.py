@@ -16,8 +16,9 @@ from vanedamp.files.errors import VanedampError
 _SECONDS = 1.0
 #: tasks that end in a second at most: schedulers manage some hundreds
 _RATE = 100
-#: tasks of each worker that the points still to be run make at least, so that workers end together
-_PER_WORKER = 16
+#: tasks of each worker that the points still to be run make at least, so that workers end together; more are dearer to
+#: hand out than they save at the end (`vanedamp bench sweep` simulates it)
+_PER_WORKER = 4
 #: workers of an executor that does not tell how many it has
 _UNKNOWN = 256
 

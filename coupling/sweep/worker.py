@@ -44,7 +44,7 @@ class Task(NamedTuple):
 
 
 class TaskResult(NamedTuple):
-    """The result of a task: values (k, columns), nan where there is none, texts (k, 2), the last state, and its time, s."""
+    """The result of a task: values (k, columns), nan where there is none, texts (k, 2), last state, and its time, s."""
 
     values: np.ndarray
     texts: list[tuple[str, str]]

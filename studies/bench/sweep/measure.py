@@ -24,7 +24,7 @@ from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.worker import COLUMNS
 from vanedamp.files.store import write_csv, write_json
 from vanedamp.studies.bench.rows import Rows
-from vanedamp.studies.bench.sweep.simulation import Costs, Simulated, simulated
+from vanedamp.studies.bench.sweep.simulation import Costs, simulated
 from vanedamp.studies.bench.sweep.worker import Job, scene
 from vanedamp.studies.bench.timing import format_spread, machine, spread
 from vanedamp.studies.workers import available_cores, run_module
@@ -206,7 +206,7 @@ def _checkpoint() -> dict[str, float]:
         for size in sizes:
             made, path = scene(size, 5), Path(folder, f"{size}.partial")
             kept = Checkpoint(path, made, size, {})
-            kept.finished.put(np.arange(size), rng.normal(size=(size, len(COLUMNS))), np.zeros((size, 2)), ["ok"])
+            kept.finished.put(np.arange(size), rng.normal(size=(size, len(COLUMNS))), np.zeros((size, 2), int), ["ok"])
             took = []
             for _ in range(5):
                 kept._file._unsaved = True

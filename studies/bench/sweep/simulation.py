@@ -1,8 +1,8 @@
 """A sweep on many workers, simulated from measured costs: what its main process can hand out, collect and keep.
 
-The main process (with dask: and its scheduler) does one thing after the other: it hands out a task, takes a result, writes
-the checkpoint. Each worker does one task after the other. What is not in the model: the network, start-up, the loss of
-workers.
+The main process (with dask: and its scheduler) does one thing after the other: it hands out a task, takes a result,
+writes the checkpoint. Each worker does one task after the other. What is not in the model: the network, start-up, the
+loss of workers.
 """
 
 from __future__ import annotations

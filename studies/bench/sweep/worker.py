@@ -2,7 +2,7 @@
 
     python -m vanedamp.studies.bench.sweep.worker JOB.json RESULT.json
 
-JOB: fields of Job. The result is a line of JSON, see `measure`. With MPI each rank runs this, and the first one measures.
+JOB: fields of Job. RESULT: what `measure` returns. With MPI each rank runs this, and the first one measures.
 """
 
 from __future__ import annotations
