@@ -35,6 +35,12 @@ _COLUMNS = (
     "executor", "points", "periods", "workers", "wall_s", "main_cpu_s", "worker_cpu_s", "tasks", "task_s",
     "main_peak_bytes", "worker_peak_bytes", "worker_own_bytes", "file_bytes", "load",
 )  # fmt: skip
+#: measures of efficiency, in words
+EFFICIENCIES = {
+    "clock": "parallel efficiency by the clock",
+    "processor": "parallel efficiency by the processor",
+    "busy": "share of the time with a task",
+}
 _EXECUTORS = {"pool": "process pool", "dask": "dask", "mpi": "mpi4py"}
 _RANKS = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
@@ -95,7 +101,7 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
     result["simulated"] = _simulations(rows, effort, result)
     result["efficiency"] = {
         name: spread(np.array([pair["efficiency"][name] for pair in result["pairs"]]))
-        for name in ("clock", "processor", "busy")
+        for name in EFFICIENCIES
     }
     result["overhead"] = spread(np.array([_overhead(entry) for entry in result["sizes"]]))
     write_json(folder / "bench_sweep.json", result | {"wall_time_s": rows.seconds})
@@ -117,7 +123,7 @@ def print_summary(result: Mapping[str, Any]) -> None:
     points, workers = pairs[0]["all"]["points"], result["workers"]
     print(f"{points} scenes of {result['periods']} periods, {workers} workers and one process in turns:")
     for name, values in result["efficiency"].items():
-        print(f"  parallel efficiency by the {name:9} {format_spread(values)}  target {result['target']}")
+        print(f"  {EFFICIENCIES[name]:38} {format_spread(values)}  target {result['target']}")
     most = max(pair["all"]["worker_peak_bytes"] for pair in pairs)
     print(f"  memory of a worker with its part of the server {most / 1e6:.0f} MB  target {MOST_MB} MB")
     print(f"  share of the main process in the processors' time {format_spread(result['overhead'])}")
