@@ -74,15 +74,15 @@ def _context() -> BaseContext:
 
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([_PRELOADED])
-    before = dict(os.environ)
+    before = {name: os.environ.pop(name) for name in _THREADS if name in os.environ}
     try:
-        for name in _THREADS:  # every worker has a core of its own, and a library that is told so starts no thread
-            os.environ.setdefault(name, "1")
+        # every worker has a core of its own, and a library that is told so starts no thread in the server
+        os.environ.update(dict.fromkeys(_THREADS, "1"))
         forkserver.ensure_running()
     finally:
         for name in _THREADS:
-            if name not in before:
-                del os.environ[name]
+            del os.environ[name]
+        os.environ.update(before)
     return context
 
 

@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -92,16 +93,16 @@ def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
         # the sweep of this row keeps what is done beside the rows, and goes on from there
         kept = folder / f"bench_sweep_{points}.files"
         job = Job("sweep", points, periods, cores, str(kept))
-        result["sizes"].append(rows.take(_name(job), lambda job=job: _run(job), tell=_tell_sweep))  # type: ignore[misc]
+        result["sizes"].append(rows.take(_name(job), partial(_run, job), tell=_tell_sweep))
         shutil.rmtree(kept, ignore_errors=True)
     result["executors"] = _executors(rows, effort)
     result["checkpoint"] = rows.take("checkpoint", _checkpoint, tell=_tell_checkpoint)
     timed = Job("points", effort.timed, effort.compared[1], 1, "")
     result["point_s"] = rows.take("single scenes", lambda: _run(timed)["seconds"], tell=_tell_points)
     result["simulated"] = _simulations(rows, effort, result)
+    result["checks"] = _checks(result)
     result["efficiency"] = {
-        name: spread(np.array([pair["efficiency"][name] for pair in result["pairs"]]))
-        for name in EFFICIENCIES
+        name: spread(np.array([pair["efficiency"][name] for pair in result["pairs"]])) for name in EFFICIENCIES
     }
     result["overhead"] = spread(np.array([_overhead(entry) for entry in result["sizes"]]))
     write_json(folder / "bench_sweep.json", result | {"wall_time_s": rows.seconds})
@@ -127,6 +128,11 @@ def print_summary(result: Mapping[str, Any]) -> None:
     most = max(pair["all"]["worker_peak_bytes"] for pair in pairs)
     print(f"  memory of a worker with its part of the server {most / 1e6:.0f} MB  target {MOST_MB} MB")
     print(f"  share of the main process in the processors' time {format_spread(result['overhead'])}")
+    for check in result["checks"]:
+        print(
+            f"  {_EXECUTORS[check['executor']]}, {check['workers']} workers, {check['points']} scenes: time with a task"
+            f" {check['measured']:.3f} measured, {check['simulated']:.3f} simulated"
+        )
     for name, runs in result["simulated"].items():
         least = next((run["workers"] for run in runs if run["efficiency"] < TARGET), None)
         text = f"up to {runs[-1]['workers']} workers" if least is None else f"below {least} workers"
@@ -167,7 +173,7 @@ def _pair(rows: Rows, effort: Effort, cores: int, turn: int) -> dict[str, Any]:
     runs = {}
     for count in (1, cores) if turn % 2 == 0 else (cores, 1):
         job = Job("sweep", *effort.compared, count, "")
-        runs[count] = rows.take(f"{_name(job)}, round {turn + 1}", lambda job=job: _run(job), tell=_tell_sweep)  # type: ignore[misc]
+        runs[count] = rows.take(f"{_name(job)}, round {turn + 1}", partial(_run, job), tell=_tell_sweep)
     return {"one": runs[1], "all": runs[cores], "efficiency": _efficiency(runs[1], runs[cores])}
 
 
@@ -180,8 +186,8 @@ def _executors(rows: Rows, effort: Effort) -> dict[str, dict[str, Any]]:
             for name in (*map(_name, jobs), f"{title}, handing out", f"{title}, simulated"):
                 rows.leave_out(name, reason)
             continue
-        sweeps = [rows.take(_name(job), lambda job=job: _run(job), tell=_tell_sweep) for job in jobs]  # type: ignore[misc]
-        handing = rows.take(f"{title}, handing out", lambda e=executor: _handing_out(e, effort.tasks), tell=_tell_tasks)  # type: ignore[misc]
+        sweeps = [rows.take(_name(job), partial(_run, job), tell=_tell_sweep) for job in jobs]
+        handing = rows.take(f"{title}, handing out", partial(_handing_out, executor, effort.tasks), tell=_tell_tasks)
         found[executor] = {"sweeps": sweeps, "costs": handing}
     return found
 
@@ -233,9 +239,27 @@ def _simulations(rows: Rows, effort: Effort, result: Mapping[str, Any]) -> dict[
         costs = Costs(**measured["costs"], write=kept["write"], write_point=kept["write_point"])
         inputs = asdict(effort) | {"costs": costs._asdict(), "points": result["point_s"]}
         found[executor] = rows.take(
-            f"{_EXECUTORS[executor]}, simulated", lambda costs=costs: _growing(effort, result["point_s"], costs),  # type: ignore[misc]
+            f"{_EXECUTORS[executor]}, simulated", partial(_growing, effort, result["point_s"], costs),
             inputs=inputs, tell=_tell_simulated,
         )  # fmt: skip
+    return found
+
+
+def _checks(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the share of the time in which workers have a task, as measured and as simulated, of every sweep."""
+    found = []
+    for executor, measured in result["executors"].items():
+        kept = result["checkpoint"]
+        costs = Costs(**measured["costs"], write=kept["write"], write_point=kept["write_point"])
+        for entry in [*measured["sweeps"], *(pair["all"] for pair in result["pairs"] if executor == "pool")]:
+            if not entry["tasks"]:  # in one process
+                continue
+            seconds = np.full(entry["points"], entry["task_s"] / entry["points"])
+            found.append({
+                "executor": executor, "workers": entry["workers"], "points": entry["points"],
+                "measured": entry["task_s"] / (entry["workers"] * entry["wall_s"]),
+                "simulated": simulated(entry["workers"], seconds, costs).efficiency,
+            })  # fmt: skip
     return found
 
 
