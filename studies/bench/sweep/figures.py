@@ -8,7 +8,7 @@ from typing import Any
 
 from vanedamp.studies.figures import BLUE, GOLD, GREEN, GREY, RED, draw_grid, save, subplots
 
-_LABELS = {"clock": "by the clock", "processor": "by the processor", "busy": "workers with a task"}
+_LABELS = {"clock": "by the\nclock", "processor": "by the\nprocessor", "busy": "workers\nwith a task"}
 
 
 def sweep_figure(result: Mapping[str, Any], path: Path) -> None:
@@ -19,7 +19,7 @@ def sweep_figure(result: Mapping[str, Any], path: Path) -> None:
     bars = left.bar([_LABELS[name] for name in names], values, color=[GREY, BLUE, GREEN])
     left.bar_label(bars, [f"{value:.3f}" for value in values])
     left.axhline(result["target"], color=RED, linestyle="--", label=f"target {result['target']}")
-    left.set_ylim(0, 1.1)
+    left.set_ylim(0, 1.2)
     left.set_ylabel("parallel efficiency")
     left.set_title(f"{result['workers']} workers, load {result['machine']['load']:.1f} at the start")
     entries = sorted([pair["all"] for pair in result["pairs"][:1]] + result["sizes"], key=lambda entry: entry["points"])
