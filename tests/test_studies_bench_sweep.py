@@ -13,7 +13,7 @@ from vanedamp.studies.bench.sweep.measure import Effort, _efficiency, print_summ
 from vanedamp.studies.bench.sweep.simulation import Costs, simulated
 from vanedamp.studies.bench.sweep.worker import Job, measure, scene
 
-TINY = Effort((8, 20), 1, ((4, 5),), (4, 5), 4, 3, (1, 2, 50), 20)
+TINY = Effort((8, 20), 1, ((4, 5),), (6, 5), 4, 3, (1, 2, 50), 20)
 FREE = Costs(0.0, 0.0, 0.0, 0.0)
 
 
