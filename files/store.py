@@ -167,8 +167,11 @@ def save(
     kind: str,
     variables: Mapping[str, Variable],
     attributes: Mapping[str, Any] | None = None,
+    compressed: bool = True,
 ) -> None:
     """Write a record of the given kind. A variable named like a dimension is that dimension's coordinate.
+
+    compressed: large arrays, which takes ten times as long.
 
     Strings and lists of strings become UTF-8 text; dictionaries among the attributes become JSON text. Equal records
     become equal files, byte by byte. Raises StoreError when the file cannot be written: a full disk, no permission.
@@ -181,7 +184,7 @@ def save(
         for name, value in (attributes or {}).items():
             file.attrs[name] = json.dumps(value, sort_keys=True) if isinstance(value, dict) else value
         for name, variable in variables.items():
-            _create(file, name, variable)
+            _create(file, name, variable, compressed)
         lengths = _dimension_lengths(variables)
         for dimension, length in lengths.items():
             if dimension not in file:
@@ -302,13 +305,14 @@ def _dimension_lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
     return lengths
 
 
-def _create(file: h5py.File, name: str, variable: Variable) -> None:
+def _create(file: h5py.File, name: str, variable: Variable, compressed: bool) -> None:
     values = np.asarray(variable.values)
     if values.dtype.kind in "UO":
         text = values.astype(object)
         dataset = file.create_dataset(name, data=text, dtype=h5py.string_dtype(), track_order=_TRACK_ORDER)
     else:
-        options = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size > 4096 else {}
+        zipped = compressed and values.size > 4096
+        options = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if zipped else {}
         dataset = file.create_dataset(name, data=values, track_order=_TRACK_ORDER, **options)
     dataset.attrs["units"] = variable.units
 

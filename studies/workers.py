@@ -7,9 +7,11 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
+from multiprocessing.context import BaseContext
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
@@ -19,6 +21,8 @@ from vanedamp.studies.interrupts import uninterrupted_children
 #: folder that holds the package vanedamp
 _ROOT = Path(__file__).parents[2]
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+#: what the server of workers loads before it forks the first one
+_PRELOADED = "vanedamp.studies.preloaded"
 
 
 class WorkerPool(Executor):
@@ -51,12 +55,35 @@ class WorkerPool(Executor):
         self.shutdown(cancel_futures=kind is not None)
 
     def _new(self) -> ProcessPoolExecutor:
-        # fresh processes: a fork of one that holds MPI or threads is not safe
-        context = multiprocessing.get_context("spawn")
+        resource_tracker.ensure_running()  # its start ends with interrupts unblocked, for the server to come as well
         with uninterrupted_children():  # a semaphore that was made and not noted yet is warned of at the end
             return ProcessPoolExecutor(
-                self._max_workers, mp_context=context, initializer=_begin, initargs=(self._niceness,)
+                self._max_workers, mp_context=_context(), initializer=_begin, initargs=(self._niceness,)
             )
+
+
+def _context() -> BaseContext:
+    """Return how workers begin: not as a fork of this process, which may hold MPI or threads.
+
+    On Linux they are forks of a server that holds neither, and that has the engine in its memory, which they share.
+    Elsewhere the system's libraries may have threads of their own, and each worker begins anew.
+    """
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    from multiprocessing import forkserver
+
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([_PRELOADED])
+    before = {name: os.environ.pop(name) for name in _THREADS if name in os.environ}
+    try:
+        # every worker has a core of its own, and a library that is told so starts no thread in the server
+        os.environ.update(dict.fromkeys(_THREADS, "1"))
+        forkserver.ensure_running()
+    finally:
+        for name in _THREADS:
+            del os.environ[name]
+        os.environ.update(before)
+    return context
 
 
 def _begin(niceness: int) -> None:
@@ -87,18 +114,21 @@ def workers(count: int | None) -> Iterator[Executor | None]:
         yield pool
 
 
-def run_module(module: str, *arguments: str, threads: int | None = None, **options: Any) -> CompletedProcess[str]:
+def run_module(
+    module: str, *arguments: str, threads: int | None = None, launcher: Sequence[str] = (),
+    variables: Mapping[str, str] | None = None, **options: Any,
+) -> CompletedProcess[str]:  # fmt: skip
     """Run a module of ours in a process of its own and wait for its end.
 
-    threads: of each numerical library, left to them by default; options: those of subprocess.run. Raises
-    subprocess.TimeoutExpired.
+    threads: of each numerical library, left to them by default; launcher: a command before it, such as mpirun;
+    variables: of the environment, in addition; options: those of subprocess.run. Raises subprocess.TimeoutExpired.
     """
-    environment = dict(os.environ)
+    environment = dict(os.environ) | dict(variables or {})
     if threads is not None:
         environment |= dict.fromkeys(_THREADS, str(threads))
     paths = [str(_ROOT), *filter(None, [environment.get("PYTHONPATH")])]
     return subprocess.run(
-        [sys.executable, "-m", module, *arguments], env=environment | {"PYTHONPATH": os.pathsep.join(paths)},
+        [*launcher, sys.executable, "-m", module, *arguments], env=environment | {"PYTHONPATH": os.pathsep.join(paths)},
         capture_output=True, text=True, check=False, **options,
     )  # fmt: skip
 

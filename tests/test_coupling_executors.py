@@ -16,7 +16,7 @@ import pytest
 from tests.tools.processes import RANKS, environment
 from tests.tools.sweep_processes import scene
 from vanedamp.coupling.sweep import worker as points
-from vanedamp.coupling.sweep.schedule import SweepError
+from vanedamp.coupling.sweep.schedule import SweepError, TaskSize
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.studies.workers import WorkerPool
 
@@ -130,3 +130,61 @@ def running(process):
             return file.read().rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:
         return False
+
+
+SHARED = """
+import os, sys
+from vanedamp.studies.workers import WorkerPool
+
+def found():
+    threads = len(os.listdir("/proc/self/task")) - 1  # one waits for the end of the parent
+    return os.getppid(), "vanedamp.studies.preloaded" in sys.modules, threads, os.environ["OMP_NUM_THREADS"]
+
+if __name__ == "__main__":
+    os.environ["OMP_NUM_THREADS"] = "2"
+    with WorkerPool(2) as pool:
+        (server, loaded, threads, told), = {future.result() for future in [pool.submit(found) for _ in range(50)]}
+    print(server != os.getpid(), loaded, threads, told, os.environ["OMP_NUM_THREADS"])
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere every worker begins anew")
+def test_workers_are_forks_of_a_server_without_threads(tmp_path):
+    (tmp_path / "program.py").write_text(SHARED)
+    done = subprocess.run(
+        [sys.executable, "program.py"], cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False
+    )
+    assert done.stdout.split() == ["True", "True", "1", "1", "2"], done.stderr
+
+
+def test_the_server_of_workers_compiles_nothing(tmp_path):
+    """Nobody could interrupt it."""
+    code = "import sys, vanedamp.studies.preloaded; print('vanedamp.coupling.sweep.sweep' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment(NUMBA_CACHE_DIR=str(tmp_path)), capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("True\n", "")
+    assert not list(tmp_path.rglob("*.nb*"))
+
+
+def test_tasks_take_a_second_and_are_few_at_the_end():
+    table = points.SweepTable(10_000)
+    size = TaskSize(table, 2)
+    assert size() == 1
+    size.learn(1, 1e-3)
+    assert size() == 4  # the first point may have been a quick one
+    for _ in range(5):
+        size.learn(size(), 1e-3 * size())
+    assert size() == 1000
+    table.count = 9_960
+    assert size() == 5
+    table.count = 9_999
+    assert size() == 1
+    size.learn(1, 1e3)
+    table.count = 0
+    assert size() == 1
+    many = TaskSize(table, 1000)
+    for _ in range(9):
+        many.learn(many(), 1e-3 * many())
+    assert many() == 2  # 10000 points are four tasks for each of 1000 workers, and no more

@@ -97,8 +97,11 @@ class Grid:
 
     def values(self, index: int) -> dict[str, Any]:
         """Return the values of the axes at a point, counted from 0 with the last axis fastest."""
-        places = np.unravel_index(index, self.shape)
-        return {path: values[int(place)] for (path, values), place in zip(self.axes.items(), places, strict=True)}
+        found: dict[str, Any] = dict.fromkeys(self.axes)
+        for path in reversed(found):
+            index, place = divmod(index, len(self.axes[path]))
+            found[path] = self.axes[path][place]
+        return found
 
     def chains(self) -> Iterator[Chain]:
         """Yield all points, in chains that can run side by side."""

@@ -12,10 +12,15 @@ from vanedamp.coupling.sweep.grid import Grid, PointList
 from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points, tasks_of, width_of
 from vanedamp.files.errors import VanedampError
 
-# few enough points that workers end together, and that a killed sweep loses little
-_MOST_PER_TASK = 16
-#: tasks that are with an executor of unknown size at a time: enough for some hundred workers
-_IN_FLIGHT = 512
+#: s that a task takes at least, unless few points are left: long enough that handing it out costs nothing
+_SECONDS = 1.0
+#: tasks that end in a second at most: schedulers manage some hundreds
+_RATE = 100
+#: tasks of each worker that the points still to be run make at least, so that workers end together; more are dearer to
+#: hand out than they save at the end (`vanedamp bench sweep` simulates it)
+_PER_WORKER = 4
+#: workers of an executor that does not tell how many it has
+_UNKNOWN = 256
 
 
 class SweepError(VanedampError):
@@ -26,16 +31,17 @@ class SweepError(VanedampError):
 _Entry = tuple[Task, Sequence[int]]
 
 
-def _run(
+def run_tasks(
     grid: Grid | PointList, finished: SweepTable, executor: Executor | None
 ) -> Iterator[tuple[Task, Sequence[int], TaskResult]]:
     """Yield tasks as they are done, each with the rest of its chain, and its result."""
-    most = max(1, min(_MOST_PER_TASK, (grid.size - finished.count) // 32))
-    source, ready = tasks_of(grid, finished, most), deque[_Entry]()
+    workers = _workers(executor)
+    size = TaskSize(finished, workers)
+    source, ready = tasks_of(grid, finished, size), deque[_Entry]()
     running: dict[Future[TaskResult], _Entry] = {}
     try:
         while True:
-            while len(running) < (1 if executor is None else _in_flight(executor)):
+            while len(running) < (1 if executor is None else 2 * workers + 2):
                 entry = ready.popleft() if ready else next(source, None)
                 if entry is None:
                     break
@@ -43,7 +49,9 @@ def _run(
             if not running:
                 return
             for (task, rest), result in _ended(grid, running, executor):
+                size.learn(len(task.points), result.seconds)
                 if rest and task.linked:
+                    most = size()
                     ready.append((Task(rest[:most], True, result.final, task.chain), rest[most:]))
                 yield task, rest, result
     finally:
@@ -51,10 +59,32 @@ def _run(
             future.cancel()
 
 
-def _in_flight(executor: Executor) -> int:
-    """Return how many tasks keep an executor busy; few, since all of them are in doubt when a worker dies."""
+class TaskSize:
+    """How many points the next task takes: by the time of those before, and few at the end."""
+
+    def __init__(self, finished: SweepTable, workers: int) -> None:
+        self._finished, self._tasks = finished, _PER_WORKER * workers
+        self._seconds = max(_SECONDS, workers / _RATE)
+        self._most = 1
+
+    def __call__(self) -> int:
+        """Return the number of points, at least 1."""
+        left = len(self._finished.done) - self._finished.count
+        return max(1, min(self._most, left // self._tasks))
+
+    def learn(self, points: int, seconds: float) -> None:
+        """Take the time that some points took. A task grows at most fourfold: the first points may be quick ones."""
+        self._most = max(1, min(4 * points, int(points * self._seconds / max(seconds, 1e-9))))
+
+
+def _workers(executor: Executor | None) -> int:
+    """Return the number of an executor's workers; those that a dask cluster has now."""
+    if executor is None:
+        return 1
+    if (client := getattr(executor, "_client", None)) is not None:
+        return len(client.ncores()) or _UNKNOWN
     known = getattr(executor, "_max_workers", None) or getattr(executor, "num_workers", None)
-    return 2 * known + 2 if isinstance(known, int) else _IN_FLIGHT
+    return known if isinstance(known, int) else _UNKNOWN
 
 
 def _submit(grid: Grid | PointList, task: Task, executor: Executor | None) -> Future[TaskResult]:

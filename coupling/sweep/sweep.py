@@ -17,7 +17,7 @@ from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.record import PEAKS, Sweep
-from vanedamp.coupling.sweep.schedule import _run
+from vanedamp.coupling.sweep.schedule import run_tasks
 from vanedamp.coupling.sweep.worker import COLUMNS, IN_PLANE, LOSSES, MEASURES, TEXTS, SweepTable, width_of
 from vanedamp.coupling.system.linear_response import LinearPeak, linear_peaks
 from vanedamp.files.store import frozen
@@ -46,7 +46,7 @@ def sweep(
         finished = kept.finished
         if progress is not None:
             progress(finished.count, grid.size)
-        for task, rest, result in _run(grid, finished, executor):
+        for task, rest, result in run_tasks(grid, finished, executor):
             kept.add(task, result, bool(rest))
             if progress is not None:
                 progress(finished.count, grid.size)
@@ -65,7 +65,7 @@ def run_list(
     """
     listed = PointList(base, points)
     finished = SweepTable(listed.size, width_of(base))
-    for task, rest, result in _run(listed, finished, executor):
+    for task, rest, result in run_tasks(listed, finished, executor):
         finished.add(task, result, bool(rest))
         if progress is not None:
             progress(finished.count)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from typing import Any, NamedTuple
 
@@ -43,15 +44,17 @@ class Task(NamedTuple):
 
 
 class TaskResult(NamedTuple):
-    """The result of a task: values (k, columns), nan where there is none, texts (k, 2), and the last state."""
+    """The result of a task: values (k, columns), nan where there is none, texts (k, 2), last state, and its time, s."""
 
     values: np.ndarray
     texts: list[tuple[str, str]]
     final: RestartState | None
+    seconds: float = 0.0
 
 
 def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> TaskResult:
     """Run some points, given by the values of the axes: the task of a worker."""
+    started = time.perf_counter()
     maker, state = Points(base, choices), task.start
     values = np.full((len(points), width_of(base)), np.nan)
     texts: list[tuple[str, str]] = []
@@ -59,7 +62,7 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
         final = _run(maker, point, state if task.linked else None, row, texts)
         # a run that broke off within a period leaves the state that it began with
         state = state if final is None else final
-    return TaskResult(values, texts, state if task.linked else None)
+    return TaskResult(values, texts, state if task.linked else None, time.perf_counter() - started)
 
 
 def width_of(base: Scene) -> int:
@@ -154,8 +157,10 @@ def _linear(scene: Scene) -> list[float]:
     return [float(response.amplitude(frequency)[0]) for response in linear_responses(scene)]
 
 
-def tasks_of(grid: Grid | PointList, finished: SweepTable, most: int) -> Iterator[tuple[Task, Sequence[int]]]:
-    """Yield tasks of at most `most` points that can run side by side, each with the rest of its chain.
+def tasks_of(
+    grid: Grid | PointList, finished: SweepTable, size: Callable[[], int]
+) -> Iterator[tuple[Task, Sequence[int]]]:
+    """Yield tasks that can run side by side, each with the rest of its chain; size: of the next task, in points.
 
     All tasks of chains that are not linked, and the first of those that are; of points that are not done.
     """
@@ -163,8 +168,9 @@ def tasks_of(grid: Grid | PointList, finished: SweepTable, most: int) -> Iterato
         if chain.linked:
             rest = [point for point in chain.points if not finished.done[point]]
             if rest:
+                most = size()
                 yield Task(rest[:most], True, finished.states.get(number), number), rest[most:]
             continue
         points = (point for point in chain.points if not finished.done[point])
-        while some := list(itertools.islice(points, most)):
+        while some := list(itertools.islice(points, size())):
             yield Task(some, chain=number), []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 ORDER = 30
-SUMMARY = "time and memory of sweeps of up to 100 000 scenes"
+SUMMARY = "efficiency and memory of sweeps of up to a million scenes, and what limits many workers"
 
 
 def run(folder: Path, quick: bool) -> None:
