@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -25,7 +24,7 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import result_of
 from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points, width_of
 from vanedamp.coupling.system.linear_response import linear_responses
-from vanedamp.coupling.system.transient import left_over
+from vanedamp.coupling.system.transient import left_over, settled_after
 from vanedamp.files.toml_input import InputError
 
 #: frequencies of a curve, and the step from one to the next of its coarse form
@@ -80,9 +79,8 @@ def seen(scene: Scene, band: Band) -> Scene:
     low, high = _ends(scene, band)
     if not 1 <= band.evaluated <= _MOST_PERIODS:
         raise InputError(f"periods evaluated: expected 1 to {_MOST_PERIODS}, not {band.evaluated:g}")
-    slowest, lengths = scene.replace({FREQUENCY: high}), range(_SHORTEST, _LONGEST, 10)
-    enough = bisect_left(lengths, True, key=lambda n: left_over(slowest, n) <= Time().tolerance)
-    transient = _SHORTEST + 10 * enough
+    slowest = replace(scene.replace({FREQUENCY: high}), time=Time())
+    transient = settled_after(slowest, range(_SHORTEST, _LONGEST, 10))
     return replace(
         scene.replace({"solver.max_events": min(scene.solver.max_events, _EVENTS)}),
         time=Time(periods=transient + band.evaluated, transient=transient),
