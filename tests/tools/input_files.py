@@ -84,8 +84,8 @@ mass = 0.05
 friction = 0.3
 restitution = 0.6
 [time]
-periods = 30
-transient = 10
+periods = 90
+transient = 80
 [sweep]
 "excitation.frequency" = {start = 15.4, stop = 16.2, num = 4}
 """
