@@ -26,6 +26,7 @@ from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken,
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.coupling.system.transient import left_over, settled_after
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.report.forced_response import linear_between
 
 #: frequencies of a curve, and the step from one to the next of its coarse form
 POINTS, _COARSE = 60, 4
@@ -129,33 +130,17 @@ def ends_of(scene: Scene) -> tuple[float | None, float | None]:
     return (min(values), max(values)) if min(values) < max(values) else (None, None)
 
 
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """The linear curves, known everywhere: frequencies (f,), Hz; undamped and fixed amplitudes (f,), m."""
-
-    frequencies: np.ndarray
-    undamped: np.ndarray
-    fixed: np.ndarray
-
-
-def linear_curves(scene: Scene) -> Linear:
-    """Return the linear curves of a `seen` scene, with a grid between whose points no maximum hides."""
-    low, high = ends_of(scene)
-    assert low is not None and high is not None
-    free, fixed = linear_responses(scene)
-    frequencies = np.unique(np.concatenate([free.grid(low, high), fixed.grid(low, high)]))
-    return Linear(frequencies, free.amplitude(frequencies), fixed.amplitude(frequencies))
-
-
 class Curve:
     """The forced response of a `seen` scene under way: its points run in workers, coarse ones first.
 
-    done, size: points so far, and of the whole curve; coarse: of its coarse form; note: a warning, of transient_note;
-    asked: when a tab last asked for it, s of time.monotonic. Raises InputError.
+    linear: its linear curves; done, size: points so far, and of the whole curve; coarse: of its coarse form; note: a
+    warning, of transient_note; asked: when a tab last asked for it, s of time.monotonic. Raises InputError.
     """
 
     def __init__(self, scene: Scene, submit: Submit) -> None:
-        self.scene, self.linear, self.note = scene, linear_curves(scene), transient_note(scene)
+        low, high = ends_of(scene)
+        assert low is not None and high is not None
+        self.scene, self.linear, self.note = scene, linear_between(scene, low, high), transient_note(scene)
         self._grid = grid(scene)
         self.size = self._grid.size
         self._table = SweepTable(self.size, width_of(self._grid.base))
