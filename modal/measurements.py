@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.files.csv_input import content_lines
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.correlation import MeasuredShapes
@@ -183,15 +184,16 @@ def _existing(path: str | os.PathLike[str]) -> Path:
 
 def _shapes_of_csv(file: Path) -> MeasuredShapes:
     rows = _table(file)
-    if not rows or [word.strip() for word in rows[0][:6]] != list(_PLACE) or len(rows[0]) < 7:
+    header = rows[0][1] if rows else []
+    if [word.strip() for word in header[:6]] != list(_PLACE) or len(header) < 7:
         raise MeasurementError(f"{file}: expected the header {','.join(_PLACE)},<mode>,... in the first line")
-    names, body = rows[0][6:], rows[1:]
-    values = np.empty((len(body), len(rows[0])), dtype=complex)
-    for number, row in enumerate(body, start=2):
-        if len(row) != len(rows[0]):
-            raise MeasurementError(f"{file}: line {number} has {len(row)} columns, the header has {len(rows[0])}")
+    names, body = header[6:], rows[1:]
+    values = np.empty((len(body), len(header)), dtype=complex)
+    for place, (number, row) in enumerate(body):
+        if len(row) != len(header):
+            raise MeasurementError(f"{file}: line {number} has {len(row)} columns, the header has {len(header)}")
         try:
-            values[number - 2] = [complex(word.replace(" ", "")) for word in row]
+            values[place] = [complex(word.replace(" ", "")) for word in row]
         except ValueError as error:
             raise MeasurementError(f"{file}: line {number}: expected numbers ({error})") from error
     shapes = values[:, 6:].T
@@ -206,7 +208,7 @@ def _shapes_of_csv(file: Path) -> MeasuredShapes:
 
 def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
     """Return the words of a header line, if there is one, and the rows of numbers of a CSV file."""
-    rows, header = _table(file), []
+    rows, header = [words for _, words in _table(file)], []
     if rows and np.isnan(_number(rows[0][0])):
         header, rows = [word.strip() for word in rows[0]], rows[1:]
     try:
@@ -218,13 +220,13 @@ def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
     return header, values
 
 
-def _table(file: Path) -> list[list[str]]:
+def _table(file: Path) -> list[tuple[int, list[str]]]:
+    """Return number and words of the lines of a CSV file."""
     try:
         text = file.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise MeasurementError(f"{file}: not a text file ({error})") from error
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    return list(csv.reader(lines))
+    return [(number, next(csv.reader([line]))) for number, line in content_lines(text)]
 
 
 def _number(word: str) -> float:
