@@ -113,7 +113,7 @@ def test_work_of_months_is_refused(command, old, new, told, folder, capfd):
 def test_samples_that_fill_the_memory(folder, capfd):
     (folder / "scene.toml").write_text(SCENE)
     assert main(["run", "scene.toml", "--samples", "100000000"]) == BAD_INPUT
-    assert "--samples: 30 periods need 96 GB for their samples" in capfd.readouterr().err
+    assert "--samples: 90 periods need 288 GB for their samples" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.reduced_model_file import coordinates_in_file
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.workers import available_cores
 
@@ -63,7 +63,7 @@ def _modes(scene: Scene) -> int:
     if not isinstance(scene.structure, Rom):
         return 0
     modes = scene.structure.modes
-    return modes if isinstance(modes, int) else ReducedModel.load(scene.structure.file).size
+    return modes if isinstance(modes, int) else coordinates_in_file(scene.structure)
 
 
 def designs_of(study: Study) -> int:
