@@ -31,6 +31,12 @@ class CsvRow(NamedTuple):
         return value
 
 
+def content_lines(text: str) -> list[tuple[int, str]]:
+    """Return number, from 1, and text of the lines that are neither blank nor comments, which begin with #."""
+    lines = enumerate(text.splitlines(), 1)
+    return [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
+
+
 def read_csv(path: str | Path, columns: Sequence[str], least: int = 1) -> list[CsvRow]:
     """Return the rows of a CSV table, at least `least`; empty lines and those that begin with # are left out.
 
@@ -42,9 +48,7 @@ def read_csv(path: str | Path, columns: Sequence[str], least: int = 1) -> list[C
         raise InputError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
-    lines = [
-        (n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")
-    ]
+    lines = content_lines(text)
     try:  # line by line, so that no quotation mark joins two of them
         table = [[word.strip() for word in next(csv.reader([line]))] for _, line in lines]
     except csv.Error as error:

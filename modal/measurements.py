@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from vanedamp.files.csv_input import content_lines
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.correlation import MeasuredShapes
@@ -31,7 +32,15 @@ COLUMNS = ("real-imaginary", "magnitude-degrees", "magnitude-radians")
 _PLACE = ("x", "y", "z", "dx", "dy", "dz")
 # specific data types of UFF 58, record 9
 _QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
-_NORMAL_MODE, _COMPLEX_MODE, _FRF = 2, 3, 4
+_NORMAL_MODE, _COMPLEX_MODE = 2, 3
+#: types of the functions of dataset 58
+GENERAL, HISTORY, FRF = 0, 1, 4
+#: specific data types of its axes, and their names and units
+UNKNOWN, DISPLACEMENT, FORCE, TIME, FREQUENCY = 0, 8, 13, 17, 18
+_AXES = {
+    UNKNOWN: ("NONE", "NONE"), DISPLACEMENT: ("displacement", "m"), 11: ("velocity", "m/s"),
+    12: ("acceleration", "m/s^2"), FORCE: ("force", "N"), TIME: ("time", "s"), FREQUENCY: ("frequency", "Hz"),
+}  # fmt: skip
 
 
 class MeasurementError(VanedampError):
@@ -175,15 +184,16 @@ def _existing(path: str | os.PathLike[str]) -> Path:
 
 def _shapes_of_csv(file: Path) -> MeasuredShapes:
     rows = _table(file)
-    if not rows or [word.strip() for word in rows[0][:6]] != list(_PLACE) or len(rows[0]) < 7:
+    header = rows[0][1] if rows else []
+    if [word.strip() for word in header[:6]] != list(_PLACE) or len(header) < 7:
         raise MeasurementError(f"{file}: expected the header {','.join(_PLACE)},<mode>,... in the first line")
-    names, body = rows[0][6:], rows[1:]
-    values = np.empty((len(body), len(rows[0])), dtype=complex)
-    for number, row in enumerate(body, start=2):
-        if len(row) != len(rows[0]):
-            raise MeasurementError(f"{file}: line {number} has {len(row)} columns, the header has {len(rows[0])}")
+    names, body = header[6:], rows[1:]
+    values = np.empty((len(body), len(header)), dtype=complex)
+    for place, (number, row) in enumerate(body):
+        if len(row) != len(header):
+            raise MeasurementError(f"{file}: line {number} has {len(row)} columns, the header has {len(header)}")
         try:
-            values[number - 2] = [complex(word.replace(" ", "")) for word in row]
+            values[place] = [complex(word.replace(" ", "")) for word in row]
         except ValueError as error:
             raise MeasurementError(f"{file}: line {number}: expected numbers ({error})") from error
     shapes = values[:, 6:].T
@@ -198,7 +208,7 @@ def _shapes_of_csv(file: Path) -> MeasuredShapes:
 
 def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
     """Return the words of a header line, if there is one, and the rows of numbers of a CSV file."""
-    rows, header = _table(file), []
+    rows, header = [words for _, words in _table(file)], []
     if rows and np.isnan(_number(rows[0][0])):
         header, rows = [word.strip() for word in rows[0]], rows[1:]
     try:
@@ -210,13 +220,13 @@ def _numbers(file: Path) -> tuple[list[str], np.ndarray]:
     return header, values
 
 
-def _table(file: Path) -> list[list[str]]:
+def _table(file: Path) -> list[tuple[int, list[str]]]:
+    """Return number and words of the lines of a CSV file."""
     try:
         text = file.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise MeasurementError(f"{file}: not a text file ({error})") from error
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    return list(csv.reader(lines))
+    return [(number, next(csv.reader([line]))) for number, line in content_lines(text)]
 
 
 def _number(word: str) -> float:
@@ -338,9 +348,9 @@ def _damping_ratio(mode: dict[str, Any]) -> float:
 
 
 def _frf_of_universal(file: Path) -> Frf:
-    found = [d for d in _datasets(file) if d["type"] == 58 and d["func_type"] == _FRF]
+    found = [d for d in _datasets(file) if d["type"] == 58 and d["func_type"] == FRF]
     if not found:
-        raise MeasurementError(f"{file}: holds no frequency response (dataset 58, function type {_FRF})")
+        raise MeasurementError(f"{file}: holds no frequency response (dataset 58, function type {FRF})")
     kinds = {int(d["ordinate_spec_data_type"]) for d in found}
     if len(kinds) > 1 or not kinds <= set(_QUANTITIES):
         raise MeasurementError(
@@ -358,18 +368,35 @@ def _frf_of_universal(file: Path) -> Frf:
 
 
 def _frf_to_universal(frf: Frf, target: Path) -> None:
-    prepare = _pyuff()
     kind = next(number for number, name in _QUANTITIES.items() if name == frf.quantity)
     sets = [
-        prepare.prepare_58(
-            binary=1, func_type=_FRF, rsp_node=index + 1, rsp_dir=3, ref_node=1, ref_dir=3, data=values,
-            x=frf.frequencies_hz, id1=label[:80], rsp_ent_name="NONE", ref_ent_name="NONE", abscissa_spacing=0,
-            abscissa_spec_data_type=18, ordinate_spec_data_type=kind, orddenom_spec_data_type=13, ver_num=0,
-            load_case_id=0, z_axis_value=0.0,
+        curve_dataset(
+            label, frf.frequencies_hz, values, FRF, FREQUENCY, kind, FORCE, binary=1, rsp_node=index + 1, rsp_dir=3,
+            ref_node=1, ref_dir=3,
         )
         for index, (values, label) in enumerate(zip(frf.values, frf.labels, strict=True))
     ]  # fmt: skip
     write_universal(sets, target)
+
+
+def curve_dataset(
+    title: str, x: np.ndarray, values: np.ndarray, function: int, abscissa: int, ordinate: int, per: int = UNKNOWN,
+    **more: Any,
+) -> dict[str, Any]:  # fmt: skip
+    """Return dataset 58 of a curve, values (n,) over x (n,), for `write_universal`.
+
+    function: type of the function; abscissa, ordinate, per: specific data types of x, of the values, and of what they
+    are over, as those of `_AXES`; more: further entries, or others in place of these.
+    """
+    data: dict[str, Any] = {
+        "type": 58, "binary": 0, "func_type": function, "id1": title[:80], "rsp_node": 1, "rsp_dir": 0, "ref_node": 0,
+        "ref_dir": 0, "data": values, "x": x, "abscissa_spacing": 0, "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
+        "ver_num": 0, "load_case_id": 0, "z_axis_value": 0.0,
+    }  # fmt: skip
+    for axis, kind in (("abscissa", abscissa), ("ordinate", ordinate), ("orddenom", per)):
+        data[f"{axis}_spec_data_type"] = kind
+        data[f"{axis}_axis_lab"], data[f"{axis}_axis_units_lab"] = _AXES[kind]
+    return data | more
 
 
 def write_universal(sets: Iterable[Any], target: Path) -> None:

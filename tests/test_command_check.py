@@ -286,7 +286,7 @@ def test_sweeps_make_a_pipeline(tmp_path, capfd):
         ("[matrix]\nmass = 'm.npz'\n", "an external has matrices"),
         (changed(SCENE, ("frequency = 15.9", "frequenzy = 15.9")), "frequenzy: unknown key; did you mean 'frequency'?"),
         (changed(SCENE, ("num = 4", "num = 4000000")), "sweep: 4e+06 points take"),
-        (changed(SCENE, ("periods = 30", "periods = 1000000000000")), "time.periods: 1e+12 periods"),
+        (changed(SCENE, ("periods = 90", "periods = 1000000000000")), "time.periods: 1e+12 periods"),
         ("a = ", "not valid TOML"),
         (
             changed(SCENE, ("{start = 15.4, stop = 16.2, num = 4}", "[]")),

@@ -9,7 +9,7 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import select_model_order
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import sweep
-from vanedamp.coupling.system.transient import LIMIT, left_over, outlasted
+from vanedamp.coupling.system.transient import LIMIT, left_over, outlasted, settled_after
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 
@@ -128,6 +128,39 @@ def test_a_mean_that_drifts_among_impacts():
     assert not outlasted(given, 1.0 + noise + np.linspace(0.0, 0.2, 500), impacts)
     # where the structure alone has forgotten its start, nothing is asked
     assert outlasted(scene(0.02, time={"periods": 600, "transient": 100}), 1.0 + np.linspace(0.0, 1.0, 500), impacts)
+
+
+@pytest.mark.parametrize(
+    ("gap", "dropped", "evaluated"),
+    [(BETWEEN / 5, 50, 50), (BETWEEN / 2, 200, 100), (BETWEEN, 400, 200), (BETWEEN, 400, 400)],
+)
+def test_a_short_window_among_impacts(gap, dropped, evaluated):
+    """Of too few periods to know their scatter, those of a transient are told from the steady ones of a long run."""
+    long = simulate(scene(2e-4, gap=gap, time={"periods": 9000, "transient": 6000}))
+    short = simulate(scene(2e-4, gap=gap, time={"periods": dropped + evaluated, "transient": dropped}))
+    assert short.impacts_per_period > 0 and short.status == "not_steady"
+    assert abs(short.amplitude_mean / long.amplitude_mean - 1) > 0.2
+
+
+def test_what_repeats_is_steady_in_a_short_window():
+    """Halves that agree within the tolerance are not enough: a slow decay goes on for long."""
+    given, impacts, decay = (
+        scene(2e-4, time={"periods": 200, "transient": 100}),
+        np.ones(100),
+        np.linspace(0, 0.005, 100),
+    )
+    assert outlasted(given, np.ones(100), impacts)
+    assert outlasted(given, np.tile([1.0, 1.2], 50), impacts)  # of two periods
+    assert not outlasted(given, 1.0 + decay, impacts)
+    noise = np.random.default_rng(1).uniform(-0.03, 0.03, 100)
+    assert not outlasted(given, 1.0 + noise, impacts)
+
+
+def test_settled_after():
+    lengths = range(100, 1000, 7)
+    assert settled_after(scene(0.002), lengths) == 373  # ln(100) / (2 pi 0.002) = 366.5, rounded up to one of them
+    assert settled_after(scene(1e-5), lengths) == 1003 == lengths[-1] + 7
+    assert settled_after(scene(0.1), lengths) == 100
 
 
 def test_every_point_of_a_sweep_has_its_own():

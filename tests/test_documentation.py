@@ -8,6 +8,7 @@ import sys
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 
@@ -234,14 +235,14 @@ def test_search_index_has_every_key(site):
     html = {page: (site / f"{page}.html").read_text(encoding="utf-8") for page, _ in found.values()}
     for kind in KINDS.keys() - {"study"}:
         for key in keys_of(kind):
-            page, anchor = found[f"{kind}.{key}"]
+            page, anchor = found[f"{kind}.{key}".replace(toml_keys.NAME, toml_keys.FOUND)]
             assert page == f"reference/{kind}" and f'id="{anchor}"' in html[page]
     assert found["study.optimise.seed"][0] == "reference/study"
 
 
 @pytest.mark.slow
 def test_search_in_a_browser_from_files(site):
-    """Without a server: the search finds keys, and no page asks for anything but files."""
+    """Without a server: the search finds keys, of tables with names as well, and no page asks for more than files."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
     if not CHROMIUM.exists():
         pytest.skip("needs chromium")
@@ -258,6 +259,12 @@ def test_search_in_a_browser_from_files(site):
             assert target.startswith("reference/scene.html#") and target.endswith(f".{key.split('.')[-1]}"), target
             page.goto(f"{site.as_uri()}/{target}")
             assert page.locator(":target").inner_text() == key.split(".")[-1]
+        for asked_for in ("external.interface.<name>.direction", "external.interface.direction"):
+            page.goto(f"{(site / 'search.html').as_uri()}?q={quote(asked_for)}")
+            first = page.locator("#search-results ul.search li a").first
+            first.wait_for(timeout=20000)
+            assert first.get_attribute("href") == "reference/external.html#interface.name.direction"
+            assert first.inner_text() == "external.interface.NAME.direction"
         for name in ("index", "engine", "reference/commands", "tutorial/index", "auto_gallery/index"):
             page.goto((site / f"{name}.html").as_uri())
             page.wait_for_load_state("networkidle")

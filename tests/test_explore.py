@@ -34,12 +34,11 @@ from vanedamp.studies.explore.curves import (
     Curves,
     ends_of,
     explorable,
-    linear_curves,
     seen,
     transient_note,
 )
 from vanedamp.studies.file_kinds import KINDS
-from vanedamp.studies.report.forced_response import forced_responses
+from vanedamp.studies.report.forced_response import forced_responses, linear_between
 
 TABLES = {
     "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
@@ -309,7 +308,7 @@ def test_worker_that_breaks_leaves_a_point_that_says_so():
     drawn = curve.sweep()
     assert curve.done == POINTS
     assert drawn.status[4] == "error: RuntimeError: out of order"
-    figure = response_figure(drawn, curve.linear, {})
+    figure = response_figure(drawn, *forced_responses(drawn), curve.linear, {})
     assert "out of order" in figure["data"][3]["text"][4]
 
 
@@ -319,7 +318,8 @@ def test_points_that_are_not_ok_are_open_and_say_why():
     drawn = curve.sweep()
     status = drawn.status.copy()
     status[7] = "not_steady"
-    figure = response_figure(replace(drawn, status=status), curve.linear, {})
+    marked = replace(drawn, status=status)
+    figure = response_figure(marked, *forced_responses(marked), curve.linear, {})
     for trace, symbol in zip(figure["data"][2:], ("diamond", "circle"), strict=True):
         symbols = list(trace["marker"]["symbol"])
         assert symbols.pop(7) == f"{symbol}-open" and set(symbols) == {symbol}
@@ -333,8 +333,8 @@ def test_key_figures_are_those_of_the_sweep():
     exploration = page.Exploration.of(scene(), "scene.toml")
     curve = Curve(exploration.seen(exploration.texts), at_once)
     drawn = curve.sweep()
-    shown = dict(key_figures(drawn))
-    headline = forced_responses(drawn)[0].headline
+    (response,) = forced_responses(drawn)
+    shown, headline = dict(key_figures(response)), response.headline
     # 1/sqrt(1 - 2 zeta^2) = 1.0001 below the natural frequency, where the level is reached
     assert shown["undamped maximum X"].startswith("1000 µm at 15.91")
     assert shown["damped peak / X"] == f"{headline.peak_ratio:.3f}"
@@ -343,10 +343,10 @@ def test_key_figures_are_those_of_the_sweep():
 
 def test_linear_curves_hide_no_maximum():
     shown = seen(explorable(scene()), Band())
-    linear = linear_curves(shown)
+    linear = linear_between(shown, *ends_of(shown))
     peak = 1e4 / 1.05  # squared natural frequency with the body fixed
     assert linear.undamped.max() == pytest.approx(1e-3, rel=1e-3)
-    assert linear.frequencies[np.argmax(linear.fixed)] == pytest.approx(math.sqrt(peak) / (2 * math.pi), rel=1e-3)
+    assert linear.x[np.argmax(linear.fixed)] == pytest.approx(math.sqrt(peak) / (2 * math.pi), rel=1e-3)
 
 
 # --- the address ----------------------------------------------------------------------------------------------------

@@ -38,7 +38,7 @@ SCENE = {
     "excitation": {"frequency": 2400.0, "force": 5.0},
     "cavity": [{"name": "c1", "gap": 2e-5}, {"name": "c2", "gap": 1e-5}],
     "damper": [BODY | {"cavity": "c1"}, BODY | {"cavity": "c2", "position": -1e-6}, BODY | {"cavity": "c2"}],
-    "time": {"periods": 60, "transient": 30},
+    "time": {"periods": 60, "transient": 0},
 }
 BLOCK = BODY | {"cavity": "c1", "shape": "block", "length": 0.01, "height": 0.006}
 PLANAR = SCENE | {
@@ -51,6 +51,10 @@ AXES = {
     "excitation.frequency": {"start": 2380.0, "stop": 2430.0, "num": 6},
     "damper.restitution": [0.3, 0.7],
 }
+
+
+def drawn(sweep, along, places):
+    return curve_figure(sweep, chosen_curve(sweep, along, places), places)
 
 
 def scene_of(data):
@@ -110,7 +114,7 @@ def test_views_show_the_run():
     planes = [trace for trace in view.phase.data if trace.name == "structure"]
     assert len(planes[0].x) == 25 * 200
     starts = next(trace for trace in view.phase.data if trace.name == "starts of periods")
-    np.testing.assert_allclose(starts.x, 1e6 * response.section[30:, 0])
+    np.testing.assert_allclose(starts.x, 1e6 * response.section[:, 0])
     styles = [trace.line.dash for trace in view.phase.data if str(trace.name).startswith("body")]
     assert len(set(styles)) == 3
     assert view.motion.count("<script") == 2
@@ -307,7 +311,7 @@ def grid():
 def test_curve_is_that_of_the_chosen_values(grid):
     places = {"cavity.c1.gap": 1, "damper.restitution": 0}
     assert abscissas(grid) == ["excitation.frequency", "cavity.c1.gap", "damper.restitution"]
-    figure = {trace.name: trace for trace in curve_figure(grid, "excitation.frequency", places).data}
+    figure = {trace.name: trace for trace in drawn(grid, "excitation.frequency", places).data}
     np.testing.assert_allclose(figure["damped, mean of peaks"].x, np.linspace(2380.0, 2430.0, 6))
     np.testing.assert_allclose(figure["damped, mean of peaks"].y, 1e6 * grid.amplitude_mean[1, :, 0])
     for name, kept, peak in (
@@ -326,10 +330,10 @@ def test_curve_is_that_of_the_chosen_values(grid):
 
 def test_any_axis_is_the_abscissa_and_numbers_rise(grid):
     places = {"excitation.frequency": 3, "damper.restitution": 1}
-    figure = {trace.name: trace for trace in curve_figure(grid, "cavity.c1.gap", places).data}
+    figure = {trace.name: trace for trace in drawn(grid, "cavity.c1.gap", places).data}
     np.testing.assert_allclose(figure["damped, mean of peaks"].x, [10.0, 20.0, 40.0])
     np.testing.assert_allclose(figure["damped, mean of peaks"].y, 1e6 * grid.amplitude_mean[[1, 0, 2], 3, 1])
-    assert "gap" in curve_figure(grid, "cavity.c1.gap", places).layout.xaxis.title.text
+    assert "gap" in drawn(grid, "cavity.c1.gap", places).layout.xaxis.title.text
     assert "frequency" in chosen_curve(grid, "cavity.c1.gap", places).name
     ids = [{"type": "sweep-axis", "path": path} for path in ("cavity.c1.gap", "damper.restitution", "gone")]
     assert places_of(grid, [0, 1, 0], ids) == {"cavity.c1.gap": 1, "damper.restitution": 1}
@@ -340,7 +344,7 @@ def test_any_axis_is_the_abscissa_and_numbers_rise(grid):
 def test_points_of_a_sweep_run_again(grid, along):
     """Whatever the abscissa is, a point carries its value, and its run has the sweep's amplitude."""
     places = {"cavity.c1.gap": 2, "excitation.frequency": 4, "damper.restitution": 1}
-    figure = {trace.name: trace for trace in curve_figure(grid, along, places).data}
+    figure = {trace.name: trace for trace in drawn(grid, along, places).data}
     value = figure["damped, mean of peaks"].customdata[1]
     scene, axis = json.loads(json.dumps(scene_of_curve(grid, along, places)))
     assert value in axis[along]
@@ -373,7 +377,7 @@ def test_designs_with_points_that_are_not_ok_are_no_best(grid):
     assert "5 of 6 points are ok; left out: 1 event_budget" in status_sentence(
         troubled, "excitation.frequency", best.places
     )
-    figure = {trace.name: trace for trace in curve_figure(troubled, "excitation.frequency", best.places).data}
+    figure = {trace.name: trace for trace in drawn(troubled, "excitation.frequency", best.places).data}
     assert figure["not ok"].text.tolist() == ["event_budget"]
     assert figure["not ok"].x.tolist() == [2400.0]
     assert np.isnan(figure["damped, mean of peaks"].y[2])
@@ -381,7 +385,7 @@ def test_designs_with_points_that_are_not_ok_are_no_best(grid):
     broken = replace(grid, status=status)
     assert best_design(broken) is None
     assert "No design" in best_sentence(broken, None)
-    assert curve_figure(broken, "excitation.frequency", start_places(broken)).data
+    assert drawn(broken, "excitation.frequency", start_places(broken)).data
 
 
 def test_best_design_counts_its_worst_start():
@@ -404,7 +408,7 @@ def test_sweeps_without_numbers_or_frequency(tmp_path):
         scene_of(SCENE | {"sweep": {"continuation.direction": ["independent", "up"], "excitation.frequency": [2400.0]}})
     )
     assert abscissas(words) == ["continuation.direction"]
-    assert curve_figure(words, "continuation.direction", start_places(words)).data
+    assert drawn(words, "continuation.direction", start_places(words)).data
     gaps = sweep(scene_of(SCENE | {"sweep": {"cavity.c1.gap": [1e-5, 2e-5, 3e-5]}}))
     best = best_design(gaps)
     assert best.amplitude == gaps.amplitude_mean.min()

@@ -109,7 +109,7 @@ def test_click_shows_history_phase_planes_and_motion(tmp_path):
 
 
 def test_sliders_move_through_a_sweep(tmp_path):
-    long = changed(SCENE, ("periods = 30", "periods = 150"), ("transient = 10", "transient = 100"))
+    long = changed(SCENE, ("periods = 90", "periods = 150"), ("transient = 80", "transient = 100"))
     (tmp_path / "scene.toml").write_text(long.split("[sweep]")[0] + "[sweep]" + AXES)
     sweep(Scene.load(tmp_path / "scene.toml")).save(tmp_path / "gaps.h5")
     (tmp_path / "scene.toml").write_text(SCENE)

@@ -91,6 +91,15 @@ def test_bad_responses_are_told(tmp_path, text, message):
         read_frf(tmp_path / "bad.csv")
 
 
+def test_comments_and_blank_lines_count_as_lines(tmp_path):
+    """The line that an error names is that of the file; a comment may stand behind blanks."""
+    (tmp_path / "shapes.csv").write_text("# one\nx,y,z,dx,dy,dz,100\n\n  # two\n0,0,0,1,0,0,1\n0,0,0,1,0\n")
+    with pytest.raises(MeasurementError, match="line 6 has 5 columns, the header has 7"):
+        read_shapes(tmp_path / "shapes.csv")
+    (tmp_path / "frf.csv").write_text("f,re,im\n  # behind blanks\n1,2,3\n2,3,4\n")
+    assert read_frf(tmp_path / "frf.csv").values.tolist() == [[2 + 3j, 3 + 4j]]
+
+
 def test_universal_files_hold_axes_alone(tmp_path):
     with pytest.raises(MeasurementError, match="write CSV instead"):
         write_shapes(shapes(axes=False), tmp_path / "shapes.unv")

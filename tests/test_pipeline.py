@@ -214,6 +214,23 @@ def test_lost_and_changed_results_are_made_again(folder):
         assert path.read_bytes() == was
 
 
+@pytest.mark.parametrize("name", ["rigid.toml", "tuned.toml"])
+def test_an_edited_scene_or_case_is_not_written_over(folder, name, capsys):
+    """Nothing runs then; where it is renamed the stage writes it again."""
+    path, was = folder / "out" / name, (folder / "out" / name).read_bytes()
+    path.write_bytes(was + b"# mine\n")
+    before = {each: each.read_bytes() for each in path.parent.iterdir()}
+    for options in ([], ["--dry-run"]):
+        assert main(["pipeline", "pipeline.toml", "--workers", "1", *options]) == BAD_INPUT
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and f"out/{name}: is not as calibrate wrote it" in error and "rename it" in error
+        assert {each: each.read_bytes() for each in path.parent.iterdir()} == before
+    path.rename(folder / "mine.toml")
+    result = vd.pipeline("pipeline.toml", workers=1)
+    assert result.done == ["calibrate"] and path.read_bytes() == was
+    assert (folder / "mine.toml").read_bytes() == was + b"# mine\n"
+
+
 def test_another_version_does_all_again(folder, monkeypatch):
     monkeypatch.setattr(stages, "versions", lambda: {"vanedamp": "0.0.1"})
     plan = vd.pipeline("pipeline.toml", dry_run=True)
@@ -277,7 +294,7 @@ sys.exit(main(sys.argv[2:]))
 @pytest.fixture
 def killed(tmp_path, monkeypatch):
     """A folder in which a sweep was killed at its second write of finished points."""
-    (tmp_path / "own.toml").write_text(changed(SCENE, ("num = 4", "num = 40"), ("periods = 30", "periods = 300")))
+    (tmp_path / "own.toml").write_text(changed(SCENE, ("num = 4", "num = 40"), ("periods = 90", "periods = 300")))
     (tmp_path / "pipeline.toml").write_text(SWEEPS)
     words = [sys.executable, "-c", PROGRAM, "2", "pipeline", "pipeline.toml", "--workers", "1"]
     done = subprocess.run(words, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)

@@ -245,7 +245,7 @@ def test_command_says_which_body(tmp_path, capsys):
 
 def test_the_peak_of_a_sweep_runs_as_in_the_sweep(tmp_path, capsys):
     """Blocks begin in the sliders' motion there, too, and the report says which body ran."""
-    data = scene(1.0, periods=60, transient=20).to_dict()
+    data = scene(1.0, periods=60, transient=0).to_dict()
     lines = [f"[{name}]\n" + _table(data[name]) for name in ("structure", "excitation", "gravity", "time")]
     lines += [f"[[{name}]]\n" + _table(data[name][0]) for name in ("cavity", "damper")]
     lines += [f'[sweep]\n"excitation.frequency" = [{NATURAL}, {1.002 * NATURAL}]\n']

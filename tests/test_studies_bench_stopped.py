@@ -14,6 +14,9 @@ ROOT = Path(__file__).resolve().parent.parent
 FILES = {
     "limits": {f"bench_limits.{ending}" for ending in ("json", "csv")},
     "engine": {"bench_engine.json", "bench_engine.csv", "bench_one_mode.png", "bench_scaling.png"},
+    "start": {f"bench_start.{ending}" for ending in ("json", "csv", "png")},
+    "sweep": {f"bench_sweep.{ending}" for ending in ("json", "csv", "png")},
+    "reduction": {f"bench_reduction.{ending}" for ending in ("json", "csv")},
     "modal": {f"bench_modal.{ending}" for ending in ("json", "csv", "png")},
     "bodies": {
         "bench_bodies_motion.png", *(f"bench_bodies.{ending}" for ending in ("json", "csv", "png")),

@@ -129,7 +129,7 @@ def test_run(folder, capsys):
     assert all(event.keys() == set(fields.split()) for event in result["event_list"])
     assert {event["kind"] for event in result["event_list"]} >= {"impact"}
     with xarray.open_dataset("response.h5", engine="h5netcdf") as data:
-        assert data.sizes["time"] == 30 * 20
+        assert data.sizes["time"] == 90 * 20
         provenance = json.loads(data.attrs["provenance"])
     assert provenance["scene"]["cavity"][0]["gap"] == 2e-4
     assert "numba" in provenance["versions"]

@@ -83,7 +83,7 @@ def rigid(tmp_path_factory):
     """The folder of a small rigid demonstration."""
     folder = tmp_path_factory.mktemp("demo")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(demo, "EFFORT", Effort(points=6, periods=60, transient=30))
+        patch.setattr(demo, "EFFORT", Effort(points=6, periods=430, transient=390))
         assert main(["demo", "--rigid", "--workers", "1", "-o", str(folder)]) == 0
     return folder
 

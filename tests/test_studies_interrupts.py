@@ -17,7 +17,7 @@ from tests.tools.processes import environment
 from vanedamp.studies.interrupts import swallowed_interrupts_again, uninterrupted_children
 
 # hours of work
-LONG = changed(SCENE, ("periods = 30", "periods = 2000"), ("num = 4", "num = 100_000"))
+LONG = changed(SCENE, ("periods = 90", "periods = 2000"), ("num = 4", "num = 100_000"))
 #: the command; it sends the signal to its process group at the n-th event of a kind
 PROGRAM = """
 import os, signal, sys

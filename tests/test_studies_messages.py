@@ -79,8 +79,8 @@ def test_free_decay_has_no_undamped_maximum(folder, capfd):
 @pytest.mark.parametrize(
     ("command", "old", "new", "told"),
     [
-        ("run", "periods = 30", "periods = 1_000_000_000", "time.periods: 1e+09 periods need 300 GB for their"),
-        ("sweep", "periods = 30", "periods = 1_000_000_000", "time.periods: 1e+09 periods need 300 GB"),
+        ("run", "periods = 90", "periods = 1_000_000_000", "time.periods: 1e+09 periods need 300 GB for their"),
+        ("sweep", "periods = 90", "periods = 1_000_000_000", "time.periods: 1e+09 periods need 300 GB"),
         (
             "sweep",
             RANGE,
@@ -96,7 +96,7 @@ def test_free_decay_has_no_undamped_maximum(folder, capfd):
         ),
         (
             "sweep",
-            "periods = 30\ntransient = 10",
+            "periods = 90\ntransient = 80",
             "periods = 20_000_000\n[solver]\nmethod = 'solve_ivp'\nsteps_per_period = 1000",
             "time.periods: 2e+07 periods take about 23",
         ),
@@ -113,7 +113,7 @@ def test_work_of_months_is_refused(command, old, new, told, folder, capfd):
 def test_samples_that_fill_the_memory(folder, capfd):
     (folder / "scene.toml").write_text(SCENE)
     assert main(["run", "scene.toml", "--samples", "100000000"]) == BAD_INPUT
-    assert "--samples: 30 periods need 96 GB for their samples" in capfd.readouterr().err
+    assert "--samples: 90 periods need 288 GB for their samples" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_more_hot_spots_than_places(folder, capfd):
 
 
 def test_a_run_in_blocks_is_the_same(monkeypatch, folder):
-    (folder / "scene.toml").write_text(changed(SCENE, ("periods = 30", "periods = 250")))
+    (folder / "scene.toml").write_text(changed(SCENE, ("periods = 90", "periods = 250")))
     scene = Scene.load("scene.toml")
     found = []
     for block in (7, 1000):

@@ -216,6 +216,27 @@ def test_runs_that_are_not_ok_count_as_undamped(tmp_path):
     assert "3 of 3 points are left out" in record.sentence
 
 
+def test_a_design_with_a_run_that_is_not_ok_never_wins(tmp_path, monkeypatch):
+    """Not by the mean of its other runs either; designs below 1 % of the mass would be the best."""
+
+    def unsettled(self, designs, sample):
+        shape = (len(designs), len(sample), len(self.study.frequencies))
+        masses = np.array([design.mass_ratio for design in designs])
+        damped = np.broadcast_to(masses[:, None, None], shape).copy()
+        damped[masses < 0.01, :, 0] = np.nan
+        return damped, np.ones(shape)
+
+    def mean(data):
+        data["optimise"] |= {"over_band": "mean", "over_tolerances": "mean"}
+
+    monkeypatch.setattr(module._Trial, "_run", unsettled)
+    record = optimise(Study.load(study(tmp_path, mean)))
+    light = record.history_design[:, 0] < 0.01
+    assert light.any() and np.all(record.history_amplitude[light] >= 1.0)
+    for best in (record.nominal, record.robust):
+        assert best.design.mass_ratio >= 0.01 and best.amplitude == pytest.approx(best.design.mass_ratio)
+
+
 def test_figure(found):
     figure = optimisation_figure(found[0])
     assert [trace.type for trace in figure.data] == ["contour", "scatter", "scatter"]
@@ -250,6 +271,12 @@ def test_command(tmp_path, capsys, monkeypatch):
         (lambda data: data.pop("damper"), "damper: missing"),
         (lambda data: data["damper"][0].update(stiffness=1e5), "the search is for sliders"),
         (lambda data: data["structure"].update(damping_ratio=0.0), "an undamped resonance has no amplitude"),
+        (
+            lambda data: data.update(time={"periods": 150, "transient": 100}),
+            "time.transient: 100 periods leave 0.29 of the structure's own transient, so that designs cannot be "
+            "compared; give transient = 37",
+        ),
+        (lambda data: data["structure"].update(damping_ratio=5e-5) or data.pop("time"), "1000 periods leave 0.7"),
         (lambda data: data["optimise"].update(evaluations=2), "optimise.evaluations: should be greater"),
         (lambda data: data["optimise"].update(rpm=[6000.0]), "give one of band (Hz) and, for an engine order, speeds"),
         (

@@ -203,7 +203,7 @@ def test_verdicts():
 def folder(tmp_path_factory):
     """Claims of figures with few frequencies and periods."""
     folder = tmp_path_factory.mktemp("paper")
-    session = Session(STRUCTURE, folder, effort=Effort(points=9, periods=120, transient=60))
+    session = Session(STRUCTURE, folder, effort=Effort(points=9, periods=430, transient=390))
     for name in ("fig9", "fig10", "fig19"):
         study(name, session)
     return folder
@@ -233,8 +233,8 @@ def test_claims_have_their_structure(folder):
 def test_claims_of_blocks_stand_beside_those_of_sliders(tmp_path):
     """With one block and one slider in the place of all others, so that nothing is better than anything."""
     shares = [0.96, 0.98, 0.9875, 1.0, 1.01]
-    block, gaps = (damped("blocks", name, shares, 400, 200) for name in ("single", "gap"))
-    slider = damped("fig9", "", shares, 400, 200)
+    block, gaps = (damped("blocks", name, shares, 600, 390) for name in ("single", "gap"))
+    slider = damped("fig9", "", shares, 600, 390)
     scenes = PaperFigure.load("blocks", STRUCTURE).scenes
     mine = dict.fromkeys(scenes, block) | {"gap": gaps}
     others = {figure: dict.fromkeys(of, slider) for figure, of in claims_blocks.SLIDERS["blocks"].items()}
@@ -250,7 +250,7 @@ def test_claims_of_blocks_stand_beside_those_of_sliders(tmp_path):
 
 
 def test_map_of_fit_and_friction(tmp_path):
-    found = study("fit", Session(STRUCTURE, tmp_path, effort=Effort(points=5, periods=120, transient=60)))
+    found = study("fit", Session(STRUCTURE, tmp_path, effort=Effort(points=5, periods=430, transient=390)))
     assert (tmp_path / "fit.png").stat().st_size > 10_000
     assert Sweep.load(tmp_path / "fit_map.h5").shape == (2, 5, 4, 5)
     least, most = (found.claims[0].figures[name] for name in ("least", "most"))
@@ -266,7 +266,7 @@ def test_points_that_failed_are_named():
 
 
 def test_resumed_session_takes_over_what_is_of_the_same_scene(folder, monkeypatch):
-    effort = Effort(points=9, periods=120, transient=60)
+    effort = Effort(points=9, periods=430, transient=390)
     monkeypatch.setattr(paper, "sweep", None)
     study("fig9", Session(STRUCTURE, folder, effort=effort, resume=True))
     with pytest.raises(TypeError):  # another scene, and so another sweep

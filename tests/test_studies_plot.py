@@ -7,27 +7,18 @@ import plotly.graph_objects as go
 import pytest
 
 import vanedamp as vd
-from tests.tools.input_files import DAMPED_BLOCK
+from tests.tools.input_files import DAMPED_BLOCK, OSCILLATOR, RESONANCE
 from tests.tools.processes import ROOT
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.modal.frf import Frf
 from vanedamp.modal.measurements import write_frf
 from vanedamp.studies.cli import main
 
-RESONANCE = 100.0 / (2 * np.pi)
-DATA = {
-    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
-    "excitation": {"frequency": RESONANCE, "resonance_amplitude": 1e-3},
-    "cavity": [{"name": "c1", "gap": 2e-4}],
-    "damper": [{"cavity": "c1", "mass": 0.05, "friction": 0.1, "restitution": 0.6}],
-    "time": {"periods": 20, "transient": 10},
-}
-
 
 def test_sweep_shows_its_best_curves(tmp_path):
     gaps = np.linspace(1e-4, 1e-3, 10).tolist()
     axes = {"cavity.c1.gap": gaps, "excitation.frequency": [0.99 * RESONANCE, RESONANCE, 1.01 * RESONANCE]}
-    sweep = vd.sweep(validate(vd.Scene, DATA | {"sweep": axes}, "x"))
+    sweep = vd.sweep(validate(vd.Scene, OSCILLATOR | {"sweep": axes}, "x"))
     figure = vd.plot(sweep)
     damped = [trace for trace in figure.data if trace.name == "damped, mean of peaks"]
     assert len(damped) == 8
@@ -39,7 +30,7 @@ def test_sweep_shows_its_best_curves(tmp_path):
 
 
 def test_run_shows_its_history():
-    scene = validate(vd.Scene, DATA, "x")
+    scene = validate(vd.Scene, OSCILLATOR, "x")
     response = vd.simulate(scene, events=True, samples_per_period=20)
     structure = vd.plot(response).data[0]
     np.testing.assert_allclose(structure.y, 1e6 * response.displacement)

@@ -48,6 +48,11 @@ def greatest_speed(structure: Rom) -> float:
     return _loaded(structure.file, file_stamp(structure.file)).greatest_speed
 
 
+def coordinates_in_file(structure: Rom) -> int:
+    """Return the number of coordinates of the model of a file."""
+    return _loaded(structure.file, file_stamp(structure.file)).size
+
+
 @lru_cache(maxsize=8)
 def _restricted(structure: Rom, speed: float, stamp: int) -> Restricted:
     whole = _loaded(structure.file, stamp)

@@ -59,6 +59,13 @@ class _Transient:
         return float(share) if np.isfinite(share) else np.inf
 
 
+def settled_after(scene: Scene, lengths: range) -> int:
+    """Return the first of rising numbers of periods that leaves at most `time.tolerance`; their end where none does."""
+    transient, tolerance = _Transient(scene), scene.time.tolerance
+    place = bisect_left(lengths, True, key=lambda periods: transient.left_over(periods) <= tolerance)
+    return lengths.start + place * lengths.step
+
+
 def timed(scene: Scene) -> Scene:
     """Return the scene with a transient that suits its damping, where it leaves the number of periods open.
 
@@ -67,11 +74,10 @@ def timed(scene: Scene) -> Scene:
     """
     if scene.time.periods is not None or scene.time.transient is not None or isinstance(scene.structure, Prescribed):
         return scene
-    transient, default = _Transient(scene), scene.time
-    lengths = range(default.dropped, LIMIT + 1)
-    if transient.left_over(lengths[0]) <= default.tolerance or transient.left_over(lengths[-1]) > default.tolerance:
+    default = scene.time
+    enough = settled_after(scene, range(default.dropped, LIMIT + 1))
+    if enough in (default.dropped, LIMIT + 1):
         return scene
-    enough = lengths[bisect_left(lengths, True, key=lambda n: transient.left_over(n) <= default.tolerance)]
     periods = enough + default.simulated - default.dropped
     chosen = replace(default, periods=periods, transient=None if default.steady else enough)
     return replace(scene, time=chosen)
@@ -82,28 +88,33 @@ def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray) -> bool:
 
     It was where the structure without bodies leaves less than `time.tolerance`. Otherwise bodies may have ended it,
     which the peaks show. Without impacts the motion is linear but for friction: peaks that spread or, extrapolated with
-    the slowest decay, are off by more than the tolerance belong to a transient. With impacts peaks spread anyway: from
-    500 periods on, the means of both halves must agree within the tolerance or the scatter.
+    the slowest decay, are off by more than the tolerance belong to a transient. With impacts peaks spread anyway, and
+    the means of both halves tell: of 500 periods or more they must agree within the tolerance or the scatter; of fewer
+    the scatter is not known, and their difference must be within the tolerance when it is extrapolated, too.
     """
     transient, tolerance = _Transient(scene), scene.time.tolerance
     if transient.left_over(scene.time.dropped) <= tolerance or not peaks.any():
         return True
-    if impacts.any():
-        return not _drifts(peaks, tolerance)
     if len(peaks) < 2:
         return False
     rate = float(transient.damping.min()) * np.pi / transient.omega
-    remaining = abs(peaks[-1] - peaks[0]) / max(-np.expm1(-rate * (len(peaks) - 1)), tolerance)
-    return bool(max(np.ptp(peaks), remaining) <= tolerance * peaks.mean())
+    if impacts.any():
+        return not _drifts(peaks, rate, tolerance)
+    allowed = tolerance * peaks.mean()
+    return bool(max(np.ptp(peaks), _remaining(peaks[0], peaks[-1], rate * (len(peaks) - 1), tolerance)) <= allowed)
 
 
-def _drifts(peaks: np.ndarray, tolerance: float) -> bool:
-    """Whether the means of both halves differ by more than the tolerance and the second half's scatter."""
+def _remaining(before: float, after: float, decayed: float, least: float) -> float:
+    """Return how far a decay to zero as exp(-decayed) may still go, from the change over it; least: share decayed."""
+    return float(abs(after - before) / max(-np.expm1(-decayed), least))
+
+
+def _drifts(peaks: np.ndarray, rate: float, tolerance: float) -> bool:
+    """Whether the means of both halves of a window with impacts differ by too much; rate: slowest decay, a period."""
     half = len(peaks) // 2
+    before, after, allowed = peaks[:half].mean(), peaks[-half:].mean(), tolerance * peaks.mean()
     size = half // _BATCHES
     if size < _SHORTEST:
-        return False
+        return _remaining(before, after, rate * (len(peaks) - half), tolerance) > allowed
     late = peaks[-size * _BATCHES :].reshape(_BATCHES, size).mean(axis=1)
-    apart = abs(peaks[:half].mean() - peaks[half:].mean())
-    error = np.sqrt(2 / _BATCHES) * late.std(ddof=1)
-    return bool(apart > tolerance * peaks.mean() and apart > _CERTAIN * error)
+    return bool(abs(after - before) > max(allowed, _CERTAIN * np.sqrt(2 / _BATCHES) * late.std(ddof=1)))

@@ -1,7 +1,7 @@
 """Reference of the keys of an input file, made from the JSON Schema of its record: the directive `keys`.
 
 A table of the file is a section, a key a line with an anchor: `damper.normal_load`. The role `toml:key` leads there,
-and the search finds it under the kind of file: `scene.damper.normal_load`.
+and the search finds it under the kind of file: `scene.damper.normal_load`, `case.interface.NAME.direction`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ Schema = dict[str, Any]
 HEADER = ("Key", "Value", "Unit", "Default", "Meaning")
 #: the part of a key's path that the file chooses: [interface.<name>]
 NAME = "<name>"
+#: how the search shows it, which takes < for markup
+FOUND = "NAME"
 #: a default that a description tells in words
 DEFAULT = re.compile(r" \(default: ([^()]+)\)")
 #: types of JSON in words
@@ -273,7 +275,8 @@ class TomlDomain(Domain):
 
     def get_objects(self) -> Iterator[tuple[str, str, str, str, str, int]]:
         for name, docname, anchor, kind in self.data["keys"]:
-            yield name, name, kind, docname, anchor, 0  # important: before names of the same word in Python
+            found = name.replace(NAME, FOUND)
+            yield found, found, kind, docname, anchor, 0  # important: before names of the same word in Python
 
     def resolve_xref(
         self, env: BuildEnvironment, fromdocname: str, builder: Any, typ: str, target: str, node: pending_xref,

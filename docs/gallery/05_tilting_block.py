@@ -17,7 +17,7 @@ scene = vd.Scene(
     excitation={"frequency": 2380.0, "resonance_amplitude": X},
     cavity=[{"name": "c1", "gap": 0.5 * X, "play": 2e-4, "normal_motion": -0.0178, "rotation": -5.25}],
     damper=[{"cavity": "c1", "mass": 3.14e-3, "friction": 0.4, "restitution": 0.7}],
-    time={"periods": 400, "transient": 250},
+    time={"periods": 530, "transient": 380},
     sweep={"excitation.frequency": np.linspace(2330.0, 2430.0, 21)},
 )
 block = scene.replace({"damper.0.shape": "block", "damper.0.length": 6.88e-3, "damper.0.height": 4.8e-3})

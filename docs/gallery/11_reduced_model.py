@@ -67,7 +67,7 @@ for count, model in models.items():
         cavity=[{"name": "c1", "gap": 35e-6, "floor": "c1"}],
         damper=[{"cavity": "c1", "mass": 3.14e-3, "friction": 0.4, "restitution": 0.7}],
         contact={"law": "compliant", "stiffness": 1e8},
-        time={"periods": 500, "transient": 350},
+        time={"periods": 550, "transient": 400},
         sweep={"excitation.frequency": np.linspace(0.965, 1.01, 19) * first},
     )
     result = vd.sweep(scene)

@@ -12,25 +12,26 @@ import plotly.graph_objects as go
 
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.studies.explore.curves import Linear
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
-from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses
+from vanedamp.studies.report.forced_response import ForcedResponse, LinearCurves
 
 _FREE, _FIXED, _MEAN, _MAXIMUM = COLOURS[7], COLOURS[2], COLOURS[0], COLOURS[1]
 _HEIGHT = 480
 
 
-def response_figure(sweep: Sweep, linear: Linear, marks: Mapping[str, Any]) -> dict[str, Any]:
+def response_figure(
+    sweep: Sweep, response: ForcedResponse, linear: LinearCurves, marks: Mapping[str, Any]
+) -> dict[str, Any]:
     """Return the picture of damped and linear amplitudes, relative to the undamped maximum, as plotly's plain data.
 
-    Points of the damped curve carry their frequency (Hz); open markers are points that are not ok. marks: kept as the
-    figure's `meta`. Plain, since plotly's own objects take longer than the runs of a coarse curve.
+    response: the only one of the sweep; marks: kept as the figure's `meta`. Points of the damped curve carry their
+    frequency (Hz); open markers are points that are not ok. Plain, since plotly's own objects take longer than the runs
+    of a coarse curve.
     """
-    (response,) = forced_responses(sweep)
     reference = response.reference
     lines = [
         {
-            "x": linear.frequencies, "y": np.where(np.isfinite(values), values / reference, np.nan), "name": name,
+            "x": linear.x, "y": np.where(np.isfinite(values), values / reference, np.nan), "name": name,
             "mode": "lines", "line": {"color": colour, "dash": dash, "width": 1.8}, "hoverinfo": "skip",
         }
         for values, name, dash, colour in (
@@ -80,9 +81,8 @@ class Figure(NamedTuple):
     value: str
 
 
-def key_figures(sweep: Sweep) -> list[Figure]:
+def key_figures(response: ForcedResponse) -> list[Figure]:
     """Return the key figures of a curve for people, those of the headline that `vanedamp sweep` prints."""
-    (response,) = forced_responses(sweep)
     headline = response.headline
     return [
         Figure("undamped maximum X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at)),
@@ -95,9 +95,8 @@ def key_figures(sweep: Sweep) -> list[Figure]:
     ]
 
 
-def remarks(sweep: Sweep, complete: bool) -> list[str]:
+def remarks(sweep: Sweep, response: ForcedResponse, complete: bool) -> list[str]:
     """Return what keeps the figures of a curve from being taken as they are."""
-    (response,) = forced_responses(sweep)
     found = [*sweep.provenance.get("warnings", ())]
     if complete:
         found += response.headline.remarks

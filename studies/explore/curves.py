@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -25,8 +24,9 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import result_of
 from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points, width_of
 from vanedamp.coupling.system.linear_response import linear_responses
-from vanedamp.coupling.system.transient import left_over
+from vanedamp.coupling.system.transient import left_over, settled_after
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.report.forced_response import linear_between
 
 #: frequencies of a curve, and the step from one to the next of its coarse form
 POINTS, _COARSE = 60, 4
@@ -80,9 +80,8 @@ def seen(scene: Scene, band: Band) -> Scene:
     low, high = _ends(scene, band)
     if not 1 <= band.evaluated <= _MOST_PERIODS:
         raise InputError(f"periods evaluated: expected 1 to {_MOST_PERIODS}, not {band.evaluated:g}")
-    slowest, lengths = scene.replace({FREQUENCY: high}), range(_SHORTEST, _LONGEST, 10)
-    enough = bisect_left(lengths, True, key=lambda n: left_over(slowest, n) <= Time().tolerance)
-    transient = _SHORTEST + 10 * enough
+    slowest = replace(scene.replace({FREQUENCY: high}), time=Time())
+    transient = settled_after(slowest, range(_SHORTEST, _LONGEST, 10))
     return replace(
         scene.replace({"solver.max_events": min(scene.solver.max_events, _EVENTS)}),
         time=Time(periods=transient + band.evaluated, transient=transient),
@@ -131,33 +130,17 @@ def ends_of(scene: Scene) -> tuple[float | None, float | None]:
     return (min(values), max(values)) if min(values) < max(values) else (None, None)
 
 
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """The linear curves, known everywhere: frequencies (f,), Hz; undamped and fixed amplitudes (f,), m."""
-
-    frequencies: np.ndarray
-    undamped: np.ndarray
-    fixed: np.ndarray
-
-
-def linear_curves(scene: Scene) -> Linear:
-    """Return the linear curves of a `seen` scene, with a grid between whose points no maximum hides."""
-    low, high = ends_of(scene)
-    assert low is not None and high is not None
-    free, fixed = linear_responses(scene)
-    frequencies = np.unique(np.concatenate([free.grid(low, high), fixed.grid(low, high)]))
-    return Linear(frequencies, free.amplitude(frequencies), fixed.amplitude(frequencies))
-
-
 class Curve:
     """The forced response of a `seen` scene under way: its points run in workers, coarse ones first.
 
-    done, size: points so far, and of the whole curve; coarse: of its coarse form; note: a warning, of transient_note;
-    asked: when a tab last asked for it, s of time.monotonic. Raises InputError.
+    linear: its linear curves; done, size: points so far, and of the whole curve; coarse: of its coarse form; note: a
+    warning, of transient_note; asked: when a tab last asked for it, s of time.monotonic. Raises InputError.
     """
 
     def __init__(self, scene: Scene, submit: Submit) -> None:
-        self.scene, self.linear, self.note = scene, linear_curves(scene), transient_note(scene)
+        low, high = ends_of(scene)
+        assert low is not None and high is not None
+        self.scene, self.linear, self.note = scene, linear_between(scene, low, high), transient_note(scene)
         self._grid = grid(scene)
         self.size = self._grid.size
         self._table = SweepTable(self.size, width_of(self._grid.base))

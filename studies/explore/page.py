@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import uuid
 from collections.abc import Mapping
@@ -22,6 +23,7 @@ from vanedamp.studies.explore.chart import Figure, key_figures, remarks, respons
 from vanedamp.studies.explore.controls import Control, controls_of, moved, number_in
 from vanedamp.studies.explore.curves import EVALUATED, Band, Curve, Curves, Submit, ends_of, explorable, seen
 from vanedamp.studies.file_kinds import KINDS
+from vanedamp.studies.report.forced_response import forced_responses
 
 #: steps of a slider, and the longest that a request waits for the next form of a curve, s
 _STEPS, _PATIENCE = 200, 0.5
@@ -112,11 +114,7 @@ def layout(exploration: Exploration) -> html.Main:
                 [
                     html.Div(
                         dcc.Graph(
-                            id="curve", figure={"layout": {"height": 480}},
-                            config={
-                                "displaylogo": False, "responsive": True,
-                                "modeBarButtons": [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
-                            },
+                            id="curve", figure={"layout": {"height": 480}}, config=point.GRAPH
                         ),
                         id="frame",
                     ),
@@ -216,17 +214,18 @@ def changes(exploration: Exploration, curves: Curves, request: dict[str, Any]) -
 def _drawn(curve: Curve, version: int) -> tuple[dict[str, Any], html.Div, str]:
     """Return figure, key figures and a line on what there is of a curve so far."""
     sweep = curve.sweep()
+    (response,) = forced_responses(sweep)
     count, complete = len(sweep.status), len(sweep.status) == curve.size
-    notes = [*([curve.note] if curve.note else []), *remarks(sweep, complete)]
+    notes = [*([curve.note] if curve.note else []), *remarks(sweep, response, complete)]
     figures = html.Div(
         [
-            html.Dl([part for figure in key_figures(sweep) for part in _term(figure)]),
+            html.Dl([part for figure in key_figures(response) for part in _term(figure)]),
             html.Ul([html.Li(note) for note in notes], className="remarks"),
         ]
     )
     text = f"{count} frequencies" if complete else f"{count} of {curve.size} frequencies so far"
-    figure = response_figure(sweep, curve.linear, {"version": version, "points": count, "complete": complete})
-    return figure, figures, text
+    marks = {"version": version, "points": count, "complete": complete}
+    return response_figure(sweep, response, curve.linear, marks), figures, text
 
 
 def _term(figure: Figure) -> list[Any]:
@@ -235,15 +234,16 @@ def _term(figure: Figure) -> list[Any]:
 
 def _write(exploration: Exploration, scene: Scene) -> tuple[Any, str]:
     """Return the file for the browser, and what to say; writes the file of the command line, too."""
-    said = "saved by the browser"
+    said, data = "saved by the browser", short_form(scene)
     if exploration.output is not None:
         replaced = ", in place of the file that was there" if exploration.output.exists() else ""
         try:
-            write_commented(exploration.output, relative(short_form(scene), exploration.output), KINDS["scene"])
+            named = relative(copy.deepcopy(data), exploration.output)
+            write_commented(exploration.output, named, KINDS["scene"])
             said = f"{exploration.output} written{replaced}; {said}"
         except (OSError, VanedampError) as error:
             said = f"{exploration.output} cannot be written ({error}); {said}"
-    text = commented(relative(short_form(scene), None), KINDS["scene"].schema, "scene")
+    text = commented(relative(data, None), KINDS["scene"].schema, "scene")
     return {"content": text, "filename": "scene.toml", "type": "application/toml"}, said
 
 

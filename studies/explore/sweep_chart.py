@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,7 @@ def abscissas(sweep: Sweep) -> list[str]:
     return sorted(several, key=lambda path: (path != swept, is_start(path))) or list(sweep.axes)[:1]
 
 
+@lru_cache(maxsize=32)  # every move of a slider asks for it
 def best_design(sweep: Sweep) -> Best | None:
     """Return the best design of a sweep; None if every design has points that are not ok."""
     swept = resonance_axis(sweep.scene, sweep.axes)[0]
@@ -118,9 +120,9 @@ def chosen_curve(sweep: Sweep, along: str, places: Mapping[str, int]) -> ForcedR
     return response_along(sweep, _point(sweep, along, places), along, ", ".join(values) or "damped", settings)
 
 
-def curve_figure(sweep: Sweep, along: str, places: Mapping[str, int]) -> go.Figure:
-    """Draw the curve along an axis of a sweep at places on the others, with its linear curves, before all others."""
-    response = chosen_curve(sweep, along, places)
+def curve_figure(sweep: Sweep, response: ForcedResponse, places: Mapping[str, int]) -> go.Figure:
+    """Draw the curve of a sweep at places on its other axes (`chosen_curve`), with its linear curves, before others."""
+    along = response.axis
     factor, unit = for_people(response.units)
     text = response.x.dtype.kind not in "if"
     x = response.x if text else factor * response.x

@@ -122,7 +122,7 @@ def register(app: Dash, sweeps: Mapping[str, Sweep], submit: Submit) -> None:
             scene: tuple[Any, Any] = scene_of_curve(sweep, along, places)
         except VanedampError:  # of a point that is no scene, whose status says so
             scene = (None, None)
-        return curve_figure(sweep, along, places), " ".join([said, *_remarks(sweep)]), *scene, title, labels
+        return curve_figure(sweep, curve, places), " ".join([said, *_remarks(sweep)]), *scene, title, labels
 
     @app.callback(
         Output({"type": "sweep-axis", "path": ALL}, "value"),

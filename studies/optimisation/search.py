@@ -184,10 +184,12 @@ class _Trial:
 
     def _judge(self, designs: Sequence[Design], sample: Sequence[_Deviation]) -> np.ndarray:
         table, (damped, undamped) = self.study.table, self._run(designs, sample)
-        # a run that is not ok has damped nothing
-        damped = np.where(np.isnan(damped), np.fmax(undamped, 1.0), damped)
+        # a design with a run that is not ok has damped nothing
+        bad = np.isnan(damped)
+        damped = np.where(bad, np.fmax(undamped, 1.0), damped)
         band = damped.max(axis=2) if table.over_band == "worst" else damped.mean(axis=2)
-        return np.asarray(band.max(axis=1) if table.over_tolerances == "worst" else band.mean(axis=1))
+        amplitudes = band.max(axis=1) if table.over_tolerances == "worst" else band.mean(axis=1)
+        return np.where(bad.any(axis=(1, 2)), np.fmax(amplitudes, 1.0), amplitudes)
 
     def _run(self, designs: Sequence[Design], sample: Sequence[_Deviation]) -> tuple[np.ndarray, np.ndarray]:
         """Return the amplitudes (d, s, f) over the reference at the same level, with the bodies and without.

@@ -22,10 +22,13 @@ from vanedamp.coupling.sweep.sweep import tops
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_peaks
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
+from vanedamp.coupling.system.transient import left_over, settled_after, timed
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import STRICT, InputError, NonNegative, Positive, Real, Whole, read_toml
 
 _MOST_FREQUENCIES = 10_000
+#: longest transient that is proposed, in periods
+_MOST_PERIODS = 10_000_000
 #: what the points of a band are, and their unit
 _UNITS = {"band": ("frequencies", "Hz"), "speeds": ("speeds", "rad/s"), "rpm": ("speeds", "rpm")}
 
@@ -238,6 +241,7 @@ class Study(NamedTuple):
                 scene = replace(scene, excitation=replace(scene.excitation, resonance_near=near))
             scene = _at(scene, float(band[0]))
             _check(scene)
+            _check_settled(scene, band)
             force, resonance = excitation_force(scene), chosen_resonance(scene)
             if worst:
                 reference = linear_peaks(scene, *_ends(scene, band))[0].amplitude
@@ -296,11 +300,9 @@ class Study(NamedTuple):
             f"damper.{index}.position": gap * ((cavities[:index].count(name) + 1) / (cavities.count(name) + 1) - 0.5)
             for index, name in enumerate(cavities)
         }
-        order = scene.excitation.engine_order
-        drive = {"excitation.frequency": frequency} if order is None else {"rotation.speed": speed_of(order, frequency)}
         return (
             places
-            | drive
+            | _drive(scene, frequency)
             | {
                 f"excitation.{key}": level * (1 + deviation["excitation"]),
                 "cavity.gap": gap,
@@ -318,10 +320,33 @@ def _at(scene: Scene, frequency: float) -> Scene:
     return scene if order is None else replace(scene, rotation=Rotation(speed=speed_of(order, frequency)))
 
 
+def _drive(scene: Scene, frequency: float) -> dict[str, Any]:
+    """Return what changes in a scene, at some speed with an engine order, for another frequency, Hz."""
+    order = scene.excitation.engine_order
+    return {"excitation.frequency": frequency} if order is None else {"rotation.speed": speed_of(order, frequency)}
+
+
 def _ends(scene: Scene, band: np.ndarray) -> tuple[float, float]:
     """Return the ends of a band of frequencies (f,), Hz, as `linear_peaks` takes them."""
     low, high, order = float(band[0]), float(band[-1]), scene.excitation.engine_order
     return (low, high) if order is None else (speed_of(order, low), speed_of(order, high))
+
+
+def _check_settled(scene: Scene, band: np.ndarray) -> None:
+    """Raise InputError where runs would be evaluated before the structure's own transient has ended.
+
+    Bodies may end it sooner, but those that do are not the best ones for that.
+    """
+    ends = [timed(scene.replace(_drive(scene, float(frequency)))) for frequency in (band[0], band[-1])]
+    if scene.time.steady == "auto" or not scene.time.dropped:
+        return
+    left, dropped = max((left_over(end, end.time.dropped), end.time.dropped) for end in ends)
+    if left > scene.time.tolerance:
+        enough = max(settled_after(end, range(dropped, _MOST_PERIODS)) for end in ends)
+        raise InputError(
+            f"time.transient: {dropped} periods leave {min(left, 1.0):.2g} of the structure's own transient, so that "
+            f'designs cannot be compared; give transient = {enough} and more periods in all, or steady = "auto"'
+        )
 
 
 def _check(scene: Scene) -> None:

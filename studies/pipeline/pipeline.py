@@ -84,6 +84,7 @@ def pipeline(
     say = note or (lambda line: None)
     _check(listed, [source, *table.named_files.values()], source, check_scene or (lambda scene, peak: None))
     record = Record(target / f"{source.stem}.record.json")
+    _keep_edited(listed, record)
     if dry_run:
         return PipelineResult(tuple(_plan(listed, record, say)), time.perf_counter() - started)
     target.mkdir(parents=True, exist_ok=True)
@@ -163,6 +164,16 @@ def _check(
     for path, name in made.items():
         if path in inputs - taken:
             raise InputError(f"{source}: {name} writes {path.name}, which is an input; give another folder or name")
+
+
+def _keep_edited(listed: Sequence[Stage], record: Record) -> None:
+    """Refuse to write in place of a case or a scene that somebody has edited; other results are made again."""
+    for stage in listed:
+        for path in record.edited(stage.name, [path for path in stage.outputs if path.suffix == ".toml"]):
+            raise InputError(
+                f"{_shown(path)}: is not as {stage.name} wrote it, which would write it again; rename it to keep the "
+                "changes, or delete it"
+            )
 
 
 @contextmanager

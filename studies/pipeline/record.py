@@ -49,6 +49,11 @@ class Record:
             return ["not done so far"]
         return list(changes(done["inputs"], plain(inputs))) + list(_lost(done["outputs"], outputs))
 
+    def edited(self, name: str, outputs: Sequence[Path]) -> list[Path]:
+        """Return the outputs of a stage that are not as it made them, of those that it has made."""
+        made = self._done.get(name, {"outputs": {}})["outputs"]
+        return [path for path in outputs if made.get(path.name) and path.exists() and digest(path) != made[path.name]]
+
     def begin(self, name: str, inputs: Inputs) -> bool:
         """Note that a stage begins. Returns whether what an earlier start left is of the same inputs, or unknown."""
         mine = plain(inputs)

@@ -22,6 +22,8 @@ from vanedamp.studies.headline import Headline, format_value, headline, referenc
 
 #: share by which a linear amplitude that is computed again may differ from the one that the sweep has kept
 _SAME = 1e-6
+#: no further frequencies
+_NOWHERE = np.zeros(0)
 #: points of linear curves along an engine order, each of which needs the modes at its speed
 _ALONG_ORDER = 201
 
@@ -175,18 +177,28 @@ def linear_curves(sweep: Sweep, response: ForcedResponse) -> LinearCurves:
     low, high = response.hertz * float(response.x[0]), response.hertz * float(response.x[-1])
     try:
         scene = base_scene(sweep.scene).replace({**response.settings, response.axis: response.x[0]})
-        if scene.excitation.engine_order is None:
-            between = np.concatenate([each.grid(low, high) for each in linear_responses(scene)])
-        else:
-            between = np.linspace(low, high, _ALONG_ORDER)
-        frequencies, places = np.unique(np.concatenate([response.hertz * response.x, between]), return_inverse=True)
-        undamped, fixed = linear_amplitudes(scene, frequencies)
+        curves = linear_between(scene, low, high, response.hertz * response.x)
     except (VanedampError, OSError):
         return kept
-    at = places[: len(response.x)]
-    if not np.allclose([undamped[at], fixed[at]], [kept.undamped, kept.fixed], rtol=_SAME, atol=0.0):
+    at = np.searchsorted(curves.x, response.hertz * response.x)
+    if not np.allclose([curves.undamped[at], curves.fixed[at]], [kept.undamped, kept.fixed], rtol=_SAME, atol=0.0):
         return kept
-    return LinearCurves(frozen(frequencies / response.hertz), frozen(undamped), frozen(fixed))
+    return curves._replace(x=frozen(curves.x / response.hertz))
+
+
+def linear_between(scene: Scene, low: float, high: float, further: np.ndarray = _NOWHERE) -> LinearCurves:
+    """Return the linear curves from a frequency to another, Hz, so fine that they hide no peak, and at further ones.
+
+    Along an engine order that is not sure. Raises InputError as coupling.system.linear_response.linear_responses.
+    """
+    if scene.excitation.engine_order is None:
+        both = linear_responses(scene)
+        frequencies = np.unique(np.concatenate([further, *(each.grid(low, high) for each in both)]))
+        amplitudes = [each.amplitude(frequencies) for each in both]
+    else:
+        frequencies = np.unique(np.concatenate([further, np.linspace(low, high, _ALONG_ORDER)]))
+        amplitudes = list(linear_amplitudes(scene, frequencies))
+    return LinearCurves(*map(frozen, (frequencies, *amplitudes)))
 
 
 def peaks_of(sweep: Sweep, point: tuple[Any, ...]) -> dict[str, Any]:

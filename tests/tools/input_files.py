@@ -1,5 +1,7 @@
 """Texts of cases and of a scene that many tests vary."""
 
+import math
+
 from vanedamp.meshes.vane_cluster import SHIPPED
 
 #: a clamped block of two by one by six elements
@@ -84,11 +86,22 @@ mass = 0.05
 friction = 0.3
 restitution = 0.6
 [time]
-periods = 30
-transient = 10
+periods = 90
+transient = 80
 [sweep]
 "excitation.frequency" = {start = 15.4, stop = 16.2, num = 4}
 """
+
+
+#: an oscillator like it as tables, in resonance, in a short run from its start; its natural frequency, Hz
+RESONANCE = 100.0 / (2 * math.pi)
+OSCILLATOR = {
+    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
+    "excitation": {"frequency": RESONANCE, "resonance_amplitude": 1e-3},
+    "cavity": [{"name": "c1", "gap": 2e-4}],
+    "damper": [{"cavity": "c1", "mass": 0.05, "friction": 0.1, "restitution": 0.6}],
+    "time": {"periods": 20, "transient": 0},
+}
 
 
 def rom_scene(file: str, at: str = "tip") -> str:

@@ -7,14 +7,12 @@ import time
 
 import tomli_w
 
+from tests.tools.input_files import OSCILLATOR, RESONANCE
 from tests.tools.processes import environment
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate
 
-RESONANCE = 15.915494309189533
-DATA = {
-    "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
-    "excitation": {"frequency": RESONANCE, "resonance_amplitude": 1e-3},
+DATA = OSCILLATOR | {
     "cavity": [{"name": "c1", "gap": 5e-4}],
     "damper": [{"cavity": "c1", "mass": 0.05, "friction": 0.3, "restitution": 0.6}],
     "time": {"periods": 90, "transient": 80},

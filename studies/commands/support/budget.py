@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.reduced_model_file import coordinates_in_file
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.terminal import duration
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def _modes(scene: Scene) -> int:
     if not isinstance(scene.structure, Rom):
         return 0
     modes = scene.structure.modes
-    return modes if isinstance(modes, int) else ReducedModel.load(scene.structure.file).size
+    return modes if isinstance(modes, int) else coordinates_in_file(scene.structure)
 
 
 def designs_of(study: Study) -> int:

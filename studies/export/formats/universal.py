@@ -15,7 +15,19 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files.toml_input import InputError
-from vanedamp.modal.measurements import mode_dataset, write_universal
+from vanedamp.modal.measurements import (
+    DISPLACEMENT,
+    FORCE,
+    FREQUENCY,
+    FRF,
+    GENERAL,
+    HISTORY,
+    TIME,
+    UNKNOWN,
+    curve_dataset,
+    mode_dataset,
+    write_universal,
+)
 from vanedamp.studies.export.formats.vtkhdf import shapes_of
 from vanedamp.studies.export.options import Option
 from vanedamp.studies.export.record import Record
@@ -27,9 +39,6 @@ OPTIONS = (
         "frequencies", "of a .uff of a reduced model: the receptances' frequencies, Hz", ("START", "STOP", "NUM"), float
     ),
 )
-# specific data types and function types of the datasets
-_UNKNOWN, _DISPLACEMENT, _FORCE, _TIME, _FREQUENCY = 0, 8, 13, 17, 18
-_GENERAL, _HISTORY, _FRF = 0, 1, 4
 #: corners and descriptor of solids in dataset 2412 by the number of nodes of a cell
 _SOLIDS = {4: (4, 111), 10: (4, 111), 8: (8, 115), 20: (8, 115), 27: (8, 115), 6: (6, 112), 15: (6, 112), 18: (6, 112)}
 _CURVES = {
@@ -84,7 +93,7 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
     pairs = itertools.product(enumerate(model.interface), repeat=2)
     curves = (
         _curve(
-            f"receptance {response} / {force}", x, receptance[:, i, j], _FRF, _FREQUENCY, _DISPLACEMENT, _FORCE,
+            f"receptance {response} / {force}", x, receptance[:, i, j], FRF, FREQUENCY, FORCE,
             rsp_node=i + 1, rsp_dir=directions[i], ref_node=j + 1, ref_dir=directions[j],
             rsp_ent_name=_short(response), ref_ent_name=_short(force),
         )
@@ -125,7 +134,7 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
                 curve = curves[name][place]
                 known = np.isfinite(curve)
                 if np.count_nonzero(known) > 1:
-                    yield _curve(words, x[known], curve[known], _GENERAL, _FREQUENCY, **names)
+                    yield _curve(words, x[known], curve[known], GENERAL, FREQUENCY, **names)
 
     write_universal(sets(), path)
     lost = sum(int(np.count_nonzero(~np.isfinite(curve))) for curve in curves.values())
@@ -141,9 +150,9 @@ def response(record: Record, path: Path) -> tuple[str, ...]:
     if "time" not in record.variables or len(record.values("time")) < 2:
         raise InputError(f"{record.file}: holds no samples; run the scene by `vanedamp run --samples N`")
     time, bodies = record.values("time"), record.values("body_displacement")
-    sets = [*_headers(record), _curve("displacement", time, record.values("displacement"), _HISTORY, _TIME)]
+    sets = [*_headers(record), _curve("displacement", time, record.values("displacement"), HISTORY, TIME)]
     for body, moved in enumerate(bodies.T, start=1):
-        sets.append(_curve(f"body {body} in its cavity", time, moved, _HISTORY, _TIME, rsp_node=1 + body))
+        sets.append(_curve(f"body {body} in its cavity", time, moved, HISTORY, TIME, rsp_node=1 + body))
     write_universal(sets, path)
     return _troubles([record.attributes["status"]], "runs")
 
@@ -186,23 +195,13 @@ def _elements(corners: np.ndarray, descriptor: int) -> Iterator[dict[str, Any]]:
 
 
 def _curve(
-    title: str, x: np.ndarray, values: np.ndarray, function: int, abscissa: int, ordinate: int = _DISPLACEMENT,
-    per: int = _UNKNOWN, **more: Any,
-) -> dict[str, Any]:  # fmt: skip
-    """Return dataset 58 of a curve: even, where the spacing is even in the digits that the file has."""
+    title: str, x: np.ndarray, values: np.ndarray, function: int, abscissa: int, per: int = UNKNOWN, **more: Any
+) -> dict[str, Any]:
+    """Return dataset 58 of displacements: even, where the spacing is even in the digits that the file has."""
     step = _rounded(float(x[1] - x[0]))
     even = np.abs(_rounded(float(x[0])) + step * np.arange(len(x)) - x).max() <= 1e-5 * np.abs(x).max()
-    units = {_TIME: ("time", "s"), _FREQUENCY: ("frequency", "Hz")}[abscissa]
-    data: dict[str, Any] = {
-        "type": 58, "binary": 0, "func_type": function, "id1": _ascii(title)[:80], "rsp_node": 1, "rsp_dir": 0,
-        "ref_node": 0, "ref_dir": 0, "data": values, "x": x, "abscissa_spacing": int(even),
-        "abscissa_spec_data_type": abscissa, "abscissa_axis_lab": units[0], "abscissa_axis_units_lab": units[1],
-        "ordinate_spec_data_type": ordinate, "ordinate_axis_lab": "displacement", "ordinate_axis_units_lab": "m",
-        "orddenom_spec_data_type": per, "orddenom_axis_lab": "force" if per else "NONE",
-        "orddenom_axis_units_lab": "N" if per else "NONE", "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
-        "ver_num": 0, "load_case_id": 0, "z_axis_value": 0.0,
-    }  # fmt: skip
-    return data | more
+    spacing = {"abscissa_spacing": int(even)}
+    return curve_dataset(_ascii(title), x, values, function, abscissa, DISPLACEMENT, per, **spacing, **more)
 
 
 def _range(given: Sequence[float] | None, top: float) -> tuple[float, float, int]:
