@@ -347,7 +347,7 @@ def _select_awake_modes(flows, st):
 
 @inlined
 def _wake_modes(flows, st):
-    """Wake the modes that an impulse has set in motion. None goes to sleep before the period's end: it is in the spell."""
+    """Wake the modes that an impulse has set in motion. None goes to sleep before its spell has ended."""
     s, largest, fastest = st.counters[FLOW], 0.0, 0.0
     for j in range(flows.modes[s]):
         c = st.amplitude[j]

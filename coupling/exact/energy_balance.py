@@ -94,13 +94,13 @@ def _quadratic_form(form, change, total, count, coupled):
 def account_impact(system, flows, st, rec, r, impulse):
     """Take the jump of all forms at an impulse on row r (N s) out of the spell, before the amplitudes jump."""
     s, period, e = st.counters[FLOW], st.counters[PERIOD], len(system.frequency)
-    kick, maps, phase = flows.kick[s, r], flows.kick_maps[s, r], st.amplitude[0]
+    kick, maps, back = flows.kick[s, r], flows.kick_maps[s, r], st.amplitude[0].conjugate()
     loss, square, contact = _kicks(kick, st.amplitude, flows.impulse_response[s, r], impulse, flows.modes[s])
     st.ledger[VISCOUS] -= impulse * loss
     st.ledger[CONTACT] -= impulse * contact
     rec.square[period] -= impulse * (square + st.offset[0] * maps[MEAN_MAP // 2])
-    rec.harmonic[period] -= impulse * (phase.conjugate() * complex(maps[HARMONIC_MAP // 2], maps[HARMONIC_MAP // 2 + 1]))
-    rec.momentum[period] -= impulse * (phase.conjugate() * complex(maps[MOMENTUM_MAP // 2], maps[MOMENTUM_MAP // 2 + 1]))
+    rec.harmonic[period] -= impulse * (back * complex(maps[HARMONIC_MAP // 2], maps[HARMONIC_MAP // 2 + 1]))
+    rec.momentum[period] -= impulse * (back * complex(maps[MOMENTUM_MAP // 2], maps[MOMENTUM_MAP // 2 + 1]))
     for h in range(e):
         phase = st.amplitude[h]
         work = phase.real * maps[WORK_MAP // 2 + 2 * h] + phase.imag * maps[WORK_MAP // 2 + 2 * h + 1]

@@ -199,7 +199,7 @@ def _surely_opens(system, st, r):
 
 @inlined
 def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, both, k):
-    """Add the gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign; both: and the gap behind it."""
+    """Add the gap (POSITION) or the speed of a slip (VELOCITY) of row r, times its sign; both: and the next gap."""
     if order == POSITION:
         value, slope, watched.k2[k] = sign * st.displacement[r], sign * st.velocity[r], sign * st.free_acceleration[r]
     else:

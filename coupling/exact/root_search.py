@@ -1,11 +1,12 @@
 """Guaranteed search for the first root of an event function.
 
 Event functions are  k0 + k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t)  with Re lambda_j <= 0, and positive until the
-event. Two that differ by the sign of their motion, as the gaps on both sides of a body, share its expansion. With the exponentials at a point come all derivatives there, and bounds of the derivatives at all later times:
-the sums of |g_j exp(lambda_j t)| |lambda_j|^p. The function stays above its Taylor polynomial less the bound of its
-remainder: a step that ends before the first root of this lower polynomial provably holds no root. Steps are as long as
-a few radians of the fastest motion, and where the remainder is round-off the polynomial's root is the function's. No
-event can be missed, and none is found twice. A double root is approached at a geometric rate.
+event. Two that differ by the sign of their motion, as the gaps on both sides of a body, share its expansion. With the
+exponentials at a point come all derivatives there, and bounds of the derivatives at all later times: the sums of
+|g_j exp(lambda_j t)| |lambda_j|^p. The function stays above its Taylor polynomial less the bound of its remainder: a
+step that ends before the first root of this lower polynomial provably holds no root. Steps are as long as a few radians
+of the fastest motion, and where the remainder is round-off the polynomial's root is the function's. No event can be
+missed, and none is found twice. A double root is approached at a geometric rate.
 
 Modes that the excitation drives at their own frequency add terms in D(t) (exact.subsystem_assembly), bounded over two
 periods.
@@ -153,9 +154,7 @@ def expand(order, k1, k2, g, eigenvalue, count, t, taylor):
     whole, slow = taylor[0], taylor[1]
     if order == POSITION:
         c2, second = c2 + k2, second + abs(k2)
-    _set(
-        whole, value, slope, c2 + f2, c3 + f3, c4 + f4, c5 + f5, c6 + f6, c7 + f7, c8 + f8, c9 + f9, last + fast_last
-    )
+    _set(whole, value, slope, c2 + f2, c3 + f3, c4 + f4, c5 + f5, c6 + f6, c7 + f7, c8 + f8, c9 + f9, last + fast_last)
     if fast_second == 0.0:
         return ROUND_OFF * noise, second, -1.0, 0.0
     _set(slow, value - fast_value, slope - fast_slope, c2, c3, c4, c5, c6, c7, c8, c9, last)

@@ -24,7 +24,7 @@ class State(NamedTuple):
     # changes in every segment
     counters: np.ndarray  # (COUNTERS,) int
     time: np.ndarray  # (1,) within the period, s
-    amplitude: np.ndarray  # (m,) complex modal amplitudes; the first e are the phases of the excitation's harmonics, the
+    amplitude: np.ndarray  # (m,) complex modal amplitudes, the first e the phases of the excitation's harmonics; the
     # first counters[AWAKE] are awake, the others zero
     change: np.ndarray  # (2m,) real and imaginary parts of their changes since the spell began (exact.energy_balance)
     displacement: np.ndarray  # (r,) of each row, m; of a friction row's spring: its elongation

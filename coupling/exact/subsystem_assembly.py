@@ -510,7 +510,7 @@ def _real_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _real_form(both: np.ndarray, mixed: np.ndarray) -> np.ndarray:
-    """Return the matrix (2m, 2m) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts in turns."""
+    """Return the matrix (2m, 2m) of Re(c_j (both_jk c_k + mixed_jk conj(c_k)))/2 by real and imaginary parts."""
     m = len(both)
     form = 0.5 * _real_map(both, mixed) * [1, 1, -1, -1]
     return form.reshape(m, m, 2, 2).swapaxes(1, 2).reshape(2 * m, 2 * m)

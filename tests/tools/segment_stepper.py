@@ -201,7 +201,7 @@ class Stepper:
         """The segment that begins now."""
         run, state = self.run, self.run.state
         s, awake = state.counters[FLOW], np.arange(state.counters[AWAKE])
-        flows, n = run.flows, len(state.constant)
+        flows = run.flows
         return Segment(
             system=run.system, begun=float(state.counters[PERIOD] * run.system.period + state.time[0]),
             state=state.state.copy(), displacement=state.displacement.copy(), velocity=state.velocity.copy(),
