@@ -129,7 +129,8 @@ class Walk:
                 u = self._agreed(u)
                 continue
             watched = run.event_functions
-            row, order, meaning = (int(part[event]) for part in (watched.row, watched.order, watched.meaning))
+            at = event, watched.side[event]
+            row, order, meaning = int(watched.row[at]), int(watched.order[event]), int(watched.meaning[at])
             before = Before(row, order, meaning, state, flow, u, float(st.time[0]), self._size)
             u, M = self._across(before, M, float(st.ledger[IMPACT_LOSS]) - loss)
         S, then = self._last
