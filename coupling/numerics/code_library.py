@@ -95,10 +95,14 @@ class _Entry(JITCodeLibrary):
         return [name for name in names if name.startswith(_ENVIRONMENT) and lookup_environment(name) is not None]
 
     def _optimize_final_module(self) -> None:
-        """Optimise the code, in which nobody else calls the functions below: so that unused arguments go."""
-        for function in self._final_module.functions:
+        """Optimise the code, in which nobody else calls the functions below: so that unused arguments go.
+
+        Names of their own keep code that is loaded later, with all its arguments, from being taken for this one.
+        """
+        for place, function in enumerate(self._final_module.functions):
             if not function.is_declaration and function.name not in self._own:
                 function.linkage = llvm.Linkage.internal
+                function.name = f"{self.name}.{place}"
         super()._optimize_final_module()
 
 

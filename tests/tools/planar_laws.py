@@ -308,8 +308,8 @@ class Stepper:
     def _advance(self, periods: int, events: int, run: Run) -> np.ndarray:
         while True:
             self.code = advance(
-                run.system, run.flows, run.state, run.guards, run.records, run.log, run.scratch, run.all_modes,
-                periods, events,
+                run.system, run.flows, run.state, run.guards, run.records, run.log, run.scratch, periods,
+                events,
             )  # fmt: skip
             if self.code != NEEDS_FLOW:
                 return self._take()
