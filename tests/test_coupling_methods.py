@@ -28,8 +28,9 @@ from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.toml_input import InputError, Positive, validate
-from vanedamp.studies.bench.methods import figures, measure
+from vanedamp.studies.bench.methods import charts, figures
 from vanedamp.studies.bench.methods.scenes import charted
+from vanedamp.studies.bench.rows import Rows
 from vanedamp.studies.commands.support.budget import check_run
 
 # -- the method
@@ -297,8 +298,9 @@ def test_what_it_cannot_do_is_refused():
 
 def test_appears_in_the_chart(tmp_path, monkeypatch):
     """Measured like ours, and drawn: in the legend with its own marks, beside all that did not fail."""
-    effort = measure.Effort(1, (100, 200), (1e-4,), 1, 60, 200, 2, 1e5, 200, None, ())
-    chart = measure._chart(scene(), True, effort, np.random.default_rng(1))
+    effort = charts.Effort(1, (100, 200), (1e-4,), 1, 60, 200, 2, 1e5, 200, None, ())
+    measured = charts.Chart("one body", scene, True, effort)
+    chart = measured.measure(Rows(tmp_path, "work-precision", {}, measured.rows()), 0)
     ours = {(point["method"], point["setting"]): point for point in chart["points"]}
     assert ours["leapfrog", 200]["status"] == "ok" and ours["leapfrog, hard walls", 100]["time"]["median"] > 0
     assert ours["leapfrog", 200]["error"] < 0.5 * ours["leapfrog", 100]["error"]

@@ -148,7 +148,11 @@ def brute_force(system, q, v, span):
         load = load - system.stiffness @ q - system.damping @ v
         load = load + normal.T @ pushes - slip.T @ (way * system.friction * pushes)
         held = [r for r in range(u) if state[r] == "stick"]
-        friction = -np.linalg.solve((slip[held] / system.mass) @ slip[held].T, slip[held] @ (load / system.mass))
+        # the least of all shares: those of two corners of one block are open
+        shares, *_ = np.linalg.lstsq(
+            (slip[held] / system.mass) @ slip[held].T, slip[held] @ (load / system.mass), rcond=None
+        )
+        friction = -shares
         return (load + slip[held].T @ friction) / system.mass, would, dict(zip(held, friction, strict=True))
 
     def functions():

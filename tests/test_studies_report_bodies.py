@@ -311,7 +311,7 @@ transient = {DROPPED}
 
 
 def test_sweep_runs_its_peak_for_the_report(tmp_path):
-    (tmp_path / "scene.toml").write_text(SCENE + SWEEP)
+    (tmp_path / "scene.toml").write_text(SCENE.replace(f"transient = {DROPPED}", "transient = 0") + SWEEP)
     options = ["-o", str(tmp_path / "sweep.h5"), "--peak", str(tmp_path / "peak.h5"), "--workers", "1"]
     assert main(["sweep", str(tmp_path / "scene.toml"), *options]) == 0
     sweep = Sweep.load(tmp_path / "sweep.h5")

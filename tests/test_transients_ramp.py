@@ -581,9 +581,7 @@ def test_command_and_report(tmp_path, capsys):
     text = text.replace("rate = [50.0, 200.0, 1000.0, 5000.0]", "rate = [2000.0, 5000.0]").replace(
         "num = 81", "num = 3"
     )
-    (tmp_path / "ramp.toml").write_text(
-        text.replace("periods = 2500\ntransient = 2000", "periods = 60\ntransient = 20")
-    )
+    (tmp_path / "ramp.toml").write_text(text.replace("periods = 2500\ntransient = 2000", "periods = 60\ntransient = 0"))
     arguments = [str(tmp_path / "ramp.toml"), "-o", str(tmp_path / "ramp.h5")]
     assert main(["ramp", *arguments, "--json", str(tmp_path / "ramp.json")]) == 0
     printed = capsys.readouterr().out.splitlines()
