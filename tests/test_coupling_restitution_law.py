@@ -281,7 +281,7 @@ class Other(ContactLaw):
 
 response = simulate(dropped({{"law": "other"}}, 1.0), events=True)
 first = impacts(response)[0]
-print(first.relative_velocity_after / -first.relative_velocity_before, len(advance.stats.cache_misses))
+print(first.relative_velocity_after / -first.relative_velocity_before, len(advance._compiled.stats.cache_misses))
 """
 
 

@@ -108,15 +108,16 @@ def register(app: Dash, sweeps: Mapping[str, Sweep], submit: Submit) -> None:
         State("sweep-file", "value"),
     )
     def draw(values: list[Any], along: Any, ids: list[Any], name: Any) -> tuple[Any, ...]:
-        unchanged = [no_update] * len(ctx.outputs_list[5])
+        labelled = [output["id"]["path"] for output in ctx.outputs_list[5]]
         sweep = sweeps.get(name)
         places = {} if sweep is None else places_of(sweep, values, ids)
-        if sweep is None or set(places) != set(sweep.axes) - {along}:  # controls of another file are on their way
-            return *[no_update] * 5, unchanged
+        others = set() if sweep is None else set(sweep.axes) - {along}
+        if sweep is None or set(places) != others or not others.issuperset(labelled):
+            return *[no_update] * 5, [no_update] * len(labelled)  # controls of another file are on their way
         shown = {path: _value(sweep, path, place) for path, place in places.items()}
         curve = chosen_curve(sweep, along, places)
         said = f"{curve.sentence}. {status_sentence(sweep, along, places)}"
-        labels = [shown[output["id"]["path"]] for output in ctx.outputs_list[5]]
+        labels = [shown[path] for path in labelled]
         title = f"at {axis_title(along, sweep.units()[along])}"
         try:
             scene: tuple[Any, Any] = scene_of_curve(sweep, along, places)
