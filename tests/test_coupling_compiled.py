@@ -1,11 +1,15 @@
 """Compiled functions are compiled anew when the code that they hold has changed, and only then."""
 
+import os
 import pickle
+import subprocess
+import sys
 
 import pytest
 
 from vanedamp.coupling.numerics import jit
 from vanedamp.coupling.numerics.jit import _sources
+from vanedamp.studies.workers import _ROOT
 
 
 @pytest.fixture
@@ -57,3 +61,41 @@ def test_a_cache_of_another_version_is_no_cache(tmp_path):
     with pytest.raises(AttributeError):
         load()
     assert jit._forgiving(load)() == {}
+
+
+_LIBRARIES = """
+import numpy as np
+from numba import njit
+from vanedamp.coupling.exact.event_functions import step_or_stop
+from vanedamp.coupling.exact.root_search import expand
+from vanedamp.coupling.numerics.codes import POSITION
+from vanedamp.coupling.numerics.jit import entry, kernel
+
+
+@kernel
+def step(k0, g, eigenvalue, end, taylor):
+    noise, second, calm, fast = expand(POSITION, 0.1, 0.0, g, eigenvalue, len(g), 0.0, taylor)
+    return step_or_stop(taylor, 1.0, k0, noise, second, calm, fast, end, 1e-15 * end)[0]
+
+
+def twice(g, eigenvalue, taylor):
+    return step(1.0, g, eigenvalue, 6.0, taylor) + step(2.0, g, eigenvalue, 0.1, taylor)
+
+
+arguments = np.ones(3) + 0j, 1j * np.arange(1, 4.0), np.zeros((2, 11))
+print(entry(twice)(*arguments), njit(twice)(*arguments), njit(lambda a, b, c: step(1.0, a, b, 6.0, c))(*arguments))
+"""
+
+
+def test_kernels_serve_entries_and_functions_of_others(tmp_path):
+    """Called from several places, optimised in an entry first, then linked into functions that numba compiles."""
+    (tmp_path / "libraries.py").write_text(_LIBRARIES)
+    said = [
+        subprocess.run(
+            [sys.executable, tmp_path / "libraries.py"], check=True, capture_output=True, text=True,
+            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(_ROOT)},
+        ).stdout
+        for _ in range(2)  # compiled, and from the disk
+    ]  # fmt: skip
+    both, same, one = map(float, said[0].split())
+    assert said[1] == said[0] and both == same and 0 < one < both < one + 0.1 + 1e-12
