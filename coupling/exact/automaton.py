@@ -254,8 +254,6 @@ def _begin_subsystem(system, flows, st, scratch, s):
     st.offset[0] = 0.0
     for i in range(n):
         st.offset[0] += system.response[i] * st.constant[i]
-    for i in range(len(st.change)):
-        st.change[i] = 0.0
     st.counters[AWAKE] = flows.modes[s]
     _select_awake_modes(flows, st)
 
@@ -328,13 +326,8 @@ def _select_awake_modes(flows, st):
 
     Modes are in order of their rates: what is awake are the first counters[AWAKE] of them.
     """
-    s, e, largest, fastest = st.counters[FLOW], flows.driven.shape[1] - 1, 0.0, 0.0
-    for j in range(st.counters[AWAKE]):
-        c = st.amplitude[j]
-        size = abs(c.real) + abs(c.imag)
-        largest = max(largest, size * flows.acceleration[s, j])
-        fastest = max(fastest, size * flows.speed[s, j])
-    st.largest_speed[0] = fastest
+    s, e = st.counters[FLOW], flows.driven.shape[1] - 1
+    largest = _largest_acceleration(flows, st, s, st.counters[AWAKE])
     last, count = flows.driven[s, e], flows.driven[s, e]
     for j in range(last, st.counters[AWAKE]):
         c = st.amplitude[j]
@@ -348,14 +341,8 @@ def _select_awake_modes(flows, st):
 @inlined
 def _wake_modes(flows, st):
     """Wake the modes that an impulse has set in motion. None goes to sleep before its spell has ended."""
-    s, largest, fastest = st.counters[FLOW], 0.0, 0.0
-    for j in range(flows.modes[s]):
-        c = st.amplitude[j]
-        size = abs(c.real) + abs(c.imag)
-        largest = max(largest, size * flows.acceleration[s, j])
-        fastest = max(fastest, size * flows.speed[s, j])
-    st.largest_speed[0] = fastest
-    count = flows.modes[s]
+    s = st.counters[FLOW]
+    largest, count = _largest_acceleration(flows, st, s, flows.modes[s]), flows.modes[s]
     while count > st.counters[AWAKE]:
         c = st.amplitude[count - 1]
         if (abs(c.real) + abs(c.imag)) * flows.acceleration[s, count - 1] > _ASLEEP * largest:
@@ -364,6 +351,19 @@ def _wake_modes(flows, st):
         st.amplitude[count] = 0.0
         st.change[2 * count], st.change[2 * count + 1] = 0.0, 0.0
     st.counters[AWAKE] = count
+
+
+@inlined
+def _largest_acceleration(flows, st, s, count):
+    """Return the largest acceleration of the first `count` modes, and set the bound of their speeds."""
+    largest, fastest = 0.0, 0.0
+    for j in range(count):
+        c = st.amplitude[j]
+        size = abs(c.real) + abs(c.imag)
+        largest = max(largest, size * flows.acceleration[s, j])
+        fastest = max(fastest, size * flows.speed[s, j])
+    st.largest_speed[0] = fastest
+    return largest
 
 
 @inlined
