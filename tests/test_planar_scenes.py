@@ -55,8 +55,8 @@ def test_means_of_an_independent_program(ratio):
         assert response.energy_residual < 1e-11
         # from wall to wall
         assert 0.95 * 0.5 * X / 4.8e-3 < response.tilt_max[0] <= 0.5 * X / 4.8e-3 * (1 + 1e-9)
-    # one start in forty comes to lie flat on its way, whichever the processor chooses
-    assert np.median([response.lift_share[0] for response in responses]) > 0.98
+    # one start in forty comes to lie flat on its way, whichever the processor chooses: six of eight at least do not
+    assert sorted(response.lift_share[0] for response in responses)[2] > 0.98
 
 
 def in_the_air(turn):
