@@ -1,15 +1,14 @@
 """Compiled functions are compiled anew when the code that they hold has changed, and only then."""
 
-import os
 import pickle
 import subprocess
 import sys
 
 import pytest
 
+from tests.tools.processes import environment
 from vanedamp.coupling.numerics import jit
 from vanedamp.coupling.numerics.jit import _sources
-from vanedamp.studies.workers import _ROOT
 
 
 @pytest.fixture
@@ -93,7 +92,7 @@ def test_kernels_serve_entries_and_functions_of_others(tmp_path):
     said = [
         subprocess.run(
             [sys.executable, tmp_path / "libraries.py"], check=True, capture_output=True, text=True,
-            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(_ROOT)},
+            env=environment(NUMBA_CACHE_DIR=str(tmp_path / "cache")),
         ).stdout
         for _ in range(2)  # compiled, and from the disk
     ]  # fmt: skip
