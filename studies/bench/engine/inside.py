@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from vanedamp.coupling.exact.automaton import amplitude_changes
 from vanedamp.coupling.exact.energy_balance import account
@@ -16,6 +15,7 @@ from vanedamp.coupling.exact.event_driven import EngineRun
 from vanedamp.coupling.exact.event_functions import next_event
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import AWAKE, CARRIED, EVENT_BUDGET, EVENTS, PERIOD
+from vanedamp.coupling.numerics.jit import entry
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.bench.timing import seconds
 
@@ -69,7 +69,7 @@ def _begun(scene: Scene, periods: int) -> EngineRun:
     return run
 
 
-@njit(error_model="numpy")
+@entry
 def _search(system: Any, flows: Any, st: Any, functions: Any, times: int) -> float:
     tau = 0.0
     for _ in range(times):
@@ -78,12 +78,12 @@ def _search(system: Any, flows: Any, st: Any, functions: Any, times: int) -> flo
     return tau
 
 
-@njit(error_model="numpy")
+@entry
 def _amplitudes(flows: Any, st: Any, scratch: Any, tau: float) -> None:
     amplitude_changes(flows, st, scratch, tau)
 
 
-@njit(error_model="numpy")
+@entry
 def _account(system: Any, flows: Any, st: Any, records: Any, scratch: Any, tau: float, times: int) -> None:
     period = st.counters[PERIOD]
     peak = records.peak[period]
