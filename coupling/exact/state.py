@@ -13,11 +13,13 @@ import numpy as np
 from vanedamp.coupling.exact.root_search import DEGREE
 from vanedamp.coupling.numerics.codes import COAST, COUNTERS, OPEN
 from vanedamp.coupling.numerics.complementarity import Problem, new_problem
+from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.response.records import ENERGIES
 from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
 
 
+@record
 class State(NamedTuple):
     """The state at the start of a segment."""
 
@@ -55,6 +57,7 @@ class State(NamedTuple):
     coordinate_acceleration: np.ndarray  # (N,) constant acceleration of the free bodies, m/s^2; 0 for modes
 
 
+@record
 class EventFunctions(NamedTuple):
     """The event functions that are watched in a segment.
 
@@ -83,6 +86,7 @@ class EventFunctions(NamedTuple):
     taylor: np.ndarray  # (2, DEGREE + 1) polynomials of the motion of one of them
 
 
+@record
 class Scratch(NamedTuple):
     """Space for intermediate results: nothing in it outlives the handling of a segment or an event."""
 

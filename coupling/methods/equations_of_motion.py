@@ -7,10 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import COUNTERS
+from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.system.assembly import InitialMotion, Loads
 from vanedamp.coupling.system.system import System
 
 
+@record
 class TimeGrid(NamedTuple):
     """The steps of an excitation period."""
 
@@ -21,6 +23,7 @@ class TimeGrid(NamedTuple):
     travel: np.ndarray  # (r,) free travel of a rigid contact's cavity, m; inf: nothing to check
 
 
+@record
 class Motion(NamedTuple):
     """The state of a run, advanced in place."""
 

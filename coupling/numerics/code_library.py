@@ -21,7 +21,8 @@ from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
-from numba.core.types import BaseNamedTuple
+
+from vanedamp.coupling.numerics.record import Record
 
 _METHODS = (
     "finalize", "get_pointer_to_function", "serialize_using_object_code", "_get_compiled_object",
@@ -144,7 +145,7 @@ def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) ->
                 state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
                 state.library.enable_object_caching()
             if inline:
-                state.flags.forceinline = not any(isinstance(kind, BaseNamedTuple) for kind in state.args)
+                state.flags.forceinline = not any(isinstance(kind, Record) for kind in state.args)
             return False
 
     class Chosen(CompilerBase):

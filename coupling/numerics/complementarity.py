@@ -18,6 +18,7 @@ import numpy as np
 
 from vanedamp.coupling.numerics.codes import AT_HIGH, AT_LOW, DEPENDENT, FREE, OUT
 from vanedamp.coupling.numerics.jit import entry, kernel
+from vanedamp.coupling.numerics.record import record
 
 NONE = np.int64(-1)
 _ROUND_OFF = 1e-12
@@ -204,6 +205,7 @@ def _solve(problem, count, i):
         x[p] = total / factor[p, p]
 
 
+@record
 class Problem(NamedTuple):
     """A complementarity problem of up to r rows with the space to solve it."""
 

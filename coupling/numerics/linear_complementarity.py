@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.jit import entry, kernel
+from vanedamp.coupling.numerics.record import record
 
 #: entries of the tableau below this are round-off, for problems scaled to numbers of size one
 _PIVOT = 1e-11
@@ -22,6 +23,7 @@ _RESIDUAL = 1e-9
 _ATTEMPTS, _GOLDEN = 4, 0.6180339887498949
 
 
+@record
 class Lemke(NamedTuple):
     """Room for a problem of up to k unknowns."""
 

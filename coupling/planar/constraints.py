@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.scene.bodies import Cavity, Damper
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.scene import Scene
@@ -31,6 +32,7 @@ _MOMENT = 1e-6
 _SMOOTH = 1e-9
 
 
+@record
 class PlanarSystem(NamedTuple):
     """Matrices of a scene: N coordinates, e harmonics, u units, b bodies. Compiled functions take it as it is.
 

@@ -19,6 +19,7 @@ from scipy.linalg import eig, null_space, orth
 
 from vanedamp.coupling.exact.complex_modes import DEFECTIVE, LOST, IllConditioned
 from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
+from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.planar.constraints import PlanarSystem
 
 #: share of their size below which singular values are zero: rows that depend on each other
@@ -31,6 +32,7 @@ _SLOW = 1e-6
 _STIFF = 1e4
 
 
+@record
 class ContactFlows(NamedTuple):
     """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included."""
 

@@ -9,10 +9,12 @@ import numpy as np
 from vanedamp.coupling.exact.root_search import DEGREE
 from vanedamp.coupling.numerics.codes import COUNTERS, OPEN
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
+from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
 from vanedamp.coupling.response.records import ENERGIES, Records
 
 
+@record
 class PlanarState(NamedTuple):
     """The state at the start of a segment."""
 
@@ -46,6 +48,7 @@ class PlanarState(NamedTuple):
     prestress: np.ndarray
 
 
+@record
 class Guards(NamedTuple):
     """The event functions of a segment."""
 
@@ -64,6 +67,7 @@ class Guards(NamedTuple):
     taylor: np.ndarray  # (2, DEGREE + 1) scratch
 
 
+@record
 class Scratch(NamedTuple):
     """Space for intermediate results."""
 

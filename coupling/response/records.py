@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.system.system import System
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")
@@ -15,6 +16,7 @@ ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
 EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES))
 
 
+@record
 class Records(NamedTuple):
     """Records of a run, made once and filled as it advances. One entry a period unless said otherwise."""
 

@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.numerics.record import record
+
 
 class Part(NamedTuple):
     """The part of a system that belongs to k of its coordinates: as in System, and J (r, k) on them."""
@@ -26,6 +28,7 @@ class Part(NamedTuple):
     J: np.ndarray
 
 
+@record
 class System(NamedTuple):
     """Matrices of a scene: n modes, b bodies, N = n + b coordinates, r rows (friction rows first, then contacts).
 

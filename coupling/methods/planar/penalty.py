@@ -20,11 +20,13 @@ from vanedamp.coupling.methods.planar.step_records import (
 )
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD
 from vanedamp.coupling.numerics.jit import entry, inlined
+from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.planar.constraints import STOP, PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
 from vanedamp.files.toml_input import InputError
 
 
+@record
 class PenaltyForces(NamedTuple):
     """The laws of the units (u,), and the forces and half-step velocities that the steps leave."""
 

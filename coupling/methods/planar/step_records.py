@@ -17,6 +17,7 @@ from vanedamp.coupling.numerics.codes import (
     STEPS,
 )
 from vanedamp.coupling.numerics.jit import inlined
+from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.planar.constraints import FLOOR, PlanarMotion, PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import elongation, gap
 from vanedamp.coupling.planar.recorder import note_tilts, put_sample, record_section
@@ -36,6 +37,7 @@ from vanedamp.coupling.response.records import (
 _BOUND = 1e30
 
 
+@record
 class SteppedMotion(NamedTuple):
     """The state of a run, advanced in place. Sizes as in constraints.PlanarSystem."""
 
