@@ -22,8 +22,6 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
 
-from vanedamp.coupling.numerics.record import Record
-
 _METHODS = (
     "finalize", "get_pointer_to_function", "serialize_using_object_code", "_get_compiled_object",
     "_get_module_for_linking", "_optimize_final_module", "codegen",
@@ -127,7 +125,8 @@ def _module(library: Any) -> Any:
 def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) -> type[CompilerBase]:
     """Return numba's compiler, with its code in a library of this class.
 
-    inline: compile functions without records into all callers.
+    inline: compile functions into all callers. As an option of numba's it would reach the builtin functions that they
+    call, which would be compiled twice.
     """
 
     @register_pass(mutates_CFG=False, analysis_only=True)
@@ -144,8 +143,7 @@ def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) ->
             if state.library is None:
                 state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
                 state.library.enable_object_caching()
-            if inline:
-                state.flags.forceinline = not any(isinstance(kind, Record) for kind in state.args)
+            state.flags.forceinline = inline
             return False
 
     class Chosen(CompilerBase):

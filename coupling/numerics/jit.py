@@ -74,10 +74,7 @@ def summing(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a kernel into its callers if it takes no records: for functions of numbers that every segment runs.
-
-    Whether a function of records is a part of its callers is left to LLVM, or the engine would compile for minutes.
-    """
+    """Compile a kernel into its callers: for functions that every segment runs."""
     return njit(**_NOT_FROM_PYTHON, pipeline_class=INLINED)(function)
 
 
