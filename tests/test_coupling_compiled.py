@@ -74,7 +74,7 @@ from vanedamp.coupling.numerics.jit import entry, kernel
 @kernel
 def step(k0, g, eigenvalue, end, taylor):
     noise, second, calm, fast = expand(POSITION, 0.1, 0.0, g, eigenvalue, len(g), 0.0, taylor)
-    return step_or_stop(taylor, 1.0, k0, noise, second, calm, fast, end, 1e-15 * end)[0]
+    return step_or_stop(taylor, 1.0, k0, np.inf, noise, second, calm, fast, end, 1e-15 * end)[0]
 
 
 def twice(g, eigenvalue, taylor):

@@ -16,7 +16,7 @@ def search(order, k0, k1, k2, g, eigenvalue, end):
     t, steps, a = 0.0, 0, np.zeros((2, DEGREE + 1))
     while t < end:
         noise, second, calm, fast = expand(order, k1, k2, g, eigenvalue, len(g), t, a)
-        step, found = step_or_stop(a, 1.0, k0, noise, second, calm, fast, end - t, 1e-15 * end)
+        step, found, _ = step_or_stop(a, 1.0, k0, np.inf, noise, second, calm, fast, end - t, 1e-15 * end)
         t += step
         if found:
             return t, steps

@@ -90,15 +90,16 @@ def next_event(system, flows, st, watched):
             calm = calm + bound if calm >= 0.0 else calm
         longest = max(longest - tau, shortest)
         # the side that the motion approaches first: the other one is looked at until then
-        side = 1 if watched.sides[k] == 2 and watched.taylor[0, 1] > 0.0 else 0
-        step, found = step_or_stop(
-            watched.taylor, 1.0 - 2.0 * side, watched.k0[k, side], max(noise, watched.noise[k]), second, calm, fast,
-            longest, shortest,
+        two = watched.sides[k] == 2
+        side = 1 if two and watched.taylor[0, 1] > 0.0 else 0
+        step, found, clear = step_or_stop(
+            watched.taylor, 1.0 - 2.0 * side, watched.k0[k, side], watched.k0[k, 1 - side] if two else math.inf,
+            max(noise, watched.noise[k]), second, calm, fast, longest, shortest,
         )  # fmt: skip
-        if watched.sides[k] == 2:
-            other, root = step_or_stop(
-                watched.taylor, 2.0 * side - 1.0, watched.k0[k, 1 - side], max(noise, watched.noise[k]), second, calm,
-                fast, step, shortest,
+        if two and not clear:
+            other, root, _ = step_or_stop(
+                watched.taylor, 2.0 * side - 1.0, watched.k0[k, 1 - side], math.inf, max(noise, watched.noise[k]),
+                second, calm, fast, step, shortest,
             )  # fmt: skip
             if other < step:
                 step, found, side = other, root, 1 - side
@@ -118,9 +119,10 @@ def carry_over_period(system, st, watched, tau):
 
 
 @kernel
-def step_or_stop(taylor, sign, k0, noise, second, calm, fast, longest, shortest):
+def step_or_stop(taylor, sign, k0, k0_far, noise, second, calm, fast, longest, shortest):
     """Return a safe step from a point of an event function k0 + sign motion, and whether its root is at the end.
 
+    The third value returned: whether k0_far - sign motion has no root on the step either; False is not known.
     taylor, noise, second, calm, fast: of the motion, as set and returned by exact.root_search.expand.
     """
     whole, slow = taylor[0], taylor[1]
@@ -128,23 +130,23 @@ def step_or_stop(taylor, sign, k0, noise, second, calm, fast, longest, shortest)
     f, slope, bend = k0 + sign * whole[0], sign * whole[1], sign * whole[2]
     if f <= noise:
         if slope < 0.0 or (slope <= second * shortest and bend < 0.0):
-            return 0.0, True
+            return 0.0, True, False
         f = 0.0
     longest = max(longest, shortest)
     far = 0.0
     if calm >= 0.0:
         above = k0 + sign * slow[0] - fast
         if above > noise:
-            far, _ = safe_step(slow, sign, above, 0.0, calm, longest)
+            far, _, _ = safe_step(slow, sign, above, 0.0, 0.0, calm, longest)
             if far >= longest:
-                return far, False
-    step, found = safe_step(whole, sign, f, noise, second, longest)
+                return far, False, False
+    step, found, clear = safe_step(whole, sign, f, max(k0_far - sign * whole[0], 0.0), noise, second, longest)
     if far > step:
-        return far, False
+        return far, False, False
     if step < shortest:
         falls = slope < 0.0 and f <= 2.0 * shortest * (second * shortest - slope)
-        return (0.0, True) if falls else (shortest, False)
-    return step, found
+        return (0.0, True, False) if falls else (shortest, False, False)
+    return step, found, clear
 
 
 @inlined

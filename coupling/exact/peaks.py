@@ -182,7 +182,7 @@ def _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h):
         else:
             hi = t
         step = -v / w if w != 0.0 else math.inf
-        for _ in range(3):
+        for _ in range(2):
             slope = v + step * (w + step * (third / 2 + step * (fourth / 6 + step * fifth / 24)))
             step -= slope / (w + step * (third + step * (fourth / 2 + step * fifth / 6)))
         if lo <= t + step <= hi:

@@ -17,7 +17,13 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
-from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular, secular_bound
+from vanedamp.coupling.numerics.exponentials import (
+    eighth_root_of_ratio,
+    exp_minus_line,
+    exp_minus_one,
+    secular,
+    secular_bound,
+)
 from vanedamp.coupling.numerics.jit import inlined, kernel, summing
 
 #: degree of the lower polynomial; its last coefficient is that of the bound
@@ -30,8 +36,8 @@ ROUND_OFF = 4.0 * 2.0**-52
 _REACH = 3.6
 # modes faster than this times the first, squared, are fast
 _FAST = 4.0
-# Newton's iteration: a correction below this share leaves an error of its square
-_CONVERGED = 1e-8
+# Newton's iteration: a correction below a share leaves an error of about its square
+_NEAR, _CONVERGED = 1e-2, 1e-8
 
 
 @kernel
@@ -191,37 +197,29 @@ def _slope(a, sign, h):
 
 
 @inlined
-def _weight(a, sign, p):
-    c = sign * a[p]
-    return c + (p - 2.0) * max(c, 0.0)
+def _bounds(a, sign, f, h):
+    """Return bounds of the polynomial with f for its constant term on [0, h], apart from its values at both ends.
 
-
-@inlined
-def _stays_above(a, sign, f, h):
-    """Whether the polynomial with f for its constant term has no root on [0, h), given that it is not negative at h.
-
-    It is the chord from 0 to h less s (h - s) times its second divided difference over 0, h and s, which must not
-    exceed f/h^2: exact for parabolas.
+    They are the least and the largest of its other coefficients in Bernstein's basis on [0, h] (Farouki 2012): sums of
+    its terms at h by Pascal's triangle. The remainder, of the last power, is in none of them.
     """
     h2 = h * h
-    h4 = h2 * h2
-    low = (_weight(a, sign, 2) + _weight(a, sign, 3) * h) + (_weight(a, sign, 4) + _weight(a, sign, 5) * h) * h2
-    high = (_weight(a, sign, 6) + _weight(a, sign, 7) * h) + (_weight(a, sign, 8) + _weight(a, sign, 9) * h) * h2
-    return (low + high * h4 - a[10] * (h4 * h4)) * h2 <= f
-
-
-@inlined
-def _departs(a, sign, h):
-    """Whether the polynomial, not negative at 0, rises from there and has no root on (0, h]: that without constant,
-    divided by the time, by the same argument as in `_stays_above`."""
-    h2 = h * h
-    h4 = h2 * h2
-    c3, c4, c5, c6 = sign * a[3], sign * a[4], sign * a[5], sign * a[6]
-    c7, c8, c9 = sign * a[7], sign * a[8], sign * a[9]
-    end = _value(a, sign, 0.0, h)
-    low = (c3 + (c4 + max(c4, 0.0)) * h) + ((c5 + 2.0 * max(c5, 0.0)) + (c6 + 3.0 * max(c6, 0.0)) * h) * h2
-    high = ((c7 + 4.0 * max(c7, 0.0)) + (c8 + 5.0 * max(c8, 0.0)) * h) + (c9 + 6.0 * max(c9, 0.0)) * h2
-    return end > 0.0 and (low + high * h4 - a[10] * (h * h2 * h4)) * h2 <= sign * a[1]
+    h3, h4 = h2 * h, h2 * h2
+    h5, h6, h7, h8 = h4 * h, h4 * h2, h4 * h3, h4 * h4
+    b1, b2, b3 = sign * a[1] * h * (1 / 10), sign * a[2] * h2 * (1 / 45), sign * a[3] * h3 * (1 / 120)
+    b4, b5, b6 = sign * a[4] * h4 * (1 / 210), sign * a[5] * h5 * (1 / 252), sign * a[6] * h6 * (1 / 210)
+    b7, b8, b9 = sign * a[7] * h7 * (1 / 120), sign * a[8] * h8 * (1 / 45), sign * a[9] * (h8 * h) * (1 / 10)
+    b1, b2, b3, b4, b5, b6, b7, b8, b9 = b1 + f, b2 + b1, b3 + b2, b4 + b3, b5 + b4, b6 + b5, b7 + b6, b8 + b7, b9 + b8
+    b2, b3, b4, b5, b6, b7, b8, b9 = b2 + b1, b3 + b2, b4 + b3, b5 + b4, b6 + b5, b7 + b6, b8 + b7, b9 + b8
+    b3, b4, b5, b6, b7, b8, b9 = b3 + b2, b4 + b3, b5 + b4, b6 + b5, b7 + b6, b8 + b7, b9 + b8
+    b4, b5, b6, b7, b8, b9 = b4 + b3, b5 + b4, b6 + b5, b7 + b6, b8 + b7, b9 + b8
+    b5, b6, b7, b8, b9 = b5 + b4, b6 + b5, b7 + b6, b8 + b7, b9 + b8
+    b6, b7, b8, b9 = b6 + b5, b7 + b6, b8 + b7, b9 + b8
+    b7, b8, b9 = b7 + b6, b8 + b7, b9 + b8
+    b8, b9 = b8 + b7, b9 + b8
+    b9 = b9 + b8
+    least = min(min(min(b1, b2), min(b3, b4)), min(min(b5, b6), min(min(b7, b8), b9)))
+    return least, max(max(max(b1, b2), max(b3, b4)), max(max(b5, b6), max(max(b7, b8), b9)))
 
 
 @inlined
@@ -236,25 +234,24 @@ def _step_by_parabola(a, sign, f, h):
 
 
 @kernel
-def safe_step(a, sign, f, noise, second, longest):
-    """Return a step without root of f + sign (motion - its value), f >= 0, and whether a root follows.
+def safe_step(a, sign, f, far, noise, second, longest):
+    """Return a step without root of f + sign (motion - its value), f >= 0, whether a root follows, and of the other.
 
     a: Taylor polynomial of the motion (`expand`). A root follows at the end of the step if the remainder of the
-    polynomial there is below the round-off.
+    polynomial there is below the round-off. The third value returned: whether far - sign (motion - its value), far >= 0
+    and rising, has no root on the step either; False is not known.
     """
     slope = sign * a[1]
     if f + longest * (slope - 0.5 * second * longest) > 0.0:
-        return longest, False
-    reach = longest
+        return longest, False, False
+    reach, top = longest, f + far - noise if slope < 0.0 else 0.0
     if a[DEGREE] > 0.0:
-        eighth = second * _OVER_FACTORIAL[DEGREE] / a[DEGREE]
-        reach = min(longest, _REACH * math.sqrt(math.sqrt(math.sqrt(eighth))))
-    if slope > 0.0 and _departs(a, sign, reach):
-        return reach, False
-    if _value(a, sign, f, reach) >= 0.0 and (
-        _stays_above(a, sign, f, reach) or _step_by_parabola(a, sign, f, reach) >= reach
-    ):
-        return reach, False
+        reach = min(longest, _REACH * eighth_root_of_ratio(second * _OVER_FACTORIAL[DEGREE], a[DEGREE]))
+    end = _value(a, sign, f, reach)
+    if end >= 0.0:
+        least, most = _bounds(a, sign, f, reach)
+        if least > noise:
+            return reach, False, max(most, end + 2.0 * _remainder(a, reach)) <= top
     root = min(reach, first_root_of_parabola(f, slope, 2.0 * sign * a[2]))
     for _ in range(8):
         if root <= 0.0:
@@ -267,21 +264,24 @@ def safe_step(a, sign, f, noise, second, longest):
         if not 0.0 < better <= reach:
             break
         root = better
-        if abs(change) < 1e-3 * root:
-            r2 = root * root
-            r4 = r2 * r2
-            if a[DEGREE] * (r4 * r4 * r2) > noise:
+        if abs(change) < _NEAR * root:
+            if _remainder(a, root) > noise:
                 break
             if abs(change) < _CONVERGED * root:
-                if _stays_above(a, sign, f, root):
-                    return root, True
+                least, most = _bounds(a, sign, f, root)
+                if least > noise:
+                    return root, True, most <= top
                 break
     # short of the lower polynomial's root: from there the function's own is seen
-    h = root * (1.0 - 1e-5)
-    if _value(a, sign, f, h) >= 0.0 and _stays_above(a, sign, f, h):
-        return h, False
-    # the best of the parabolas below it: over the rest of the reach, and beyond its own minimum
-    best, h = 0.0, reach
+    h = root * (1.0 - 0.1 * _NEAR)
+    end = _value(a, sign, f, h)
+    if end >= 0.0:
+        least, most = _bounds(a, sign, f, h)
+        if least > noise:
+            return h, False, max(most, end + 2.0 * _remainder(a, h)) <= top
+    # the best of the parabolas below it: over the rest of the reach, and beyond its own minimum. Where they come down to
+    # round-off it may touch zero
+    best, h, f = 0.0, reach, max(f - noise, 0.0)
     if slope < 0.0 < sign * a[2] and -2.0 * slope < sign * a[2] * reach:
         best = _step_by_parabola(a, sign, f, -2.0 * a[1] / a[2])
     for _ in range(12):
@@ -289,4 +289,12 @@ def safe_step(a, sign, f, noise, second, longest):
             break
         best = max(best, _step_by_parabola(a, sign, f, h))
         h *= 0.5
-    return best, False
+    return best, False, False
+
+
+@inlined
+def _remainder(a, h):
+    """Return the bound of the polynomial's remainder at h."""
+    h2 = h * h
+    h4 = h2 * h2
+    return a[DEGREE] * (h4 * h4 * h2)

@@ -87,6 +87,29 @@ def _float_of_exponent(typing_context, k):
     return types.float64(types.float64), code
 
 
+def eighth_root_of_ratio(x, y):
+    """Return (x/y)^(1/8) of positive numbers; compiled: to 7 percent, without a division or a root."""
+    return (x / y) ** 0.125
+
+
+@overload(eighth_root_of_ratio, inline="always")
+def _ratio_compiled(x, y):
+    return lambda x, y: _by_logarithms(x, y)
+
+
+@intrinsic
+def _by_logarithms(typing_context, x, y):
+    """Return the eighth root of a ratio with the bits of doubles for their logarithms: linear between powers of two."""
+
+    def code(context, builder, signature, values):
+        integer, number = ir.IntType(64), ir.DoubleType()
+        first, second = (builder.bitcast(value, integer) for value in values)
+        share = builder.ashr(builder.sub(first, second), ir.Constant(integer, 3))
+        return builder.bitcast(builder.add(share, ir.Constant(integer, 1023 << 52)), number)
+
+    return types.float64(types.float64, types.float64), code
+
+
 @inlined
 def exp_minus_line(z, first):
     """Return exp(z) - 1 - z given first = exp(z) - 1, with full relative accuracy."""

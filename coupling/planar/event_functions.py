@@ -75,9 +75,10 @@ def next_event(system, flows, st, guards):
         if grows > 1.0:  # bounds of the derivatives hold for motions that decay
             second, calm = second * grows, -1.0
             guards.taylor[0, DEGREE] *= grows
-        step, found = step_or_stop(
-            guards.taylor, 1.0, guards.k0[k], max(noise, guards.noise[k]), second, calm, fast, system.period, shortest
-        )
+        step, found, _ = step_or_stop(
+            guards.taylor, 1.0, guards.k0[k], math.inf, max(noise, guards.noise[k]), second, calm, fast, system.period,
+            shortest,
+        )  # fmt: skip
         guards.status[k] = ROOT if found else EXPANDED
         guards.no_root_before[k] = tau + step if found else max(guards.no_root_before[k], tau + step)
 
