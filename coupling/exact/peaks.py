@@ -6,7 +6,10 @@ import math
 
 from vanedamp.coupling.numerics.codes import AWAKE
 from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound
-from vanedamp.coupling.numerics.jit import inlined, kernel, summing
+from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel, summing
+
+#: grids of peaks, by steps of an eighth of a period, half of that, and so on, whose factors are known
+GRIDS = 5
 
 
 @inlined
@@ -34,18 +37,18 @@ def highest(system, flows, st, scratch, s, tau, constant, peak):
     peak = max(peak, abs(x0), abs(x1))
     if not _may_exceed(peak, x0, v0, x1, v1, tau, fourth):
         return peak
-    h = 0.125 * system.period
-    if fourth * min(h, tau) ** 4 <= 0.384 * size:
-        pieces = math.ceil(tau / h)
-        for j in range(count):
-            scratch.step_factor[j] = flows.eighth_factor[s, j]
+    h, level = 0.125 * system.period, ZERO
+    while level < GRIDS and fourth * min(h, tau) ** 4 > 0.384 * size:
+        h, level = 0.5 * h, level + 1
+    if level < GRIDS:
+        turns, pieces = flows.grid_factor[s, level], math.ceil(tau / h)
     else:
-        pieces = min(math.ceil(tau * math.sqrt(math.sqrt(fourth / (0.384 * size)))), 4096)
+        turns, pieces = scratch.step_factor, min(math.ceil(tau * math.sqrt(math.sqrt(fourth / (0.384 * size)))), 4096)
         h = tau / pieces
         for j in range(count):
-            scratch.step_factor[j] = exp_minus_one(flows.eigenvalue[s, j] * h) + 1.0
+            turns[j] = exp_minus_one(flows.eigenvalue[s, j] * h) + 1.0
     return _search_grid(
-        flows.eigenvalue[s, :count], scratch.wave, scratch.step_factor, flows.driven[s], scratch.drive, scratch.growth,
+        flows.eigenvalue[s, :count], scratch.wave, scratch.ahead, turns, flows.driven[s], scratch.drive, scratch.growth,
         constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak,
     )  # fmt: skip
 
@@ -90,9 +93,11 @@ def _set_drive(eigenvalue, response, driven, load, phase, change, period, drive)
 
 
 @inlined
-def _search_grid(rates, waves, turns, driven, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak):
+def _search_grid(
+    rates, waves, ahead, turns, driven, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak
+):
     """Return the largest |response| on a grid of `pieces` steps of length h, the last one shorter, and before."""
-    count, e = len(rates), len(driven) - 1
+    e = len(driven) - 1
     for k in range(e):
         for j in range(driven[k], driven[k + 1]):
             growths[j], _ = secular(rates[j], rates[k], h)
@@ -101,31 +106,30 @@ def _search_grid(rates, waves, turns, driven, drives, growths, constant, x0, v0,
         if i == pieces - 1:
             x1, v1, h = end, end_slope, tau - i * h
         else:
-            x1, v1 = _next_point(rates, waves, turns, constant)
+            x1, v1 = _next_point(rates, waves, ahead, turns, constant)
             for k in range(e):
                 for j in range(driven[k], driven[k + 1]):
+                    ahead[j] += drives[j] * growths[j]
                     x1 += (drives[j] * growths[j]).real
                     v1 += (drives[j] * (rates[j] * growths[j] + turns[k])).real
             peak = max(peak, abs(x1))
         if v0 * v1 < 0.0 and _may_exceed(peak, x0, v0, x1, v1, h, fourth):
             peak = max(peak, _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h))
         x0, v0 = x1, v1
-        if i < pieces - 1:
-            for j in range(count):
-                waves[j] *= turns[j]
-            for k in range(e):
-                for j in range(driven[k], driven[k + 1]):
-                    waves[j] += drives[j] * growths[j]
-                    drives[j] *= turns[k]
+        waves, ahead = ahead, waves
+        for k in range(e):
+            for j in range(driven[k], driven[k + 1]):
+                drives[j] *= turns[k]
     return peak
 
 
 @summing
-def _next_point(rates, waves, turns, constant):
-    """Return response and speed of the modes a step of the grid later."""
+def _next_point(rates, waves, ahead, turns, constant):
+    """Set the modes' shares of the response a step of the grid ahead. Return response and speed there."""
     x, v = constant, 0.0
     for j in range(len(rates)):
         wave, rate = waves[j] * turns[j], rates[j]
+        ahead[j] = wave
         x += wave.real
         v += rate.real * wave.real - rate.imag * wave.imag
     return x, v

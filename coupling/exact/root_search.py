@@ -279,8 +279,8 @@ def safe_step(a, sign, f, far, noise, second, longest):
         least, most = _bounds(a, sign, f, h)
         if least > noise:
             return h, False, max(most, end + 2.0 * _remainder(a, h)) <= top
-    # the best of the parabolas below it: over the rest of the reach, and beyond its own minimum. Where they come down to
-    # round-off it may touch zero
+    # the best of the parabolas below it: over the rest of the reach, and beyond its own minimum. Where they come down
+    # to round-off it may touch zero
     best, h, f = 0.0, reach, max(f - noise, 0.0)
     if slope < 0.0 < sign * a[2] and -2.0 * slope < sign * a[2] * reach:
         best = _step_by_parabola(a, sign, f, -2.0 * a[1] / a[2])

@@ -97,6 +97,7 @@ class Scratch(NamedTuple):
     # a segment: energy balance and peak
     total: np.ndarray  # (2m,) sums of the amplitudes at both ends of a spell
     wave: np.ndarray  # (m,) share of each awake mode in the response
+    ahead: np.ndarray  # (m,) that at the next point of a grid
     step_factor: np.ndarray  # (m,) exp(rate t) for one step of a grid
     growth: np.ndarray  # (m,) of driven modes over that step
     drive: np.ndarray  # (m,) share of the response in the growth of driven modes, 1/s
@@ -189,6 +190,7 @@ def new_scratch(system: System, modes: int) -> Scratch:
         bend=np.zeros(modes, complex),
         total=np.zeros(2 * modes),
         wave=np.zeros(modes, complex),
+        ahead=np.zeros(modes, complex),
         step_factor=np.zeros(modes, complex),
         growth=np.zeros(modes, complex),
         drive=np.zeros(modes, complex),

@@ -24,6 +24,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.exact.complex_modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
+from vanedamp.coupling.exact.peaks import GRIDS
 from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
 from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.system.system import System
@@ -51,8 +52,7 @@ _Modes = tuple[np.ndarray, np.ndarray, np.ndarray]
 class Flows(NamedTuple):
     """Stack of the subsystems met so far, first axis s, filled once a subsystem.
 
-    m is the largest number of complex modes, the excitation's e harmonics included. Compiled functions hand over every
-    array of it in each call: one more has cost half the engine's speed.
+    m is the largest number of complex modes, the excitation's e harmonics included.
     """
 
     # the subsystem
@@ -86,10 +86,10 @@ class Flows(NamedTuple):
     closed_inverse: np.ndarray  # (s, r, r): inverse Delassus matrix of the rigid closed rows
     impulse_response: np.ndarray  # (s, r, m): change of c by a unit impulse on a row
 
-    # sizes of modes, and a step of the search for the peak
+    # sizes of modes, and steps of the search for the peak
     speed: np.ndarray  # (s, m): largest speed of a mode over all rows and the response
     acceleration: np.ndarray  # (s, m): largest acceleration of its terms, whether closed rows hold them or not
-    eighth_factor: np.ndarray  # (s, m): factor of its amplitude over an eighth of a period
+    grid_factor: np.ndarray  # (s, GRIDS, m): factor of its amplitude over a step of each grid (exact.peaks)
 
     # Antiderivatives of the terms of the ledger, as forms of c: an integral over a segment is the form at its end minus
     # the form at its start. Where the rate by which a product of two modes changes vanishes beside the frequency, the
@@ -141,7 +141,7 @@ def empty_flows(system: System, capacity: int = 4) -> Flows:
         impulse_response=np.zeros((s, r, m), complex),
         speed=np.zeros((s, m)),
         acceleration=np.zeros((s, m)),
-        eighth_factor=np.zeros((s, m), complex),
+        grid_factor=np.zeros((s, GRIDS, m), complex),
         linear=np.zeros((s, m, WORK_MAP + 4 * e)),
         loss=np.zeros((s, 2 * m, 2 * m)),
         dashpot=np.zeros((s, 2 * m, 2 * m)),
@@ -292,7 +292,8 @@ def _fill(flows: Flows, system: System, s: int, subsystem: Subsystem) -> None:
         [np.abs(functional) @ np.abs(full[:n]), np.abs(system.of_structure.response) @ np.abs(full[:n])]
     ).max(axis=0)
     flows.speed[s, :m], flows.acceleration[s, :m] = size * rate, np.maximum(size, held) * rate**2
-    flows.eighth_factor[s, :m] = np.exp(flows.eigenvalue[s, :m] * system.period / 8)
+    steps = 0.125 * system.period * 0.5 ** np.arange(GRIDS)
+    flows.grid_factor[s, :, :m] = np.exp(np.outer(steps, flows.eigenvalue[s, :m]))
     _fill_forces(flows, system, s, full[structure], rigid, sprung)
     _fill_energy(flows, system, s, full[structure], body)
 
