@@ -48,6 +48,11 @@ class _Log:
             self.chunks.append(log[:count].copy())
 
 
+def _is_common(system: System, modes: int) -> bool:
+    """Whether this is the most common scene, for which the engine is compiled: one mode, one body, two rigid walls."""
+    return system.modes == system.bodies == len(system.frequency) == 1 and len(system.delassus) == modes == 3
+
+
 class EngineRun:
     """The mutable state of one run and the subsystems it has met.
 
@@ -68,6 +73,11 @@ class EngineRun:
         self.state = new_state(system, modes, initial)
         self.event_functions = new_event_functions(system, modes)
         self.scratch = new_scratch(system, modes)
+        self._advance_compiled = automaton.advance
+        if _is_common(system, modes) and hasattr(automaton.advance, "sized"):
+            self._advance_compiled = automaton.advance.sized(
+                system, self.flows, self.state, self.event_functions, records, self.scratch
+            )
 
     def begin(self, max_events: int) -> int:
         """Decide the initial state and record it. Return the code of numerics.codes.
@@ -87,7 +97,7 @@ class EngineRun:
     def advance(self, periods: int, max_events: int) -> int:
         """Advance to the end of `periods`. Return the code of numerics.codes."""
         while True:
-            code = automaton.advance(
+            code = self._advance_compiled(
                 self.system, self.flows, self.state, self.event_functions, self.records, self.scratch, periods,
                 max_events,
             )  # fmt: skip

@@ -11,6 +11,7 @@ import hashlib
 import re
 from collections.abc import Callable
 from functools import cache, update_wrapper
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from numba import config, njit, types
 from numba.extending import typeof_impl
 
 from vanedamp.coupling.numerics.code_library import ENTRY, INLINED, KERNEL
+from vanedamp.coupling.numerics.record import lengths, sized_type
 from vanedamp.files.errors import VanedampError
 
 #: start of a counter: numba would compile the callees of a literal 0 again
@@ -45,10 +47,21 @@ class Entry:
         update_wrapper(self, function)
         self.kernel = kernel(function)
         self._compiled = _kept(function)
+        self._sized: dict[Any, Callable[..., Any]] = {}
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it, compiled for the types of these arguments."""
         return self._compiled(*arguments)
+
+    def sized(self, *records: Any) -> Callable[..., Any]:
+        """Return it compiled for the lengths of these records, with integers for its other arguments."""
+        key = tuple((type(values), lengths(values)) for values in records)
+        if key not in self._sized:
+            others = (types.int64,) * (len(signature(self._compiled.py_func).parameters) - len(records))
+            kinds = (*map(sized_type, records), *others)
+            self._compiled.compile(kinds)
+            self._sized[key] = self._compiled.overloads[kinds].entry_point
+        return self._sized[key]
 
 
 @typeof_impl.register(Entry)

@@ -4,12 +4,17 @@ numba passes a named tuple by its items, an array as seven of them: the engine's
 which take longer to pass than many a function takes, and longer to compile. A record made with `record` is passed as
 one pointer to all of them. Records never change while compiled functions run: what is loaded once is known, whatever
 has been written to the arrays meanwhile.
+
+A type may have the lengths of the arrays in it: functions are compiled for these lengths then.
 """
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+import numpy as np
 from llvmlite import ir
 from numba import typeof, types
 from numba.core import cgutils
@@ -28,26 +33,66 @@ Class = TypeVar("Class", bound=type[tuple[Any, ...]])
 
 
 class Record(types.Type):
-    """The type of a record: its class and the types of its fields."""
+    """The type of a record: its class, the types of its fields, and the lengths that it is compiled for.
 
-    def __init__(self, kind: type, fields: tuple[tuple[str, types.Type], ...]) -> None:
-        self.kind, self.fields = kind, dict(fields)
-        super().__init__(name=f"{kind.__module__}.{kind.__qualname__}({', '.join(str(type) for _, type in fields)})")
+    lengths: of each field None, the value of an integer, or the shape of an array, None in it for an axis that may be
+    of any length.
+    """
+
+    def __init__(self, kind: type, fields: dict[str, types.Type], lengths: dict[str, Any] | None = None) -> None:
+        self.kind, self.fields, self.lengths = kind, fields, lengths or {}
+        sizes = f"; {self.lengths}" if lengths else ""
+        super().__init__(name=f"{kind.__module__}.{kind.__qualname__}({', '.join(map(str, fields.values()))}{sizes})")
 
     @property
     def key(self) -> tuple[Any, ...]:
         """What tells types apart."""
-        return self.kind, *self.fields.items()
+        return self.kind, *self.fields.items(), *self.lengths.items()
+
+
+#: of each class the names of integers that are lengths, and the number of first axes that may be of any length
+_LENGTHS: dict[type, tuple[Sequence[str], int]] = {}
 
 
 def record(kind: Class) -> Class:
     """Make a class of named tuples a record of compiled functions."""
+    return record_with()(kind)
 
-    @typeof_impl.register(kind)
-    def type_of(values, context):
-        return Record(kind, tuple((name, typeof(value)) for name, value in zip(kind._fields, values, strict=True)))
 
-    return kind
+def record_with(sizes: Sequence[str] = (), free_axes: int = 0) -> Callable[[Class], Class]:
+    """As `record`; sizes: integers that are lengths; free_axes: so many first axes of arrays may be of any length."""
+
+    def made(kind: Class) -> Class:
+        _LENGTHS[kind] = sizes, free_axes
+
+        @typeof_impl.register(kind)
+        def type_of(values, context):
+            return _type(values)
+
+        return kind
+
+    return made
+
+
+def sized_type(values: Any) -> Record:
+    """Return the type of a record with the lengths of its arrays in it."""
+    return _type(values, dict(zip(values._fields, lengths(values), strict=True)))
+
+
+def lengths(values: Any) -> tuple[Any, ...]:
+    """Return the lengths of a record's fields, as `Record` holds them."""
+    sizes, free = _LENGTHS[type(values)]
+    return tuple(
+        (None,) * min(free, value.ndim) + value.shape[free:]
+        if isinstance(value, np.ndarray)
+        else (value if name in sizes else None)
+        for name, value in zip(values._fields, values, strict=True)
+    )
+
+
+def _type(values: Any, of_lengths: dict[str, Any] | None = None) -> Record:
+    fields = {name: typeof(value) for name, value in zip(values._fields, values, strict=True)}
+    return Record(type(values), fields, of_lengths)
 
 
 @register_model(Record)
@@ -70,10 +115,28 @@ class _Fields(AttributeTemplate):
 @lower_getattr_generic(Record)
 def _get(context, builder, type, value, name):
     """Load a field. All loads are marked as those of what never changes."""
+    field, length = type.fields[name], type.lengths.get(name)
+    if isinstance(field, types.Integer) and length is not None:
+        return context.get_constant(field, length)
     place = cgutils.gep_inbounds(builder, value, 0, list(type.fields).index(name))
-    never = builder.module.add_metadata([])
-    loaded = _load(builder, place, never)
-    return context.data_model_manager[type.fields[name]].from_data(builder, loaded)
+    loaded = _load(builder, place, builder.module.add_metadata([]))
+    whole = context.data_model_manager[field].from_data(builder, loaded)
+    return whole if length is None else _with_lengths(context, builder, field, whole, length)
+
+
+def _with_lengths(context: Any, builder: Any, field: Any, value: Any, shape: Sequence[int | None]) -> Any:
+    """Return an array, ordered as in C, with these lengths and its strides known to the compiler."""
+    array = context.make_array(field)(context, builder, value)
+    lengths = [
+        known if length is None else context.get_constant(types.intp, length)
+        for length, known in zip(shape, cgutils.unpack_tuple(builder, array.shape), strict=True)
+    ]
+    strides = [context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(field.dtype)))]
+    for length in reversed(lengths[1:]):
+        strides.insert(0, builder.mul(strides[0], length))
+    array.shape, array.strides = (cgutils.pack_array(builder, parts) for parts in (lengths, strides))
+    array.nitems = functools.reduce(builder.mul, lengths)
+    return array._getvalue()
 
 
 def _load(builder: Any, place: Any, never: Any) -> Any:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.record import record_with
 from vanedamp.coupling.system.system import System
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")
@@ -16,7 +16,7 @@ ENERGIES = ("excitation", "viscous", "friction", "impact", "contact", "stored")
 EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES))
 
 
-@record
+@record_with(free_axes=2)
 class Records(NamedTuple):
     """Records of a run, made once and filled as it advances. One entry a period unless said otherwise."""
 

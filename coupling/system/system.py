@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.record import record_with
 
 
 class Part(NamedTuple):
@@ -28,7 +28,7 @@ class Part(NamedTuple):
     J: np.ndarray
 
 
-@record
+@record_with(sizes=("modes", "bodies", "friction_rows"))
 class System(NamedTuple):
     """Matrices of a scene: n modes, b bodies, N = n + b coordinates, r rows (friction rows first, then contacts).
 
