@@ -66,22 +66,22 @@ _LIBRARIES = """
 import numpy as np
 from numba import njit
 from vanedamp.coupling.exact.event_functions import step_or_stop
-from vanedamp.coupling.exact.root_search import expand
+from vanedamp.coupling.exact.root_search import expand, new_expansion
 from vanedamp.coupling.numerics.codes import POSITION
 from vanedamp.coupling.numerics.jit import entry, kernel
 
 
 @kernel
-def step(k0, g, eigenvalue, end, taylor):
-    noise, second, calm, fast = expand(POSITION, 0.1, 0.0, g, eigenvalue, len(g), 0.0, taylor)
-    return step_or_stop(taylor, 1.0, k0, np.inf, noise, second, calm, fast, end, 1e-15 * end)[0]
+def step(k0, g, eigenvalue, end, work):
+    noise, second, calm, fast = expand(POSITION, 0.1, 0.0, g, eigenvalue, 0, len(g), 0.0, work)
+    return step_or_stop(work.taylor, 1.0, k0, np.inf, noise, second, calm, fast, end, 1e-15 * end)[0]
 
 
-def twice(g, eigenvalue, taylor):
-    return step(1.0, g, eigenvalue, 6.0, taylor) + step(2.0, g, eigenvalue, 0.1, taylor)
+def twice(g, eigenvalue, work):
+    return step(1.0, g, eigenvalue, 6.0, work) + step(2.0, g, eigenvalue, 0.1, work)
 
 
-arguments = np.ones(3) + 0j, 1j * np.arange(1, 4.0), np.zeros((2, 11))
+arguments = np.ones(3) + 0j, 1j * np.arange(1, 4.0), new_expansion(3)
 print(entry(twice)(*arguments), njit(twice)(*arguments), njit(lambda a, b, c: step(1.0, a, b, 6.0, c))(*arguments))
 """
 

@@ -5,18 +5,23 @@ import pytest
 from numba import njit
 
 from vanedamp.coupling.exact.event_functions import step_or_stop
-from vanedamp.coupling.exact.root_search import DEGREE, expand
+from vanedamp.coupling.exact.root_search import expand, new_expansion
 from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 
 
-@njit
 def search(order, k0, k1, k2, g, eigenvalue, end):
     """First root in (0, end), or inf: the engine's loop for one event function."""
-    t, steps, a = 0.0, 0, np.zeros((2, DEGREE + 1))
+    rates = np.argsort(np.abs(eigenvalue))
+    return search_in_order(order, k0, k1, k2, g[rates], eigenvalue[rates], end, new_expansion(len(g)))
+
+
+@njit
+def search_in_order(order, k0, k1, k2, g, eigenvalue, end, work):
+    t, steps = 0.0, 0
     while t < end:
-        noise, second, calm, fast = expand(order, k1, k2, g, eigenvalue, len(g), t, a)
-        step, found, _ = step_or_stop(a, 1.0, k0, np.inf, noise, second, calm, fast, end - t, 1e-15 * end)
+        noise, second, calm, fast = expand(order, k1, k2, g, eigenvalue, 0, len(g), t, work)
+        step, found, _ = step_or_stop(work.taylor, 1.0, k0, np.inf, noise, second, calm, fast, end - t, 1e-15 * end)
         t += step
         if found:
             return t, steps

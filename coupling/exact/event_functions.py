@@ -56,7 +56,7 @@ def next_event(system, flows, st, watched):
     driven = _is_driven(flows, s)
     left = max(system.period - st.time[0], 0.0)
     shortest = RESOLUTION * system.period
-    count = _list_functions(system, flows, st, watched, s)
+    count, taylor = _list_functions(system, flows, st, watched, s), watched.expansion.taylor
     st.counters[SEGMENTS] += 1
     while True:
         k, tau, longest = -1, left, system.period
@@ -78,27 +78,27 @@ def next_event(system, flows, st, watched):
         else:
             st.counters[EVALUATIONS] += 1
         noise, second, calm, fast = expand(
-            watched.order[k], watched.k1[k], watched.k2[k], watched.g[k], flows.eigenvalue[s], st.counters[AWAKE], tau,
-            watched.taylor,
+            watched.order[k], watched.k1[k], watched.k2[k], watched.g[k], flows.eigenvalue[s],
+            flows.driven.shape[1] - 1, st.counters[AWAKE], tau, watched.expansion,
         )  # fmt: skip
         if driven:
             more, bound = add_secular(
                 watched.order[k], watched.drive[k], flows.driven[s], flows.eigenvalue[s], tau, system.period,
-                watched.taylor,
+                taylor,
             )  # fmt: skip
             noise, second = noise + more, second + bound
             calm = calm + bound if calm >= 0.0 else calm
         longest = max(longest - tau, shortest)
         # the side that the motion approaches first: the other one is looked at until then
         two = watched.sides[k] == 2
-        side = 1 if two and watched.taylor[0, 1] > 0.0 else 0
+        side = 1 if two and taylor[0, 1] > 0.0 else 0
         step, found, clear = step_or_stop(
-            watched.taylor, 1.0 - 2.0 * side, watched.k0[k, side], watched.k0[k, 1 - side] if two else math.inf,
+            taylor, 1.0 - 2.0 * side, watched.k0[k, side], watched.k0[k, 1 - side] if two else math.inf,
             max(noise, watched.noise[k]), second, calm, fast, longest, shortest,
         )  # fmt: skip
         if two and not clear:
             other, root, _ = step_or_stop(
-                watched.taylor, 2.0 * side - 1.0, watched.k0[k, 1 - side], math.inf, max(noise, watched.noise[k]),
+                taylor, 2.0 * side - 1.0, watched.k0[k, 1 - side], math.inf, max(noise, watched.noise[k]),
                 second, calm, fast, step, shortest,
             )  # fmt: skip
             if other < step:

@@ -15,8 +15,11 @@ periods.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
+import numpy as np
+
+from vanedamp.coupling.numerics.codes import POSITION, VELOCITY
 from vanedamp.coupling.numerics.exponentials import (
     eighth_root_of_ratio,
     exp_minus_line,
@@ -25,10 +28,14 @@ from vanedamp.coupling.numerics.exponentials import (
     secular_bound,
 )
 from vanedamp.coupling.numerics.jit import inlined, kernel, summing
+from vanedamp.coupling.numerics.record import record
 
 #: degree of the lower polynomial; its last coefficient is that of the bound
 DEGREE = 10
 _OVER_FACTORIAL = tuple(1.0 / math.factorial(p) for p in range(DEGREE + 1))
+
+# places in the sums over modes: derivatives up to the bound of order DEGREE, a bound of the second, sizes
+_SECOND, _SIZE, _SUMS = DEGREE + 1, DEGREE + 2, DEGREE + 3
 
 #: round-off of a sum, relative to the sum of its terms' sizes
 ROUND_OFF = 4.0 * 2.0**-52
@@ -38,6 +45,24 @@ _REACH = 3.6
 _FAST = 4.0
 # Newton's iteration: a correction below a share leaves an error of about its square
 _NEAR, _CONVERGED = 1e-2, 1e-8
+
+
+@record
+class Expansion(NamedTuple):
+    """The expansion of an event function at a time, and room for it."""
+
+    taylor: np.ndarray  # (2, DEGREE + 1) polynomials of its motion, and of that without fast modes
+    amplitude: np.ndarray  # (m,) complex: those of the exponentials at its time
+    slow: np.ndarray  # sums over the slow modes
+    fast: np.ndarray  # those over the fast ones
+    more: np.ndarray
+
+
+def new_expansion(modes: int) -> Expansion:
+    """Return room for the expansion of event functions of m modes."""
+    return Expansion(
+        np.zeros((2, DEGREE + 1)), np.zeros(modes, complex), np.zeros(_SUMS), np.zeros(_SUMS), np.zeros(_SUMS)
+    )
 
 
 @kernel
@@ -89,52 +114,139 @@ def first_root_of_parabola(f, slope, curvature):
     return 2.0 * f / (math.sqrt(square) - slope)
 
 
-@summing
-def expand(order, k1, k2, g, eigenvalue, count, t, taylor):
-    """Set the Taylor polynomials (2, DEGREE + 1) of a motion from time t on, by powers of the time since.
+@inlined
+def expand(order, k1, k2, g, eigenvalue, harmonics, count, t, work):
+    """Set the Taylor polynomials of a motion from time t on, by powers of the time since, in `work`.
 
-    The motion is k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t) of the first `count` modes. Its remainder is no larger
-    than the last coefficient times its power. The first polynomial is that of all modes; the second leaves out those
-    much faster than the first mode: less sharp close to a root, but good for long steps far from it.
+    The motion is k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t) of the first `count` modes: harmonics, then others, both
+    in order of their rates. Its remainder is no larger than the last coefficient times its power. The first polynomial
+    is that of all modes; the second leaves out those much faster than the first mode: less sharp close to a root, but
+    good for long steps far from it. Modes in another order are as well bounded, but steps may be shorter.
     Returns the round-off of the value, a bound of the second derivative, that of the slow modes (-1: all are), and the
     size of the fast modes.
     order POSITION: exponentials as exp(z) - 1 - z, so that there is no motion at the start, and its rate is k1 exactly;
     VELOCITY: exp(z) - 1 with the constant slope k1; FORCE: exp(z) only.
     """
-    value, slope, noise = 0.0, k1, 0.0
-    c2, c3, c4, c5, c6, c7, c8, c9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    f2, f3, f4, f5, f6, f7, f8, f9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    second, last, fast_value, fast_slope, fast_second, fast_last, fast_size = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    value, noise, slope, amplitude = 0.0, 0.0, 0.0, g
+    if t > 0.0:
+        amplitude = work.amplitude
+        if order != POSITION:
+            value, noise, slope = _amplitudes(g, eigenvalue, count, t, 0.0, amplitude)
+        elif t * min(_size(eigenvalue[0]), _size(eigenvalue[min(harmonics, count - 1)])) > 0.25:
+            value, noise, slope = _amplitudes(g, eigenvalue, count, t, 1.0, amplitude)
+        else:
+            value, noise, slope = _young_amplitudes(g, eigenvalue, count, t, amplitude)
+    limit = _FAST * _square(eigenvalue[0])
+    low, high = (
+        _first_fast(eigenvalue, 0, min(harmonics, count), limit), _first_fast(eigenvalue, harmonics, count, limit)
+    )  # fmt: skip
+    slow, fast, more = work.slow, work.fast, work.more
+    apart = low < harmonics
+    _add_up(amplitude, eigenvalue, 0, low if apart else high, slow)
+    if apart:
+        _add_up(amplitude, eigenvalue, harmonics, high, more)
+        for p in range(_SUMS):
+            slow[p] += more[p]
+        _add_up(amplitude, eigenvalue, low, harmonics, fast)
+        _add_up(amplitude, eigenvalue, high, count, more)
+        for p in range(_SUMS):
+            fast[p] += more[p]
+    elif high < count:
+        _add_up(amplitude, eigenvalue, high, count, fast)
+    whole, quiet, all_slow = work.taylor[0], work.taylor[1], not apart and high >= count
     if order == POSITION:
-        value += t * (k1 + 0.5 * k2 * t)
-        slope += k2 * t
+        slow[2] += k2
+        slow[_SECOND] += abs(k2)
+    for p in range(DEGREE + 1):
+        whole[p] = (slow[p] if all_slow else slow[p] + fast[p]) * _OVER_FACTORIAL[p]
+    size = slow[_SIZE] if all_slow else slow[_SIZE] + fast[_SIZE]
+    if order == POSITION:
+        whole[0], whole[1] = value + t * (k1 + 0.5 * k2 * t), slope + k1 + k2 * t
         noise += abs(k1 * t) + abs(k2 * t * t)
     elif order == VELOCITY:
-        value += k1 * t
+        whole[0], whole[1] = value + k1 * t, whole[1] + k1
         noise += abs(k1 * t)
-    # what of exp(z) the order leaves out
-    line, one = 1.0 if order == POSITION else 0.0, 0.0 if order == FORCE else 1.0
-    limit = _FAST * (eigenvalue[0].real * eigenvalue[0].real + eigenvalue[0].imag * eigenvalue[0].imag)
-    for j in range(count):
-        rate, amplitude = eigenvalue[j], g[j]
-        x, y, u, v = rate.real, rate.imag, amplitude.real, amplitude.imag
-        if t > 0.0:
-            z = complex(x * t, y * t)
-            first = exp_minus_one(z)
-            beyond = exp_minus_line(z, first) if order == POSITION else first
-            part, other = u * beyond.real - v * beyond.imag, u * beyond.imag + v * beyond.real
-            du, dv = u * first.real - v * first.imag, u * first.imag + v * first.real
-            slope += line * (x * du - y * dv)
-            u, v = u + du, v + dv
-            part, other = part + (1.0 - one) * amplitude.real, other + (1.0 - one) * amplitude.imag
+    else:
+        noise = size
+    if all_slow:
+        return ROUND_OFF * noise, slow[_SECOND], -1.0, 0.0
+    for p in range(2, DEGREE + 1):
+        quiet[p] = slow[p] * _OVER_FACTORIAL[p]
+    quiet[0], quiet[1] = whole[0] - fast[0], whole[1] - fast[1]
+    return ROUND_OFF * noise, slow[_SECOND] + fast[_SECOND], slow[_SECOND], fast[_SIZE]
+
+
+@inlined
+def _size(z):
+    return abs(z.real) + abs(z.imag)
+
+
+@inlined
+def _square(z):
+    return z.real * z.real + z.imag * z.imag
+
+
+@inlined
+def _first_fast(eigenvalue, low, high, limit):
+    """Return the first mode from `low` to `high`, in order of their rates, whose squared rate is beyond the limit."""
+    while low < high:
+        middle = (low + high) // 2
+        if _square(eigenvalue[middle]) > limit:
+            high = middle
         else:
-            part, other = (1.0 - one) * u, (1.0 - one) * v
-        value += part
-        noise += abs(part) + abs(other)
+            low = middle + 1
+    return low
+
+
+@summing
+def _amplitudes(g, eigenvalue, count, t, line, amplitude):
+    """Set the amplitudes of the exponentials after a time t.
+
+    Returns Re sum g (exp(z) - 1 - line z), the sum of its terms' sizes, and the rate of Re sum g (exp(z) - 1) less that
+    at the start.
+    """
+    value, size, slope = 0.0, 0.0, 0.0
+    for j in range(count):
+        rate, start = eigenvalue[j], g[j]
+        z = complex(rate.real * t, rate.imag * t)
+        first = exp_minus_one(z)
+        change = start * first
+        beyond = complex(first.real - line * z.real, first.imag - line * z.imag)
+        part = start * beyond
+        value += part.real
+        size += abs(part.real) + abs(part.imag)
+        slope += rate.real * change.real - rate.imag * change.imag
+        amplitude[j] = start + change
+    return value, size, slope
+
+
+@summing
+def _young_amplitudes(g, eigenvalue, count, t, amplitude):
+    """As `_amplitudes` with line 1, where exp(z) - 1 - z of some mode would cancel."""
+    value, size, slope = 0.0, 0.0, 0.0
+    for j in range(count):
+        rate, start = eigenvalue[j], g[j]
+        z = complex(rate.real * t, rate.imag * t)
+        first = exp_minus_one(z)
+        change, part = start * first, start * exp_minus_line(z, first)
+        value += part.real
+        size += abs(part.real) + abs(part.imag)
+        slope += rate.real * change.real - rate.imag * change.imag
+        amplitude[j] = start + change
+    return value, size, slope
+
+
+@summing
+def _add_up(amplitude, eigenvalue, low, high, sums):
+    """Set the sums of the exponentials' derivatives over the modes from `low` to `high`, and of their bounds."""
+    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    size, second, last = 0.0, 0.0, 0.0
+    for j in range(low, high):
+        rate, one = eigenvalue[j], amplitude[j]
         # derivatives of Re exp(lambda t) obey the recurrence of the characteristic polynomial
-        twice, square = 2.0 * x, x * x + y * y
-        d1 = x * u - y * v
-        d2 = twice * d1 - square * u
+        twice, square = 2.0 * rate.real, _square(rate)
+        d0, d1 = one.real, rate.real * one.real - rate.imag * one.imag
+        d2 = twice * d1 - square * d0
         d3 = twice * d2 - square * d1
         d4 = twice * d3 - square * d2
         d5 = twice * d4 - square * d3
@@ -142,37 +254,14 @@ def expand(order, k1, k2, g, eigenvalue, count, t, taylor):
         d7 = twice * d6 - square * d5
         d8 = twice * d7 - square * d6
         d9 = twice * d8 - square * d7
-        slope += (1.0 - line) * d1
-        size = (abs(u) + abs(v)) * square
-        largest = size * (square * square) * (square * square)
-        # never one sum less the other: they differ by powers of the rates
-        fast = 1.0 if square > limit else 0.0
-        calm = 1.0 - fast
-        second, last = second + calm * size, last + calm * largest
-        c2, c3, c4, c5 = c2 + calm * d2, c3 + calm * d3, c4 + calm * d4, c5 + calm * d5
-        c6, c7, c8, c9 = c6 + calm * d6, c7 + calm * d7, c8 + calm * d8, c9 + calm * d9
-        fast_value, fast_slope = fast_value + fast * u, fast_slope + fast * d1
-        fast_size, fast_second, fast_last = (
-            fast_size + fast * (abs(u) + abs(v)), fast_second + fast * size, fast_last + fast * largest
-        )  # fmt: skip
-        f2, f3, f4, f5 = f2 + fast * d2, f3 + fast * d3, f4 + fast * d4, f5 + fast * d5
-        f6, f7, f8, f9 = f6 + fast * d6, f7 + fast * d7, f8 + fast * d8, f9 + fast * d9
-    whole, slow = taylor[0], taylor[1]
-    if order == POSITION:
-        c2, second = c2 + k2, second + abs(k2)
-    _set(whole, value, slope, c2 + f2, c3 + f3, c4 + f4, c5 + f5, c6 + f6, c7 + f7, c8 + f8, c9 + f9, last + fast_last)
-    if fast_second == 0.0:
-        return ROUND_OFF * noise, second, -1.0, 0.0
-    _set(slow, value - fast_value, slope - fast_slope, c2, c3, c4, c5, c6, c7, c8, c9, last)
-    return ROUND_OFF * noise, second + fast_second, second, fast_size
-
-
-@inlined
-def _set(a, value, slope, c2, c3, c4, c5, c6, c7, c8, c9, last):
-    """Set the coefficients of a Taylor polynomial from its derivatives, the last one a bound."""
-    a[0], a[1], a[2], a[3], a[4] = value, slope, c2 * (1 / 2), c3 * (1 / 6), c4 * (1 / 24)
-    a[5], a[6], a[7], a[8] = c5 * (1 / 120), c6 * (1 / 720), c7 * (1 / 5040), c8 * (1 / 40320)
-    a[9], a[10] = c9 * (1 / 362880), last * (1 / 3628800)
+        c0, c1, c2, c3, c4 = c0 + d0, c1 + d1, c2 + d2, c3 + d3, c4 + d4
+        c5, c6, c7, c8, c9 = c5 + d5, c6 + d6, c7 + d7, c8 + d8, c9 + d9
+        part = _size(one)
+        fourth = square * square
+        size, second, last = size + part, second + part * square, last + part * (square * (fourth * fourth))
+    sums[0], sums[1], sums[2], sums[3], sums[4], sums[5] = c0, c1, c2, c3, c4, c5
+    sums[6], sums[7], sums[8], sums[9], sums[DEGREE] = c6, c7, c8, c9, last
+    sums[_SECOND], sums[_SIZE] = second, size
 
 
 @inlined

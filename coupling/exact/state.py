@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.exact.root_search import DEGREE
+from vanedamp.coupling.exact.root_search import Expansion, new_expansion
 from vanedamp.coupling.numerics.codes import COAST, COUNTERS, OPEN
 from vanedamp.coupling.numerics.complementarity import Problem, new_problem
 from vanedamp.coupling.numerics.record import record
@@ -82,8 +82,7 @@ class EventFunctions(NamedTuple):
     no_root_before: np.ndarray  # (k,) time before which no root can lie; its first root once that is known, s
     side: np.ndarray  # (k,) int: side of that root
 
-    # scratch
-    taylor: np.ndarray  # (2, DEGREE + 1) polynomials of the motion of one of them
+    expansion: Expansion  # of one of them
 
 
 @record
@@ -178,7 +177,7 @@ def new_event_functions(system: System, modes: int) -> EventFunctions:
         status=np.zeros(k, np.int64),
         no_root_before=np.zeros(k),
         side=np.zeros(k, np.int64),
-        taylor=np.zeros((2, DEGREE + 1)),
+        expansion=new_expansion(modes),
     )
 
 

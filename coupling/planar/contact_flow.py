@@ -161,6 +161,8 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     preload = system.spring[pressed] * system.rest[pressed]
     weight = system.weight / root + applied
     eigenvalue, shape, project = _modes(own, loss, float(system.frequency[0]))
+    order = np.argsort(np.abs(eigenvalue), kind="stable")
+    eigenvalue, shape, project = eigenvalue[order], shape[:, order], project[order]
     count = e + len(eigenvalue)
     rate = np.r_[1j * system.frequency, eigenvalue]
     # constant part, of loads and of what constraints hold

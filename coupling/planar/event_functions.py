@@ -70,14 +70,15 @@ def next_event(system, flows, st, guards):
         else:
             st.counters[EVALUATIONS] += 1
         noise, second, calm, fast = expand(
-            guards.order[k], guards.k1[k], guards.k2[k], guards.g[k], eigenvalue, modes, tau, guards.taylor
-        )
+            guards.order[k], guards.k1[k], guards.k2[k], guards.g[k], eigenvalue, len(system.frequency), modes, tau,
+            guards.expansion,
+        )  # fmt: skip
         if grows > 1.0:  # bounds of the derivatives hold for motions that decay
             second, calm = second * grows, -1.0
-            guards.taylor[0, DEGREE] *= grows
+            guards.expansion.taylor[0, DEGREE] *= grows
         step, found, _ = step_or_stop(
-            guards.taylor, 1.0, guards.k0[k], math.inf, max(noise, guards.noise[k]), second, calm, fast, system.period,
-            shortest,
+            guards.expansion.taylor, 1.0, guards.k0[k], math.inf, max(noise, guards.noise[k]), second, calm, fast,
+            system.period, shortest,
         )  # fmt: skip
         guards.status[k] = ROOT if found else EXPANDED
         guards.no_root_before[k] = tau + step if found else max(guards.no_root_before[k], tau + step)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.exact.root_search import DEGREE
+from vanedamp.coupling.exact.root_search import Expansion, new_expansion
 from vanedamp.coupling.numerics.codes import COUNTERS, OPEN
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
 from vanedamp.coupling.numerics.record import record
@@ -64,7 +64,7 @@ class Guards(NamedTuple):
     noise: np.ndarray
     no_root_before: np.ndarray  # s
     g: np.ndarray  # (k, m) complex
-    taylor: np.ndarray  # (2, DEGREE + 1) scratch
+    expansion: Expansion
 
 
 @record
@@ -127,7 +127,7 @@ def new_guards(system: PlanarSystem, modes: int) -> Guards:
     return Guards(
         unit=np.zeros(k, np.int64), order=np.zeros(k, np.int64), what=np.zeros(k, np.int64),
         status=np.zeros(k, np.int64), k0=np.zeros(k), k1=np.zeros(k), k2=np.zeros(k), noise=np.zeros(k),
-        no_root_before=np.zeros(k), g=np.zeros((k, modes), complex), taylor=np.zeros((2, DEGREE + 1)),
+        no_root_before=np.zeros(k), g=np.zeros((k, modes), complex), expansion=new_expansion(modes),
     )  # fmt: skip
 
 
