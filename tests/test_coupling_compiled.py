@@ -74,7 +74,7 @@ from vanedamp.coupling.numerics.jit import entry, kernel
 @kernel
 def step(k0, g, eigenvalue, end, work):
     noise, second, calm, fast = expand(POSITION, 0.1, 0.0, g, eigenvalue, 0, len(g), 0.0, work)
-    return step_or_stop(work.taylor, 1.0, k0, np.inf, noise, second, calm, fast, end, 1e-15 * end)[0]
+    return step_or_stop(work, 1.0, k0, np.inf, noise, second, calm, fast, end, 1e-15 * end)[0]
 
 
 def twice(g, eigenvalue, work):

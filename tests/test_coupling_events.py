@@ -21,7 +21,7 @@ def search_in_order(order, k0, k1, k2, g, eigenvalue, end, work):
     t, steps = 0.0, 0
     while t < end:
         noise, second, calm, fast = expand(order, k1, k2, g, eigenvalue, 0, len(g), t, work)
-        step, found, _ = step_or_stop(work.taylor, 1.0, k0, np.inf, noise, second, calm, fast, end - t, 1e-15 * end)
+        step, found, _ = step_or_stop(work, 1.0, k0, np.inf, noise, second, calm, fast, end - t, 1e-15 * end)
         t += step
         if found:
             return t, steps

@@ -64,8 +64,9 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
     VELOCITY,
 )
-from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular
-from vanedamp.coupling.numerics.jit import entry, inlined, kernel, summing
+from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, is_long, secular
+from vanedamp.coupling.numerics.jit import comparing, entry, inlined, kernel, summing
+from vanedamp.coupling.numerics.vectors import whole_vectors
 from vanedamp.coupling.response.records import FRICTION
 
 #: differences below this share of their terms are round-off
@@ -356,29 +357,55 @@ def _wake_modes(flows, st):
 @inlined
 def _largest_acceleration(flows, st, s, count):
     """Return the largest acceleration of the first `count` modes, and set the bound of their speeds."""
+    largest, st.largest_speed[0] = _largest(st.amplitude, flows.acceleration[s], flows.speed[s], count)
+    return largest
+
+
+@comparing
+def _largest(amplitude, acceleration, speed, count):
     largest, fastest = 0.0, 0.0
     for j in range(count):
-        c = st.amplitude[j]
-        size = abs(c.real) + abs(c.imag)
-        largest = max(largest, size * flows.acceleration[s, j])
-        fastest = max(fastest, size * flows.speed[s, j])
-    st.largest_speed[0] = fastest
-    return largest
+        size = abs(amplitude[j].real) + abs(amplitude[j].imag)
+        largest = max(largest, size * acceleration[j])
+        fastest = max(fastest, size * speed[j])
+    return largest, fastest
 
 
 @inlined
 def amplitude_changes(flows, st, scratch, tau):
     """Set the changes of the awake modes' amplitudes over the segment."""
     s, e = st.counters[FLOW], flows.driven.shape[1] - 1
-    for j in range(st.counters[AWAKE]):
-        z = flows.eigenvalue[s, j] * tau
-        first = exp_minus_one(z)
-        scratch.gain[j] = st.amplitude[j] * first
-        scratch.bend[j] = st.amplitude[j] * exp_minus_line(z, first)
+    count = whole_vectors(st.counters[AWAKE], len(st.amplitude))
+    if is_long(flows.eigenvalue[s], e, st.counters[AWAKE], tau):
+        _grow_long(flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
+    else:
+        _grow(flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
     if flows.driven[s, e] > e:
         _add_driven_growth(
             flows.eigenvalue[s], flows.driven[s], flows.load[s], st.amplitude, scratch.gain, scratch.bend, tau
         )
+
+
+@summing
+def _grow(eigenvalue, amplitude, count, tau, gain, bend):
+    """Set the changes of amplitudes over a time, and the same less their tangents."""
+    for j in range(count):
+        rate, c = eigenvalue[j], amplitude[j]
+        z = complex(rate.real * tau, rate.imag * tau)
+        first = exp_minus_one(z)
+        gain[j] = c * first
+        bend[j] = c * exp_minus_line(z, first)
+
+
+@summing
+def _grow_long(eigenvalue, amplitude, count, tau, gain, bend):
+    """As `_grow`, over a long time (`is_long`)."""
+    for j in range(count):
+        rate, c = eigenvalue[j], amplitude[j]
+        z = complex(rate.real * tau, rate.imag * tau)
+        first = exp_minus_one(z)
+        gain[j] = c * first
+        bend[j] = c * complex(first.real - z.real, first.imag - z.imag)
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.root_search import ROUND_OFF, add_secular, expand, first_root_of_parabola, safe_step
+from vanedamp.coupling.exact.root_search import ROUND_OFF, add_secular, expand, first_root_of_parabola, safe_step, shift
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
@@ -93,12 +93,12 @@ def next_event(system, flows, st, watched):
         two = watched.sides[k] == 2
         side = 1 if two and taylor[0, 1] > 0.0 else 0
         step, found, clear = step_or_stop(
-            taylor, 1.0 - 2.0 * side, watched.k0[k, side], watched.k0[k, 1 - side] if two else math.inf,
+            watched.expansion, 1.0 - 2.0 * side, watched.k0[k, side], watched.k0[k, 1 - side] if two else math.inf,
             max(noise, watched.noise[k]), second, calm, fast, longest, shortest,
         )  # fmt: skip
         if two and not clear:
             other, root, _ = step_or_stop(
-                taylor, 2.0 * side - 1.0, watched.k0[k, 1 - side], math.inf, max(noise, watched.noise[k]),
+                watched.expansion, 2.0 * side - 1.0, watched.k0[k, 1 - side], math.inf, max(noise, watched.noise[k]),
                 second, calm, fast, step, shortest,
             )  # fmt: skip
             if other < step:
@@ -119,13 +119,13 @@ def carry_over_period(system, st, watched, tau):
 
 
 @kernel
-def step_or_stop(taylor, sign, k0, k0_far, noise, second, calm, fast, longest, shortest):
+def step_or_stop(expansion, sign, k0, k0_far, noise, second, calm, fast, longest, shortest):
     """Return a safe step from a point of an event function k0 + sign motion, and whether its root is at the end.
 
     The third value returned: whether k0_far - sign motion has no root on the step either; False is not known.
-    taylor, noise, second, calm, fast: of the motion, as set and returned by exact.root_search.expand.
+    expansion, noise, second, calm, fast: of the motion, as set and returned by exact.root_search.expand.
     """
-    whole, slow = taylor[0], taylor[1]
+    whole, slow = expansion.taylor[0], expansion.taylor[1]
     noise += ROUND_OFF * abs(k0)
     f, slope, bend = k0 + sign * whole[0], sign * whole[1], sign * whole[2]
     if f <= noise:
@@ -143,6 +143,12 @@ def step_or_stop(taylor, sign, k0, k0_far, noise, second, calm, fast, longest, s
     step, found, clear = safe_step(whole, sign, f, max(k0_far - sign * whole[0], 0.0), noise, second, longest)
     if far > step:
         return far, False, False
+    if calm >= 0.0 and far == 0.0 and not found and shortest < step < longest:
+        # the slow motion has left the fast one behind by then
+        above = k0 + sign * slow[0] - fast + shift(slow, sign, step, expansion.shifted)
+        if above > noise:
+            far, _, _ = safe_step(expansion.shifted, 1.0, above, 0.0, 0.0, calm, longest - step)
+            return step + far, False, False
     if step < shortest:
         falls = slope < 0.0 and f <= 2.0 * shortest * (second * shortest - slope)
         return (0.0, True, False) if falls else (shortest, False, False)

@@ -7,6 +7,7 @@ import math
 from vanedamp.coupling.numerics.codes import AWAKE
 from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound
 from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel, summing
+from vanedamp.coupling.numerics.vectors import whole_vectors
 
 #: grids of peaks, by steps of an eighth of a period, half of that, and so on, whose factors are known
 GRIDS = 5
@@ -20,7 +21,7 @@ def highest(system, flows, st, scratch, s, tau, constant, peak):
     derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is refined by Newton.
     Where interpolant and bound stay below the peak so far there is nothing to find.
     """
-    count = st.counters[AWAKE]
+    count = whole_vectors(st.counters[AWAKE], len(st.amplitude))
     x0, v0, x1, v1, size, fourth = _ends(
         flows.response[s], flows.eigenvalue[s], st.amplitude, scratch.gain, scratch.wave, count
     )

@@ -24,11 +24,13 @@ from vanedamp.coupling.numerics.exponentials import (
     eighth_root_of_ratio,
     exp_minus_line,
     exp_minus_one,
+    is_long,
     secular,
     secular_bound,
 )
 from vanedamp.coupling.numerics.jit import inlined, kernel, summing
 from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.vectors import whole_vectors
 
 #: degree of the lower polynomial; its last coefficient is that of the bound
 DEGREE = 10
@@ -56,13 +58,14 @@ class Expansion(NamedTuple):
     slow: np.ndarray  # sums over the slow modes
     fast: np.ndarray  # those over the fast ones
     more: np.ndarray
+    shifted: np.ndarray  # (DEGREE + 1,) polynomial from another time on
 
 
 def new_expansion(modes: int) -> Expansion:
     """Return room for the expansion of event functions of m modes."""
     return Expansion(
-        np.zeros((2, DEGREE + 1)), np.zeros(modes, complex), np.zeros(_SUMS), np.zeros(_SUMS), np.zeros(_SUMS)
-    )
+        np.zeros((2, DEGREE + 1)), np.zeros(modes, complex), *np.zeros((3, _SUMS)), np.zeros(DEGREE + 1)
+    )  # fmt: skip
 
 
 @kernel
@@ -128,14 +131,15 @@ def expand(order, k1, k2, g, eigenvalue, harmonics, count, t, work):
     VELOCITY: exp(z) - 1 with the constant slope k1; FORCE: exp(z) only.
     """
     value, noise, slope, amplitude = 0.0, 0.0, 0.0, g
+    all_modes = whole_vectors(count, len(g))
     if t > 0.0:
         amplitude = work.amplitude
         if order != POSITION:
-            value, noise, slope = _amplitudes(g, eigenvalue, count, t, 0.0, amplitude)
-        elif t * min(_size(eigenvalue[0]), _size(eigenvalue[min(harmonics, count - 1)])) > 0.25:
-            value, noise, slope = _amplitudes(g, eigenvalue, count, t, 1.0, amplitude)
+            value, noise, slope = _later(g, eigenvalue, all_modes, t, 0.0, amplitude)
+        elif is_long(eigenvalue, harmonics, count, t):
+            value, noise, slope = _later(g, eigenvalue, all_modes, t, 1.0, amplitude)
         else:
-            value, noise, slope = _young_amplitudes(g, eigenvalue, count, t, amplitude)
+            value, noise, slope = _soon(g, eigenvalue, all_modes, t, amplitude)
     limit = _FAST * _square(eigenvalue[0])
     low, high = (
         _first_fast(eigenvalue, 0, min(harmonics, count), limit), _first_fast(eigenvalue, harmonics, count, limit)
@@ -148,11 +152,11 @@ def expand(order, k1, k2, g, eigenvalue, harmonics, count, t, work):
         for p in range(_SUMS):
             slow[p] += more[p]
         _add_up(amplitude, eigenvalue, low, harmonics, fast)
-        _add_up(amplitude, eigenvalue, high, count, more)
+        _add_up(amplitude, eigenvalue, high, all_modes, more)
         for p in range(_SUMS):
             fast[p] += more[p]
     elif high < count:
-        _add_up(amplitude, eigenvalue, high, count, fast)
+        _add_up(amplitude, eigenvalue, high, all_modes, fast)
     whole, quiet, all_slow = work.taylor[0], work.taylor[1], not apart and high >= count
     if order == POSITION:
         slow[2] += k2
@@ -199,7 +203,7 @@ def _first_fast(eigenvalue, low, high, limit):
 
 
 @summing
-def _amplitudes(g, eigenvalue, count, t, line, amplitude):
+def _later(g, eigenvalue, count, t, line, amplitude):
     """Set the amplitudes of the exponentials after a time t.
 
     Returns Re sum g (exp(z) - 1 - line z), the sum of its terms' sizes, and the rate of Re sum g (exp(z) - 1) less that
@@ -221,8 +225,8 @@ def _amplitudes(g, eigenvalue, count, t, line, amplitude):
 
 
 @summing
-def _young_amplitudes(g, eigenvalue, count, t, amplitude):
-    """As `_amplitudes` with line 1, where exp(z) - 1 - z of some mode would cancel."""
+def _soon(g, eigenvalue, count, t, amplitude):
+    """As `_later` with line 1, where exp(z) - 1 - z of some mode would cancel."""
     value, size, slope = 0.0, 0.0, 0.0
     for j in range(count):
         rate, start = eigenvalue[j], g[j]
@@ -283,6 +287,22 @@ def _slope(a, sign, h):
     low = (a[1] + 2.0 * a[2] * h) + (3.0 * a[3] + 4.0 * a[4] * h) * h2
     high = (5.0 * a[5] + 6.0 * a[6] * h) + (7.0 * a[7] + 8.0 * a[8] * h) * h2
     return sign * (low + (high + 9.0 * a[9] * h4) * h4) - 10.0 * a[10] * (h * h4 * h4)
+
+
+@inlined
+def shift(a, sign, h, shifted):
+    """Set the coefficients of the lower polynomial of sign motion from h on, by powers of the time since.
+
+    The last one stays a bound. Returns its value at h less that at 0.
+    """
+    for p in range(DEGREE):
+        shifted[p] = sign * a[p]
+    shifted[0], shifted[DEGREE] = 0.0, -a[DEGREE]
+    for low in range(DEGREE):
+        for p in range(DEGREE - 1, low - 1, -1):
+            shifted[p] += h * shifted[p + 1]
+    shifted[DEGREE] = a[DEGREE]
+    return shifted[0]
 
 
 @inlined

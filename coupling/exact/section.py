@@ -31,5 +31,6 @@ def structure_state(flows, st, y):
         y[i] = st.constant[i] if i < n else 0.0
     for j in range(st.counters[AWAKE]):
         c, shape = st.amplitude[j], flows.shape[s, j]
-        for i in range(2 * n):
+        for i in range(flows.support[s, j, 0], flows.support[s, j, 1]):
             y[i] += shape[i].real * c.real - shape[i].imag * c.imag
+            y[n + i] += shape[n + i].real * c.real - shape[n + i].imag * c.imag

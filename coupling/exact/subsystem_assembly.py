@@ -64,6 +64,7 @@ class Flows(NamedTuple):
 
     # functionals of the amplitudes c
     shape: np.ndarray  # (s, m, 2n): (p, p') = constant + Re(c shape)
+    support: np.ndarray  # (s, m, 2): the first coordinate p of each of its rows, and the last one plus 1
     motion: np.ndarray  # (s, r, m): displacement of each row
     velocity: np.ndarray  # (s, r, m): its rate
     force: np.ndarray  # (s, r, m): force of each closed row
@@ -122,6 +123,7 @@ def empty_flows(system: System, capacity: int = 4) -> Flows:
         sprung=np.zeros(s, np.bool_),
         attached=np.zeros((s, b), np.bool_),
         shape=np.zeros((s, m, 2 * n), complex),
+        support=np.zeros((s, m, 2), np.int64),
         motion=np.zeros((s, r, m), complex),
         velocity=np.zeros((s, r, m), complex),
         force=np.zeros((s, r, m), complex),
@@ -268,6 +270,8 @@ def _fill(flows: Flows, system: System, s: int, subsystem: Subsystem) -> None:
     full = np.hstack([np.vstack([harmonic, 1j * system.frequency * harmonic + growing]), shape])
     structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
     flows.shape[s, :m] = full[structure].T
+    moved = (full[structure] != 0.0).reshape(2, n, m).any(axis=0)
+    flows.support[s, :m, 0], flows.support[s, :m, 1] = moved.argmax(axis=0), n - moved[::-1].argmax(axis=0)
     flows.excited[s] = full[xi, :e]
     flows.project[s, e:m], flows.project_slip[s, e:m] = project[:, structure], project[:, xi]
     flows.impulse_response[s, :, e:m] = system.of_structure.J @ project[:, n + b : 2 * n + b].T

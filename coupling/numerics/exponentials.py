@@ -23,6 +23,8 @@ _S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.9841
 _S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
 _C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
 _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
+# exp(z) - 1 - z cancels below
+_LONG = 0.25
 # e^x is 0 or inf to doubles beyond
 _LEAST, _MOST = -708.0, 709.0
 
@@ -114,7 +116,7 @@ def _by_logarithms(typing_context, x, y):
 def exp_minus_line(z, first):
     """Return exp(z) - 1 - z given first = exp(z) - 1, with full relative accuracy."""
     x, y = z.real, z.imag
-    if abs(x) + abs(y) > 0.25:
+    if abs(x) + abs(y) > _LONG:
         return first - z
     # Taylor series of 1 - cos y, sin y - y and e^x - 1 - x; the remainder is below 1e-16 of them
     u = y * y
@@ -129,6 +131,13 @@ def exp_minus_line(z, first):
     line = 0.5 * x * x * (1.0 + x * (1 / 3) * line)
     growth = x + line
     return complex(line - (1.0 + growth) * versine, sine + growth * (y + sine))
+
+
+@inlined
+def is_long(eigenvalue, harmonics, count, t):
+    """Whether exp(z) - 1 - z cancels for none of these modes over a time: harmonics, then others, slow ones first."""
+    first, other = eigenvalue[0], eigenvalue[min(harmonics, count - 1)]
+    return t * min(abs(first.real) + abs(first.imag), abs(other.real) + abs(other.imag)) > _LONG
 
 
 @kernel

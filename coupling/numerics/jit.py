@@ -32,7 +32,7 @@ _OPTIONS: dict[str, Any] = {
 _NOT_FROM_PYTHON = _OPTIONS | {"no_cpython_wrapper": True}
 
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
-_MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@intrinsic", "(NamedTuple)")
+_MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@comparing", "@intrinsic", "(NamedTuple)")
 _PACKAGE = Path(__file__).parents[2]
 
 
@@ -84,6 +84,11 @@ def kernel(function: Callable[..., Any]) -> Any:
 def summing(function: Callable[..., Any]) -> Any:
     """Compile a kernel whose sums may be taken in any order, several terms at once."""
     return njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=KERNEL)(function)
+
+
+def comparing(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that compares many numbers, several at once; what it returns for NaN is anything."""
+    return njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=KERNEL)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:

@@ -77,7 +77,7 @@ def next_event(system, flows, st, guards):
             second, calm = second * grows, -1.0
             guards.expansion.taylor[0, DEGREE] *= grows
         step, found, _ = step_or_stop(
-            guards.expansion.taylor, 1.0, guards.k0[k], math.inf, max(noise, guards.noise[k]), second, calm, fast,
+            guards.expansion, 1.0, guards.k0[k], math.inf, max(noise, guards.noise[k]), second, calm, fast,
             system.period, shortest,
         )  # fmt: skip
         guards.status[k] = ROOT if found else EXPANDED
