@@ -22,6 +22,8 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
 
+from vanedamp.coupling.numerics.record import Record
+
 _METHODS = (
     "finalize", "get_pointer_to_function", "serialize_using_object_code", "_get_compiled_object",
     "_get_module_for_linking", "_optimize_final_module", "codegen",
@@ -65,14 +67,27 @@ class _Kernel(JITCodeLibrary):
         return module
 
 
+class _Loops(_Kernel):
+    """Code of a function whose loops are long."""
+
+
 class _Entry(JITCodeLibrary):
-    """Code of a function that Python calls, with that of all functions below it."""
+    """Code of a function that Python calls, with that of all functions below it.
+
+    sized: whether it is compiled for the lengths of its records.
+    """
+
+    sized = False
 
     def finalize(self) -> None:
         """Link everything, optimise it, and make machine code."""
         self._own = [function.name for function in self._final_module.functions if not function.is_declaration]
+        self._loops: set[str] = set()
         for library in _below(self):
-            self._final_module.link_in(_module(library), preserve=True)
+            module = _module(library)
+            if isinstance(library, _Loops):
+                self._loops |= {function.name for function in module.functions if not function.is_declaration}
+            self._final_module.link_in(module, preserve=True)
             self._reload_init.update(library._reload_init)
         self._linking_libraries = []
         super().finalize()
@@ -98,7 +113,13 @@ class _Entry(JITCodeLibrary):
 
         Names of their own keep code that is loaded later, with all its arguments, from being taken for this one.
         """
+        vectors = bool(self._loops) and not self.sized
         for place, function in enumerate(self._final_module.functions):
+            if function.name in self._own and vectors:
+                # no vectors, which short loops pay for: long loops stay functions, with vectors of their own
+                function.add_function_attribute("noimplicitfloat")
+            if function.name in self._loops and vectors:
+                function.add_function_attribute("noinline")
             if not function.is_declaration and function.name not in self._own:
                 function.linkage = llvm.Linkage.internal
                 function.name = f"{self.name}.{place}"
@@ -144,6 +165,8 @@ def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) ->
                 state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
                 state.library.enable_object_caching()
             state.flags.forceinline = inline
+            if isinstance(state.library, _Entry):
+                state.library.sized = any(isinstance(kind, Record) and kind.lengths for kind in state.args)
             return False
 
     class Chosen(CompilerBase):
@@ -161,6 +184,6 @@ def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) ->
 
 if all(hasattr(JITCodeLibrary, name) for name in _METHODS):
     ENTRY, KERNEL = _compiler(_Entry, "entry"), _compiler(_Kernel, "kernel")
-    INLINED = _compiler(_Kernel, "inlined", inline=True)
+    INLINED, LOOPS = _compiler(_Kernel, "inlined", inline=True), _compiler(_Loops, "loops")
 else:
-    ENTRY = KERNEL = INLINED = Compiler
+    ENTRY = KERNEL = INLINED = LOOPS = Compiler

@@ -19,7 +19,7 @@ import numpy as np
 from numba import config, njit, types
 from numba.extending import typeof_impl
 
-from vanedamp.coupling.numerics.code_library import ENTRY, INLINED, KERNEL
+from vanedamp.coupling.numerics.code_library import ENTRY, INLINED, KERNEL, LOOPS
 from vanedamp.coupling.numerics.record import lengths, sized_type
 from vanedamp.files.errors import VanedampError
 
@@ -83,12 +83,12 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 def summing(function: Callable[..., Any]) -> Any:
     """Compile a kernel whose sums may be taken in any order, several terms at once."""
-    return njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=KERNEL)(function)
+    return njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, pipeline_class=LOOPS)(function)
 
 
 def comparing(function: Callable[..., Any]) -> Any:
     """Compile a kernel that compares many numbers, several at once; what it returns for NaN is anything."""
-    return njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=KERNEL)(function)
+    return njit(**_NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, pipeline_class=LOOPS)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
