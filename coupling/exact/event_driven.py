@@ -48,8 +48,11 @@ class _Log:
             self.chunks.append(log[:count].copy())
 
 
-def _is_common(system: System, modes: int) -> bool:
-    """Whether this is the most common scene, for which the engine is compiled: one mode, one body, two rigid walls."""
+def is_common(system: System, modes: int) -> bool:
+    """Whether this is the most common scene, for whose lengths the engine is compiled.
+
+    One mode, one body between two rigid walls, one harmonic.
+    """
     return system.modes == system.bodies == len(system.frequency) == 1 and len(system.delassus) == modes == 3
 
 
@@ -74,9 +77,9 @@ class EngineRun:
         self.event_functions = new_event_functions(system, modes)
         self.scratch = new_scratch(system, modes)
         self._advance_compiled = automaton.advance
-        if _is_common(system, modes) and hasattr(automaton.advance, "sized"):
+        if is_common(system, modes) and hasattr(automaton.advance, "sized"):
             self._advance_compiled = automaton.advance.sized(
-                system, self.flows, self.state, self.event_functions, records, self.scratch
+                system, self.flows, self.state, self.event_functions, records, self.scratch, 0, 0
             )
 
     def begin(self, max_events: int) -> int:

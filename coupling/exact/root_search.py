@@ -63,8 +63,9 @@ class Expansion(NamedTuple):
 
 def new_expansion(modes: int) -> Expansion:
     """Return room for the expansion of event functions of m modes."""
+    slow, fast, more = np.zeros((3, _SUMS))
     return Expansion(
-        np.zeros((2, DEGREE + 1)), np.zeros(modes, complex), *np.zeros((3, _SUMS)), np.zeros(DEGREE + 1)
+        np.zeros((2, DEGREE + 1)), np.zeros(modes, complex), slow, fast, more, np.zeros(DEGREE + 1)
     )  # fmt: skip
 
 

@@ -11,16 +11,15 @@ import hashlib
 import re
 from collections.abc import Callable
 from functools import cache, update_wrapper
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import config, njit, types
+from numba import config, njit, typeof, types
 from numba.extending import typeof_impl
 
 from vanedamp.coupling.numerics.code_library import ENTRY, INLINED, KERNEL, LOOPS
-from vanedamp.coupling.numerics.record import lengths, sized_type
+from vanedamp.coupling.numerics.record import is_record, lengths, sized_type
 from vanedamp.files.errors import VanedampError
 
 #: start of a counter: numba would compile the callees of a literal 0 again
@@ -53,12 +52,11 @@ class Entry:
         """Call it, compiled for the types of these arguments."""
         return self._compiled(*arguments)
 
-    def sized(self, *records: Any) -> Callable[..., Any]:
-        """Return it compiled for the lengths of these records, with integers for its other arguments."""
-        key = tuple((type(values), lengths(values)) for values in records)
+    def sized(self, *arguments: Any) -> Callable[..., Any]:
+        """Return it compiled for arguments like these, and for the lengths of the records among them."""
+        key = tuple((type(value), lengths(value) if is_record(value) else None) for value in arguments)
         if key not in self._sized:
-            others = (types.int64,) * (len(signature(self._compiled.py_func).parameters) - len(records))
-            kinds = (*map(sized_type, records), *others)
+            kinds = tuple(sized_type(value) if is_record(value) else typeof(value) for value in arguments)
             self._compiled.compile(kinds)
             self._sized[key] = self._compiled.overloads[kinds].entry_point
         return self._sized[key]

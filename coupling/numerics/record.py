@@ -74,6 +74,11 @@ def record_with(sizes: Sequence[str] = (), free_axes: int = 0) -> Callable[[Clas
     return made
 
 
+def is_record(value: Any) -> bool:
+    """Whether a value is a record of compiled functions."""
+    return type(value) in _LENGTHS
+
+
 def sized_type(values: Any) -> Record:
     """Return the type of a record with the lengths of its arrays in it."""
     return _type(values, dict(zip(values._fields, lengths(values), strict=True)))

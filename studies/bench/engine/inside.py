@@ -11,7 +11,7 @@ import numpy as np
 
 from vanedamp.coupling.exact.automaton import amplitude_changes
 from vanedamp.coupling.exact.energy_balance import account
-from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.exact.event_driven import EngineRun, is_common
 from vanedamp.coupling.exact.event_functions import next_event
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import AWAKE, CARRIED, EVENT_BUDGET, EVENTS, PERIOD
@@ -49,17 +49,26 @@ def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
     code = run.advance(period, scene.solver.max_events)
     search, accounting = np.zeros(rounds), np.zeros(rounds)
     while True:
-        tau = _search(run.system, run.flows, run.state, run.event_functions, 1)
-        _amplitudes(run.flows, run.state, run.scratch, tau)
+        searched = run.system, run.flows, run.state, run.event_functions
+        tau = _as_run(_search, run, *searched, 1)
+        grown = run.flows, run.state, run.scratch, tau
+        _as_run(_amplitudes, run, *grown)
+        accounted = run.system, run.flows, run.state, run.records, run.scratch, tau
         for turn in range(-1, rounds):  # the first compiles
-            one = seconds(_search, run.system, run.flows, run.state, run.event_functions, _REPEATS)
-            two = seconds(_account, run.system, run.flows, run.state, run.records, run.scratch, tau, _REPEATS)
+            one = seconds(_as_run, _search, run, *searched, _REPEATS)
+            two = seconds(_as_run, _account, run, *accounted, _REPEATS)
             if turn >= 0:
                 search[turn] += one / _REPEATS
                 accounting[turn] += two / _REPEATS
         code = run.advance(period + 1, int(run.state.counters[EVENTS]) + 1)
         if code != EVENT_BUDGET:
             return {"search": float(np.median(search)), "account": float(np.median(accounting))}
+
+
+def _as_run(function: Any, run: EngineRun, *arguments: Any) -> Any:
+    """Call a compiled function, compiled for the lengths of its records if the run is."""
+    common = is_common(run.system, len(run.state.amplitude))
+    return function.sized(*arguments)(*arguments) if common else function(*arguments)
 
 
 def _begun(scene: Scene, periods: int) -> EngineRun:
