@@ -5,9 +5,9 @@ import pytest
 from numba import njit
 
 from vanedamp.coupling.exact.event_functions import step_or_stop
-from vanedamp.coupling.exact.root_search import expand, new_expansion
+from vanedamp.coupling.exact.root_search import DEGREE, _bounds, expand, new_expansion, shift
 from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
-from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
+from vanedamp.coupling.numerics.exponentials import eighth_root_of_ratio, exp_minus_line, exp_minus_one
 
 
 def search(order, k0, k1, k2, g, eigenvalue, end):
@@ -34,6 +34,24 @@ def remainders(z):
     """exp(z) - 1 and exp(z) - 1 - z as the engine has them."""
     first = exp_minus_one(z)
     return first, exp_minus_line(z, first)
+
+
+@njit
+def bounds(a, sign, f, h):
+    """Bounds of the lower polynomial on a step."""
+    return _bounds(a, sign, f, h)
+
+
+@njit
+def moved(a, sign, h, shifted):
+    """That polynomial from another time on."""
+    return shift(a, sign, h, shifted)
+
+
+@njit
+def ratio(x, y):
+    """Eighth root of a ratio."""
+    return eighth_root_of_ratio(x, y)
 
 
 def value(order, k0, k1, k2, g, eigenvalue, t):
@@ -134,3 +152,41 @@ def test_exponentials_without_cancellation(size):
             first, rest = remainders(z)
             assert abs(complex(first) / complex(exact) - 1) < 1e-15
             assert abs(complex(rest) / complex(line) - 1) < 4e-15
+
+
+def test_bounds_enclose_the_polynomial():
+    """Bernstein's coefficients against dense sampling; those of a line are on it."""
+    rng = np.random.default_rng(4)
+    for sign in (1.0, -1.0):
+        for _ in range(200):
+            a, h, f = rng.normal(size=DEGREE + 1), rng.uniform(0.1, 2.0), rng.uniform(0.0, 1.0)
+            a[DEGREE] = abs(a[DEGREE])
+            t = np.linspace(0.0, h, 1001)
+            powers = t[:, None] ** np.arange(1, DEGREE + 1)
+            shape = f + powers @ np.r_[sign * a[1:DEGREE], -a[DEGREE]]
+            least, most = bounds(a, sign, f, h)
+            ends = shape[[0, -1]]
+            assert shape.min() >= min(least, *ends) - 1e-12 * np.abs(powers[-1]).max()
+            assert shape.max() <= max(most, *ends) + 1e-12 * np.abs(powers[-1]).max()
+    a = np.zeros(DEGREE + 1)
+    a[1] = -1.0
+    assert bounds(a, 1.0, 1.0, 0.5) == pytest.approx((0.55, 0.95), rel=1e-14)
+
+
+def test_shifted_polynomial_is_the_same():
+    rng = np.random.default_rng(5)
+    a, h, t, shifted = rng.normal(size=DEGREE + 1), 0.3, np.linspace(0.0, 1.0, 7), np.zeros(DEGREE + 1)
+    a[DEGREE] = abs(a[DEGREE])
+    for sign in (1.0, -1.0):
+        rise = moved(a, sign, h, shifted)
+        whole = np.polynomial.Polynomial(np.r_[0.0, sign * a[1:DEGREE], -a[DEGREE]])
+        assert rise == pytest.approx(whole(h), rel=1e-13)
+        assert shifted[DEGREE] == a[DEGREE]
+        from_there = np.polynomial.Polynomial(np.r_[shifted[:DEGREE], -shifted[DEGREE]])
+        assert from_there(t) == pytest.approx(whole(h + t), rel=1e-12)
+
+
+def test_eighth_root_by_logarithms():
+    x, y = 10.0 ** np.random.default_rng(6).uniform(-150, 150, (2, 2000))
+    share = np.array([ratio(*pair) for pair in zip(x, y, strict=True)]) / (x / y) ** 0.125
+    assert share.min() > 0.98 and share.max() < 1.07
