@@ -270,8 +270,9 @@ def _fill(flows: Flows, system: System, s: int, subsystem: Subsystem) -> None:
     full = np.hstack([np.vstack([harmonic, 1j * system.frequency * harmonic + growing]), shape])
     structure, xi = np.r_[0:n, n + b : 2 * n + b], np.r_[n : n + b, 2 * n + b : 2 * (n + b)]
     flows.shape[s, :m] = full[structure].T
-    moved = (full[structure] != 0.0).reshape(2, n, m).any(axis=0)
-    flows.support[s, :m, 0], flows.support[s, :m, 1] = moved.argmax(axis=0), n - moved[::-1].argmax(axis=0)
+    if n:
+        moved = (full[structure] != 0.0).reshape(2, n, m).any(axis=0)
+        flows.support[s, :m, 0], flows.support[s, :m, 1] = moved.argmax(axis=0), n - moved[::-1].argmax(axis=0)
     flows.excited[s] = full[xi, :e]
     flows.project[s, e:m], flows.project_slip[s, e:m] = project[:, structure], project[:, xi]
     flows.impulse_response[s, :, e:m] = system.of_structure.J @ project[:, n + b : 2 * n + b].T
