@@ -53,10 +53,11 @@ def eigenpairs(
     """
     wanted, width = count + spare, block(count)
     limits = np.r_[np.full(count, tolerance), np.full(spare, tolerance**0.5)]
-    space = _Space(mass, directions(wanted))
-    space.append(solve(_product(mass, np.random.default_rng(0).standard_normal((width, space.size)))))
+    space, random = _Space(mass, directions(wanted)), np.random.default_rng(0)
     for _ in range(_RESTARTS):
         while space.count <= space.most - width:
+            if space.block == 0:  # at the start, or what is there holds all that its start can reach
+                space.begin(solve(_product(mass, random.standard_normal((width, space.size)))))
             leak = space.extend(solve)
             values, turns = space.ritz(wanted)
             residuals = np.linalg.norm(leak @ turns[-leak.shape[1] :], axis=0)
@@ -78,6 +79,11 @@ class _Space:
         self.vectors, self.inertia = np.empty((most, self.size)), np.empty((most, self.size))
         self.projected = np.zeros((most, most))
         self._mass = mass
+
+    def begin(self, rows: np.ndarray) -> None:
+        """Append independent rows (b, n) that are not from the space."""
+        self.append(self._orthogonal(rows, 0)[0])
+        self._before = self.count - self.block
 
     def append(self, rows: np.ndarray) -> np.ndarray:
         """Make rows (b, n) orthonormal, append those that are independent, and return their shares (b, j) in `rows`."""

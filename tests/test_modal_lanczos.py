@@ -92,6 +92,18 @@ def test_a_space_that_is_invariant_at_once():
     check(matrix, sparse.eye(size), found, vectors)
 
 
+def test_a_space_that_runs_out_of_directions():
+    """Two eigenvalues, 200 and 400 times: a start reaches a block of copies of each, then another one is made.
+
+    That copies are left is for a count of the eigenvalues to say (modal.eigen).
+    """
+    stiffness = sparse.diags(np.repeat([1.0, 2.0], [200, 400]), format="csr")
+    mass = sparse.identity(SIZE, format="csr")
+    values, vectors = eigenpairs(inverse(stiffness, mass, 0.0), mass, 20)
+    assert values == pytest.approx(np.repeat([1.0, 2.0], 10), rel=1e-10)
+    check(stiffness, mass, values, vectors)
+
+
 def test_too_little_time(monkeypatch):
     stiffness, mass, _ = rod()
     monkeypatch.setattr(lanczos, "_RESTARTS", 1)
