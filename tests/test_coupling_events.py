@@ -190,3 +190,23 @@ def test_eighth_root_by_logarithms():
     x, y = 10.0 ** np.random.default_rng(6).uniform(-150, 150, (2, 2000))
     share = np.array([ratio(*pair) for pair in zip(x, y, strict=True)]) / (x / y) ** 0.125
     assert share.min() > 0.98 and share.max() < 1.07
+
+
+@njit
+def expanded(order, g, eigenvalue, count, t, work):
+    """The engine's expansion."""
+    return expand(order, 0.3, -0.2, g, eigenvalue, 1, count, t, work)
+
+
+@pytest.mark.parametrize("order", [POSITION, VELOCITY, FORCE])
+@pytest.mark.parametrize("t", [0.0, 0.05, 3.0])
+def test_modes_that_sleep_do_not_count(order, t):
+    """Loops go beyond the modes that are awake, where amplitudes of an earlier time may be."""
+    rng = np.random.default_rng(7)
+    eigenvalue = np.sort(rng.uniform(1.0, 40.0, 30)) * (1j - 0.01)
+    g, count = rng.normal(size=30) + 1j * rng.normal(size=30), 11
+    few, all_of_them = new_expansion(count), new_expansion(30)
+    bounds_of_few = expanded(order, g[:count].copy(), eigenvalue[:count], count, t, few)
+    bounds_of_all = expanded(order, g, eigenvalue, count, t, all_of_them)
+    assert np.allclose(bounds_of_all, bounds_of_few, rtol=1e-13)
+    assert np.allclose(all_of_them.taylor, few.taylor, rtol=1e-12, atol=0.0)

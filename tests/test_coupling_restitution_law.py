@@ -288,8 +288,9 @@ print(first.relative_velocity_after / -first.relative_velocity_before, len(advan
 def test_laws_share_the_compiled_engine():
     """In one process and in others: nothing of the engine is compiled for a law, and no law is taken for another."""
     simulate(dropped({"law": "newton"}, 0.5))
+    compiled = len(advance._compiled.signatures)
     simulate(dropped({"law": "fifth root", "c": C}))
-    assert len(advance._compiled.signatures) == 1
+    assert len(advance._compiled.signatures) == compiled > 0
     for factor in (0.25, 0.75):
         text = _PROCESS.format(factor=factor)
         said = subprocess.run(

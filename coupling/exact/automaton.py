@@ -251,6 +251,8 @@ def _begin_subsystem(system, flows, st, scratch, s):
             for i in range(2 * b):
                 total += flows.project_slip[s, j, i] * scratch.slips[i]
         st.amplitude[j] = total
+    for j in range(flows.modes[s], len(st.amplitude)):
+        st.amplitude[j] = 0.0  # loops in whole vectors go beyond the modes
     _constant_forces(system, flows, st, scratch, s)
     st.offset[0] = 0.0
     for i in range(n):
@@ -376,7 +378,7 @@ def amplitude_changes(flows, st, scratch, tau):
     """Set the changes of the awake modes' amplitudes over the segment."""
     s, e = st.counters[FLOW], flows.driven.shape[1] - 1
     count = whole_vectors(st.counters[AWAKE], len(st.amplitude))
-    if is_long(flows.eigenvalue[s], e, st.counters[AWAKE], tau):
+    if is_long(flows.eigenvalue[s], flows.driven[s, e], st.counters[AWAKE], tau):
         _grow_long(flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
     else:
         _grow(flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)

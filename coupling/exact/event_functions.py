@@ -79,7 +79,7 @@ def next_event(system, flows, st, watched):
             st.counters[EVALUATIONS] += 1
         noise, second, calm, fast = expand(
             watched.order[k], watched.k1[k], watched.k2[k], watched.g[k], flows.eigenvalue[s],
-            flows.driven.shape[1] - 1, st.counters[AWAKE], tau, watched.expansion,
+            flows.driven[s, flows.driven.shape[1] - 1], st.counters[AWAKE], tau, watched.expansion,
         )  # fmt: skip
         if driven:
             more, bound = add_secular(

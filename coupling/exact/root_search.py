@@ -122,10 +122,11 @@ def first_root_of_parabola(f, slope, curvature):
 def expand(order, k1, k2, g, eigenvalue, harmonics, count, t, work):
     """Set the Taylor polynomials of a motion from time t on, by powers of the time since, in `work`.
 
-    The motion is k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t) of the first `count` modes: harmonics, then others, both
-    in order of their rates. Its remainder is no larger than the last coefficient times its power. The first polynomial
-    is that of all modes; the second leaves out those much faster than the first mode: less sharp close to a root, but
-    good for long steps far from it. Modes in another order are as well bounded, but steps may be shorter.
+    The motion is k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t) of the first `count` modes: `harmonics` of them the
+    harmonics and the modes that they drive, then others, both in order of their rates. Its remainder is no larger than
+    the last coefficient times its power. The first polynomial is that of all modes; the second leaves out those much
+    faster than the first mode: less sharp close to a root, but good for long steps far from it. Modes in another order
+    are as well bounded, but steps may be shorter. What g holds of other modes is lost.
     Returns the round-off of the value, a bound of the second derivative, that of the slow modes (-1: all are), and the
     size of the fast modes.
     order POSITION: exponentials as exp(z) - 1 - z, so that there is no motion at the start, and its rate is k1 exactly;
@@ -133,6 +134,8 @@ def expand(order, k1, k2, g, eigenvalue, harmonics, count, t, work):
     """
     value, noise, slope, amplitude = 0.0, 0.0, 0.0, g
     all_modes = whole_vectors(count, len(g))
+    for j in range(count, all_modes):
+        g[j] = 0.0  # of modes that were awake before
     if t > 0.0:
         amplitude = work.amplitude
         if order != POSITION:

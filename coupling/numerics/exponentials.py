@@ -135,7 +135,10 @@ def exp_minus_line(z, first):
 
 @inlined
 def is_long(eigenvalue, harmonics, count, t):
-    """Whether exp(z) - 1 - z cancels for none of these modes over a time: harmonics, then others, slow ones first."""
+    """Whether exp(z) - 1 - z cancels for none of these modes over a time.
+
+    harmonics: the first ones, which are no slower than the very first; the others are in order of their rates.
+    """
     first, other = eigenvalue[0], eigenvalue[min(harmonics, count - 1)]
     return t * min(abs(first.real) + abs(first.imag), abs(other.real) + abs(other.imag)) > _LONG
 
