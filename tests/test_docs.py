@@ -17,7 +17,6 @@ from docs._ext.pages import language
 from tests.tools.input_files import CLUSTER, SCENE, changed
 from tests.tools.processes import RANKS, ROOT, environment
 from tests.tools.schemas import faults, kind_of
-from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
@@ -194,9 +193,15 @@ def test_program_of_the_readme(tmp_path):
     scene.save(tmp_path / "out" / "fig10_single.toml")
     status, *printed = run(program("README.md", "simulate"), tmp_path).replace("[", "").replace("]", "").split()
     amplitude, attached, *reductions = map(float, printed)
-    response = simulate(scene.replace({"excitation.frequency": 2382.0, "cavity.c1.gap": 2e-5}))
-    assert status == response.status
-    assert (amplitude, attached) == pytest.approx((response.amplitude_mean, response.attached_mass_fraction))
+    scene.replace({"excitation.frequency": 2382.0, "cavity.c1.gap": 2e-5}).save(tmp_path / "same.toml")
+    # in a process like the program's: the motion is chaotic, and BLAS's threads decide its last bits
+    asked = (
+        "import vanedamp as vd\nr = vd.simulate('same.toml')\n"
+        "print(r.status, r.amplitude_mean, r.attached_mass_fraction)"
+    )
+    expected, *figures = run(asked, tmp_path).split()
+    assert status == expected
+    assert (amplitude, attached) == pytest.approx(tuple(map(float, figures)))
     assert len(reductions) == 3 and max(reductions) < 1.0
 
 
