@@ -114,7 +114,7 @@ def _kept(function: Callable[..., Any]) -> Any:
 
 
 def _load(kept: Any, signature: Any, target: Any) -> Any:
-    """Load machine code as numba does, but do not make it know all that it could compile first: a quarter of a start."""
+    """Load machine code as numba does, without all that it could compile, which takes a quarter of a start."""
     with kept._guard_against_spurious_io_errors():
         return kept._load_overload(signature, target)
 
