@@ -19,8 +19,9 @@ from vanedamp.files.reference import constants, options
 
 T = TypeVar("T")
 
-#: Every record read from a file knows all its keys and holds finite numbers.
-STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+#: Every record read from a file knows all its keys and holds finite numbers. Its schema is built when it is read, as a
+#: part of that of its file: on import it would be built once more
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, defer_build=True)
 
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 _NO_TABLE = ("dataclass_type", "model_type", "dict_type", "mapping_type", "model_attributes_type")
@@ -99,6 +100,12 @@ def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
         # a misspelt key is missing, too: its own complaint is the one that helps
         found = sorted(error.errors(), key=lambda entry: entry["type"] not in _UNKNOWN)
         raise InputError(f"{source}: {_explain(adapter, found[0], data)}") from None
+
+
+def tables(record: Any) -> dict[str, Any]:
+    """Return a record as plain nested data, as in its file, without values that are None."""
+    data: dict[str, Any] = _adapter(record.__class__).dump_python(record, mode="json", exclude_none=True, by_alias=True)
+    return data
 
 
 def plain(data: Any) -> Any:

@@ -60,7 +60,7 @@ class Variants(Generic[Base]):
                 self.register(record)
             self._loaded = True
         if self._compiled is None:
-            choices = {name: TypeAdapter(record).core_schema for name, record in self._records.items()}
+            choices = {name: _schema(record) for name, record in self._records.items()}
             schema = core_schema.tagged_union_schema(choices, self._key) if choices else self._nothing()
             self._compiled = schema, SchemaValidator(schema), SchemaSerializer(schema)
         return self._compiled
@@ -85,3 +85,10 @@ class Variants(Generic[Base]):
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         return handler(self._union()[0])
+
+
+def _schema(record: Any) -> CoreSchema:
+    """Return the schema of a record, built now where that was put off."""
+    adapter = TypeAdapter(record)
+    adapter.rebuild()
+    return adapter.core_schema

@@ -64,7 +64,7 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
     VELOCITY,
 )
-from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, is_long, secular
+from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, is_long, long_minus_line, secular
 from vanedamp.coupling.numerics.jit import comparing, entry, inlined, kernel, summing
 from vanedamp.coupling.numerics.vectors import whole_vectors
 from vanedamp.coupling.response.records import FRICTION
@@ -379,9 +379,9 @@ def amplitude_changes(flows, st, scratch, tau):
     s, e = st.counters[FLOW], flows.driven.shape[1] - 1
     count = whole_vectors(st.counters[AWAKE], len(st.amplitude))
     if is_long(flows.eigenvalue[s], flows.driven[s, e], st.counters[AWAKE], tau):
-        _grow_long(flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
+        _grow(long_minus_line, flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
     else:
-        _grow(flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
+        _grow(exp_minus_line, flows.eigenvalue[s], st.amplitude, count, tau, scratch.gain, scratch.bend)
     if flows.driven[s, e] > e:
         _add_driven_growth(
             flows.eigenvalue[s], flows.driven[s], flows.load[s], st.amplitude, scratch.gain, scratch.bend, tau
@@ -389,25 +389,14 @@ def amplitude_changes(flows, st, scratch, tau):
 
 
 @summing
-def _grow(eigenvalue, amplitude, count, tau, gain, bend):
-    """Set the changes of amplitudes over a time, and the same less their tangents."""
+def _grow(term, eigenvalue, amplitude, count, tau, gain, bend):
+    """Set the changes of amplitudes over a time, and the same less their tangents, by this function of z."""
     for j in range(count):
         rate, c = eigenvalue[j], amplitude[j]
         z = complex(rate.real * tau, rate.imag * tau)
         first = exp_minus_one(z)
         gain[j] = c * first
-        bend[j] = c * exp_minus_line(z, first)
-
-
-@summing
-def _grow_long(eigenvalue, amplitude, count, tau, gain, bend):
-    """As `_grow`, over a long time (`is_long`)."""
-    for j in range(count):
-        rate, c = eigenvalue[j], amplitude[j]
-        z = complex(rate.real * tau, rate.imag * tau)
-        first = exp_minus_one(z)
-        gain[j] = c * first
-        bend[j] = c * complex(first.real - z.real, first.imag - z.imag)
+        bend[j] = c * term(z, first)
 
 
 @kernel

@@ -25,6 +25,8 @@ from vanedamp.coupling.numerics.exponentials import (
     exp_minus_line,
     exp_minus_one,
     is_long,
+    long_minus_line,
+    minus_one,
     secular,
     secular_bound,
 )
@@ -139,11 +141,11 @@ def expand(order, k1, k2, g, eigenvalue, harmonics, count, t, work):
     if t > 0.0:
         amplitude = work.amplitude
         if order != POSITION:
-            value, noise, slope = _later(g, eigenvalue, all_modes, t, 0.0, amplitude)
+            value, noise, slope = _later(minus_one, g, eigenvalue, all_modes, t, amplitude)
         elif is_long(eigenvalue, harmonics, count, t):
-            value, noise, slope = _later(g, eigenvalue, all_modes, t, 1.0, amplitude)
+            value, noise, slope = _later(long_minus_line, g, eigenvalue, all_modes, t, amplitude)
         else:
-            value, noise, slope = _soon(g, eigenvalue, all_modes, t, amplitude)
+            value, noise, slope = _later(exp_minus_line, g, eigenvalue, all_modes, t, amplitude)
     limit = _FAST * _square(eigenvalue[0])
     low, high = (
         _first_fast(eigenvalue, 0, min(harmonics, count), limit), _first_fast(eigenvalue, harmonics, count, limit)
@@ -207,36 +209,18 @@ def _first_fast(eigenvalue, low, high, limit):
 
 
 @summing
-def _later(g, eigenvalue, count, t, line, amplitude):
+def _later(term, g, eigenvalue, count, t, amplitude):
     """Set the amplitudes of the exponentials after a time t.
 
-    Returns Re sum g (exp(z) - 1 - line z), the sum of its terms' sizes, and the rate of Re sum g (exp(z) - 1) less that
-    at the start.
+    term: a function of z and exp(z) - 1 of `numerics.exponentials`. Returns Re sum g term, the sum of its terms' sizes,
+    and the rate of Re sum g (exp(z) - 1) less that at the start.
     """
     value, size, slope = 0.0, 0.0, 0.0
     for j in range(count):
         rate, start = eigenvalue[j], g[j]
         z = complex(rate.real * t, rate.imag * t)
         first = exp_minus_one(z)
-        change = start * first
-        beyond = complex(first.real - line * z.real, first.imag - line * z.imag)
-        part = start * beyond
-        value += part.real
-        size += abs(part.real) + abs(part.imag)
-        slope += rate.real * change.real - rate.imag * change.imag
-        amplitude[j] = start + change
-    return value, size, slope
-
-
-@summing
-def _soon(g, eigenvalue, count, t, amplitude):
-    """As `_later` with line 1, where exp(z) - 1 - z of some mode would cancel."""
-    value, size, slope = 0.0, 0.0, 0.0
-    for j in range(count):
-        rate, start = eigenvalue[j], g[j]
-        z = complex(rate.real * t, rate.imag * t)
-        first = exp_minus_one(z)
-        change, part = start * first, start * exp_minus_line(z, first)
+        change, part = start * first, start * term(z, first)
         value += part.real
         size += abs(part.real) + abs(part.imag)
         slope += rate.real * change.real - rate.imag * change.imag
@@ -360,11 +344,9 @@ def safe_step(a, sign, f, far, noise, second, longest):
     reach, top = longest, f + far - noise if slope < 0.0 else 0.0
     if a[DEGREE] > 0.0:
         reach = min(longest, _REACH * eighth_root_of_ratio(second * _OVER_FACTORIAL[DEGREE], a[DEGREE]))
-    end = _value(a, sign, f, reach)
-    if end >= 0.0:
-        least, most = _bounds(a, sign, f, reach)
-        if least > noise:
-            return reach, False, max(most, end + 2.0 * _remainder(a, reach)) <= top
+    positive, clear = _without_root(a, sign, f, reach, noise, top)
+    if positive:
+        return reach, False, clear
     root = min(reach, first_root_of_parabola(f, slope, 2.0 * sign * a[2]))
     for _ in range(8):
         if root <= 0.0:
@@ -387,11 +369,9 @@ def safe_step(a, sign, f, far, noise, second, longest):
                 break
     # short of the lower polynomial's root: from there the function's own is seen
     h = root * (1.0 - 0.1 * _NEAR)
-    end = _value(a, sign, f, h)
-    if end >= 0.0:
-        least, most = _bounds(a, sign, f, h)
-        if least > noise:
-            return h, False, max(most, end + 2.0 * _remainder(a, h)) <= top
+    positive, clear = _without_root(a, sign, f, h, noise, top)
+    if positive:
+        return h, False, clear
     # the best of the parabolas below it: over the rest of the reach, and beyond its own minimum. Where they come down
     # to round-off it may touch zero
     best, h, f = 0.0, reach, max(f - noise, 0.0)
@@ -403,6 +383,19 @@ def safe_step(a, sign, f, far, noise, second, longest):
         best = max(best, _step_by_parabola(a, sign, f, h))
         h *= 0.5
     return best, False, False
+
+
+@inlined
+def _without_root(a, sign, f, h, noise, top):
+    """Return whether the lower polynomial is positive on [0, h], and whether the motion provably stays below the top.
+
+    noise: where the polynomial's bounds are below it, nothing is known.
+    """
+    end = _value(a, sign, f, h)
+    if end < 0.0:
+        return False, False
+    least, most = _bounds(a, sign, f, h)
+    return least > noise, max(most, end + 2.0 * _remainder(a, h)) <= top
 
 
 @inlined

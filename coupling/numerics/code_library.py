@@ -113,12 +113,12 @@ class _Entry(JITCodeLibrary):
 
         Names of their own keep code that is loaded later, with all its arguments, from being taken for this one.
         """
-        vectors = bool(self._loops) and not self.sized
+        apart = bool(self._loops) and not self.sized
         for place, function in enumerate(self._final_module.functions):
-            if function.name in self._own and vectors:
+            if function.name in self._own and apart:
                 # no vectors, which short loops pay for: long loops stay functions, with vectors of their own
                 function.add_function_attribute("noimplicitfloat")
-            if function.name in self._loops and vectors:
+            if function.name in self._loops and apart:
                 function.add_function_attribute("noinline")
             if not function.is_declaration and function.name not in self._own:
                 function.linkage = llvm.Linkage.internal

@@ -134,6 +134,18 @@ def exp_minus_line(z, first):
 
 
 @inlined
+def long_minus_line(z, first):
+    """As `exp_minus_line`, where that does not cancel (`is_long`)."""
+    return complex(first.real - z.real, first.imag - z.imag)
+
+
+@inlined
+def minus_one(z, first):
+    """Return exp(z) - 1 given it: for callers that take one of these functions."""
+    return first
+
+
+@inlined
 def is_long(eigenvalue, harmonics, count, t):
     """Whether exp(z) - 1 - z cancels for none of these modes over a time.
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper, Stop
@@ -34,6 +34,7 @@ from vanedamp.files.toml_input import (
     Whole,
     nearest,
     read_toml,
+    tables,
     validate,
 )
 
@@ -408,8 +409,7 @@ class Scene(Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain nested data as in the file, without values that are None."""
-        data: dict[str, Any] = TypeAdapter(Scene).dump_python(self, mode="json", exclude_none=True, by_alias=True)
-        return data
+        return tables(self)
 
     def replace(self, values: Mapping[str, Any]) -> Scene:
         """Return another scene with some values changed, by their dotted paths ("cavity.c1.gap", "damper.0.mass").
