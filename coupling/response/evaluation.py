@@ -124,8 +124,9 @@ def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | Non
             return Status.OK, transient
         status, dropped = Status.UNCERTAIN, transient
     if scene.time.steady != "auto":
-        records, window = run.outcome().records, slice(dropped, scene.time.simulated)
-        steady = not dropped or outlasted(scene, records.peak[window], records.impacts[window])
+        outcome, window = run.outcome(), slice(dropped, scene.time.simulated)
+        records = outcome.records
+        steady = not dropped or outlasted(scene, records.peak[window], records.impacts[window], outcome.system)
         status = Status.OK if steady else Status.NOT_STEADY
     return status, dropped
 

@@ -88,11 +88,9 @@ def constraints_of(scene: Scene, basis: ModalBasis, at: str) -> Constraints:
     on_bodies = (right[:, None] == numbers).astype(float) - (left[:, None] == numbers)
     # a gap that only bodies and walls that move with their floors bound is a difference of slips
     on_floors, slips = on_bodies @ -floor, len(friction)
-    moves = [
-        r >= slips and bool(on_bodies[r].any()) and np.allclose(structure[r], on_floors[r], rtol=1e-14, atol=0)
-        for r in range(len(rows))
-    ]
     contact = np.arange(len(rows)) >= slips
+    alike = (np.abs(structure - on_floors) <= 1e-14 * np.abs(on_floors)).all(axis=1)
+    moves = contact & on_bodies.any(axis=1) & alike
     return Constraints(
         friction_rows=slips, floor=floor, floors=floors, J=np.hstack([structure, on_bodies]),
         rest=np.array([float(row.rest) for row in rows]), limit=np.array([float(row.limit) for row in rows]),
@@ -100,7 +98,7 @@ def constraints_of(scene: Scene, basis: ModalBasis, at: str) -> Constraints:
         dashpot=np.array([float(row.element.dashpot) for row in rows]),
         restitution=np.array([float(row.element.restitution) for row in rows]),
         free_travel=np.array([float(row.free_travel) for row in rows]), left_body=np.where(contact, left, -1),
-        right_body=np.where(contact, right, -1), moves_with_floor=np.array(moves, np.bool_),
+        right_body=np.where(contact, right, -1), moves_with_floor=moves,
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.coupling.system.system import System
 
 #: longest transient that is taken without being asked for, in periods
 LIMIT = 10_000
@@ -34,8 +35,8 @@ def left_over(scene: Scene, periods: float) -> float:
 class _Transient:
     """The transient of each mode of a scene's structure: its start, and its rate of decay."""
 
-    def __init__(self, scene: Scene) -> None:
-        system = assemble(scene)
+    def __init__(self, scene: Scene, system: System | None = None) -> None:
+        system = assemble(scene) if system is None else system
         start, modes = initial_motion(scene, system), system.of_structure
         own, dashpot = np.sqrt(modes.stiffness), np.diag(modes.damping)
         rate = system.frequency[:, None]
@@ -83,8 +84,10 @@ def timed(scene: Scene) -> Scene:
     return replace(scene, time=chosen)
 
 
-def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray) -> bool:
+def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray, system: System | None = None) -> bool:
     """Whether the transient that a scene leaves out was long enough; peaks, impacts: (n,) of the periods evaluated.
+
+    system: that of the scene, if it is there.
 
     It was where the structure without bodies leaves less than `time.tolerance`. Otherwise bodies may have ended it,
     which the peaks show. Without impacts the motion is linear but for friction: peaks that spread or, extrapolated with
@@ -92,7 +95,7 @@ def outlasted(scene: Scene, peaks: np.ndarray, impacts: np.ndarray) -> bool:
     the means of both halves tell: of 500 periods or more they must agree within the tolerance or the scatter; of fewer
     the scatter is not known, and their difference must be within the tolerance when it is extrapolated, too.
     """
-    transient, tolerance = _Transient(scene), scene.time.tolerance
+    transient, tolerance = _Transient(scene, system), scene.time.tolerance
     if transient.left_over(scene.time.dropped) <= tolerance or not peaks.any():
         return True
     if len(peaks) < 2:
