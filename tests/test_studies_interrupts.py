@@ -16,6 +16,15 @@ from tests.tools.input_files import SCENE, changed
 from tests.tools.processes import environment
 from vanedamp.studies.interrupts import swallowed_interrupts_again, uninterrupted_children
 
+
+@pytest.fixture(autouse=True)
+def heeding_interrupts():
+    """What a shell runs in the background ignores interrupts, and the tests with it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 # hours of work
 LONG = changed(SCENE, ("periods = 90", "periods = 2000"), ("num = 4", "num = 100_000"))
 #: the command; it sends the signal to its process group at the n-th event of a kind
