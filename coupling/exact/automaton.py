@@ -19,7 +19,7 @@ from vanedamp.coupling.exact.contact_states import (
     stop_attached_bodies,
 )
 from vanedamp.coupling.exact.energy_balance import account, account_impact, account_spell
-from vanedamp.coupling.exact.event_functions import carry_over_period, hop_speed, next_event
+from vanedamp.coupling.exact.event_functions import AT_START, carry_over_period, hop_speed, next_event
 from vanedamp.coupling.exact.gap_kinematics import (
     SIMULTANEOUS,
     align_gaps,
@@ -108,6 +108,10 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
         amplitude_changes(flows, st, scratch, tau)
         account(system, flows, st, rec, scratch, tau)
         _advance_motion(system, flows, st, scratch, tau)
+        # the end of a period is no event: a row that has let go just before it still does
+        if tau > (0.0 if event >= 0 else AT_START * system.period):
+            for r in range(len(st.released)):
+                st.released[r] = 0
         if event < 0:
             carry_over_period(system, st, watched, tau)
             account_spell(system, flows, st, rec, scratch)
@@ -437,9 +441,6 @@ def _advance_motion(system, flows, st, scratch, tau):
         st.amplitude[j] += gain
         st.change[2 * j] += gain.real
         st.change[2 * j + 1] += gain.imag
-    if tau > 0.0:
-        for r in range(len(st.released)):
-            st.released[r] = 0
 
 
 @summing

@@ -36,6 +36,8 @@ from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel, summing
 
 #: shortest step in periods: the resolution of a double within a period
 RESOLUTION = 1e-15
+#: time in periods for which a root at the start of a segment is left out where a row has just let go
+AT_START = 1e3 * RESOLUTION
 #: a compliant contact ends when its spring is pulled by this share of the free travel
 ADHESION = 1e-13
 #: rest of a chatter, in periods, that is completed by a plastic impact; a body at rest does not leave for less.
@@ -334,8 +336,8 @@ def _skip_root_at_start(system, flows, st, watched, s, r, order, sign, k):
             jerk += (drive * (rate * rate + rate * excitation + excitation * excitation)).real
             snap += secular_bound(drive, rate, excitation, system.period, 4)
     quick = (2.0 if order == POSITION else 1.5) * jerk / snap
-    shortest = 1e3 * RESOLUTION * system.period
-    watched.no_root_before[k], watched.status[k] = max(quick if quick == quick else system.period, shortest), EXPANDED
+    quick = max(quick if quick == quick else system.period, AT_START * system.period)
+    watched.no_root_before[k], watched.status[k] = quick, EXPANDED
 
 
 @kernel
@@ -440,6 +442,6 @@ def _add_force(system, flows, st, watched, s, r, side, sides, near, far, value, 
             curvature += second.real
             third += (abs(second.real) + abs(second.imag)) * abs(rate)
         quick = 2.9 * curvature / third if third > 0.0 else system.period
-        watched.no_root_before[k] = max(quick, 1e3 * RESOLUTION * system.period)
+        watched.no_root_before[k] = max(quick, AT_START * system.period)
         watched.status[k] = EXPANDED
     return k + 1
