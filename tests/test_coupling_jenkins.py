@@ -12,17 +12,23 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 
 
-@pytest.mark.parametrize(("limit", "stiffness"), [(2.0, 1e5), (30.0, 1e5), (1e-3, 10.0), (99.0, 1e5)])
-def test_hysteresis_loop(limit, stiffness):
-    """A motion X cos(w t) that nothing can stop encloses 4 R (X - R / k) in every period: Jenkins (1962)."""
-    size, mass = 1e-3, 1e15
+def swung(size, limit, stiffness):
+    """The response of a Jenkins element to six periods of a motion size cos(w t) that nothing can stop."""
+    mass = 1e15
     case = scene(
         structure={"model": "rigid", "mass": mass, "stiffness": mass * (2 * math.pi) ** 2, "damping": 0.0},
         initial={"displacement": size},
         friction_damper=[{"normal_force": 2 * limit, "friction": 0.5, "stiffness": stiffness}],
         time={"periods": 6, "transient": 1},
     )
-    response = simulate(case, events=True)
+    return simulate(case, events=True)
+
+
+@pytest.mark.parametrize(("limit", "stiffness"), [(2.0, 1e5), (30.0, 1e5), (1e-3, 10.0), (99.0, 1e5)])
+def test_hysteresis_loop(limit, stiffness):
+    """A motion X cos(w t) that nothing can stop encloses 4 R (X - R / k) in every period: Jenkins (1962)."""
+    size = 1e-3
+    response = swung(size, limit, stiffness)
     loop = 4 * limit * (size - limit / stiffness)
     assert response.energy["friction"] == pytest.approx(5 * loop, rel=1e-9)
     slips = [event for event in response.event_list if event.kind == "slip"]
@@ -39,15 +45,8 @@ def test_hysteresis_loop(limit, stiffness):
 
 def test_turning_points_at_the_ends_of_periods():
     """A slider that stops there, to round-off, before or after the end: it slips twice a period, not once more."""
-    mass = 1e15
     for limit in np.linspace(5e-4, 4e-3, 60).tolist():
-        case = scene(
-            structure={"model": "rigid", "mass": mass, "stiffness": mass * (2 * math.pi) ** 2, "damping": 0.0},
-            initial={"displacement": 1e-3},
-            friction_damper=[{"normal_force": 2 * limit, "friction": 0.5, "stiffness": 10.0}],
-            time={"periods": 6, "transient": 1},
-        )
-        kinds = [event.kind for event in simulate(case, events=True).event_list]
+        kinds = [event.kind for event in swung(1e-3, limit, 10.0).event_list]
         # after the last end nothing, or one stick: it lies there to round-off
         assert kinds[:23] == 11 * ["slip", "stick"] + ["slip"], limit
         assert kinds[23:] in ([], ["stick"]), limit
