@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.event_functions import RESOLUTION, step_or_stop
+from vanedamp.coupling.exact.event_functions import AT_START, RESOLUTION, step_or_stop
 from vanedamp.coupling.exact.root_search import DEGREE, expand, first_root_of_parabola
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
@@ -210,7 +210,7 @@ def _leave(period, first, second, third, second_bound, third_bound, fourth_bound
 
     The decision of the contacts at this instant says that it rises.
     """
-    shortest = 1e3 * RESOLUTION * period
+    shortest = AT_START * period
     omega = 2.0 * math.pi / period
     step = shortest
     if first > _NOTHING * second_bound / omega:
