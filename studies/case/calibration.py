@@ -189,6 +189,8 @@ def calibrate(case: Case) -> Calibration:
     if analysis.first_bending is None or analysis.functional is None:
         raise InputError("; ".join(analysis.warnings))
     damping, ratio, warnings = None, case.damping_ratio, analysis.warnings
+    if tuning is not None:
+        warnings += tuple(f"calibration.tune: {warning}" for warning in tuning.warnings)
     frequency = float(analysis.modes.frequencies_hz[analysis.first_bending])
     if table.damping is not None:
         damping, doubts = _damping(table.damping, frequency)
