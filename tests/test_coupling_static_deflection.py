@@ -61,7 +61,7 @@ def test_a_body_that_strikes_gives_the_structure_its_weight_in_the_mean():
 def slow_model(folder):
     """A file of a model with quick modes, one slow beside the excitation, and one that hardly moves in a period."""
     natural = 2 * np.pi * NATURAL * np.array([1.0, 3.3, 0.03, 2e-4])
-    rows = dict(zip(("tip", "left", "right"), np.array([[1, 0.4, 0.2, 0.1], [1, -0.3, 0.2, 0.1], [1, -0.2, 0.2, 0.1]])))
+    rows = {"tip": [1, 0.4, 0.2, 0.1], "left": [1, -0.3, 0.2, 0.1], "right": [1, -0.2, 0.2, 0.1]}
     model = ReducedModel.from_matrices(
         np.eye(4), np.diag(natural**2), rows, damping_ratio=0.02, directions={row: [1.0, 0.0, 0.0] for row in rows}
     )
