@@ -313,6 +313,7 @@ class ReducedModel(Displayed):
         _save(self, path)
 
     @classmethod
+    @store.reader
     def load(cls, path: str | os.PathLike[str]) -> ReducedModel:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         return cls(**_fields(path))

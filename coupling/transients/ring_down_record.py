@@ -15,7 +15,7 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
-from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.store import Variable, frozen, load, reader, save
 from vanedamp.files.toml_input import validate
 
 if TYPE_CHECKING:
@@ -177,6 +177,7 @@ class RingDown:
         save(path, KIND, self.variables(), attributes)
 
     @classmethod
+    @reader
     def load(cls, path: str | Path) -> RingDown:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, KIND)
