@@ -18,6 +18,7 @@ from vanedamp.files import store
 from vanedamp.files.display import Displayed
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.sparse_indices import SparseError, within_shape
+from vanedamp.files.toml_input import LARGEST
 
 _KIND = "system-matrices"
 # assembly adds the same numbers in another order above and below the diagonal
@@ -251,6 +252,8 @@ def _symmetric(name: str, matrix: Any, size: int) -> sparse.csr_array:
     largest = abs(copy.data).max(initial=0.0)
     if not np.isfinite(largest):
         raise MatricesError(f"{name}: holds entries that are not finite")
+    if largest > LARGEST:
+        raise MatricesError(f"{name}: has an entry of {largest:.3g}; expected up to {LARGEST:g} in SI units")
     if abs(copy - copy.T).max() > _ASYMMETRY * largest:
         raise MatricesError(
             f"{name}: not symmetric; if only one triangle is stored, add the transpose of its strict part"

@@ -138,6 +138,12 @@ def _system(
                 f"{path}: shape {matrix.shape} for {len(coordinates)} nodes; expected "
                 f"{(coordinates.size, coordinates.size)}, three degrees of freedom a node"
             )
+        diagonal = matrix.diagonal()
+        if diagonal.min(initial=0.0) < 0.0:
+            place = int(diagonal.argmin())
+            raise MatricesError(
+                f"{path}: degree of freedom {place} has {diagonal[place]:.3g} on the diagonal; check its sign"
+            )
     return SystemMatrices(
         stiffness=loaded["stiffness"], mass=loaded["mass"], coordinates=coordinates, fixed=fixed, patches=patches,
         damping_ratio=damping_ratio, provenance=provenance,

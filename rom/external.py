@@ -87,6 +87,7 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
     existing(path, ExternalError)
     try:
         with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             warnings.filterwarnings("error", "Premature end-of-file")  # so pyyeti calls a file that is cut short
             found = _READERS[file.suffix.lower()](str(file))
     except (ExternalError, MemoryError):
@@ -133,6 +134,15 @@ def external_model(
             raise ExternalError(f"{name}: shape {matrix.shape}; expected square matrices of one size")
         if not np.all(np.isfinite(matrix)) or not np.any(matrix):
             raise ExternalError(f"{name}: zero, or holds entries that are not finite")
+        checks.check_size(name, matrix)
+    checks.check_mass(matrices["mass"])
+    for name in ("mass", "stiffness"):
+        place = int(np.argmin(np.diag(matrices[name])))
+        if matrices[name][place, place] < 0.0:
+            raise ExternalError(
+                f"{name}: not positive definite: coordinate {place} has {matrices[name][place, place]:.3g} on the "
+                "diagonal, which is negative; check its sign"
+            )
     asymmetry, worst = max((checks.asymmetry(matrix), name) for name, matrix in matrices.items())
     if asymmetry > _ASYMMETRY:
         raise ExternalError(f"{worst}: not symmetric ({asymmetry:.1e}); if only one triangle is stored, mirror it")
