@@ -97,9 +97,9 @@ class RingDown:
     def bins(self) -> dict[str, Bins]:
         """Means over `table.bins` bins of amplitude (m), of equal ratio: of frequency (Hz) and both damping ratios."""
         half, whole = self.half_cycles, self.cycles
-        edges = np.zeros(0)
-        if self.table.bins and len(half.time):
-            edges = np.geomspace(half.amplitude.min(), half.amplitude.max(), self.table.bins + 1)
+        edges, moving = np.zeros(0), half.amplitude[half.amplitude > 0.0]
+        if self.table.bins and len(moving):
+            edges = np.geomspace(moving.min(), moving.max(), self.table.bins + 1)
         stride = 2 * self.table.cycles
         return {
             "frequency": bins(half.amplitude, half.frequency, edges),
