@@ -114,6 +114,9 @@ def _columns(given: str | None, header: Sequence[str], first: np.ndarray, second
     """Return which of COLUMNS the pairs (k, n) of a CSV are."""
     if given is not None and given not in COLUMNS:
         raise MeasurementError(f"columns: expected one of {', '.join(COLUMNS)}, not {given!r}")
+    for name in header[1::2]:
+        if re.search(r"(\b|_|\d|mag|amp)db(\b|_)|decibel", name.lower()):
+            raise MeasurementError(f"columns: {name!r}: expected linear magnitudes, not decibels")
     kind = given or _header_kind(header, second)
     if kind is None:
         one_sign = np.all(first > 0.0, axis=1) | np.all(first < 0.0, axis=1)
@@ -134,8 +137,6 @@ def _header_kind(header: Sequence[str], second: np.ndarray) -> str | None:
     if len(header) < 3:
         return None
     one, other = header[1].lower(), header[2].lower()
-    if re.search(r"\bdb\b|_db|decibel", one):
-        raise MeasurementError(f"columns: {header[1]!r}: expected linear magnitudes, not decibels")
     if re.search(r"phase|\barg|angle", other):
         if re.search(r"deg|\u00b0", other):
             return "magnitude-degrees"

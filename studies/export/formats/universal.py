@@ -43,6 +43,7 @@ OPTIONS = (
 _SOLIDS = {4: (4, 111), 10: (4, 111), 8: (8, 115), 20: (8, 115), 27: (8, 115), 6: (6, 112), 15: (6, 112), 18: (6, 112)}
 _CURVES = {
     "amplitude_mean": "mean of the peaks", "amplitude_max": "largest peak", "amplitude_harmonic": "harmonic",
+    "amplitude_mean_dynamic": "mean of the peaks from the static deflection",
     "amplitude_undamped": "undamped", "amplitude_fixed": "bodies fixed",
 }  # fmt: skip
 #: of the receptances of a file: frequencies, and bytes in memory
@@ -130,7 +131,8 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
     x = record.values(_dimension(swept))[upwards]
     others = [axis for axis in axes if axis != swept]
     given = {axis: record.values(_dimension(axis)) for axis in others}
-    curves = {name: np.moveaxis(record.values(name), axes.index(swept), -1)[..., upwards] for name in _CURVES}
+    kept = {name: record.values(name) for name in _CURVES if name in record.variables}
+    curves = {name: np.moveaxis(value, axes.index(swept), -1)[..., upwards] for name, value in kept.items()}
 
     def sets() -> Iterator[dict[str, Any]]:
         yield from _headers(record)
@@ -138,11 +140,11 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
             at = ", ".join(f"{axis} = {given[axis][index]}" for axis, index in zip(others, place, strict=True))
             lines = textwrap.wrap(_ascii(at), 80)
             names: dict[str, Any] = dict(zip(("id2", "id3", "id4", "id5"), lines, strict=False))
-            for name, words in _CURVES.items():
-                curve = curves[name][place]
+            for name, values in curves.items():
+                curve = values[place]
                 known = np.isfinite(curve)
                 if np.count_nonzero(known) > 1:
-                    yield _curve(words, x[known], curve[known], GENERAL, FREQUENCY, **names)
+                    yield _curve(_CURVES[name], x[known], curve[known], GENERAL, FREQUENCY, **names)
 
     write_universal(sets(), path)
     lost = sum(int(np.count_nonzero(~np.isfinite(curve))) for curve in curves.values())
