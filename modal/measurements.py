@@ -21,6 +21,7 @@ import numpy as np
 
 from vanedamp.files.csv_input import content_lines
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.foreign import existing, reading
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import Frf, FrfError
@@ -54,7 +55,7 @@ def read_shapes(path: str | os.PathLike[str]) -> MeasuredShapes:
     direction, and its value in every mode, as 0.5 or 0.5+0.1j; a mode's name is its frequency in Hz, if it is a number.
     Universal: datasets 15 or 2411 (nodes) and 55 (normal or complex modes). Raises MeasurementError.
     """
-    file = _existing(path)
+    file = existing(path, MeasurementError)
     return _shapes_of_universal(file) if file.suffix.lower() in _UNIVERSAL else _shapes_of_csv(file)
 
 
@@ -88,7 +89,7 @@ def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns
 
     Raises MeasurementError.
     """
-    file = _existing(path)
+    file = existing(path, MeasurementError)
     if file.suffix.lower() in _UNIVERSAL:
         return _frf_of_universal(file)
     header, rows = _numbers(file)
@@ -166,7 +167,7 @@ def read_temperature(path: str | os.PathLike[str], reference: float) -> Temperat
 
     reference: temperature without thermal stress. Raises MeasurementError.
     """
-    file = _existing(path)
+    file = existing(path, MeasurementError)
     rows = _numbers(file)[1]
     if rows.shape[1] != 4:
         raise MeasurementError(f"{file}: expected the columns x, y, z (m) and temperature, not {rows.shape[1]}")
@@ -174,13 +175,6 @@ def read_temperature(path: str | os.PathLike[str], reference: float) -> Temperat
         return Temperature(reference, rows[:, 3], rows[:, :3])
     except TemperatureError as error:
         raise MeasurementError(f"{file}: {error}") from error
-
-
-def _existing(path: str | os.PathLike[str]) -> Path:
-    file = Path(path)
-    if not file.is_file():
-        raise MeasurementError(f"{file}: no such file")
-    return file
 
 
 def _shapes_of_csv(file: Path) -> MeasuredShapes:
@@ -252,13 +246,12 @@ def _pyuff() -> Any:
 
 
 def _datasets(file: Path) -> list[dict[str, Any]]:
-    universal = _pyuff().UFF(str(file))
-    try:
+    pyuff = _pyuff()
+    with reading(file, MeasurementError, "not a universal file that pyuff can read"):
+        universal = pyuff.UFF(str(file))
         kinds = universal.get_set_types()
         wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58, 2411)))
         return [universal.read_sets(int(index)) for index in wanted]
-    except Exception as error:  # pyuff raises what its parsing meets
-        raise MeasurementError(f"{file}: not a universal file that pyuff can read ({error})") from error
 
 
 def _shapes_of_universal(file: Path) -> MeasuredShapes:

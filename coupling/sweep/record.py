@@ -15,7 +15,7 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Displayed
-from vanedamp.files.store import Variable, dataset, frozen, load, save
+from vanedamp.files.store import Variable, dataset, frozen, load, reader, save
 from vanedamp.files.toml_input import validate
 
 _KIND = "sweep"
@@ -127,6 +127,7 @@ class Sweep(Displayed):
         return variables, attributes
 
     @classmethod
+    @reader
     def load(cls, path: str | Path) -> Sweep:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, _KIND)

@@ -13,7 +13,7 @@ import numpy as np
 from vanedamp.coupling.response.records import ENERGIES
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.store import Variable, frozen, load, reader, save
 from vanedamp.files.toml_input import validate
 
 if TYPE_CHECKING:
@@ -177,6 +177,7 @@ class Ramp:
         save(path, KIND, self.variables(), attributes)
 
     @classmethod
+    @reader
     def load(cls, path: str | Path) -> Ramp:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, KIND)

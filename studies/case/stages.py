@@ -17,6 +17,7 @@ from scipy import linalg
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError
+from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.campbell import Campbell, campbell
 from vanedamp.modal.correlation import mode_like
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
@@ -392,7 +393,7 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, mo
         for _ in range(spots):
             if not stress.any():
                 raise InputError(f"hot spots: {len(picked)} are all that lie 2 % of the structure's size apart")
-            picked.append(int(np.argmax(stress)))
+            picked.append(first_largest(stress))
             stress[np.linalg.norm(places - places[picked[-1]], axis=1) < apart] = 0.0
     values = solid.stress_components(model.recovery.T, np.array(picked))
     residual = None

@@ -46,6 +46,8 @@ _CURVES = {
     "amplitude_mean_dynamic": "mean of the peaks from the static deflection",
     "amplitude_undamped": "undamped", "amplitude_fixed": "bodies fixed",
 }  # fmt: skip
+#: of the receptances of a file: frequencies, and bytes in memory
+_MOST, _MOST_BYTES = 1_000_000, 8e9
 
 
 def modes(record: Record, path: Path) -> None:
@@ -82,12 +84,18 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
     """Write the receptances between all interface coordinates, m/N, at evenly spaced frequencies.
 
     frequencies: first and last (Hz) and their number; left out: 1000 up to the estimate's highest frequency, or 1.5
-    times the first natural one. Raises InputError for frequencies that are no range.
+    times the first natural one. Raises InputError for frequencies that are no range, or too many.
     """
     model = record.reduced_model()
     start, step, count = _range(frequencies, _top(record, model.natural_frequencies_hz, model.rigid_modes))
     if start == 0.0 and model.rigid_modes:
         raise InputError("--frequencies: a structure that moves freely has no receptance at 0 Hz; begin above")
+    size = 16 * count * len(model.interface) ** 2
+    if count > _MOST or size > _MOST_BYTES:
+        raise InputError(
+            f"--frequencies: {count} frequencies of {len(model.interface)} interface coordinates take "
+            f"{size / 1e9:.3g} GB; at most {_MOST} frequencies and {_MOST_BYTES / 1e9:g} GB: take fewer"
+        )
     x = start + step * np.arange(count)
     receptance = model.receptance(x)
     directions = [_direction(row) for row in model.directions]
