@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from vanedamp import ReducedModel, Scene, Sweep, simulate, sweep
-from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp import ReducedModel, Scene, Sweep, ramp, simulate, sweep
+from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_responses
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.report.forced_response import forced_responses
 
@@ -134,3 +134,14 @@ def test_curves_compare_motions_about_the_static_deflection(tmp_path):
     assert curve.headline.damped_peak == pytest.approx(result.amplitude_fixed.max(), rel=1e-4)
     result.save(tmp_path / "sweep.h5")
     assert np.array_equal(Sweep.load(tmp_path / "sweep.h5").amplitude_mean_dynamic, result.amplitude_mean_dynamic)
+
+
+def test_a_slow_ramp_follows_the_fixed_curve_about_the_static_deflection():
+    """A stuck body again: from a steady start the distance from the sag is the fixed amplitude of each frequency."""
+    up = scene(HELD, pull=500.0, ramp={"from": 70.0, "to": 75.0, "periods": 400, "start": "steady"})
+    (run,) = (record := ramp(up)).runs
+    assert run.status == "ok"
+    _, glued = linear_amplitudes(scene(HELD, pull=500.0), run.frequency)
+    assert run.amplitude_dynamic == pytest.approx(glued, rel=0.01)
+    assert run.peak > 20 * glued.max()
+    assert record.share(run) == pytest.approx(glued.max() / record.tops["undamped_peak"], rel=0.01)
