@@ -145,3 +145,29 @@ def test_a_slow_ramp_follows_the_fixed_curve_about_the_static_deflection():
     assert run.amplitude_dynamic == pytest.approx(glued, rel=0.01)
     assert run.peak > 20 * glued.max()
     assert record.share(run) == pytest.approx(glued.max() / record.tops["undamped_peak"], rel=0.01)
+
+
+@pytest.mark.parametrize("modes", [2, 7])
+def test_mean_position_beside_a_body_on_a_spring_is_that_of_samples(tmp_path, modes):
+    """Bodies on springs run in the plane's engine: integrals by nodes for few modes, in closed form for many."""
+    natural, rng = 2 * np.pi * NATURAL * np.linspace(1.0, 4.0, modes), np.random.default_rng(1)
+    rows = {name: rng.uniform(0.5, 1.0, modes) for name in ("tip", "left", "right")}
+    model = ReducedModel.from_matrices(
+        np.eye(modes), np.diag(natural**2), rows, damping_ratio=0.02, directions={row: [1.0, 0.0, 0.0] for row in rows}
+    )
+    model.save(tmp_path / "rom.h5")
+    sprung = scene(
+        {"restitution": 0.6, "stiffness": 0.5 * BODY * natural[0] ** 2},
+        structure={"model": "rom", "file": str(tmp_path / "rom.h5")},
+        excitation={"frequency": 0.98 * NATURAL, "force": 200.0, "at": "tip"},
+        gravity={"acceleration": 30.0, "direction": [-1.0, 0.0, 0.0]},
+        cavity=[{"name": "c", "gap": 1e-3, "left": "left", "right": "right"}], time={"periods": 4, "transient": 1},
+    )  # fmt: skip
+    samples = 400
+    response = simulate(sprung, samples_per_period=samples)
+    assert response.impacts_per_period > 1.0
+    x = response.displacement[samples:]
+    ends = 0.5 * (response.section[-1, 0] - x[0]) / len(x)  # the trapezoid's rule
+    assert response.static_deflection == pytest.approx(x.mean() + ends, abs=1e-4 * np.abs(x).max())
+    about = np.abs(x - response.static_deflection).reshape(-1, samples).max(axis=1)
+    assert response.amplitude_mean_dynamic == pytest.approx(about.mean(), rel=1e-3)
