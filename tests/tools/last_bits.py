@@ -7,9 +7,10 @@ and the same for the same seed and call: repeated and parallel runs agree as the
 fails alone as it failed among others.
 
 Reached, in this process, in pytest's workers and in child processes (by PYTHONPATH and sitecustomize):
-`@`, einsum, exp, log, sine in vanedamp and in the tests, whose modules are compiled with calls in their place; numpy.linalg, scipy.linalg and scipy.sparse.linalg wherever they are called by those names;
-factors and eigenpairs of PETSc and SLEPc in modal/petsc.py. Even seeds compile the engine for a generic processor,
-without fused multiplication and addition, into a cache of its own (a minute when it is empty).
+`@`, einsum, exp, log, sine in vanedamp and in the tests, whose modules are compiled with calls in their place;
+numpy.linalg, scipy.linalg and scipy.sparse.linalg wherever they are called by those names; factors and eigenpairs of
+PETSc and SLEPc in modal/petsc.py. Even seeds compile the engine for a generic processor, without fused multiplication
+and addition, into a cache of its own (a minute when it is empty).
 
 Not reached: products with sparse matrices, sums (numpy.sum), powers, the math module,
 integrators and optimisers inside scipy, dolfinx's assembly. For these there is `make test-arithmetic`.
