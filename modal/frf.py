@@ -153,7 +153,7 @@ def identify(frf: Frf, count: int = 1) -> Poles:
 
 
 def is_in_decibels(frf: Frf, poles: Poles) -> bool:
-    """Return whether a response, whose `poles` `identify` has found, fits far better with its magnitudes as decibels."""
+    """Return whether a response with the poles of `identify` fits far better with its magnitudes as decibels."""
     magnitude = np.abs(frf.values)
     linear = 10.0 ** ((magnitude - magnitude.max()) / 20.0) * np.exp(1j * np.angle(frf.values))
     try:

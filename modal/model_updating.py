@@ -110,8 +110,8 @@ def tune(
     Least squares on the logarithms of the factors (Gauss-Newton in a trust region) with exact sensitivities; the modes
     are tracked by their MAC, so that they may cross.
 
-    Raises TuningError, also for frequencies that the tuned modes miss by more than 5 %, and where other modes would meet
-    them far better, or with far less change of the factors unless `modes` are named. These come from the best
+    Raises TuningError, also for frequencies that the tuned modes miss by more than 5 %, and where other modes would
+    meet them far better, or with far less change of the factors unless `modes` are named. These come from the best
     assignment by relative distance of the frequencies, untuned and tuned.
     """
     problem = _Problem(matrices, dict(parts), np.asarray(target_hz, dtype=float), measured, modes, least_mac)

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from vanedamp import ReducedModel, Scene, Sweep, simulate, sweep
-from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp import ReducedModel, Scene, Sweep, ramp, simulate, sweep
+from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_responses
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.report.forced_response import forced_responses
 
@@ -61,7 +61,7 @@ def test_a_body_that_strikes_gives_the_structure_its_weight_in_the_mean():
 def slow_model(folder):
     """A file of a model with quick modes, one slow beside the excitation, and one that hardly moves in a period."""
     natural = 2 * np.pi * NATURAL * np.array([1.0, 3.3, 0.03, 2e-4])
-    rows = dict(zip(("tip", "left", "right"), np.array([[1, 0.4, 0.2, 0.1], [1, -0.3, 0.2, 0.1], [1, -0.2, 0.2, 0.1]])))
+    rows = {"tip": [1, 0.4, 0.2, 0.1], "left": [1, -0.3, 0.2, 0.1], "right": [1, -0.2, 0.2, 0.1]}
     model = ReducedModel.from_matrices(
         np.eye(4), np.diag(natural**2), rows, damping_ratio=0.02, directions={row: [1.0, 0.0, 0.0] for row in rows}
     )
@@ -134,3 +134,14 @@ def test_curves_compare_motions_about_the_static_deflection(tmp_path):
     assert curve.headline.damped_peak == pytest.approx(result.amplitude_fixed.max(), rel=1e-4)
     result.save(tmp_path / "sweep.h5")
     assert np.array_equal(Sweep.load(tmp_path / "sweep.h5").amplitude_mean_dynamic, result.amplitude_mean_dynamic)
+
+
+def test_a_slow_ramp_follows_the_fixed_curve_about_the_static_deflection():
+    """A stuck body again: from a steady start the distance from the sag is the fixed amplitude of each frequency."""
+    up = scene(HELD, pull=500.0, ramp={"from": 70.0, "to": 75.0, "periods": 400, "start": "steady"})
+    (run,) = (record := ramp(up)).runs
+    assert run.status == "ok"
+    _, glued = linear_amplitudes(scene(HELD, pull=500.0), run.frequency)
+    assert run.amplitude_dynamic == pytest.approx(glued, rel=0.01)
+    assert run.peak > 20 * glued.max()
+    assert record.share(run) == pytest.approx(glued.max() / record.tops["undamped_peak"], rel=0.01)

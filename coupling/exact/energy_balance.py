@@ -44,15 +44,23 @@ def account(system, flows, st, rec, scratch, tau):
                 rec.swing[period, 2] += mean
             break
         _slow_pair(flows, st, rec, s, period, i, tau, constant)
-    for pass_ in range(2 if deflected else 1):
-        side = 1.0 - 2.0 * pass_ if deflected else 0.0
-        before = side * rec.swing[period, pass_] if deflected else rec.peak[period]
-        top = highest(system, flows, st, scratch, s, tau, constant, before, side)
-        rec.peak[period] = max(rec.peak[period], top)
-        if deflected:
-            rec.swing[period, pass_] = side * top
+    if deflected:
+        _extremes(system, flows, st, rec, scratch, s, period, tau, constant)
+    else:
+        rec.peak[period] = highest(system, flows, st, scratch, s, tau, constant, rec.peak[period], 0.0)
     if rec.samples.shape[0] > 0:
         _sample(system, flows, st, rec, s, tau, constant)
+
+
+@kernel
+def _extremes(system, flows, st, rec, scratch, s, period, tau, constant):
+    """Record the largest and the smallest response of the segment."""
+    swing = rec.swing[period]
+    for k in range(2):
+        side = 1.0 - 2.0 * k
+        top = highest(system, flows, st, scratch, s, tau, constant, side * swing[k], side)
+        swing[k] = side * top
+        rec.peak[period] = max(rec.peak[period], top)
 
 
 @inlined

@@ -97,7 +97,7 @@ def _set_drive(eigenvalue, response, driven, load, phase, change, period, drive)
 def _search_grid(
     rates, waves, ahead, turns, driven, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak, side
 ):
-    """Return the largest height of the response on a grid of `pieces` steps of length h, the last one shorter, and before."""
+    """Return the largest height of the response on a grid of steps of length h, the last one shorter, and before."""
     e = len(driven) - 1
     for k in range(e):
         for j in range(driven[k], driven[k + 1]):

@@ -23,7 +23,8 @@ from vanedamp.files.store import StoreError
 #: measures of a run and their units, each an array over the grid
 MEASURES = {
     "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m", "amplitude_max_dynamic": "m",
-    "amplitude_mean_dynamic": "m", "amplitude_rms": "m", "amplitude_harmonic": "m", "amplitude_undamped": "m", "amplitude_fixed": "m",
+    "amplitude_mean_dynamic": "m", "amplitude_rms": "m", "amplitude_harmonic": "m", "amplitude_undamped": "m",
+    "amplitude_fixed": "m",
     "impacts_per_period": "1", "attached_mass_fraction": "1", "energy_residual": "1",
 }  # fmt: skip
 #: measures of each body in the plane and their units, each an array over the grid and the bodies
