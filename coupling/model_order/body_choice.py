@@ -93,7 +93,7 @@ def needs_body(scene: Scene) -> bool:
 
 def with_sliders(scene: Scene) -> Scene:
     """Return the scene with its bodies of shape "auto" as sliders."""
-    none = dict.fromkeys(("length", "height", "inertia"))
+    none = dict.fromkeys(("length", "inertia"))
     still = dict.fromkeys(("lift", "tilt", "lift_velocity", "tilt_rate"), 0.0)
     return _changed(scene, {"shape": "slider"} | none | still)
 
