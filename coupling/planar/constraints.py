@@ -229,7 +229,8 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
         along=np.array([body.x for body in bodies], np.int64),
         tilt=np.array([-1 if body.damper.shape == "slider" else body.x + 2 for body in bodies], np.int64),
-        floor=floor, turn=turn, rise=rise, height=np.array([body.b for body in bodies]), cavity=np.array(owner, np.int64),
+        floor=floor, turn=turn, rise=rise, height=np.array([body.b for body in bodies]),
+        cavity=np.array(owner, np.int64),
         neglected=np.array([_neglected(body, scene.cavity[owner[body.number]]) for body in bodies]),
     )  # fmt: skip
 
