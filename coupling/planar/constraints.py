@@ -430,7 +430,7 @@ def _between(
 
 
 def planar_motion(scene: Scene, flat: System, system: PlanarSystem) -> PlanarMotion:
-    """The motion that a scene begins with. Raises InputError for bodies that would overlap a surface."""
+    """The motion that a scene begins with. Raises InputError for what would overlap a surface or a stop."""
     n, size = flat.modes, len(system.mass)
     q, v = np.zeros(size), np.zeros(size)
     scale = physical_scale(scene, flat)
@@ -448,6 +448,11 @@ def planar_motion(scene: Scene, flat: System, system: PlanarSystem) -> PlanarMot
     gaps = system.rest + system.J[: len(system.rest)] @ q
     for unit in range(system.contacts):
         if gaps[unit] < -1e-12 * system.play[unit]:
+            if system.surface[unit] == STOP:
+                raise InputError(
+                    f"initial.displacement: the structure would begin {-gaps[unit]:.3g} m beyond "
+                    f"stop[{system.body[unit]}]"
+                )
             raise InputError(
                 f"damper[{system.body[unit]}]: begins {-gaps[unit]:.3g} m beyond the cavity's "
                 f"{SURFACES[system.surface[unit]]}; change position, lift or tilt"
