@@ -144,10 +144,9 @@ class _Deck:
         frame = Frame(kind="cylindrical") if kind == "C" else Frame()
         labels, points = [], []
         for line, row in card.numbers():
-            label = int(row[0])
             if len(row) < 2 or not np.all(np.isfinite(row[:4])):
-                raise card.error(f"{label}: expected a label and finite coordinates", line)
-            labels.append(label)
+                raise card.error(f"{row[0]:.15g}: expected a label and finite coordinates", line)
+            labels.append(int(row[0]))
             points.append([*row[1:4], 0.0, 0.0][:3])
         if not labels:
             return

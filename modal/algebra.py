@@ -60,7 +60,8 @@ def first_largest(values: np.ndarray) -> int:
 
     Symmetric structures have several hot spots and nearest nodes. Near: by 1e-6 of the largest absolute value.
     """
-    return int(np.argmax(values >= values.max() - 1e-6 * np.abs(values).max()))
+    near = values >= values.max() - 1e-6 * np.abs(values).max()
+    return int(np.argmax(near if near.any() else values))  # nan, if there is one
 
 
 def leading_sign(values: np.ndarray) -> float:

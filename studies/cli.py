@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
@@ -65,7 +66,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _main(argv: Sequence[str] | None) -> int:
-    words = sys.argv[1:] if argv is None else argv
+    with warnings.catch_warnings():
+        if not sys.warnoptions:  # of numbers that overflow on their way to the line that refuses them
+            warnings.simplefilter("ignore", RuntimeWarning)
+        return _run(sys.argv[1:] if argv is None else argv)
+
+
+def _run(words: Sequence[str]) -> int:
     input_file = None
     try:
         arguments = _parser(words[0] if words else None).parse_args(words)

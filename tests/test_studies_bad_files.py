@@ -1,11 +1,17 @@
 """Files of other programs that are damaged, or hold what is no structure, end in one line that names them."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
+import tomli_w
 from scipy import io, sparse
 
-from tests.tools.input_files import BLOCK
+from tests.tools.input_files import BLOCK, OSCILLATOR
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.transients.ring_down import ring_down
+from vanedamp.files.toml_input import validate
 from vanedamp.modal.matrices import MatricesError, SystemMatrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main
@@ -166,6 +172,54 @@ def test_records_that_are_not_whole(folder, change, told, capfd):
     )
     assert f"rom.h5: {told}" in refused(["run", "scene.toml"], capfd)
     assert f"rom.h5: {told}" in refused(["report", "rom.h5", "-o", "report.html"], capfd)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["run", "scene.toml", "-o", "x.txt"], "--output x.txt: expected a file name ending in .h5"),
+        (["sweep", "scene.toml", "--workers", "100000"], "expected at most 1024, not 100000"),
+        (["run", "scene.toml", "--samples", "1" * 5000], "invalid count value"),
+        (["run", "k" * 200_000], "File name too long"),
+        (["run", "long.toml"], "unknown key"),
+        (["ringdown", "blow.toml"], "ring_down: begins at 2e+09 m/s between walls, and takes about"),
+        (["export", "rom.h5", "-o", "r.uff", "--frequencies", "1", "2", "999999999"], "--frequencies: 999999999"),
+    ],
+)
+def test_what_nobody_means(folder, words, told, capfd):
+    scene = {key: OSCILLATOR[key] for key in ("structure", "excitation", "cavity", "damper", "time")}
+    blow = {"start": "impulse", "impulse": 1e9, "periods": 50}
+    elastic = [OSCILLATOR["damper"][0] | {"restitution": 1.0}]
+    bare = {key: scene[key] for key in ("structure", "cavity")} | {"excitation": {"frequency": 16.0}}
+    for name, tables in {
+        "scene.toml": scene, "long.toml": scene | {"k" * 200_000: 1},
+        "blow.toml": bare | {"damper": elastic, "ring_down": blow},
+    }.items():  # fmt: skip
+        (folder / name).write_text(tomli_w.dumps(tables))
+    ReducedModel.from_matrices(MASS, STIFFNESS, {"x": [1.0, 0.0]}, damping_ratio=0.1).save("rom.h5")
+    try:
+        assert main(words) == BAD_INPUT
+    except SystemExit as ended:
+        assert ended.code == BAD_INPUT
+    error = capfd.readouterr().err
+    assert told in error
+    assert (error.count("\n"), len(error) < 5000) == (1, True)
+
+
+def test_bins_of_amplitudes_that_reach_zero():
+    """Bins of equal ratio begin at the smallest amplitude above zero."""
+    scene = validate(Scene, OSCILLATOR | {"ring_down": {"start": "steady", "periods": 5, "bins": 3}}, "scene")
+    record = ring_down(scene)
+    still = replace(
+        record,
+        time=np.arange(8.0),
+        displacement=np.array([1e-3, -1e-3, 1e-6, -1e-6, 0.0, 0.0, 0.0, 0.0]),
+        energy=np.zeros(8),
+        structure_energy=np.zeros(8),
+        impacts=np.zeros(7, int),
+    )
+    edges = still.bins["frequency"].low
+    assert np.all(np.isfinite(edges)) and edges[0] > 0.0
 
 
 HEADER = '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 1 "root"\n2 2 "tip"\n$EndPhysicalNames\n'

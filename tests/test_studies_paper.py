@@ -153,6 +153,13 @@ def test_two_blocks_in_a_row_damp_better_than_one():
     np.testing.assert_allclose(double.mean, [0.125, 0.133], atol=0.02)
 
 
+def test_a_block_with_less_restitution_leaves_less():
+    """At the peaks of restitution 0.5 and 0.9."""
+    soft, elastic = damped("blocks", "single_restitution", [0.986, 0.989], 900, 400)
+    assert soft.mean[0] == pytest.approx(0.233, abs=0.02)
+    assert elastic.mean[1] == pytest.approx(0.751, abs=0.02)
+
+
 def test_in_a_tight_cavity_gravity_lays_blocks_flat():
     """Horizontally most of eight starts end as sliders, 0.223 or 0.261; vertically none does."""
     runs = damped("fit", "starts", [0.98], 900, 400)

@@ -50,6 +50,6 @@ STATES_GO_ON, STATES_OPEN, NO_SOLUTION = range(30, 33)
 # counters of a run, of any method
 (
     PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, AWAKE, CARRIED, CLOSED_ROWS, STEPS,
-    SOLVES, AT_ONCE,
-) = range(14)  # fmt: skip
-COUNTERS = 14
+    SOLVES, AT_ONCE, REDUCED,
+) = range(15)  # fmt: skip
+COUNTERS = 15

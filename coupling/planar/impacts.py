@@ -4,7 +4,8 @@ Newton's law in Moreau's form (Moreau 1988): after the impact v_N + k v_N- >= 0 
 other, and P_T stays within Coulomb's cone, at its edge where the contact still slips. Without friction one
 coefficient for all contacts never brings energy; with friction, or with several coefficients, the law can (Kane's
 paradox). Then all coefficients are smaller by one factor, the largest that brings none; it is zero for a wedged block
-whose contacts cannot part.
+whose contacts cannot part. One contact alone brings energy above k = sqrt(1 - G_NT^2/(G_NN G_TT)) at the earliest, G its
+mobility.
 
 Poisson's law (Glocker and Pfeiffer 1995) is two such problems: one of compression, without restitution, and one of
 expansion, in which P_N exceeds k times that of compression only where v_N+ would be negative.
@@ -19,7 +20,7 @@ import math
 
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.impacts import COLLAPSE
-from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD
+from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD, REDUCED
 from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import (
     AT_REST,
@@ -64,6 +65,7 @@ def collide(system, st, rec, log, work):
     if system.two_phases and not _compress(system, work, count, tiny):
         return False
     if not _rebound(system, st, work, count, 1.0, tiny):
+        st.counters[REDUCED] += 1
         low, high = 0.0, 1.0
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)

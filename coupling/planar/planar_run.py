@@ -14,6 +14,7 @@ from vanedamp.coupling.numerics.codes import (
     LOGGED,
     NEEDS_FLOW,
     PERIOD,
+    REDUCED,
     SEGMENTS,
 )  # fmt: skip
 from vanedamp.coupling.planar.automaton import advance, begin
@@ -93,7 +94,7 @@ class PlanarRun:
     def outcome(self) -> Outcome:
         """Return the results of the run."""
         counters = self.state.counters
-        numbers = {"impacts": IMPACTS, "segments": SEGMENTS, "evaluations": EVALUATIONS}
+        numbers = {"impacts": IMPACTS, "segments": SEGMENTS, "evaluations": EVALUATIONS, "reduced_impacts": REDUCED}
         found = {name: int(counters[place]) for name, place in numbers.items()}
         found["subsystems"] = int(np.count_nonzero(self.flows.modes))
         return Outcome(

@@ -377,7 +377,8 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, mo
     """Return the model with stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
 
     A hot spot is where a natural mode of the model at the case's speed has its largest von Mises stress, or the largest
-    one away from the spots before it; the first `modes` modes have `spots` each. Needs a model with its recovery.
+    one away from the spots before it; the first `modes` modes have `spots` each. Of places with equal stress it is the
+    first. Needs a model with its recovery.
     """
     assert model.recovery is not None
     solid = structure.solid

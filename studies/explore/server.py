@@ -97,7 +97,7 @@ def guard(app: Dash, port: int, token: str) -> None:
             return answer  # type: ignore[return-value]
         if not secrets.compare_digest(request.cookies.get(cookie, "").encode(), token.encode()):
             return "open the address that vanedamp has printed, with its token\n", HTTPStatus.FORBIDDEN
-        if request.path == _UPDATE and not _well_formed(request.get_json(silent=True), app.callback_map):
+        if request.path == _UPDATE and not _well_formed(_body(), app.callback_map):
             return "this is no request of the page\n", HTTPStatus.BAD_REQUEST
         return None
 
@@ -118,6 +118,14 @@ def guard(app: Dash, port: int, token: str) -> None:
         answer.headers["Referrer-Policy"] = "no-referrer"
         answer.headers["Cross-Origin-Resource-Policy"] = "same-origin"
         return answer
+
+
+def _body() -> Any:
+    """Return the data of a request; None for no JSON."""
+    try:
+        return request.get_json(silent=True)
+    except RecursionError:
+        return None
 
 
 def _well_formed(data: Any, callbacks: Container[str]) -> bool:

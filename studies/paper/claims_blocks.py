@@ -93,6 +93,8 @@ def _numbers(curves: Curves, sliders: Curves) -> list[Claim]:
     chosen = {name: curves[name] for name in (*ROWS, "double_aside", "quad_aside")}
     level, upright = _tops(chosen, 0), _tops({name: curves[name] for name in ROWS}, -1)
     beside, above = _tops(sliders, 0), _tops(sliders, -1)
+    others = {name: curves[f"{name}_restitution"] for name in ROWS}  # with 0.9 the last
+    elastic, soft = _tops(others, -1), _tops({name: of for name, of in others.items() if len(of) > 1}, 0)
     text = f"highest means, blocks: {_text(level)}; sliders: {_text(beside)}"
     vertical = f"highest means vertically, blocks: {_text(upright)}; sliders: {_text(above)}"
     multi = {name: value for name, value in level.items() if name != "single"}
@@ -139,8 +141,11 @@ def _numbers(curves: Curves, sliders: Curves) -> list[Claim]:
             f"best row of blocks: {best} ({level[best]:.3f}) horizontally, {best_upright} "
             f"({upright[best_upright]:.3f}) vertically; {text}",
             verdict(best == best_upright == "double", "double" in (best, best_upright)),
-            "Each more block in the row leaves more above the resonance; rows of sliders go on gaining.",
-            figures,
+            "Each more block in the row leaves more above the resonance; rows of sliders go on gaining. It goes with the "
+            f"restitution: with 0.9 {_text(elastic)}, with 0.5 {_text(soft)}.",
+            figures
+            | {f"{name}_restitution_0.9": value for name, value in elastic.items()}
+            | {f"{name}_restitution_0.5": value for name, value in soft.items()},
         ),
     ]
 

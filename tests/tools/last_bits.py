@@ -7,18 +7,20 @@ and the same for the same seed and call: repeated and parallel runs agree as the
 fails alone as it failed among others.
 
 Reached, in this process, in pytest's workers and in child processes (by PYTHONPATH and sitecustomize):
-`@`, einsum, exp, log, sine in vanedamp, tests.tools, tests.reference and tests.validation, whose modules are compiled
-with calls in their place; numpy.linalg, scipy.linalg and scipy.sparse.linalg wherever they are called by those names;
-factors and eigenpairs of PETSc and SLEPc in modal/petsc.py. Even seeds compile the engine for a generic processor,
-without fused multiplication and addition, into a cache of its own (a minute when it is empty).
+`@`, einsum, exp, log, sine in vanedamp and in the tests, whose modules are compiled with calls in their place;
+numpy.linalg, scipy.linalg and scipy.sparse.linalg wherever they are called by those names; factors and eigenpairs of
+PETSc and SLEPc in modal/petsc.py. Even seeds compile the engine for a generic processor, without fused multiplication
+and addition, into a cache of its own (a minute when it is empty).
 
-Not reached: `@` in the test files themselves, products with sparse matrices, sums (numpy.sum), powers, the math module,
+Not reached: products with sparse matrices, sums (numpy.sum), powers, the math module,
 integrators and optimisers inside scipy, dolfinx's assembly. For these there is `make test-arithmetic`.
 """
 
 import os
 import sys
 from pathlib import Path
+
+from _pytest.assertion import rewrite
 
 _HOOK = Path(__file__).with_name("last_bits_path")
 _NUMBA = Path(__file__).resolve().parents[2] / ".cache" / "numba-generic"
@@ -37,6 +39,19 @@ def begin(seed: int) -> None:
     """Perturb this process and those that it starts."""
     os.environ |= variables(seed)
     sys.path.append(str(_HOOK))
-    from last_bits_imports import install
+    import last_bits_imports
 
-    install()
+    last_bits_imports.install()
+    _perturb_tests(last_bits_imports)
+
+
+def _perturb_tests(imports) -> None:
+    """Have pytest, which compiles test files itself, compile them with other arithmetic, and keep them apart."""
+    compiled = rewrite.rewrite_asserts
+
+    def with_calls(tree, *arguments):
+        imports.change(tree)
+        compiled(tree, *arguments)
+
+    rewrite.rewrite_asserts = with_calls
+    rewrite.get_cache_dir = lambda path: imports.CACHE.joinpath("pytest", *path.parts[1:-1])

@@ -3,7 +3,8 @@
 Jean (1999); Acary and Brogliato (2008), chapter 10. The theta method for the smooth part; a contact takes part in a
 step if its gap, half a step ahead, is closed: Newton's law on its normal velocity, Coulomb's on its slip. The impulses
 of a step are found by projected Gauss-Seidel iteration (Jourdan, Alart and Jean 1998), one impulse after the other. An
-impact that others bring about within a step is a problem of its own, after theirs, as in methods.moreau.
+impact that others bring about within a step is a problem of its own, after theirs, as in methods.moreau. Where impulses
+would bring energy (Kane's paradox), all coefficients are smaller by one factor, as in planar.impacts.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ _TURNS = 20
 _TOLERANCE, _AT_REST = 1e-13, 1e-10
 #: sweeps that a problem may take
 _SWEEPS = 100_000
+#: bisections of the factor of the coefficients; energy that impulses may bring, as a share of what they move
+_HALVINGS, _GAIN = 40, 1e-10
 #: share of the play by which round-off may open a gap
 _ROUND_OFF = 1e-12
 
@@ -116,7 +119,7 @@ def _impulses(system, motion, mobility, turned, h, theta):
         if count == 0:
             return True
         motion.counters[SOLVES] += 1
-        if not _gauss_seidel(system, motion, mobility, count, h, _TOLERANCE * fastest):
+        if not _rebound(system, motion, mobility, count, h, turn, _TOLERANCE * fastest):
             return False
         for p in range(count):
             for r in (motion.listed[p], u + motion.listed[p]):
@@ -167,7 +170,7 @@ def _two_phases(system, motion, mobility, h, tolerance):
 
 @inlined
 def _list_units(system, motion, turn, h, theta):
-    """List the units that take part in a turn, with what Newton's law leaves of their speeds. Return their number."""
+    """List the units that take part in a turn, with their speeds and what Newton's law asks for. Return their number."""
     u, count, free, slowest = len(system.rest), 0, motion.free[1], motion.slowest[0]
     first = u - len(system.tangential)
     for r in range(u):
@@ -178,17 +181,67 @@ def _list_units(system, motion, turn, h, theta):
             before = motion.before[r] if turn == 0 and not system.two_phases else now
             if turn < _TURNS - 1 and before > slowest and now > -slowest:
                 continue
-            motion.left[r] = now
+            motion.now[r], motion.asked[r] = now, 0.0
             if not system.two_phases:
-                motion.left[r] += restitution_at(system, r, -before) * min(before, 0.0)
-        motion.left[u + r] = row_speed(system, u + r, free)
+                motion.asked[r] = restitution_at(system, r, -before) * min(before, 0.0)
+        motion.now[u + r] = row_speed(system, u + r, free)
         if r >= first:  # at rest is a spring whose mean force over the step is the impulse
             j, ahead = r - first, theta * h
             stretched = elongation(system, j, motion.q) + (1.0 - theta) * ahead * motion.before[u + r]
-            motion.left[u + r] += (stretched + motion.impulse[u + r] / (h * system.tangential[j])) / (theta * ahead)
+            motion.now[u + r] += (stretched + motion.impulse[u + r] / (h * system.tangential[j])) / (theta * ahead)
         motion.listed[count] = r
         count += 1
     return count
+
+
+@kernel
+def _rebound(system, motion, mobility, count, h, turn, tolerance):
+    """Find the impulses (motion.more) of a turn, with the largest factor of the coefficients that brings no energy.
+
+    Returns False if they do not converge.
+    """
+    low, high, share = 0.0, 1.0, 1.0
+    for _ in range(_HALVINGS):
+        if not _newton(system, motion, mobility, count, h, share, tolerance):
+            return False
+        if _brings_energy(system, motion, count, turn, share):
+            high = share
+        elif share == 1.0:
+            return True
+        else:
+            low = share
+        share = 0.5 * (low + high)
+    return _newton(system, motion, mobility, count, h, low, tolerance)
+
+
+@inlined
+def _newton(system, motion, mobility, count, h, share, tolerance):
+    """Find impulses (motion.more) by Newton's law with this share of the coefficients. Returns False if that fails."""
+    u = len(system.rest)
+    for p in range(count):
+        r = motion.listed[p]
+        motion.left[r], motion.left[u + r] = motion.now[r] + share * motion.asked[r], motion.now[u + r]
+    return _gauss_seidel(system, motion, mobility, count, h, tolerance)
+
+
+@inlined
+def _brings_energy(system, motion, count, turn, share):
+    """Whether the impulses (motion.more) of contacts bring energy, by the speeds before and after the step's loads.
+
+    The loads alone may let it seem so by one of them: where they pull a contact open, or turn a slip round.
+    """
+    u, early, late, terms = len(system.rest), 0.0, 0.0, 0.0
+    for p in range(count):
+        r = motion.listed[p]
+        if r < system.contacts:
+            for row in (r, u + r):
+                after = motion.left[row] - (share * motion.asked[r] if row == r else 0.0)
+                now = motion.now[row]
+                before = motion.before[row] if turn == 0 else now
+                early += 0.5 * motion.more[row] * (before + after)
+                late += 0.5 * motion.more[row] * (now + after)
+                terms += abs(motion.more[row]) * (abs(before) + abs(now) + abs(after))
+    return min(early, late) > _GAIN * terms
 
 
 @kernel

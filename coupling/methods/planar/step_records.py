@@ -71,6 +71,8 @@ class SteppedMotion(NamedTuple):
     more: np.ndarray  # (2u,) that the present problem adds
     least: np.ndarray  # (u,) normal impulse that it asks for, at least: in expansion
     approach: np.ndarray  # (u,) speed of approach before its impact, m/s
+    now: np.ndarray  # (2u,) speeds that the loads and the problems before leave
+    asked: np.ndarray  # (u,) speed that restitution asks for, less than zero
     left: np.ndarray  # (2u,) its speeds, less what restitution asks for
     closed: np.ndarray  # (u,) int: whether a contact takes part in the step
     listed: np.ndarray  # (u,) int: units of the problem
@@ -90,7 +92,8 @@ def start_steps(
         active=np.zeros(u, np.int64), speed=np.zeros(u), begun=np.zeros(u), total=np.zeros(2 * u), lost=np.zeros(u),
         start=np.zeros((2, size)), free=np.zeros((2, size)), before=np.zeros(2 * u), slowest=np.zeros(1),
         impulse=np.zeros(2 * u), more=np.zeros(2 * u), least=np.zeros(u), approach=np.zeros(u),
-        left=np.zeros(2 * u), closed=np.zeros(u, np.int64), listed=np.zeros(u, np.int64),
+        now=np.zeros(2 * u), asked=np.zeros(u), left=np.zeros(2 * u), closed=np.zeros(u, np.int64),
+        listed=np.zeros(u, np.int64),
     )  # fmt: skip
 
 

@@ -41,7 +41,7 @@ def _turn(size):
 
 
 def ulps(values):
-    """Return values of which some are the next floating point number above or below; zeros and integers stay."""
+    """Return the next floating point numbers above or below; zeros and integers stay."""
     values = np.asarray(values)
     if values.dtype == complex:
         return ulps(values.real) + 1j * ulps(values.imag)
@@ -49,8 +49,8 @@ def ulps(values):
         return values
     bits = np.abs(values).view(np.uint64) if values.ndim else np.abs(values[None]).view(np.uint64)[0]
     with np.errstate(over="ignore"):
-        drawn = (bits ^ np.uint64(zlib.crc32(_SEED.encode()))) * np.uint64(0x9E3779B97F4A7C15) >> np.uint64(62)
-    toward = np.where(drawn == 0, 0.0, np.where(drawn == 1, np.inf, np.abs(values)))
+        drawn = (bits ^ np.uint64(zlib.crc32(_SEED.encode()))) * np.uint64(0x9E3779B97F4A7C15) >> np.uint64(63)
+    toward = np.where(drawn == 0, 0.0, np.inf)
     with np.errstate(all="ignore"):
         moved = np.copysign(np.nextafter(np.abs(values), toward), values)
         return np.where(np.isfinite(values) & (np.rint(values) != values), moved, values)[()]
@@ -351,9 +351,9 @@ class _Factor:
 
 
 def _residual(size, found):
-    """Return what a backward stable solver leaves: units in the last place of |A| |x|."""
+    """Return what a backward stable solver leaves: a few units in the last place of |A| |x|."""
     scale = size @ np.abs(found)
-    return scale * _EPS * _random("residual", len(scale)).integers(-1, 2, scale.shape)
+    return scale * _EPS * _random("residual", len(scale)).integers(-4, 5, scale.shape)
 
 
 def _splu(function, matrix, *rest, **options):
@@ -379,7 +379,7 @@ def _eigsh(function, a, *rest, **options):
 
 
 def _solve_rows(function, factorization, rows):
-    return function(factorization, rows * (1.0 + _EPS * _random("rows", rows.shape[-1]).integers(-1, 2, rows.shape)))
+    return function(factorization, rows * (1.0 + _EPS * _random("rows", rows.shape[-1]).integers(-4, 5, rows.shape)))
 
 
 def _eigenpairs(function, *arguments):

@@ -24,7 +24,7 @@ _FUNCTIONS = {
 _COMPILED = {"entry", "kernel", "inlined", "summing", "comparing", "intrinsic", "njit", "overload", "staticmethod"}
 _HERE = Path(__file__)
 # modules compiled with other code are kept apart, by what compiles them
-_CACHE = _HERE.parents[3] / ".cache" / "last-bits" / hashlib.sha256(_HERE.read_bytes()).hexdigest()[:16]
+CACHE = _HERE.parents[3] / ".cache" / "last-bits" / hashlib.sha256(_HERE.read_bytes()).hexdigest()[:16]
 
 
 def install() -> None:
@@ -67,7 +67,7 @@ class _Library(SourceFileLoader):
 
 class _Perturbed(SourceFileLoader):
     def get_code(self, fullname):
-        before, sys.pycache_prefix = sys.pycache_prefix, str(_CACHE)
+        before, sys.pycache_prefix = sys.pycache_prefix, str(CACHE)
         try:
             return super().get_code(fullname)
         finally:
@@ -75,19 +75,24 @@ class _Perturbed(SourceFileLoader):
 
     def source_to_code(self, data, path, *, _optimize=-1):
         tree = ast.parse(importlib.util.decode_source(data), path)
-        calls = _Calls()
-        calls.visit(tree)
-        if calls.count:
-            first = next(
-                (place for place, node in enumerate(tree.body) if not _is_head(node)), len(tree.body)
-            )  # after the docstring and `from __future__`
-            tree.body.insert(first, ast.parse("import last_bits_arithmetic as _last_bits").body[0])
-        return compile(ast.fix_missing_locations(tree), path, "exec", dont_inherit=True, optimize=_optimize)
+        change(tree)
+        return compile(tree, path, "exec", dont_inherit=True, optimize=_optimize)
 
     def exec_module(self, module):
         super().exec_module(module)
         if module.__name__ == "vanedamp.modal.petsc":
             _perturb(module)
+
+
+def change(tree):
+    """Put the calls into a module's tree."""
+    calls = _Calls()
+    calls.visit(tree)
+    if calls.count:
+        # after the docstring and `from __future__`
+        first = next((place for place, node in enumerate(tree.body) if not _is_head(node)), len(tree.body))
+        tree.body.insert(first, ast.parse("import last_bits_arithmetic as _last_bits").body[0])
+    ast.fix_missing_locations(tree)
 
 
 def _is_head(node):
