@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import os
+import pickle
 import signal
 import stat
-import sys
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 from vanedamp.files.errors import VanedampError
 
-#: signals by which a library dies of a damaged file; PETSc catches them, and ends the process with a page of text
-_DEADLY = (signal.SIGSEGV, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
-#: s for a trial read, and bytes a second beyond them: a slow disk's
+#: signals that end a fork at once; PETSc catches some, and ends the process with a page of text
+_DEADLY = [
+    getattr(signal, name)
+    for name in ("SIGSEGV", "SIGABRT", "SIGFPE", "SIGILL", "SIGBUS", "SIGALRM", "SIGINT", "SIGTERM")
+    if hasattr(signal, name)
+]
+_Read = TypeVar("_Read")
+#: s for a fork, and bytes a second beyond them: a slow disk's
 _PATIENCE, _SPEED = 60, 1e6
 
 
@@ -55,40 +61,51 @@ def reading(path: str | os.PathLike[str], error: type[VanedampError], expected: 
         raise error(f"{path}: {expected}: damaged, or of another format ({told})") from reason
 
 
-def survive(path: str | os.PathLike[str], error: type[VanedampError], read: Callable[[], object]) -> None:
-    """Read a file in a fork of this process first, where a damaged one may crash or hang the library that reads it.
+def apart(path: str | os.PathLike[str], error: type[VanedampError], read: Callable[[], _Read]) -> _Read:
+    """Return what `read` makes of a file, called in a fork of this process: damage may crash or hang its library.
 
-    Exceptions of `read` say nothing here: they come again when the file is read in earnest. Raises `error` for a fork
-    that ends by a signal. Where the system has no forks, nothing is tried.
+    What it returns is pickled. Raises `error` for a fork that ends by a signal, and ValueError with the words of an
+    exception of `read`. Where the system has no forks, `read` is called here.
     """
     if not hasattr(os, "fork"):
-        return
+        return read()
     seconds = int(_PATIENCE + os.stat(path).st_size / _SPEED)
-    sys.stdout.flush()
-    sys.stderr.flush()
+    reading, writing = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # of threads, none of which reads files
         child = os.fork()
     if child == 0:
-        _try(read, seconds)
-    _, status = os.waitpid(child, 0)
+        _tell(read, writing, seconds)
+    os.close(writing)
+    try:
+        with os.fdopen(reading, "rb") as stream:
+            told = stream.read()
+    finally:
+        _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
         what = f"takes more than {seconds} s" if number == signal.SIGALRM else signal.Signals(number).name
         raise error(f"{path}: damaged: its library ends in the middle of it ({what}); write it again")
+    made, failure = pickle.loads(told)
+    if failure is not None:
+        raise ValueError(failure)
+    return made
 
 
-def _try(read: Callable[[], object], seconds: int) -> None:
-    """Read, silently, and end this process."""
+def _tell(read: Callable[[], object], writing: int, seconds: int) -> None:
+    """Read, silently, write what comes of it, and end this process."""
     try:
-        for number in (*_DEADLY, signal.SIGALRM, signal.SIGINT):
+        for number in _DEADLY:
             signal.signal(number, signal.SIG_DFL)
-        if hasattr(signal, "SIGBUS"):
-            signal.signal(signal.SIGBUS, signal.SIG_DFL)
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
         signal.alarm(seconds)
-        read()
+        try:
+            told = pickle.dumps((read(), None), protocol=5)
+        except BaseException as reason:  # the library may end the program
+            told = pickle.dumps((None, str(reason) or type(reason).__name__))
+        with os.fdopen(writing, "wb") as stream:
+            stream.write(told)
     finally:
         os._exit(0)

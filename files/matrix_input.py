@@ -11,7 +11,7 @@ import numpy as np
 from scipy import io, sparse
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.foreign import survive
+from vanedamp.files.foreign import apart
 from vanedamp.files.sparse_indices import within_shape
 
 
@@ -25,10 +25,10 @@ def read_mat(path: str | Path) -> dict[str, Any]:
     Versions 4 to 7 are read by scipy, 7.3 (HDF5) here. Structures, cells and texts are left out. Raises what the
     libraries raise for a damaged file.
     """
-    survive(path, MatrixFileError, lambda: _matlab(path))
+    found = apart(path, MatrixFileError, lambda: _matlab(path))
     return {
         name: within_shape(matrix)
-        for name, matrix in _matlab(path).items()
+        for name, matrix in found.items()
         if not name.startswith("__") and (sparse.issparse(matrix) or _numeric(matrix))
     }
 

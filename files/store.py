@@ -28,7 +28,7 @@ import h5py
 import numpy as np
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.foreign import existing, reading, survive
+from vanedamp.files.foreign import apart, existing, reading
 
 SCHEMA_VERSION = 1
 
@@ -232,32 +232,26 @@ def clear_leftovers(path: str | os.PathLike[str]) -> None:
 
 def load(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Read a record: (variables by name as arrays, attributes). Raises StoreError with the file and the reason."""
-    with _opened(path) as file:
-        found = file.attrs.get("kind")
-        if found != kind:
-            raise StoreError(f"{path}: holds {found or 'no record of ours'}, expected {kind}")
-        attributes = _attributes(path, file)
-        variables = {name: _read(item) for name, item in file.items() if isinstance(item, h5py.Dataset)}
-        return _Fields(path, variables), attributes
+    found, variables = _content(path)
+    if found.get("kind") != kind:
+        raise StoreError(f"{path}: holds {found.get('kind') or 'no record of ours'}, expected {kind}")
+    values = {name: variable.values for name, variable in variables.items()}
+    return _Fields(path, values), _attributes(path, found)
 
 
 def load_any(path: str | os.PathLike[str]) -> tuple[str, dict[str, Variable], dict[str, Any]]:
     """Read a record of any kind: (kind, variables with dimensions and units, attributes). Raises StoreError."""
-    with _opened(path) as file:
-        kind = file.attrs.get("kind")
-        if kind is None:
-            raise StoreError(f"{path}: holds no record of ours")
-        variables = {
-            name: Variable(_read(item), _dimensions(item, name), str(item.attrs.get("units", "1")))
-            for name, item in file.items()
-            if isinstance(item, h5py.Dataset) and not _without_coordinate(item)
-        }
-        return str(kind), variables, _attributes(path, file)
+    found, variables = _content(path, dimensions=True)
+    if found.get("kind") is None:
+        raise StoreError(f"{path}: holds no record of ours")
+    return str(found["kind"]), variables, _attributes(path, found)
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
     """Return the kind of a record's file, "None" for HDF5 of others. Raises StoreError."""
-    with _opened(path) as file:
+    if not _sealed(path):
+        return str(_content(path)[0].get("kind"))
+    with h5py.File(path, "r") as file:
         return str(file.attrs.get("kind"))
 
 
@@ -283,25 +277,29 @@ def reader(load: Callable[[_Class, _Path], _Record]) -> Callable[[_Class, _Path]
     return guarded
 
 
-@contextlib.contextmanager
-def _opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
-    """Yield a record's file. Raises StoreError for one that is missing or damaged."""
+def _content(path: str | os.PathLike[str], dimensions: bool = False) -> tuple[dict[str, Any], dict[str, Variable]]:
+    """Return attributes and variables of a record's file. Raises StoreError for one that is missing or damaged.
+
+    dimensions: names of dimensions and units as well, which takes longer, and no variables that stand for a dimension.
+    """
     existing(path, StoreError)
-    if not _sealed(path):
-        survive(path, StoreError, lambda: _read_all(path))
-    with decoding(path, expected="not a readable HDF5 file"), h5py.File(path, "r") as file:
-        yield file
+    with decoding(path, expected="not a readable HDF5 file"):
+        if _sealed(path):
+            return _read_all(path, dimensions)
+        return apart(path, StoreError, lambda: _read_all(path, dimensions))
 
 
-def _read_all(path: str | os.PathLike[str]) -> None:
-    """Read what a record holds, and whatever hangs on it."""
+def _read_all(path: str | os.PathLike[str], dimensions: bool) -> tuple[dict[str, Any], dict[str, Variable]]:
     with h5py.File(path, "r") as file:
-        dict(file.attrs)
-        for name, item in file.items():
-            dict(item.attrs)
-            if isinstance(item, h5py.Dataset):
-                _read(item)
-                _dimensions(item, name)
+        attributes = {name: _plain(value) for name, value in file.attrs.items()}
+        items = [(name, item) for name, item in file.items() if isinstance(item, h5py.Dataset)]
+        if not dimensions:
+            return attributes, {name: Variable(_read(item)) for name, item in items}
+        return attributes, {
+            name: Variable(_read(item), _dimensions(item, name), str(item.attrs.get("units", "1")))
+            for name, item in items
+            if not _without_coordinate(item)
+        }
 
 
 def _sealed(path: str | os.PathLike[str]) -> bool:
@@ -329,11 +327,12 @@ def _checked(path: str, stamp: int) -> bool:
     return True
 
 
-def _attributes(path: str | os.PathLike[str], file: h5py.File) -> dict[str, Any]:
-    version = int(file.attrs.get("schema_version", 0))
+def _attributes(path: str | os.PathLike[str], found: dict[str, Any]) -> dict[str, Any]:
+    with decoding(path):
+        version = int(found.get("schema_version", 0))
     if version > SCHEMA_VERSION:
         raise StoreError(f"{path}: schema version {version} is newer than {SCHEMA_VERSION}; update vanedamp")
-    return _Fields(path, {name: _plain(value) for name, value in file.attrs.items()})
+    return _Fields(path, found)
 
 
 def _dimensions(dataset: h5py.Dataset, name: str) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import Frf, FrfError
 from vanedamp.modal.temperature import Temperature, TemperatureError
 
+_NO_UNIVERSAL = "not a universal file that pyuff can read"
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".bunv")
 #: meanings of the two columns of a response in a CSV
 COLUMNS = ("real-imaginary", "magnitude-degrees", "magnitude-radians")
@@ -56,7 +57,10 @@ def read_shapes(path: str | os.PathLike[str]) -> MeasuredShapes:
     Universal: datasets 15 or 2411 (nodes) and 55 (normal or complex modes). Raises MeasurementError.
     """
     file = existing(path, MeasurementError)
-    return _shapes_of_universal(file) if file.suffix.lower() in _UNIVERSAL else _shapes_of_csv(file)
+    if file.suffix.lower() not in _UNIVERSAL:
+        return _shapes_of_csv(file)
+    with reading(file, MeasurementError, _NO_UNIVERSAL):
+        return _shapes_of_universal(file)
 
 
 def write_shapes(shapes: MeasuredShapes, path: str | os.PathLike[str]) -> None:
@@ -91,7 +95,8 @@ def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns
     """
     file = existing(path, MeasurementError)
     if file.suffix.lower() in _UNIVERSAL:
-        return _frf_of_universal(file)
+        with reading(file, MeasurementError, _NO_UNIVERSAL):
+            return _frf_of_universal(file)
     header, rows = _numbers(file)
     if rows.shape[1] < 3 or rows.shape[1] % 2 == 0:
         raise MeasurementError(
@@ -246,12 +251,10 @@ def _pyuff() -> Any:
 
 
 def _datasets(file: Path) -> list[dict[str, Any]]:
-    pyuff = _pyuff()
-    with reading(file, MeasurementError, "not a universal file that pyuff can read"):
-        universal = pyuff.UFF(str(file))
-        kinds = universal.get_set_types()
-        wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58, 2411)))
-        return [universal.read_sets(int(index)) for index in wanted]
+    universal = _pyuff().UFF(str(file))
+    kinds = universal.get_set_types()
+    wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58, 2411)))
+    return [universal.read_sets(int(index)) for index in wanted]
 
 
 def _shapes_of_universal(file: Path) -> MeasuredShapes:

@@ -13,7 +13,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.foreign import existing, survive
+from vanedamp.files.foreign import apart, existing
 from vanedamp.files.store import file_stamp, replacing
 from vanedamp.modal import gmsh_on_demand as gmsh
 
@@ -64,7 +64,12 @@ def merge(path: Path) -> None:
         if not file.read(64).lstrip().startswith(b"$MeshFormat"):
             raise MeshError(f"{path}: not a gmsh mesh (a .msh file starts with $MeshFormat)")
     if file_stamp(path) not in _written:
-        survive(path, MeshError, lambda: gmsh.merge(str(path)))
+        try:
+            apart(path, MeshError, lambda: gmsh.merge(str(path)))
+        except MeshError:
+            raise
+        except ValueError:  # which comes again
+            pass
     gmsh.logger.start()
     try:
         gmsh.merge(str(path))

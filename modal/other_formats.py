@@ -7,10 +7,11 @@ import importlib
 import io
 from pathlib import Path
 from textwrap import shorten
+from typing import Any
 
 import numpy as np
 
-from vanedamp.files.foreign import survive
+from vanedamp.files.foreign import apart
 from vanedamp.modal.labelled_mesh import LabelledMesh
 from vanedamp.modal.msh import MeshError
 
@@ -21,13 +22,12 @@ def read(path: Path) -> LabelledMesh:
         meshlane = importlib.import_module("meshlane")
     except ImportError as error:
         raise MeshError(f"{path}: MED and other formats need meshlane: pip install meshlane") from error
-    survive(path, MeshError, lambda: meshlane.read(path))
-    said = io.StringIO()  # it prints why, and may end the program
     try:
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
-            mesh = meshlane.read(path)
-    except (Exception, SystemExit) as error:  # its readers raise what they stumble over
-        why = " ".join(f"{said.getvalue()} {error}".split()) or type(error).__name__
+        mesh = apart(path, MeshError, lambda: _read(meshlane, path))
+    except MeshError:
+        raise
+    except Exception as error:  # its readers raise what they stumble over
+        why = " ".join(str(error).split()) or type(error).__name__
         raise MeshError(
             f"{path}: cannot be read as {path.suffix or 'a mesh without an ending'}: damaged, or of another format "
             f"({shorten(why, 120)}); expected .msh, .inp, .bdf, .nas, .fem, .cdb, .unv, .med, "
@@ -50,3 +50,13 @@ def read(path: Path) -> LabelledMesh:
         members = [start + np.asarray(part, dtype=int) for start, part in zip(starts, parts, strict=False)]
         labelled.element_sets[name.strip()] = np.concatenate(members).tolist()
     return labelled
+
+
+def _read(meshlane: Any, path: Path) -> Any:
+    """Return the mesh as meshlane reads it. Raises ValueError with what it prints: it may end the program."""
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
+            return meshlane.read(path)
+    except (Exception, SystemExit) as error:
+        raise ValueError(f"{said.getvalue()} {error}") from error

@@ -93,7 +93,7 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
     except (ExternalError, MemoryError):
         raise
     except VanedampError as error:
-        raise ExternalError(f"{path}: {error}") from error
+        raise ExternalError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from error
     except Exception as error:  # every format has exceptions of its own
         raise ExternalError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
     dense = {name: np.asarray(_dense(matrix)) for name, matrix in found.items()}

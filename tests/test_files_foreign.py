@@ -13,7 +13,7 @@ from tests.tools.processes import environment
 from vanedamp.files import foreign, store
 from vanedamp.files.csv_input import read_csv
 from vanedamp.files.errors import shortened
-from vanedamp.files.foreign import existing, reading, survive
+from vanedamp.files.foreign import apart, existing, reading
 from vanedamp.files.store import StoreError, Variable, decoding
 from vanedamp.files.toml_input import InputError, read_toml
 from vanedamp.modal.msh import MeshError, merge
@@ -56,7 +56,7 @@ def test_a_library_that_crashes_or_hangs_is_one_line(tmp_path, monkeypatch):
 
     def tried(read):
         with pytest.raises(StoreError) as told:
-            survive(tmp_path / "file", StoreError, read)
+            apart(tmp_path / "file", StoreError, read)
         return str(told.value)
 
     assert "file: damaged: its library ends in the middle of it (SIGSEGV)" in tried(
@@ -65,7 +65,9 @@ def test_a_library_that_crashes_or_hangs_is_one_line(tmp_path, monkeypatch):
     assert "SIGABRT" in tried(os.abort)
     monkeypatch.setattr(foreign, "_PATIENCE", 1)
     assert "takes more than 1 s" in tried(signal.pause)
-    survive(tmp_path / "file", StoreError, _stumble)  # told when the file is read in earnest
+    with pytest.raises(ValueError, match=r"^division by zero$"):
+        apart(tmp_path / "file", StoreError, _stumble)
+    assert apart(tmp_path / "file", StoreError, lambda: {"a": 1}) == {"a": 1}
 
 
 def test_what_a_reader_meets_names_the_file():
