@@ -9,7 +9,7 @@ TESTS = OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q -n auto --dist worksteal
 SPELLED = README.md CONTRIBUTING.md CHANGELOG.md docs files meshes modal rom coupling studies scripts vanedamp/__init__.py
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-arithmetic test-versions check bench docs
+.PHONY: help setup demo test test-all test-arithmetic test-last-bits test-versions check bench docs
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -30,6 +30,9 @@ test-all: setup ## the tests with the slow verification tier
 
 test-arithmetic: setup ## the fast tier under the arithmetic of other processors, with a table (ARGUMENTS="generic TEST ...")
 	PYTHON=$(PYTHON) scripts/test_arithmetic.sh $(ARGUMENTS)
+
+test-last-bits: setup ## the fast tier with other last bits of the libraries, under three new seeds (ARGUMENTS="SEED ... TEST ...")
+	PYTHON=$(PYTHON) scripts/test_last_bits.sh $(ARGUMENTS)
 
 test-versions: ## the finite element tests on Debian 13 (PyPI's dolfinx and apt's) and unstable, in root folders of their own
 	scripts/test_versions.sh

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from vanedamp.files.store import StoreError, Variable, clear_leftovers, digest, load, save
+from vanedamp.files.store import StoreError, Variable, clear_leftovers, decoding, digest, load, save
 from vanedamp.files.toml_input import InputError
 
 #: time between two writes over the time of a write
@@ -44,9 +44,10 @@ class CheckpointFile:
         if path is None or not path.exists():
             return None
         try:
-            variables, attributes = load(path, self._kind)
-            found = {name: json.loads(attributes[name]) for name in self._belongs}
-        except (StoreError, KeyError) as error:
+            with decoding(path):
+                variables, attributes = load(path, self._kind)
+                found = {name: json.loads(attributes[name]) for name in self._belongs}
+        except StoreError as error:
             raise InputError(
                 f"{path}: a checkpoint that cannot be read ({error}); nothing was done to it: move it away, or delete "
                 "it to start again"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from vanedamp.files.foreign import existing
 from vanedamp.files.toml_input import LARGEST, InputError
 
 
@@ -42,10 +43,9 @@ def read_csv(path: str | Path, columns: Sequence[str], least: int = 1) -> list[C
 
     The first line names the columns, in any order. Raises InputError.
     """
+    file = existing(path, InputError)
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
+        text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     lines = content_lines(text)

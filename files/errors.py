@@ -1,5 +1,10 @@
 """The base of all errors about input."""
 
+import re
+
+#: characters of a word, and of a message: no name of a file is longer
+_WORD, _MESSAGE = 500, 4000
+
 
 class VanedampError(ValueError):
     """Bad input: a file, an argument or a combination of them that cannot be used.
@@ -7,3 +12,16 @@ class VanedampError(ValueError):
     Every error class of this project derives from it. The message is one line: what, where, and what would be right.
     Any other exception is a fault of the program.
     """
+
+    def __str__(self) -> str:
+        return shortened(super().__str__())
+
+
+def shortened(message: str) -> str:
+    """Return a message with its long words, such as a key of a damaged file, cut in the middle, and not too long."""
+    text = re.sub(rf"\S{{{_WORD},}}", lambda found: _cut(found[0], _WORD), message)
+    return _cut(text, _MESSAGE)
+
+
+def _cut(text: str, length: int) -> str:
+    return text if len(text) <= length else f"{text[: length // 2]}...{text[-length // 2 :]}"

@@ -11,6 +11,8 @@ import numpy as np
 from scipy import io, sparse
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.foreign import survive
+from vanedamp.files.sparse_indices import within_shape
 
 
 class MatrixFileError(VanedampError):
@@ -23,16 +25,26 @@ def read_mat(path: str | Path) -> dict[str, Any]:
     Versions 4 to 7 are read by scipy, 7.3 (HDF5) here. Structures, cells and texts are left out. Raises what the
     libraries raise for a damaged file.
     """
-    try:
-        found = io.loadmat(path, appendmat=False)
-    except NotImplementedError:  # scipy's word for version 7.3
-        with h5py.File(path) as file:
-            found = {name: _variable(item) for name, item in file.items() if not name.startswith("#")}
+    survive(path, MatrixFileError, lambda: _matlab(path))
     return {
-        name: matrix
-        for name, matrix in found.items()
+        name: within_shape(matrix)
+        for name, matrix in _matlab(path).items()
         if not name.startswith("__") and (sparse.issparse(matrix) or _numeric(matrix))
     }
+
+
+def _matlab(path: str | Path) -> dict[str, Any]:
+    """Return the variables of a MATLAB file."""
+    try:
+        return dict(io.loadmat(path, appendmat=False))
+    except NotImplementedError:  # scipy's word for version 7.3
+        with h5py.File(path) as file:
+            return {name: _variable(item) for name, item in file.items() if not name.startswith("#")}
+
+
+def read_npz(path: str | Path) -> Any:
+    """Return the matrix of scipy.sparse.save_npz. Raises what the libraries raise for a damaged file."""
+    return within_shape(sparse.load_npz(path))
 
 
 def read_table(path: str | Path) -> np.ndarray:

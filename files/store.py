@@ -14,17 +14,21 @@ import io
 import json
 import math
 import os
+import re
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import Any, NamedTuple, TextIO, TypeVar
 
 import h5py
 import numpy as np
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.foreign import existing, reading, survive
 
 SCHEMA_VERSION = 1
 
@@ -34,6 +38,11 @@ _TRACK_ORDER = False
 _NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable."
 #: where links stand for the files that processes have open
 _OPEN_FILES = Path("/proc")
+#: the last bytes of a record's file, after those of HDF5, which passes over them and drops them at a change
+_SEAL, _SEAL_LENGTH = "\nvanedamp {:08x}\n", 19
+#: bytes that are read at once
+_PART = 1 << 20
+_Class, _Path, _Record = TypeVar("_Class"), TypeVar("_Path", bound="str | os.PathLike[str]"), TypeVar("_Record")
 
 
 class StoreError(VanedampError):
@@ -197,8 +206,9 @@ def save(
             for axis, dimension in enumerate(variable.dims):
                 if name != dimension:
                     file[name].dims[axis].attach_scale(file[dimension])
-    with replacing(path) as temporary:
-        temporary.write_bytes(image.getbuffer())
+    with replacing(path) as temporary, temporary.open("wb") as stream:
+        stream.write(image.getbuffer())
+        stream.write(_SEAL.format(zlib.crc32(image.getbuffer())).encode())
 
 
 def dataset(variables: Mapping[str, Variable], attributes: Mapping[str, Any]) -> Any:
@@ -245,16 +255,78 @@ def load_any(path: str | os.PathLike[str]) -> tuple[str, dict[str, Variable], di
         return str(kind), variables, _attributes(path, file)
 
 
+def kind_of(path: str | os.PathLike[str]) -> str:
+    """Return the kind of a record's file, "None" for HDF5 of others. Raises StoreError."""
+    with _opened(path) as file:
+        return str(file.attrs.get("kind"))
+
+
+@contextlib.contextmanager
+def decoding(*paths: str | os.PathLike[str], expected: str = "not a readable record") -> Iterator[None]:
+    """Raise StoreError for whatever is met in files, unless they are as we wrote them: then the fault is ours."""
+    doubtful = [os.fspath(path) for path in paths if not _sealed(path)]
+    if not doubtful:
+        yield
+        return
+    with reading(", ".join(doubtful), StoreError, expected):
+        yield
+
+
+def reader(load: Callable[[_Class, _Path], _Record]) -> Callable[[_Class, _Path], _Record]:
+    """Decorate a class's method that makes a record of its file: see `decoding`."""
+
+    @wraps(load)
+    def guarded(cls: _Class, path: _Path) -> _Record:
+        with decoding(path):
+            return load(cls, path)
+
+    return guarded
+
+
 @contextlib.contextmanager
 def _opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     """Yield a record's file. Raises StoreError for one that is missing or damaged."""
-    if not Path(path).is_file():
-        raise StoreError(f"{path}: no such file")
-    try:
-        with h5py.File(path, "r") as file:
-            yield file
-    except (OSError, RuntimeError) as error:  # not opened, or opened and yet damaged
-        raise StoreError(f"{path}: not a readable HDF5 file ({error})") from error
+    existing(path, StoreError)
+    if not _sealed(path):
+        survive(path, StoreError, lambda: _read_all(path))
+    with decoding(path, expected="not a readable HDF5 file"), h5py.File(path, "r") as file:
+        yield file
+
+
+def _read_all(path: str | os.PathLike[str]) -> None:
+    """Read what a record holds, and whatever hangs on it."""
+    with h5py.File(path, "r") as file:
+        dict(file.attrs)
+        for name, item in file.items():
+            dict(item.attrs)
+            if isinstance(item, h5py.Dataset):
+                _read(item)
+                _dimensions(item, name)
+
+
+def _sealed(path: str | os.PathLike[str]) -> bool:
+    """Say whether a file ends with the checksum of its content; records before it was introduced do not.
+
+    Raises StoreError where the checksum is another's: the file has been damaged since.
+    """
+    stamp = file_stamp(path)
+    return bool(stamp) and _checked(os.fspath(path), stamp)
+
+
+@lru_cache(maxsize=64)
+def _checked(path: str, stamp: int) -> bool:
+    checksum, length = 0, os.path.getsize(path) - _SEAL_LENGTH
+    with open(path, "rb") as stream:
+        stream.seek(max(length, 0))
+        seal = re.fullmatch(rb"\nvanedamp ([0-9a-f]{8})\n", stream.read())
+        if seal is None:
+            return False
+        stream.seek(0)
+        for start in range(0, length, _PART):
+            checksum = zlib.crc32(stream.read(min(length - start, _PART)), checksum)
+    if checksum != int(seal[1], 16):
+        raise StoreError(f"{path}: damaged: its bytes are not those that were written; write it again")
+    return True
 
 
 def _attributes(path: str | os.PathLike[str], file: h5py.File) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.foreign import existing
 from vanedamp.files.reference import constants, options
 
 T = TypeVar("T")
@@ -32,6 +33,8 @@ _NO_LIST = ("tuple_type", "list_type")
 LARGEST = 1e40
 #: and no whole number is longer than those of TOML
 _LONGEST = 2**63 - 1
+#: of a file of ours: bytes, and tables and lists one in another
+_MOST_BYTES, _DEEPEST = 50_000_000, 30
 
 
 def _not_huge(value: float) -> float:
@@ -76,16 +79,30 @@ class InputError(VanedampError):
 
 def read_toml(path: str | Path) -> dict[str, Any]:
     """Return the tables of a TOML file, UTF-8 with or without a byte order mark. Raises InputError."""
+    file = existing(path, InputError)
+    if file.stat().st_size > _MOST_BYTES:
+        raise InputError(f"{path}: has {file.stat().st_size / 1e6:.0f} MB; expected at most {_MOST_BYTES / 1e6:.0f} MB")
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
+        data = tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not valid TOML: {error}") from None
     except RecursionError:
         raise InputError(f"{path}: not valid TOML: nested too deeply") from None
+    except ValueError as error:  # of tomllib's own class but for whole numbers of thousands of digits
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+    if _depth(data) > _DEEPEST:
+        raise InputError(f"{path}: its tables are nested too deeply; at most {_DEEPEST} levels")
+    return data
+
+
+def _depth(data: Any) -> int:
+    """Return how many tables and lists stand one in another."""
+    level, depth = [data], 0
+    while level:
+        inner = (item.values() if isinstance(item, dict) else item for item in level)
+        level = [value for values in inner for value in values if isinstance(value, dict | list)]
+        depth += 1
+    return depth
 
 
 def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:

@@ -53,19 +53,29 @@ _REFUSED = {
 _WHY = {keyword: why for why, keywords in _REFUSED.items() for keyword in keywords}
 
 
-class _Card(NamedTuple):
-    """A keyword line with its data: (line number, words)."""
+class _Line(NamedTuple):
+    """A line of a deck that says something: where it stands, and its text without blanks around it."""
 
     file: Path
-    line: int
+    number: int
+    text: str
+
+    def error(self, message: str) -> MeshError:
+        return MeshError(f"{self.file}: line {self.number}: {message}")
+
+
+class _Card(NamedTuple):
+    """A keyword line with its data: (line, words)."""
+
+    head: _Line
     keyword: str
     parameters: dict[str, str]
-    data: list[tuple[int, list[str]]]
+    data: list[tuple[_Line, list[str]]]
 
-    def error(self, message: str, line: int | None = None) -> MeshError:
-        return MeshError(f"{self.file}: line {line or self.line}: *{self.keyword} {message}")
+    def error(self, message: str, line: _Line | None = None) -> MeshError:
+        return (line or self.head).error(f"*{self.keyword} {message}")
 
-    def numbers(self) -> list[tuple[int, list[float]]]:
+    def numbers(self) -> list[tuple[_Line, list[float]]]:
         """Return the data as numbers; an empty field is zero."""
         rows = []
         for line, words in self.data:
@@ -134,10 +144,9 @@ class _Deck:
         frame = Frame(kind="cylindrical") if kind == "C" else Frame()
         labels, points = [], []
         for line, row in card.numbers():
-            label = int(row[0])
             if len(row) < 2 or not np.all(np.isfinite(row[:4])):
-                raise card.error(f"{label}: expected a label and finite coordinates", line)
-            labels.append(label)
+                raise card.error(f"{row[0]:.15g}: expected a label and finite coordinates", line)
+            labels.append(int(row[0]))
             points.append([*row[1:4], 0.0, 0.0][:3])
         if not labels:
             return
@@ -256,7 +265,9 @@ class _Deck:
                 raise card.error(f"names {label}, which is not given before it")
         return [label for label in labels if label in known]
 
-    def _known(self, card: _Card, sets: dict[str, list[_Member]], name: str, line: int | None = None) -> list[_Member]:
+    def _known(
+        self, card: _Card, sets: dict[str, list[_Member]], name: str, line: _Line | None = None
+    ) -> list[_Member]:
         own = _spelling(sets, name)
         if own not in sets:
             raise card.error(f"names the set {name!r}, which is not given before it", line)
@@ -315,7 +326,7 @@ def read(path: Path) -> LabelledMesh:
 
 def files(path: Path) -> list[Path]:
     """Return the files of a deck: itself and those that it names. Raises MeshError with file and line."""
-    return list(dict.fromkeys([path, *(card.file for card in _cards(path))]))
+    return list(dict.fromkeys([path, *(line.file for line in _lines(path))]))
 
 
 def _spelling(sets: Mapping[str, object], name: str) -> str:
@@ -323,47 +334,63 @@ def _spelling(sets: Mapping[str, object], name: str) -> str:
     return next((known for known in sets if known.upper() == name.upper()), name)
 
 
-def _cards(path: Path, within: tuple[Path, ...] = ()) -> Iterator[_Card]:
-    """Yield the keywords of a deck and of those that it includes; within: the files that include this one."""
+def _cards(path: Path) -> Iterator[_Card]:
+    """Yield the keywords of a deck with their data."""
     card: _Card | None = None
+    for line in _lines(path):
+        if line.text.startswith("*"):
+            if card is not None:
+                yield card
+            card = _Card(line, *_keyword(line.text), [])
+        elif card is None:
+            raise line.error("a row before the first keyword; is this a deck of Abaqus?")
+        else:
+            card.data.append((line, _words(line.text)))
+    if card is not None:
+        yield card
+
+
+def _lines(path: Path, within: tuple[Path, ...] = ()) -> Iterator[_Line]:
+    """Yield the lines that say something, keywords in one line, those of named files in their place.
+
+    within: the files that include this one.
+    """
     within = (*within, path.resolve())
     lines = enumerate(text_lines(path), start=1)
     for number, line in lines:
         text = line.strip()
         if not text or text.startswith("**"):
             continue
-        if text.startswith("*"):
-            if card is not None:
-                yield from _finished(card, within)
-            while text.endswith(","):
-                text += next(lines, (0, ""))[1].strip() or "*"
-            keyword, *words = (word.strip() for word in text.rstrip("*").split(","))
-            pairs = (word.partition("=") for word in words if word)
-            parameters = {key.strip().upper(): value.strip().strip('"') for key, _, value in pairs}
-            card = _Card(path, number, " ".join(keyword[1:].upper().split()), parameters, [])
-        elif card is not None:
-            card.data.append((number, _words(text)))
-    if card is not None:
-        yield from _finished(card, within)
-
-
-def _finished(card: _Card, within: tuple[Path, ...]) -> Iterator[_Card]:
-    """Yield the card with the data of the file that it names; of *INCLUDE, the cards of that file."""
-    name = card.parameters.get("INPUT")
-    if name is None or card.keyword not in ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"):
-        yield card
-        return
-    file = card.file.parent / name
-    if not file.is_file():
-        raise card.error(f"INPUT={name}: no such file beside the deck")
-    if card.keyword == "INCLUDE":
+        while text.startswith("*") and text.endswith(","):
+            text += next(lines, (0, ""))[1].strip() or "*"
+        own = _Line(path, number, text)
+        keyword, parameters = _keyword(text)
+        name = parameters.get("INPUT")
+        if keyword != "INCLUDE":
+            yield own
+        elif name is None:
+            raise own.error("*INCLUDE without INPUT; name the file")
+        if name is None or keyword not in ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"):
+            continue
+        file = path.parent / name
+        if not file.is_file():
+            raise own.error(f"*{keyword} INPUT={name}: no such file beside the deck")
         if file.resolve() in within:
-            raise card.error(f"INPUT={name}: the file includes itself")
-        yield from _cards(file, within)
-        return
-    lines = enumerate(text_lines(file), start=1)
-    data = [(number, _words(line)) for number, line in lines if line.strip() and not line.startswith("*")]
-    yield card._replace(file=file, data=data)
+            raise own.error(f"*{keyword} INPUT={name}: the file includes itself")
+        for inner in _lines(file, within):
+            if keyword != "INCLUDE" and inner.text.startswith("*"):
+                raise inner.error(f"a keyword among the data of *{keyword}; name the file by *INCLUDE")
+            yield inner
+
+
+def _keyword(text: str) -> tuple[str, dict[str, str]]:
+    """Return the keyword of a line and its parameters, in capitals; no keyword for a line of data."""
+    if not text.startswith("*"):
+        return "", {}
+    keyword, *words = (word.strip() for word in text.rstrip("*").split(","))
+    pairs = (word.partition("=") for word in words if word)
+    parameters = {key.strip().upper(): value.strip().strip('"') for key, _, value in pairs}
+    return " ".join(keyword[1:].upper().split()), parameters
 
 
 def _words(text: str) -> list[str]:

@@ -55,6 +55,15 @@ def affine_fields(coordinates: np.ndarray) -> np.ndarray:
     return np.einsum("na,ij->niaj", terms, np.eye(3)).reshape(coordinates.size, -1)
 
 
+def first_largest(values: np.ndarray) -> int:
+    """Return the index of the largest value; near ties go to the first, so that round-off does not choose.
+
+    Symmetric structures have several hot spots and nearest nodes. Near: by 1e-6 of the largest absolute value.
+    """
+    near = values >= values.max() - 1e-6 * np.abs(values).max()
+    return int(np.argmax(near if near.any() else values))  # nan, if there is one
+
+
 def leading_sign(values: np.ndarray) -> float:
     """Return the sign of the largest value; near ties go to the first, so that round-off does not choose."""
     size = np.abs(values)

@@ -143,6 +143,7 @@ class Campbell:
         store.save(path, _KIND, variables, attributes)
 
     @classmethod
+    @store.reader
     def load(cls, path: str | os.PathLike[str]) -> Campbell:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = store.load(path, _KIND)

@@ -90,6 +90,7 @@ class Modes(Displayed):
         )
 
     @classmethod
+    @store.reader
     def load(cls, path: str | os.PathLike[str]) -> Modes:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = store.load(path, _KIND)

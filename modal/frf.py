@@ -21,6 +21,9 @@ _NARROW = 0.5
 # root mean square of the error over that of the response: where more is missed the fit is not of this response. Noise
 # of a tenth of the peak over forty bandwidths leaves 0.41
 _MISFIT = 0.5
+# share of its misfit that a response read as decibels has at most where it is one in decibels; of linear responses,
+# with noise up to a tenth of the peak, it is 0.9 and more
+_DECIBELS = 0.5
 # highest probability that noise explains a mode
 _CHANCE = 1e-4
 
@@ -147,6 +150,17 @@ def identify(frf: Frf, count: int = 1) -> Poles:
         )
     _check_misfit(result, frf)
     return result
+
+
+def is_in_decibels(frf: Frf, poles: Poles) -> bool:
+    """Return whether a response with the poles of `identify` fits far better with its magnitudes as decibels."""
+    magnitude = np.abs(frf.values)
+    linear = 10.0 ** ((magnitude - magnitude.max()) / 20.0) * np.exp(1j * np.angle(frf.values))
+    try:
+        other = identify(Frf(frf.frequencies_hz, linear, frf.quantity), len(poles.frequencies_hz))
+    except FrfError:
+        return False
+    return other.misfit < _DECIBELS * poles.misfit
 
 
 def _deviations(found: Fit, scale: float) -> np.ndarray:

@@ -17,6 +17,8 @@ from scipy import sparse
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.sparse_indices import SparseError, within_shape
+from vanedamp.files.toml_input import LARGEST
 
 _KIND = "system-matrices"
 # assembly adds the same numbers in another order above and below the diagonal
@@ -175,6 +177,7 @@ class SystemMatrices(Displayed):
         store.save(path, _KIND, variables, {"damping_ratio": self.damping_ratio, "provenance": dict(self.provenance)})
 
     @classmethod
+    @store.reader
     def load(cls, path: str | os.PathLike[str]) -> SystemMatrices:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = store.load(path, _KIND)
@@ -237,7 +240,10 @@ def _symmetric(name: str, matrix: Any, size: int) -> sparse.csr_array:
         raise MatricesError(
             f"{name}: complex; expected a real matrix, the damping as damping_ratio (half a loss factor)"
         )
-    copy = sparse.csr_array(matrix, dtype=float, copy=True)
+    try:
+        copy = sparse.csr_array(within_shape(matrix), dtype=float, copy=True)
+    except SparseError as error:
+        raise MatricesError(f"{name}: {error}") from error
     if copy.shape != (size, size):
         raise MatricesError(
             f"{name}: shape {copy.shape} does not fit {size // 3} nodes of three DOFs each, expected {(size, size)}"
@@ -246,6 +252,8 @@ def _symmetric(name: str, matrix: Any, size: int) -> sparse.csr_array:
     largest = abs(copy.data).max(initial=0.0)
     if not np.isfinite(largest):
         raise MatricesError(f"{name}: holds entries that are not finite")
+    if largest > LARGEST:
+        raise MatricesError(f"{name}: has an entry of {largest:.3g}; expected up to {LARGEST:g} in SI units")
     if abs(copy - copy.T).max() > _ASYMMETRY * largest:
         raise MatricesError(
             f"{name}: not symmetric; if only one triangle is stored, add the transpose of its strict part"

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from scipy import io, sparse
 
-from vanedamp.files.matrix_input import read_mat, read_table
+from vanedamp.files.foreign import existing, reading
+from vanedamp.files.matrix_input import read_mat, read_npz, read_table
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.algebra import symmetric_part
 from vanedamp.modal.matrices import MatricesError, Patch, SystemMatrices
@@ -26,7 +27,7 @@ FILES = ("stiffness.mtx", "mass.mtx", "nodes.csv", "sets.csv", "fixed.csv")
 _COMPONENTS = "xyz"
 _LETTERS = {"stiffness": "K", "mass": "M"}
 _READERS: dict[str, Callable[[str], Any]] = {
-    ".npz": sparse.load_npz, ".mtx": io.mmread, ".mat": read_mat, ".csv": read_table,
+    ".npz": read_npz, ".mtx": io.mmread, ".mat": read_mat, ".csv": read_table,
 }  # fmt: skip
 
 
@@ -137,6 +138,12 @@ def _system(
                 f"{path}: shape {matrix.shape} for {len(coordinates)} nodes; expected "
                 f"{(coordinates.size, coordinates.size)}, three degrees of freedom a node"
             )
+        diagonal = matrix.diagonal()
+        if diagonal.min(initial=0.0) < 0.0:
+            place = int(diagonal.argmin())
+            raise MatricesError(
+                f"{path}: degree of freedom {place} has {diagonal[place]:.3g} on the diagonal; check its sign"
+            )
     return SystemMatrices(
         stiffness=loaded["stiffness"], mass=loaded["mass"], coordinates=coordinates, fixed=fixed, patches=patches,
         damping_ratio=damping_ratio, provenance=provenance,
@@ -144,8 +151,7 @@ def _system(
 
 
 def _matrix(path: Path, name: str) -> sparse.csr_array:
-    if not path.is_file():
-        raise MatricesError(f"{path}: no such matrix file")
+    existing(path, MatricesError, "matrix file")
     if path.suffix not in _READERS:
         raise MatricesError(
             f"{path}: expected a matrix as .mtx (Matrix Market), .npz (scipy.sparse.save_npz), .mat (MATLAB) or .csv"
@@ -221,9 +227,8 @@ def _component(path: str | os.PathLike[str] | None, component: str) -> int:
 
 def _rows(path: Path, columns: tuple[str, ...]) -> list[list[str]]:
     """Return the lines of a CSV, without its header."""
-    if not path.is_file():
-        raise MatricesError(f"{path}: no such file; expected the columns {', '.join(columns)}")
-    with path.open(newline="", encoding="utf-8-sig") as stream:
+    existing(path, MatricesError, f"file; expected the columns {', '.join(columns)}")
+    with reading(path, MatricesError, "not a CSV table"), path.open(newline="", encoding="utf-8-sig") as stream:
         rows = [[word.strip() for word in row] for row in csv.reader(stream) if row and not row[0].startswith("#")]
     if rows and rows[0][0].lower() == columns[0]:
         rows = rows[1:]

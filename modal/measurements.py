@@ -21,6 +21,7 @@ import numpy as np
 
 from vanedamp.files.csv_input import content_lines
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.foreign import existing, reading
 from vanedamp.files.store import replacing, write_csv
 from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import Frf, FrfError
@@ -54,7 +55,7 @@ def read_shapes(path: str | os.PathLike[str]) -> MeasuredShapes:
     direction, and its value in every mode, as 0.5 or 0.5+0.1j; a mode's name is its frequency in Hz, if it is a number.
     Universal: datasets 15 or 2411 (nodes) and 55 (normal or complex modes). Raises MeasurementError.
     """
-    file = _existing(path)
+    file = existing(path, MeasurementError)
     return _shapes_of_universal(file) if file.suffix.lower() in _UNIVERSAL else _shapes_of_csv(file)
 
 
@@ -88,7 +89,7 @@ def read_frf(path: str | os.PathLike[str], quantity: str = "receptance", columns
 
     Raises MeasurementError.
     """
-    file = _existing(path)
+    file = existing(path, MeasurementError)
     if file.suffix.lower() in _UNIVERSAL:
         return _frf_of_universal(file)
     header, rows = _numbers(file)
@@ -113,6 +114,9 @@ def _columns(given: str | None, header: Sequence[str], first: np.ndarray, second
     """Return which of COLUMNS the pairs (k, n) of a CSV are."""
     if given is not None and given not in COLUMNS:
         raise MeasurementError(f"columns: expected one of {', '.join(COLUMNS)}, not {given!r}")
+    for name in header[1::2]:
+        if re.search(r"(\b|_|\d|mag|amp)db(\b|_)|decibel", name.lower()):
+            raise MeasurementError(f"columns: {name!r}: expected linear magnitudes, not decibels")
     kind = given or _header_kind(header, second)
     if kind is None:
         one_sign = np.all(first > 0.0, axis=1) | np.all(first < 0.0, axis=1)
@@ -133,8 +137,6 @@ def _header_kind(header: Sequence[str], second: np.ndarray) -> str | None:
     if len(header) < 3:
         return None
     one, other = header[1].lower(), header[2].lower()
-    if re.search(r"\bdb\b|_db|decibel", one):
-        raise MeasurementError(f"columns: {header[1]!r}: expected linear magnitudes, not decibels")
     if re.search(r"phase|\barg|angle", other):
         if re.search(r"deg|\u00b0", other):
             return "magnitude-degrees"
@@ -165,7 +167,7 @@ def read_temperature(path: str | os.PathLike[str], reference: float) -> Temperat
 
     reference: temperature without thermal stress. Raises MeasurementError.
     """
-    file = _existing(path)
+    file = existing(path, MeasurementError)
     rows = _numbers(file)[1]
     if rows.shape[1] != 4:
         raise MeasurementError(f"{file}: expected the columns x, y, z (m) and temperature, not {rows.shape[1]}")
@@ -173,13 +175,6 @@ def read_temperature(path: str | os.PathLike[str], reference: float) -> Temperat
         return Temperature(reference, rows[:, 3], rows[:, :3])
     except TemperatureError as error:
         raise MeasurementError(f"{file}: {error}") from error
-
-
-def _existing(path: str | os.PathLike[str]) -> Path:
-    file = Path(path)
-    if not file.is_file():
-        raise MeasurementError(f"{file}: no such file")
-    return file
 
 
 def _shapes_of_csv(file: Path) -> MeasuredShapes:
@@ -251,13 +246,12 @@ def _pyuff() -> Any:
 
 
 def _datasets(file: Path) -> list[dict[str, Any]]:
-    universal = _pyuff().UFF(str(file))
-    try:
+    pyuff = _pyuff()
+    with reading(file, MeasurementError, "not a universal file that pyuff can read"):
+        universal = pyuff.UFF(str(file))
         kinds = universal.get_set_types()
         wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58, 2411)))
         return [universal.read_sets(int(index)) for index in wanted]
-    except Exception as error:  # pyuff raises what its parsing meets
-        raise MeasurementError(f"{file}: not a universal file that pyuff can read ({error})") from error
 
 
 def _shapes_of_universal(file: Path) -> MeasuredShapes:

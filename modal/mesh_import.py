@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vanedamp.files.foreign import existing
 from vanedamp.modal import abaqus, ansys, msh, nastran, other_formats, universal_file
 from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal.labelled_mesh import KINDS, LabelledMesh
@@ -114,8 +115,7 @@ def _grouped(
 
 
 def _read(path: Path) -> LabelledMesh:
-    if not path.is_file():
-        raise MeshError(f"{path}: no such mesh file")
+    existing(path, MeshError, "mesh file")
     return _READERS.get(path.suffix.lower(), other_formats.read)(path)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, linear_sum_assignment
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
@@ -24,6 +24,13 @@ from vanedamp.modal.matrices import SystemMatrices
 LIMIT = 0.02
 #: relative error of the measured frequencies for which deviations of the factors are given
 FREQUENCY_ERROR = 1e-3
+#: relative misses of a tuned frequency: up to the first measurements scatter, from the second on a warning, beyond the
+#: third the modes are not the measured ones
+_SCATTER, _DOUBTFUL, _MISSED = FREQUENCY_ERROR, 0.01, 0.05
+#: of the sum of squared misses, or of the logarithms of factors: another pairing with less than this is better
+_BETTER = 0.1
+#: pairings that are tried in place of one that misses the frequencies
+_PAIRINGS = 4
 # further modes that are computed, so that one that moves up is not lost
 _SPARE = 4
 # of the largest singular value of the sensitivities: below it two factors do the same to all frequencies
@@ -49,6 +56,7 @@ class Tuning:
     sensitivities  (n, p) d log f / d log factor, after tuning: the share of strain energy of a part, halved
     evaluations    eigenvalue problems solved
     matrices       the tuned system
+    warnings       what to look at: frequencies that are missed, another pairing with less change
     """
 
     names: tuple[str, ...]
@@ -64,6 +72,7 @@ class Tuning:
     sensitivities: np.ndarray
     evaluations: int
     matrices: SystemMatrices
+    warnings: tuple[str, ...] = ()
 
 
 def sensitivities(
@@ -99,7 +108,11 @@ def tune(
                it is, more from as many further points between half and twice its factors, and the best is kept
 
     Least squares on the logarithms of the factors (Gauss-Newton in a trust region) with exact sensitivities; the modes
-    are tracked by their MAC, so that they may cross. Raises TuningError.
+    are tracked by their MAC, so that they may cross.
+
+    Raises TuningError, also for frequencies that the tuned modes miss by more than 5 %, and where other modes would
+    meet them far better, or with far less change of the factors unless `modes` are named. These come from the best
+    assignment by relative distance of the frequencies, untuned and tuned.
     """
     problem = _Problem(matrices, dict(parts), np.asarray(target_hz, dtype=float), measured, modes, least_mac)
     start = np.zeros(len(problem.parts))
@@ -122,6 +135,7 @@ def tune(
             f"{name}: its factor runs to {np.exp(found.x[stuck[0]]):.3g} and the frequencies still do not meet "
             f"{problem.target.tolist()} Hz; check which modes these belong to, and vary another part"
         )
+    warnings = _doubts(problem, before, after, found)
     spread = np.linalg.pinv(after.jacobian)
     return Tuning(
         names=tuple(problem.parts),
@@ -137,7 +151,72 @@ def tune(
         sensitivities=frozen(after.jacobian),
         evaluations=problem.evaluations,
         matrices=problem.system(found.x),
+        warnings=warnings,
     )
+
+
+def _doubts(problem: _Problem, before: _State, after: _State, found: Any) -> tuple[str, ...]:
+    """Return warnings about the pairing of a search's result. Raises TuningError for one that cannot be right."""
+    miss = float(np.abs(np.expm1(after.residual)).max())
+    other = None if problem.measured is not None else _other_pairing(problem, before, after, found, miss)
+    if other is not None:
+        meant, fit = other
+        by = float(np.abs(np.expm1(fit.fun)).max())
+        better = (
+            f"modes: {meant.tolist()} meet the frequencies {_listed(problem.target)} Hz to {by:.2g} with factors "
+            f"{_listed(np.exp(fit.x))}, modes {problem.meant.tolist()} to {miss:.2g} with {_listed(np.exp(found.x))}; "
+            "say which modes they are, by `modes` or measured shapes"
+        )
+        if miss > _DOUBTFUL or not problem.named:
+            raise TuningError(better)
+        return (better,)
+    if miss <= _DOUBTFUL:
+        return ()
+    misses = ", ".join(f"{error:+.1%}" for error in np.expm1(after.residual))
+    missed = (
+        f"target_hz: the tuned modes {after.indices.tolist()} lie at {_listed(after.frequencies)} Hz, off the measured "
+        f"{_listed(problem.target)} Hz by {misses}"
+    )
+    if miss > _MISSED:
+        raise TuningError(f"{missed}; check which modes these are, by measured shapes, or vary other parts")
+    return (f"{missed}, more than measurements scatter",)
+
+
+def _other_pairing(
+    problem: _Problem, before: _State, after: _State, found: Any, miss: float
+) -> tuple[np.ndarray, Any] | None:
+    """Return other modes and the search for them, where they meet the frequencies far better or with far less change.
+
+    As many factors as frequencies may meet them with any modes: then the change of the factors tells.
+    """
+    enough = len(problem.parts) == len(problem.target)
+    if miss <= _SCATTER and not enough:
+        return None
+    tried = {tuple(problem.meant.tolist())}
+    waiting = [problem.nearest(before.all_hz), problem.nearest(after.all_hz)]
+    best: tuple[np.ndarray, Any] | None = None
+    while waiting and len(tried) <= _PAIRINGS:
+        meant = waiting.pop(0)
+        if tuple(meant.tolist()) in tried:
+            continue
+        tried.add(tuple(meant.tolist()))
+        trial = _Problem(problem.matrices, problem.parts, problem.target, None, meant.tolist(), problem.least)
+        fit = _fit(trial, np.zeros(found.x.size), -np.log(LIMIT))
+        problem.evaluations += trial.evaluations
+        waiting.append(trial.nearest(trial.at(fit.x).all_hz))
+        if best is None or fit.cost < best[1].cost:
+            best = meant, fit
+    if best is None:
+        return None
+    meets = np.abs(np.expm1(best[1].fun)).max() <= _SCATTER
+    less_change = meets and best[1].x @ best[1].x < _BETTER * (found.x @ found.x)
+    if miss <= _SCATTER:
+        return best if less_change else None
+    return best if best[1].cost < _BETTER * found.cost else None
+
+
+def _listed(values: np.ndarray) -> str:
+    return ", ".join(f"{value:.6g}" for value in values)
 
 
 def _fit(problem: _Problem, start: np.ndarray, bound: float) -> Any:
@@ -149,8 +228,9 @@ def _fit(problem: _Problem, start: np.ndarray, bound: float) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """The paired modes at one set of factors."""
+    """The paired modes at one set of factors; all_hz: (k,) frequencies of all computed modes."""
 
+    all_hz: np.ndarray
     frequencies: np.ndarray
     indices: np.ndarray
     mac: np.ndarray
@@ -178,6 +258,7 @@ class _Problem:
         self._origin: np.ndarray | None = None
         self._followed: np.ndarray | None = None
         self._check(modes)
+        self.named = modes is not None
         self.meant = np.arange(target.size) if modes is None else np.asarray(modes, dtype=int)
         self.count = min(int(self.meant.max()) + 1 + _SPARE, matrices.free.size)
 
@@ -207,6 +288,12 @@ class _Problem:
         """Forget the modes followed so far; the next ones are paired with the untuned modes."""
         self._state, self._followed = None, self._origin
 
+    def nearest(self, frequencies: np.ndarray) -> np.ndarray:
+        """Return the modes (n,) whose frequencies (k,), Hz, lie nearest to the targets, each taken once."""
+        above = np.maximum(frequencies, np.finfo(float).tiny)
+        _, modes = linear_sum_assignment(np.log(self.target[:, None] / above) ** 2)
+        return np.asarray(modes)
+
     def _evaluate(self, point: np.ndarray) -> _State:
         self.evaluations += 1
         modes = solve_modes(self.system(point), self.count)
@@ -222,6 +309,7 @@ class _Problem:
         else:
             mac = pairing.pair_mac
         return _State(
+            modes.frequencies_hz,
             frequencies,
             indices,
             np.array(mac),

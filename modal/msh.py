@@ -13,8 +13,12 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.store import replacing
+from vanedamp.files.foreign import existing, survive
+from vanedamp.files.store import file_stamp, replacing
 from vanedamp.modal import gmsh_on_demand as gmsh
+
+#: stamps of files that this process wrote, which it reads without a trial
+_written: set[int] = set()
 
 
 class MeshError(VanedampError):
@@ -55,11 +59,12 @@ def session(name: str) -> Iterator[None]:
 
 def merge(path: Path) -> None:
     """Load a gmsh mesh file into the current model. Raises MeshError with the file and gmsh's own words."""
-    if not path.is_file():
-        raise MeshError(f"{path}: no such mesh file")
+    existing(path, MeshError, "mesh file")
     with path.open("rb") as file:
         if not file.read(64).lstrip().startswith(b"$MeshFormat"):
             raise MeshError(f"{path}: not a gmsh mesh (a .msh file starts with $MeshFormat)")
+    if file_stamp(path) not in _written:
+        survive(path, MeshError, lambda: gmsh.merge(str(path)))
     gmsh.logger.start()
     try:
         gmsh.merge(str(path))
@@ -88,6 +93,7 @@ def write(path: str | os.PathLike[str]) -> Path:
             file.seek(-min(64, file.seek(0, os.SEEK_END)), os.SEEK_END)
             if not file.read().rpartition(b"\n$")[2].startswith(b"End"):
                 raise OSError("gmsh wrote a part of it; is the disk full?")  # and says nothing
+    _written.add(file_stamp(path))
     return Path(path)
 
 

@@ -10,6 +10,7 @@ from textwrap import shorten
 
 import numpy as np
 
+from vanedamp.files.foreign import survive
 from vanedamp.modal.labelled_mesh import LabelledMesh
 from vanedamp.modal.msh import MeshError
 
@@ -20,6 +21,7 @@ def read(path: Path) -> LabelledMesh:
         meshlane = importlib.import_module("meshlane")
     except ImportError as error:
         raise MeshError(f"{path}: MED and other formats need meshlane: pip install meshlane") from error
+    survive(path, MeshError, lambda: meshlane.read(path))
     said = io.StringIO()  # it prints why, and may end the program
     try:
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vanedamp.modal import fenicsx
+from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.elasticity import ElasticityError, Solid
 
 
@@ -58,7 +59,7 @@ def hot_spot(
     group = np.rint(np.array(fenicsx.evaluate(numbers, corners).x.array)).astype(int)
     allowed = np.array([strengths[name] if name in looked_at else np.inf for name in groups])
     ratios = stress / allowed[group]
-    worst = int(np.argmax(ratios))
+    worst = first_largest(ratios)
     if not ratios[worst] > 0.0:
         raise ElasticityError("hot spot: the displacements strain none of the groups looked at")
     x, y, z = fenicsx.node_coordinates(corners)[worst].tolist()

@@ -9,11 +9,14 @@ from scipy import linalg
 
 from vanedamp.files import store
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.toml_input import LARGEST
 from vanedamp.modal.algebra import symmetric_part
 
 _ASYMMETRY = 1e-9
 # negative eigenvalues of a semidefinite K, relative to the largest: round-off of the rigid motions of a free structure
 _INDEFINITE = 1e-9
+# of a matrix's largest entry: what is below on its diagonal counts as zero
+_LEAST = 1e-60
 
 
 class ReducedModelError(VanedampError):
@@ -42,6 +45,7 @@ def shaped(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
         raise ReducedModelError(f"{name}: expected shape {shape}, not {array.shape}")
     if not np.all(np.isfinite(array)):
         raise ReducedModelError(f"{name}: holds entries that are not finite")
+    check_size(name, array)
     return array
 
 
@@ -59,7 +63,28 @@ def asymmetry(matrix: np.ndarray) -> float:
 
 
 def definiteness(matrix: np.ndarray) -> float:
-    """Return the lowest eigenvalue relative to the highest, the diagonal scaled to one so that units play no part."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+    """Return the lowest eigenvalue relative to the largest, the diagonal scaled to one so that units play no part.
+
+    Entries (n, n) up to LARGEST. A negative diagonal is scaled to -1.
+    """
+    diagonal = np.abs(np.diag(matrix))
+    scale = np.sqrt(np.maximum(diagonal, _LEAST * np.abs(matrix).max()))
     eigenvalues = linalg.eigvalsh(matrix / np.outer(scale, scale))
-    return float(eigenvalues[0] / eigenvalues[-1])
+    return float(eigenvalues[0] / np.abs(eigenvalues).max())
+
+
+def check_size(name: str, matrix: np.ndarray) -> None:
+    """Raise ReducedModelError for an entry whose square and products are no numbers."""
+    largest = float(np.abs(matrix).max(initial=0.0))
+    if largest > LARGEST:
+        raise ReducedModelError(f"{name}: has an entry of {largest:.3g}; expected up to {LARGEST:g} in SI units")
+
+
+def check_mass(mass: np.ndarray) -> None:
+    """Raise ReducedModelError for a mass on the diagonal whose inverse is no number."""
+    diagonal = np.diag(mass)
+    bad = np.flatnonzero((diagonal > 0.0) & (diagonal < 1.0 / LARGEST))
+    if bad.size:
+        raise ReducedModelError(
+            f"mass: coordinate {bad[0]} has {diagonal[bad[0]]:.3g} kg; expected zero, or at least {1.0 / LARGEST:g}"
+        )

@@ -18,10 +18,11 @@ import numpy as np
 from scipy import io, linalg, sparse
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.matrix_input import read_mat, read_table
+from vanedamp.files.foreign import existing
+from vanedamp.files.matrix_input import read_mat, read_npz, read_table
 from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom import checks
-from vanedamp.rom.abaqus_matrices import AbaqusMatrixError, is_matrix_market
+from vanedamp.rom.abaqus_matrices import is_matrix_market
 from vanedamp.rom.abaqus_matrices import read_matrices as read_abaqus
 from vanedamp.rom.reduced import ReducedModel
 
@@ -83,15 +84,15 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
     file = Path(path)
     if file.suffix.lower() not in NAMED + SINGLE:
         raise ExternalError(f"{path}: expected a file ending in {', '.join(NAMED + SINGLE)}")
-    if not file.is_file():
-        raise ExternalError(f"{path}: no such file")
+    existing(path, ExternalError)
     try:
         with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             warnings.filterwarnings("error", "Premature end-of-file")  # so pyyeti calls a file that is cut short
             found = _READERS[file.suffix.lower()](str(file))
-    except ExternalError:
+    except (ExternalError, MemoryError):
         raise
-    except AbaqusMatrixError as error:
+    except VanedampError as error:
         raise ExternalError(f"{path}: {error}") from error
     except Exception as error:  # every format has exceptions of its own
         raise ExternalError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
@@ -133,6 +134,15 @@ def external_model(
             raise ExternalError(f"{name}: shape {matrix.shape}; expected square matrices of one size")
         if not np.all(np.isfinite(matrix)) or not np.any(matrix):
             raise ExternalError(f"{name}: zero, or holds entries that are not finite")
+        checks.check_size(name, matrix)
+    checks.check_mass(matrices["mass"])
+    for name in ("mass", "stiffness"):
+        place = int(np.argmin(np.diag(matrices[name])))
+        if matrices[name][place, place] < 0.0:
+            raise ExternalError(
+                f"{name}: not positive definite: coordinate {place} has {matrices[name][place, place]:.3g} on the "
+                "diagonal, which is negative; check its sign"
+            )
     asymmetry, worst = max((checks.asymmetry(matrix), name) for name, matrix in matrices.items())
     if asymmetry > _ASYMMETRY:
         raise ExternalError(f"{worst}: not symmetric ({asymmetry:.1e}); if only one triangle is stored, mirror it")
@@ -197,7 +207,7 @@ def _dense(matrix: Any) -> Any:
 def _npz(path: str) -> dict[str, Any]:
     with np.load(path, allow_pickle=False) as data:
         if {"format", "shape", "data"} <= set(data.files):
-            return {"": sparse.load_npz(path)}
+            return {"": read_npz(path)}
         return {name: data[name] for name in data.files}
 
 

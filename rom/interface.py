@@ -11,6 +11,7 @@ from scipy import sparse
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
 from vanedamp.files.errors import VanedampError
+from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.matrices import Patch, SystemMatrices, patch_average, unit_direction
 from vanedamp.rom.reduced import NORMAL, ROTATION
 
@@ -367,7 +368,7 @@ def rigid_basis(offsets: np.ndarray) -> np.ndarray:
 def _nearest(matrices: SystemMatrices, patch: Patch) -> int:
     """Return the node of a patch nearest to its centroid."""
     distances = np.linalg.norm(matrices.coordinates[patch.nodes] - _centroid(matrices, patch), axis=1)
-    return int(patch.nodes[np.argmin(distances)])
+    return int(patch.nodes[first_largest(-distances)])
 
 
 def _centroid(matrices: SystemMatrices, patch: Patch) -> np.ndarray:

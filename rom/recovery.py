@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from vanedamp.modal.algebra import first_largest
 from vanedamp.rom.reduced import ReducedModel, ReducedModelError
 
 #: components of a symmetric stress, in the order of the outputs "<name>.xx" ...
@@ -49,7 +50,7 @@ def with_displacements(model: ReducedModel, points: Mapping[str, Sequence[float]
         raise ReducedModelError("recovery: this model was reduced without its basis; reduce with keep_recovery=True")
     rows, residual = {}, {}
     for name, point in points.items():
-        node = int(np.argmin(np.linalg.norm(model.coordinates - np.asarray(point, dtype=float), axis=1)))
+        node = first_largest(-np.linalg.norm(model.coordinates - np.asarray(point, dtype=float), axis=1))
         for index, axis in enumerate("xyz"):
             rows[f"{name}.{axis}"] = model.recovery[3 * node + index]
             if model.residual_recovery is not None:

@@ -18,7 +18,7 @@ from scipy import linalg
 from vanedamp.files import store
 from vanedamp.files.display import Displayed
 from vanedamp.modal.algebra import symmetric_part
-from vanedamp.rom.checks import ReducedModelError, check_definite, shaped, symmetric, unit
+from vanedamp.rom.checks import ReducedModelError, check_definite, check_mass, shaped, symmetric, unit
 from vanedamp.rom.dense_modes import count_rigid_motions, modal_damping, spectrum
 
 __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
@@ -142,9 +142,9 @@ class ReducedModel(Displayed):
             raise ReducedModelError("damping: give either the matrix `damping` or the `damping_ratio` of every mode")
         size = len(np.atleast_1d(mass))
         if damping_ratio is not None:
-            damping = modal_damping(
-                symmetric("mass", mass, size), symmetric("stiffness", stiffness, size), damping_ratio
-            )
+            own = symmetric("mass", mass, size)
+            check_mass(own)
+            damping = modal_damping(own, symmetric("stiffness", stiffness, size), damping_ratio)
         known = dict(directions or {})
         unknown = sorted(set(known) - set(interface))
         if unknown:
@@ -313,6 +313,7 @@ class ReducedModel(Displayed):
         _save(self, path)
 
     @classmethod
+    @store.reader
     def load(cls, path: str | os.PathLike[str]) -> ReducedModel:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         return cls(**_fields(path))
@@ -358,6 +359,7 @@ def _checked(model: ReducedModel) -> dict[str, Any]:
         given, shape = getattr(model, name), tuple(lengths[dimension] for dimension in dims)
         if given is not None or name in required:
             values[name] = symmetric(name, given, shape[0]) if name in _SYMMETRIC else shaped(name, given, shape)
+    check_mass(values["mass"])
     values["directions"] = unit(values["directions"])
     return values
 

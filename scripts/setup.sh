@@ -71,10 +71,15 @@ prepare_apt() {
     [ -x $python ] || apt_get install -y --no-install-recommends python3
 }
 
-# A browser for the tests of `vanedamp explore`, which are skipped without one.
-install_browser() {
-    installed chromium || (apt_get install -y --no-install-recommends chromium) 2>/dev/null ||
-        say "no chromium to install here; the tests in a browser are skipped"
+# What some tests need, which are skipped without it: a browser, and a program to compare with (27 MB), which only an
+# environment that sees apt's packages can import.
+install_for_tests() {
+    local package packages=(chromium)
+    [ $dolfinx = wheel ] || packages+=(python3-siconos)
+    for package in "${packages[@]}"; do
+        installed "$package" || (apt_get install -y --no-install-recommends "$package") 2>/dev/null ||
+            say "no $package to install here; tests that need it are skipped"
+    done
 }
 
 # Whether dolfinx is PyPI's wheel or apt's.
@@ -127,7 +132,7 @@ flock --nonblock 9 || { say "waiting for another set-up to end" && flock 9; }
 up_to_date && exit 0
 
 install_system_packages
-install_browser
+install_for_tests
 finished || $python -m venv --clear $([ $dolfinx = wheel ] || echo --system-site-packages) $venv
 rm -f $stamp
 say "installing Python packages into $venv"

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
-from vanedamp.files.errors import VanedampError
+from vanedamp.files.errors import VanedampError, shortened
 from vanedamp.studies.commands import COMMANDS
 from vanedamp.studies.interrupts import swallowed_interrupts_again
 
@@ -38,7 +39,7 @@ class _Parser(argparse.ArgumentParser):
     """A parser that refuses a wrong command line in one line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
+        self.exit(BAD_INPUT, f"{self.prog}: {shortened(message)}; see {self.prog} --help\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -47,6 +48,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Under mpirun the first rank runs it, and the others help with the factorisations.
     """
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if sys.stdout is None:  # a file that is opened would take its place, and what libraries print
+        return _refuse("standard output is closed; send it to a file, or to /dev/null")
     try:
         with swallowed_interrupts_again():
             if not _under_mpi():
@@ -61,7 +66,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _main(argv: Sequence[str] | None) -> int:
-    words = sys.argv[1:] if argv is None else argv
+    with warnings.catch_warnings():
+        if not sys.warnoptions:  # of numbers that overflow on their way to the line that refuses them
+            warnings.simplefilter("ignore", RuntimeWarning)
+        return _run(sys.argv[1:] if argv is None else argv)
+
+
+def _run(words: Sequence[str]) -> int:
     input_file = None
     try:
         arguments = _parser(words[0] if words else None).parse_args(words)
@@ -95,7 +106,7 @@ def _message(error: Exception, file: str | None) -> str | None:
 
 
 def _refuse(message: str) -> int:
-    print("vanedamp: " + " ".join(message.split()), file=sys.stderr)
+    print("vanedamp: " + shortened(" ".join(message.split())), file=sys.stderr)
     return BAD_INPUT
 
 

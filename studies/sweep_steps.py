@@ -69,7 +69,7 @@ def run_points(prepared: Prepared, output: str | Path | None, pool: Executor | N
 def run_peak(prepared: Prepared, result: Sweep, path: str | Path, note: Callable[[str], None]) -> None:
     """Run the point with the highest mean of those that are ok, and write its response; note: takes what to tell."""
     points = prepared.points
-    mean = np.where(result.status == "ok", result.amplitude_mean, -np.inf)
+    mean = np.where(result.status == "ok", result.amplitude_mean_dynamic, -np.inf)
     index = int(np.argmax(mean))
     if not np.isfinite(mean.flat[index]):
         note(f"--peak: no point is ok, {path} was not written")

@@ -102,15 +102,22 @@ def _begin(niceness: int) -> None:
 
 @contextmanager
 def workers(count: int | None) -> Iterator[Executor | None]:
-    """Yield worker processes with the engine compiled, one for every core by default; None for a single one."""
+    """Yield worker processes with the engine compiled, one for every core by default; None for a single one.
+
+    Raises SweepError when they end as they begin, such as for want of memory.
+    """
     count = count or available_cores()
     if count == 1:
         yield None
         return
     with WorkerPool(count) as pool:
         from vanedamp.coupling.sweep.sweep import warm_up
+        from vanedamp.coupling.sweep.worker import SweepError
 
-        pool.submit(warm_up).result()
+        try:
+            pool.submit(warm_up).result()
+        except BrokenExecutor as error:
+            raise SweepError(f"the workers end as they begin: {error}") from error
         yield pool
 
 

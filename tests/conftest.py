@@ -1,9 +1,31 @@
-"""Expensive records and working directories that several test files share."""
+"""Expensive records and working directories that several test files share; options of these tests."""
 
-import vanedamp.modal.stack  # noqa: F401
-
-# isort: split
 import pytest
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--last-bits", type=int, metavar="SEED", help="perturb numerical results: tests/tools/last_bits.py"
+    )
+
+
+def pytest_configure(config):
+    seed = config.getoption("last_bits")
+    if seed is not None:
+        from tests.tools.last_bits import begin
+
+        begin(seed)
+    import vanedamp.modal.stack  # noqa: F401
+
+
+def pytest_report_header(config):
+    seed = config.getoption("last_bits")
+    return None if seed is None else f"last bits: seed {seed}"
+
+
+def pytest_terminal_summary(terminalreporter):
+    if "skipped" in terminalreporter.stats:
+        terminalreporter.write_line("Skipped tests: `make setup` installs what they lack, unless they name a command.")
 
 
 @pytest.fixture

@@ -49,9 +49,9 @@ def test_states_are_measured_by_their_scales():
     """A state that all but vanishes beside its scale says nothing; one that changes by 1e-5 of its scale does."""
     period, hits = np.arange(40), np.ones(40)
     steady = np.column_stack([np.ones(40), 1e-9 * np.sin(period)])
-    assert classify(steady, np.array([1.0, 1.0]), hits, 0.0) == "periodic-1"
-    assert classify(steady, np.array([1.0, 1e-4]), hits, 0.0) == "non-periodic"
+    assert classify(steady, np.array([1.0, 1.0]), hits, True) == "periodic-1"
+    assert classify(steady, np.array([1.0, 1e-4]), hits, True) == "non-periodic"
     alternating = np.column_stack([1.0 + 1e-5 * (-1.0) ** period, np.zeros(40)])
-    assert classify(alternating, np.array([1.0, 1.0]), hits, 0.0) == "periodic-2"
-    assert classify(steady, np.array([1.0, 1.0]), 0.0 * hits, 0.0) == "stuck"
-    assert classify(steady, np.array([1.0, 1.0]), 0.0 * hits, 1.0) == "no-contact"
+    assert classify(alternating, np.array([1.0, 1.0]), hits, True) == "periodic-2"
+    assert classify(steady, np.array([1.0, 1.0]), 0.0 * hits, True) == "stuck"
+    assert classify(steady, np.array([1.0, 1.0]), 0.0 * hits, False) == "no-contact"

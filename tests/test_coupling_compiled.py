@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+from importlib.metadata import version
 
 import pytest
 
@@ -47,19 +48,84 @@ def test_a_caller_does_not_date_its_callee(digest):
     assert digest("caller", "callee") == digest(None, "callee")
 
 
-def test_a_cache_of_another_version_is_no_cache(tmp_path):
-    """Its index may name records that are no more."""
-    index = tmp_path / "index.nbi"
-    index.write_bytes(pickle.dumps("0") + b"cvanedamp.coupling.system.system\nNoRecord\n.")
+_KEPT = """
+import numpy as np
+from vanedamp.coupling.numerics.jit import entry
 
-    def load():
-        with index.open("rb") as file:
-            pickle.load(file)
-            return pickle.load(file)
+def add(values, one):
+    for place in range(len(values)):
+        values[place] += one
 
-    with pytest.raises(AttributeError):
-        load()
-    assert jit._forgiving(load)() == {}
+values, compiled = np.zeros(3), entry(add)
+compiled(values, FACTOR)
+print(values.sum(), sum(compiled._compiled.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """Runs a compiled function in a process of its own, kept in a folder. Returns its sum, and whether it was there."""
+    folder = tmp_path_factory.mktemp("kept")
+
+    def run(factor="2.0"):
+        (folder / "program.py").write_text(_KEPT.replace("FACTOR", factor))
+        done = subprocess.run(
+            [sys.executable, "program.py"], cwd=folder, capture_output=True, text=True, check=False,
+            env=environment(NUMBA_CACHE_DIR=str(folder / "cache")),
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        total, found = done.stdout.split()
+        return float(total), found == "1"
+
+    assert run() == (6.0, False)
+    (index,) = folder.rglob("*.nbi")
+    (code,) = folder.rglob("*.nbc")
+    assert run() == (6.0, True)
+    return run, {"index": index, "code": code}
+
+
+_DAMAGE = {
+    "empty": lambda content: b"",
+    "cut": lambda content: content[: len(content) // 2],
+    "noise": lambda content: bytes(range(256)) * 8,
+    "zeros within": lambda content: content[: len(content) // 2] + bytes(512) + content[len(content) // 2 + 512 :],
+    "another version's": lambda content: pickle.dumps(version("numba")) + b"cvanedamp.coupling.numerics.jit\nNo\n.",
+    "another object": lambda content: pickle.dumps(version("numba")) + pickle.dumps((None, 7)),
+}
+
+
+@pytest.mark.parametrize("damage", _DAMAGE)
+@pytest.mark.parametrize("which", ["index", "code"])
+def test_damaged_code_is_compiled_again_and_replaced(which, damage, kept):
+    """After a loss of power; zeros within machine code would crash, or compute anything."""
+    run, files = kept
+    content = files[which].read_bytes()
+    assert len(content) > 1024
+    files[which].write_bytes(_DAMAGE[damage](content))
+    assert run() == (6.0, False)
+    assert run() == (6.0, True)
+
+
+def test_code_that_cannot_be_read_is_compiled_again(kept):
+    run, files = kept
+    files["code"].unlink()
+    files["code"].mkdir()
+    # its place cannot be taken, as on a disk that is full: that is told
+    with pytest.raises(AssertionError, match="Is a directory"):
+        run()
+    files["code"].rmdir()
+    assert run() == (6.0, False)
+
+
+def test_code_of_other_arguments_is_not_taken(kept):
+    """An index is written before the code: after a crash between both it names what was there before."""
+    run, files = kept
+    before = files["code"].read_bytes()
+    files["index"].unlink()
+    files["code"].unlink()
+    assert run("2") == (6.0, False)
+    files["code"].write_bytes(before)
+    assert run("2") == (6.0, False)
 
 
 _LIBRARIES = """

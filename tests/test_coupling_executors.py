@@ -16,9 +16,10 @@ import pytest
 from tests.tools.processes import RANKS, environment
 from tests.tools.sweep_processes import scene
 from vanedamp.coupling.sweep import worker as points
-from vanedamp.coupling.sweep.schedule import SweepError, TaskSize
+from vanedamp.coupling.sweep.schedule import TaskSize
 from vanedamp.coupling.sweep.sweep import sweep
-from vanedamp.studies.workers import WorkerPool
+from vanedamp.coupling.sweep.worker import SweepError
+from vanedamp.studies.workers import WorkerPool, workers
 
 LINKED = {"continuation": {"direction": "up"}}
 PROGRAM = """
@@ -81,6 +82,30 @@ def test_a_point_that_kills_its_worker_is_one_point(changes, monkeypatch):
     others = np.arange(12) != 5
     assert set(found.status.ravel()[others]) == {"ok"}
     np.testing.assert_array_equal(found.amplitude_max.ravel()[others], expected.amplitude_max.ravel()[others])
+
+
+def poor(base, choices, values, task):
+    """Runs points where a library is missing."""
+    raise points.SweepError("stopped: no such library")
+
+
+def test_what_is_no_fault_of_a_point_ends_a_sweep_of_workers(monkeypatch):
+    monkeypatch.setattr("vanedamp.coupling.sweep.schedule.run_points", poor)
+    with WorkerPool(1) as pool, pytest.raises(SweepError, match=r"^stopped: no such library"):
+        sweep(scene(), pool)
+
+
+def end_at_once(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_workers_that_end_as_they_begin_end_a_sweep(monkeypatch):
+    """Whatever they are to run, it is no fault of a point."""
+    monkeypatch.setattr("vanedamp.studies.workers._begin", end_at_once)
+    with WorkerPool(1) as pool, pytest.raises(SweepError, match=r"^the workers end as they begin"):
+        sweep(scene(), pool)
+    with pytest.raises(SweepError, match=r"^the workers end as they begin"), workers(2):
+        pass
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.evaluation import Outcome
-from vanedamp.coupling.response.recorder import cubic_peak, record_section
+from vanedamp.coupling.response.recorder import cubic_extremum, record_section
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.scene import Scene
@@ -131,7 +131,7 @@ class Leapfrog:
         if self.rigid.any():
             self.deepest = max(self.deepest, (-gap / system.free_travel[friction:])[self.rigid].max())
         (x0, rate0, turn0), (x1, rate1, turn1) = before, self.response(k + 1)
-        records.peak[p] = max(records.peak[p], abs(x1), cubic_peak(h, x0, x1, rate0, rate1))
+        records.peak[p] = max(records.peak[p], abs(x1), abs(cubic_extremum(h, x0, x1, rate0, rate1)))
         records.square[p] += h * (x0 * x0 + x1 * x1) / 2
         records.harmonic[p] += h * (x0 * turn0 + x1 * turn1) / 2
         bodies = slice(system.modes, None)

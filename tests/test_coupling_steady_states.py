@@ -69,7 +69,7 @@ def test_states_are_told_apart_by_what_does_not_depend_on_the_last_period(basin)
         }.items()
     }  # fmt: skip
     by_position = lambda record, **options: steady_states(record, **options).label[0, 0].tolist()  # noqa: E731
-    periodic = replace(basin, amplitude_mean=amplitude, **plain)
+    periodic = replace(basin, amplitude_mean_dynamic=amplitude, **plain)
     assert by_position(periodic) == [0, 0, 0, 1, 2]
     assert by_position(periodic, tolerance=0.001) == [0, 1, 2, 3, 4]
     chaotic = replace(periodic, classification=np.full(basin.shape, "non-periodic", object))

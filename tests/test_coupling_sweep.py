@@ -14,8 +14,10 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.sweep import worker as module
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import LOSSES, MEASURES, sweep, warm_up
+from vanedamp.coupling.sweep.worker import SweepError
 from vanedamp.coupling.system.linear_response import receptance
 from vanedamp.coupling.system.resonance import excitation_force
+from vanedamp.files.store import StoreError
 from vanedamp.files.toml_input import InputError
 
 STIFFNESS, MASS, RATIO, BODY = 1.0e4, 1.0, 0.01, 0.05  # of sweeping.DATA
@@ -200,6 +202,32 @@ def test_a_broken_run_is_one_point(monkeypatch, result):
     assert np.isnan(found.amplitude_max[1, -1])
     assert found.amplitude_undamped[1, -1] == result.amplitude_undamped[1, -1]
     assert (found.status.ravel()[:-1] == "ok").all()
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [EOFError("cut"), ImportError("no such library"), MemoryError(), OSError(24, "too many files"), StoreError("gone")],
+    ids=lambda fault: type(fault).__name__,
+)
+def test_what_is_no_fault_of_a_point_ends_a_sweep(fault, monkeypatch, result, tmp_path):
+    """It would meet all others, too; what is finished is kept."""
+    last = result.axes["excitation.frequency"][-1]
+
+    def poor(point, start):
+        if point.excitation.frequency == last and point.cavity[0].gap == 2e-4:
+            raise fault
+        return simulate(point)
+
+    kept = tmp_path / "sweep.partial"
+    monkeypatch.setattr(module, "simulate", poor)
+    where = f"stopped at cavity.c1.gap = 0.0002, excitation.frequency = {last}: {type(fault).__name__}: "
+    with pytest.raises(SweepError, match=where):
+        sweep(scene(), checkpoint=kept)
+    monkeypatch.setattr(module, "simulate", simulate)
+    done = []
+    found = sweep(scene(), checkpoint=kept, progress=lambda *counts: done.append(counts))
+    assert done[0] == (11, 12)
+    np.testing.assert_array_equal(found.amplitude_max, result.amplitude_max)
 
 
 def test_numerical_trouble_is_a_status():

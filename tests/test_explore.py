@@ -1,6 +1,7 @@
 """The page of `vanedamp explore` without a browser: what moves, the curve under way, the address, nonsense."""
 
 import contextlib
+import json
 import math
 import re
 import signal
@@ -351,7 +352,7 @@ def test_linear_curves_hide_no_maximum():
 
 # --- the address ----------------------------------------------------------------------------------------------------
 
-HOST = {"Host": "127.0.0.1:4711"}
+HOST, UPDATE = {"Host": "127.0.0.1:4711"}, "/_dash-update-component"
 
 
 @pytest.fixture
@@ -384,6 +385,54 @@ def test_only_who_has_the_token_gets_the_page(client):
 @pytest.mark.parametrize("name", ["evil.example:4711", "127.0.0.1:80", "127.0.0.1", "localhost.evil.example:4711"])
 def test_other_names_that_lead_here_are_refused(client, name):
     assert client.get("/?token=secret", headers={"Host": name}).status_code == 421
+
+
+def malformed():
+    """Bodies of requests that the page never sends, by what is wrong with them."""
+    one = {"id": "request", "property": "data", "value": None}
+    well = {"output": "nothing.data", "inputs": [one], "state": [], "changedPropIds": ["request.data"]}
+    return {
+        "empty": b"", "no JSON": b"{", "null": b"null", "number": b"1", "text": b'"a"', "list": b"[]", "object": b"{}",
+        "binary": bytes(range(256)), "deep": b"[" * 100_000,
+        "unknown output": json.dumps(well).encode(),
+        "output of a wrong type": json.dumps(well | {"output": 1}).encode(),
+        "inputs that are none": json.dumps(well | {"inputs": None}).encode(),
+        "input without id": json.dumps(well | {"inputs": [{"property": "data"}]}).encode(),
+        "input that is a text": json.dumps(well | {"inputs": ["a"]}).encode(),
+        "state that is a number": json.dumps(well | {"state": 3}).encode(),
+        "changed that is a number": json.dumps(well | {"changedPropIds": 3}).encode(),
+    }  # fmt: skip
+
+
+@pytest.fixture
+def kept(client):
+    """Headers of who has the token."""
+    return HOST | {"Cookie": client.get("/?token=secret", headers=HOST).headers["Set-Cookie"].split(";")[0]}
+
+
+@pytest.mark.parametrize("name", malformed())
+def test_requests_that_are_none_of_the_page(client, kept, name, capfd):
+    answer = client.post(UPDATE, headers=kept, data=malformed()[name], content_type="application/json")
+    assert answer.status_code == 400
+    assert capfd.readouterr() == ("", "")
+
+
+def test_odd_values_of_each_callback_are_a_line_and_leave_the_page_alive(client, kept, capfd):
+    for callback in client.get("/_dash-dependencies", headers=kept).json:
+        for value in (None, 1, "a", [], {}, [[1]], {"a": {"b": 1}}):
+            given = {key: [item | {"value": value} for item in callback[key]] for key in ("inputs", "state")}
+            changed = [f"{item['id']}.{item['property']}" for item in callback["inputs"]]
+            body = given | {"output": callback["output"], "outputs": [], "changedPropIds": changed}
+            assert client.post(UPDATE, headers=kept, json=body).status_code in (200, 204, 400, 500)
+    out, error = capfd.readouterr()
+    assert out == "" and "Traceback" not in error
+    assert all(line.startswith("vanedamp: explore: a request failed: ") for line in error.splitlines())
+    assert client.get("/_dash-layout", headers=kept).status_code == 200
+
+
+def test_a_body_of_300_mb_is_not_kept(client, kept):
+    headers = kept | {"Content-Length": "300000000"}
+    assert client.post(UPDATE, headers=headers, data=b"{}", content_type="application/json").status_code in (400, 413)
 
 
 # --- the command ----------------------------------------------------------------------------------------------------

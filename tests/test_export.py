@@ -213,7 +213,7 @@ def test_sweep_and_samples_in_a_universal_file(results):
     sets = pyuff.UFF(str(export(results, "sweep.h5", "sweep.uff"))).read_sets()
     curves = [one for one in sets if one["type"] == 58]
     gaps = sweep.axes["cavity.c1.gap"]
-    assert len(curves) == 5 * len(gaps)
+    assert len(curves) == 6 * len(gaps)
     for number, gap in enumerate(gaps):
         (mean,) = (one for one in curves if one["id1"].strip() == "mean of the peaks" and f"= {gap}" in one["id2"])
         assert mean["x"] == pytest.approx(sweep.axes["excitation.frequency"], rel=1e-5)

@@ -96,6 +96,19 @@ def test_sets_files_and_spellings_of_abaqus(tmp_path):
     assert mesh.element_sets == {"all": [1], "LEFT": [2], "Both": [1, 2]}
 
 
+def test_files_included_within_data(tmp_path):
+    """Abaqus puts an included file in the place of its keyword: its rows, and those after it, belong to the block."""
+    (tmp_path / "more.inp").write_text("2, 1, 3, 5, 4\n")
+    (tmp_path / "feet.inp").write_text("3\n** and\n5\n*NSET, NSET=tip\n4\n")
+    text = "*NODE\n" + nodes([*CORNERS, (0, -1, 0)]) + "*ELEMENT, TYPE=C3D4, ELSET=all\n1, 1, 2, 3, 4\n"
+    text += "*INCLUDE, INPUT=more.inp\n3, 1, 2, 4, 5\n*NSET, NSET=foot\n1\n*INCLUDE,\nINPUT=feet.inp\n2\n"
+    mesh = abaqus.read(written(tmp_path, text))
+    nodes_of = {1: [1, 2, 3, 4], 2: [1, 3, 5, 4], 3: [1, 2, 4, 5]}
+    assert mesh.elements == {label: ("tetra", own) for label, own in nodes_of.items()}
+    assert mesh.element_sets == {"all": [1, 2, 3]}
+    assert mesh.node_sets == {"foot": [1, 3, 5], "tip": [4, 2]}
+
+
 PLAIN = "*NODE\n" + nodes(CORNERS) + TETRAHEDRON
 
 
@@ -119,6 +132,8 @@ PLAIN = "*NODE\n" + nodes(CORNERS) + TETRAHEDRON
         (PLAIN + TETRAHEDRON, r"line 9: \*ELEMENT 1: the element is given twice"),
         (PLAIN + "*ELEMENT, TYPE=C3D4\n2, 1, 2, 3, 9\n", r"line 9: \*ELEMENT 2: node 9 is not given before it"),
         (PLAIN + "*NSET, NSET=a\n1, 9\n", r"line 8: \*NSET names 9, which is not given"),
+        ("1, 0, 0, 0\n" + PLAIN, r"line 1: a row before the first keyword"),
+        (PLAIN + "*INCLUDE\n", r"line 8: \*INCLUDE without INPUT; name the file"),
         (PLAIN + "*INCLUDE, INPUT=no.inp\n", r"line 8: \*INCLUDE INPUT=no.inp: no such file"),
         ("*PART, NAME=a\n" + PLAIN + "*END PART\n*PART, NAME=b\n" + PLAIN, r"line 10: \*PART after the first one"),
         (

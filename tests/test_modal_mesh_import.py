@@ -163,7 +163,7 @@ def test_a_case_takes_the_file_as_its_mesh(meshes, tmp_path, monkeypatch, capfd)
 def test_what_cannot_be_taken_is_told(tmp_path):
     for name, text, message in [
         ("none.inp", None, "no such mesh file"),
-        ("empty.inp", "nothing\n", "holds no nodes: empty, or not of the format of .inp"),
+        ("empty.inp", "*HEADING\nnothing\n", "holds no nodes: empty, or not of the format of .inp"),
         ("bad.bdf", "GRID\n", "no ENDDATA: cut short, or no file of Nastran"),
         ("flat.inp", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*ELEMENT,TYPE=S3\n1,1,2,3\n", "volume elements: none"),
         (

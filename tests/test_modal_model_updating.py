@@ -96,6 +96,42 @@ def test_further_starts_leave_a_local_optimum():
     assert tune(matrices, parts, target, starts=8).factors == pytest.approx([1.2, 0.7], rel=1e-3)
 
 
+@pytest.mark.parametrize("true", [[0, 2, 3], [2, 4, 6], [0, 3]])
+def test_frequencies_of_other_modes_are_refused_and_named(system, true):
+    """The first modes are meant unless named; measured were others, which meet the frequencies as they are."""
+    matrices, parts = system
+    target = solve_modes(matrices, 8).frequencies_hz[true]
+    names = ", ".join(map(str, true))
+    with pytest.raises(TuningError, match=rf"modes: \[{names}\] meet .* with factors 1, 1, modes .* say which modes"):
+        tune(matrices, parts, target)
+    assert tune(matrices, parts, target, modes=true).factors == pytest.approx([1.0, 1.0], rel=1e-9)
+
+
+def test_frequencies_that_no_modes_meet_are_refused(system):
+    """Modes 0, 2 and 3 of a structure whose feet are softer: no order of the modes at hand explains them."""
+    matrices, parts = system
+    target = solve_modes(stretched(system, (1.2, 0.7)), 4).frequencies_hz
+    with pytest.raises(TuningError, match=r"tuned modes .* lie at .* off the measured .* by \+7\.9%, -8\.1%"):
+        tune(matrices, parts, target[[0, 2, 3]])
+    feet = {"support.feet": parts["support.feet"]}
+    (warning,) = tune(matrices, feet, solve_modes(matrices, 3).frequencies_hz * [1.02, 0.985, 1.0]).warnings
+    assert "off the measured" in warning
+    assert "more than measurements scatter" in warning
+
+
+def test_one_factor_meets_one_frequency_with_any_mode(system):
+    """The second mode's frequency taken as the first one's: the factor is met exactly, and so is one without change."""
+    matrices, _ = system
+    whole = {"all": matrices.stiffness}
+    first, second = solve_modes(matrices, 2).frequencies_hz
+    with pytest.raises(TuningError, match=r"modes: \[1\] meet"):
+        tune(matrices, whole, [second])
+    named = tune(matrices, whole, [second], modes=[0])
+    assert named.factors == pytest.approx([(second / first) ** 2], rel=1e-6)
+    assert "modes: [1] meet" in named.warnings[0]
+    assert not tune(matrices, whole, [1.02 * first]).warnings
+
+
 def test_modes_that_cross_are_followed():
     """Bending about two axes on springs of their own: stiffening one moves its mode past the other's."""
     bare = truss(nodes=14, held=13, seed=1)

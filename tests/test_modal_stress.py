@@ -31,6 +31,13 @@ def test_the_largest_stress_in_closed_form(solid, stretched):
     assert (spot.group, spot.strength) == ("far", 4e8)
 
 
+def test_round_off_does_not_choose_between_equal_stresses(solid, stretched):
+    """The whole end face has the largest one."""
+    round_off = 1e-15 * np.random.default_rng(0).standard_normal((8, stretched.size)) * np.abs(stretched).max()
+    spots = {hot_spot(solid, stretched + each, {"near": 4e8, "far": 4e8}).coordinates for each in round_off}
+    assert len(spots) == 1
+
+
 def test_the_weaker_material_counts(solid, stretched):
     """Half the stress at a third of the strength: the near box, at the face it shares, seen from its own side."""
     spot = hot_spot(solid, stretched, {"near": 1e8, "far": 3e8})

@@ -221,6 +221,13 @@ def test_wrong_input_is_answered_in_one_line(wrong, said):
         (sweep if "sweep" in wrong else simulate)(scene)
 
 
+def test_a_structure_beyond_a_stop_is_told_the_stop():
+    stops = [{"side": "left", "gap": 1e-3}, {"side": "right", "gap": 1e-5}]
+    scene = reference(1.0, periods=2, transient=0).replace({"stop": stops, "initial.displacement": 2e-5})
+    with pytest.raises(InputError, match=r"^initial.displacement: .* beyond stop\[1\]"):
+        simulate(scene)
+
+
 def test_bodies_that_overlap_are_refused():
     body = {"shape": "disc", "radius": 1e-3, "mass": 1.0}
     with pytest.raises(InputError, match="overlaps"):

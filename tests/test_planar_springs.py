@@ -252,6 +252,42 @@ def test_laws_of_hundreds(first, stiffness):
     assert sum(ends.values()) <= 1
 
 
+def upright(orientation, frequency, stiffness, share=1.0, speed=0.0, periods=10):
+    """Figure 9's block, flat at the start, in a cavity on end: its corners at the floor carry nothing."""
+    mass, spring, damping, unit = 0.15696, 3.6046e7, 0.002, 7e-5
+    body = {"shape": "block", "mass": 0.02 * mass, "length": 6.88e-3, "height": 4.8e-3, "friction": 0.4}
+    data = {
+        "structure": {"model": "rigid", "mass": mass, "stiffness": spring, "damping_ratio": damping},
+        "excitation": {"frequency": frequency, "force": share * 2 * damping * spring * unit},
+        "initial": {"velocity": speed * unit * 2 * np.pi * frequency},
+        "gravity": {"acceleration": 9.81, "orientation_deg": orientation},
+        "contact": {"law": "compliant", "stiffness": stiffness},
+    }  # fmt: skip
+    return run_planar(
+        planar_scene(data, body | {"restitution": 0.7}, periods=periods, gap=0.5 * unit, play=2e-4), periods, 2000
+    )
+
+
+@pytest.mark.parametrize("orientation", [90.0, -90.0])
+@pytest.mark.parametrize(("frequency", "stiffness"), [(2300.0, 1e7), (2400.0, 1e8), (2450.0, 1e9)])
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_a_block_that_stands_upright_and_flat(orientation, frequency, stiffness, speed):
+    """Its faces meet the walls as a slider does: what its unloaded corners do is not the last bit's choice."""
+    run = upright(orientation, frequency, stiffness, speed=speed)
+    assert run.status is Status.OK
+    assert abs(run.state.q[3]) <= 1e-9 * 2e-4 / 6.88e-3  # it does not turn
+    assert abs(run.state.q[2]) <= 1e-9 * 2e-4
+    flowed = np.abs(run.records.ledger[-1]).sum()
+    assert abs(ledger(run)) <= 1e-9 * flowed
+
+
+@pytest.mark.parametrize("off", [1e-9, 1e-6, 1e-3])
+def test_a_block_that_stands_as_good_as_upright(off):
+    """A weight across the cavity of a billionth of g still has a motion."""
+    for orientation in (90.0 - off, -90.0 + off):
+        assert upright(orientation, 2400.0, 1e8, speed=0.5).status is Status.OK
+
+
 def test_steps_refuse_springs():
     scene = planar_scene(springs(), DISC).replace({"solver": {"method": "moreau", "steps_per_period": 100}})
     with pytest.raises(InputError, match="two phases, is for"):

@@ -42,8 +42,8 @@ def woodpecker():
         two_phases=False, moment=1e-6 * RECORDED,
         play=np.full(3, 2 * (R_M - R_0)),
         body=np.zeros(3, np.int64), surface=np.array([LEFT, LEFT, RIGHT]), corner=np.array([-1, 0, 1]),
-        along=np.zeros(1, np.int64), tilt=np.full(1, 2), floor=one, turn=one, rise=one, cavity=np.zeros(1, np.int64),
-        neglected=np.zeros(1),
+        along=np.zeros(1, np.int64), tilt=np.full(1, 2), floor=one, turn=one, rise=one, height=np.zeros(1),
+        cavity=np.zeros(1, np.int64), neglected=np.zeros(1),
     )  # fmt: skip
     return system, root
 

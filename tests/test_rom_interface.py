@@ -34,6 +34,20 @@ def test_node_is_the_nearest_to_the_centroid():
     assert vector.max() == 1.0
 
 
+def test_round_off_does_not_choose_between_nodes_as_near():
+    """Four corners of a square."""
+    matrices, rng = truss(), np.random.default_rng(0)
+    coordinates = matrices.coordinates.copy()
+    nodes = matrices.patches["a"].nodes
+    chosen = set()
+    for _ in range(8):
+        coordinates[nodes] = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]] + 1e-16 * rng.standard_normal((4, 3))
+        square = replace(matrices, coordinates=coordinates, patches={"a": Patch(nodes, np.ones(4))})
+        vector = Interface.on_patches(square, [InterfaceCoordinate("a", "a", Y, "node")]).vectors[:, 0]
+        chosen.add(int(np.flatnonzero(vector)[0]))
+    assert chosen == {3 * nodes[0] + 1}
+
+
 @pytest.mark.parametrize("kind", ["average", "rigid", "node"])
 def test_functionals_of_a_translation(kind):
     matrices = truss()

@@ -179,8 +179,8 @@ def test_hot_spots_are_those_at_the_speed_of_the_case(tmp_path):
     turning = model.at_speed(5000.0)
     spotted = with_hot_spots(structure, model)
     stress = structure.solid.von_mises(turning.recovery @ turning.natural[1][:, 0])
-    place = structure.solid.stress_points()[np.argmax(stress)]
-    assert spotted.provenance["hot_spots"]["hot1"] == pytest.approx(place)
+    away = np.linalg.norm(structure.solid.stress_points() - spotted.provenance["hot_spots"]["hot1"], axis=1)
+    assert stress[away == 0.0].max() == pytest.approx(stress.max(), rel=1e-6)  # one of those equal by symmetry
     assert spotted.at_speed(5000.0).outputs == spotted.outputs
 
 

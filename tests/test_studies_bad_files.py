@@ -1,11 +1,17 @@
 """Files of other programs that are damaged, or hold what is no structure, end in one line that names them."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
+import tomli_w
 from scipy import io, sparse
 
-from tests.tools.input_files import BLOCK
+from tests.tools.input_files import BLOCK, OSCILLATOR
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.transients.ring_down import ring_down
+from vanedamp.files.toml_input import validate
 from vanedamp.modal.matrices import MatricesError, SystemMatrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main
@@ -73,6 +79,66 @@ def test_matrices_that_are_refused(folder, text, told, capfd):
     assert not (folder / "rom.h5").exists()
 
 
+@pytest.mark.parametrize(
+    ("mass", "stiffness", "told"),
+    [
+        (MASS, np.diag([-3e6, 1e6]), "stiffness: not positive definite: coordinate 0 has -3e+06 on the diagonal"),
+        (MASS, np.diag([4e6, -1e-3]), "stiffness: not positive definite: coordinate 1 has -0.001 on the diagonal"),
+        (-MASS, STIFFNESS, "mass: not positive definite: coordinate 0 has -1 on the diagonal"),
+        (MASS, [[0.0, 1.0], [1.0, 1e6]], "stiffness: not positive definite (lowest eigenvalue -1.0e+00 of the highest"),
+        (MASS, [[1.0, 2.0], [2.0, 1.0]], "stiffness: not positive definite (lowest eigenvalue -3.3e-01 of the highest"),
+        (MASS, np.diag([1e308, 1e6]), "stiffness: has an entry of 1e+308; expected up to 1e+40 in SI units"),
+        (np.diag([5e-324, 1.0]), STIFFNESS, "mass: coordinate 0 has 4.94e-324 kg; expected zero, or at least 1e-40"),
+        (0.0 * MASS, STIFFNESS, "mass: zero, or holds entries that are not finite"),
+    ],
+)
+def test_matrices_of_no_structure(folder, mass, stiffness, told, capfd):
+    np.savez("other.npz", m=mass, k=stiffness)
+    (folder / "model.toml").write_text(table(f'file = "other.npz"\n{NAMES}'))
+    assert f"model.toml: {told}" in refused(["import", "model.toml", "-o", "rom.h5"], capfd)
+
+
+def matlab(path, places):
+    """A sparse matrix as MATLAB 7.3 lays it out, with these row indices."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        group = file.create_group("k")
+        group.attrs["MATLAB_sparse"] = np.uint64(2)
+        group["data"], group["ir"], group["jc"] = (
+            [4e6, 9e6],
+            np.array(places, np.uint64),
+            np.array([0, 1, 2], np.uint64),
+        )
+    with open(path, "r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + bytes([0x00, 0x02]) + b"IM")
+
+
+def scipys(path, places):
+    """A sparse matrix as scipy.sparse.save_npz writes it, with these column indices."""
+    parts = {"data": [4e6, 9e6], "indices": np.array(places), "indptr": [0, 1, 2]}
+    np.savez(path, format=np.bytes_("csr"), shape=[2, 2], **parts)
+
+
+@pytest.mark.parametrize("places", [[0, 99], [0, 10**9], [0, 2], [0, 1]])
+@pytest.mark.parametrize(("write", "name"), [(matlab, "far.mat"), (scipys, "far.npz")])
+def test_sparse_indices_out_of_the_shape(folder, write, name, places, capfd):
+    """Operations do not look at them: they printed a wrong model, or ended the process."""
+    write(name, places)
+    entries = f'file = "{name}"\n{NAMES}' if write is matlab else FILES.format(name)
+    (folder / "model.toml").write_text(table(entries.replace('"m"', '"m.npz"')))
+    if places == [0, 1]:
+        assert main(["import", "model.toml", "-o", "rom.h5"]) == 0
+        return
+    error = refused(["import", "model.toml", "-o", "rom.h5"], capfd)
+    assert f"{name}: indices of a sparse matrix do not fit its shape (2, 2)" in error
+
+
+def test_system_matrices_with_indices_out_of_the_shape():
+    far = sparse.csr_array(np.eye(3))
+    far.indices[2] = 10**6
+    with pytest.raises(MatricesError, match="stiffness: indices of a sparse matrix do not fit"):
+        SystemMatrices(far, np.eye(3), np.zeros((1, 3)), [], {}, 0.0)
+
+
 def test_complex_system_matrices_are_refused():
     with pytest.raises(MatricesError, match="stiffness: complex; expected a real matrix"):
         SystemMatrices((1.0 + 0.1j) * np.eye(3), np.eye(3), np.zeros((1, 3)), [], {}, 0.0)
@@ -106,6 +172,54 @@ def test_records_that_are_not_whole(folder, change, told, capfd):
     )
     assert f"rom.h5: {told}" in refused(["run", "scene.toml"], capfd)
     assert f"rom.h5: {told}" in refused(["report", "rom.h5", "-o", "report.html"], capfd)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["run", "scene.toml", "-o", "x.txt"], "--output x.txt: expected a file name ending in .h5"),
+        (["sweep", "scene.toml", "--workers", "100000"], "expected at most 1024, not 100000"),
+        (["run", "scene.toml", "--samples", "1" * 5000], "invalid count value"),
+        (["run", "k" * 200_000], "File name too long"),
+        (["run", "long.toml"], "unknown key"),
+        (["ringdown", "blow.toml"], "ring_down: begins at 2e+09 m/s between walls, and takes about"),
+        (["export", "rom.h5", "-o", "r.uff", "--frequencies", "1", "2", "999999999"], "--frequencies: 999999999"),
+    ],
+)
+def test_what_nobody_means(folder, words, told, capfd):
+    scene = {key: OSCILLATOR[key] for key in ("structure", "excitation", "cavity", "damper", "time")}
+    blow = {"start": "impulse", "impulse": 1e9, "periods": 50}
+    elastic = [OSCILLATOR["damper"][0] | {"restitution": 1.0}]
+    bare = {key: scene[key] for key in ("structure", "cavity")} | {"excitation": {"frequency": 16.0}}
+    for name, tables in {
+        "scene.toml": scene, "long.toml": scene | {"k" * 200_000: 1},
+        "blow.toml": bare | {"damper": elastic, "ring_down": blow},
+    }.items():  # fmt: skip
+        (folder / name).write_text(tomli_w.dumps(tables))
+    ReducedModel.from_matrices(MASS, STIFFNESS, {"x": [1.0, 0.0]}, damping_ratio=0.1).save("rom.h5")
+    try:
+        assert main(words) == BAD_INPUT
+    except SystemExit as ended:
+        assert ended.code == BAD_INPUT
+    error = capfd.readouterr().err
+    assert told in error
+    assert (error.count("\n"), len(error) < 5000) == (1, True)
+
+
+def test_bins_of_amplitudes_that_reach_zero():
+    """Bins of equal ratio begin at the smallest amplitude above zero."""
+    scene = validate(Scene, OSCILLATOR | {"ring_down": {"start": "steady", "periods": 5, "bins": 3}}, "scene")
+    record = ring_down(scene)
+    still = replace(
+        record,
+        time=np.arange(8.0),
+        displacement=np.array([1e-3, -1e-3, 1e-6, -1e-6, 0.0, 0.0, 0.0, 0.0]),
+        energy=np.zeros(8),
+        structure_energy=np.zeros(8),
+        impacts=np.zeros(7, int),
+    )
+    edges = still.bins["frequency"].low
+    assert np.all(np.isfinite(edges)) and edges[0] > 0.0
 
 
 HEADER = '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 1 "root"\n2 2 "tip"\n$EndPhysicalNames\n'

@@ -1,22 +1,19 @@
 """Rows of a benchmark: printed as they come, kept, gone on from; losers are left out. No test asserts a time."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
+from tests.tools.processes import environment
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.bench import rows as bench_rows
 from vanedamp.studies.bench.rows import Contest, Rows
 from vanedamp.studies.bench.tables import seconds_text, table
 from vanedamp.studies.terminal import duration
 
-ROOT = Path(__file__).resolve().parent.parent
-#: a benchmark of five rows, which is killed once in the middle of the third where a file asks for it
 BENCHMARK = """
 import os, signal, sys
 from pathlib import Path
@@ -51,7 +48,7 @@ def run(folder, order):
     script = folder.parent / "benchmark.py"
     script.write_text(BENCHMARK)
     return subprocess.run(
-        [sys.executable, str(script), str(folder), str(order)], env=os.environ | {"PYTHONPATH": str(ROOT)},
+        [sys.executable, str(script), str(folder), str(order)], env=environment(),
         capture_output=True, text=True, check=False,
     )  # fmt: skip
 

@@ -1,16 +1,14 @@
 """A benchmark that is killed goes on from its rows when the same command is given again. No test asserts a time."""
 
 import itertools
-import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
-#: benchmarks with the files that they leave
+from tests.tools.processes import environment
+
 FILES = {
     "limits": {f"bench_limits.{ending}" for ending in ("json", "csv")},
     "engine": {"bench_engine.json", "bench_engine.csv", "bench_one_mode.png", "bench_scaling.png"},
@@ -38,7 +36,7 @@ def begin(name, folder):
     """The benchmark in a process of its own, its output in a pipe."""
     return subprocess.Popen(
         [sys.executable, "-m", "vanedamp", "bench", name, "--quick", "-o", str(folder)], stdout=subprocess.PIPE,
-        env=os.environ | {"PYTHONPATH": str(ROOT)}, text=True,
+        env=environment(), text=True,
     )  # fmt: skip
 
 

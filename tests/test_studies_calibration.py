@@ -154,6 +154,33 @@ def test_magnitude_and_phase_give_the_same_damping(measured, result, capsys):
     assert damping["ratio"] == pytest.approx(result["damping"]["ratio"], rel=1e-9)
 
 
+@pytest.mark.parametrize("columns", ["", 'columns = "magnitude-degrees"\n'])
+@pytest.mark.parametrize("header", ["f,magnitude,phase (deg)", "f,magnitude dB,phase (deg)"])
+def test_decibels_are_refused(measured, capfd, header, columns):
+    """All above zero, by their reference: no sign tells, but the shape of the resonance does, and the header may."""
+    folder, _ = measured
+    frequencies, real, imaginary = np.loadtxt(folder / "tip.csv", delimiter=",", skiprows=1).T
+    values = real + 1j * imaginary
+    level = 20.0 * np.log10(np.abs(values) / 1e-6)
+    assert level.min() > 0.0
+    table = np.column_stack([frequencies, level, np.angle(values, deg=True)])
+    np.savetxt(folder / "levels.csv", table, delimiter=",", header=header, comments="", fmt="%.17g")
+    status, _, error = calibrated(folder, capfd, 'frf = "tip.csv"\n', f'frf = "levels.csv"\n{columns}')
+    assert status == BAD_INPUT
+    assert "decibels" in error
+    assert error.count("\n") == 1
+
+
+def test_frequencies_of_other_modes_leave_no_tuned_case(measured, capfd):
+    """The measured order is 2, 0, 1; the first three in their order are named in its place."""
+    folder, _ = measured
+    text = (folder / "case.toml").read_text().replace('shapes = "shapes.csv"', "modes = [0, 1, 2]")
+    (folder / "mixed.toml").write_text(text)
+    assert main(["calibrate", str(folder / "mixed.toml"), "--case", str(folder / "mixed_tuned.toml")]) == BAD_INPUT
+    assert "check which modes these belong to" in capfd.readouterr().err
+    assert not (folder / "mixed_tuned.toml").exists()
+
+
 def calibrated(folder, capfd, old, new):
     """Exit, result and what was told of a case without tuning, whose modulus is 8 % too high."""
     text = CASE.format(young=1.08 * YOUNG, springs=SPRINGS) + TABLE[: TABLE.index("[calibration.tune]")]

@@ -39,7 +39,7 @@ def made(axes, **curves):
 def test_curve_along_the_frequency():
     frequencies = [1.0, 2.0, 3.0, 4.0]
     undamped, mean = np.array([0.2, 0.8, 2.0, 0.5]), np.array([0.2, 0.805, 1.0, 0.6])
-    sweep = made({"excitation.frequency": frequencies}, amplitude_undamped=undamped, amplitude_mean=mean)
+    sweep = made({"excitation.frequency": frequencies}, amplitude_undamped=undamped, amplitude_mean_dynamic=mean)
     (response,) = forced_responses(sweep)
     assert response.name == "rigid model"
     assert response.units == "Hz"
@@ -53,13 +53,13 @@ def test_curve_along_the_frequency():
 
 def test_onset_is_none_when_the_bodies_do_nothing():
     curve = np.array([1.0, 2.0])
-    sweep = made({"excitation.frequency": [1.0, 2.0]}, amplitude_undamped=curve, amplitude_mean=1.005 * curve)
+    sweep = made({"excitation.frequency": [1.0, 2.0]}, amplitude_undamped=curve, amplitude_mean_dynamic=1.005 * curve)
     assert forced_responses(sweep)[0].headline.onset is None
 
 
 def test_points_are_put_in_order():
     curve = np.array([3.0, 1.0, 2.0])
-    sweep = made({"excitation.frequency": [30.0, 10.0, 20.0]}, amplitude_max=curve)
+    sweep = made({"excitation.frequency": [30.0, 10.0, 20.0]}, amplitude_max_dynamic=curve)
     (response,) = forced_responses(sweep)
     assert response.x.tolist() == [10.0, 20.0, 30.0]
     assert response.damped_max.tolist() == [1.0, 2.0, 3.0]
@@ -68,7 +68,7 @@ def test_points_are_put_in_order():
 def test_one_response_for_every_combination_of_the_other_axes():
     axes = {"cavity.c1.gap": [1e-5, 2e-5], "excitation.frequency": [1.0, 2.0, 3.0], "damper.mass": [0.1, 0.2]}
     curve = np.arange(12.0).reshape(2, 3, 2)
-    responses = forced_responses(made(axes, amplitude_max=curve))
+    responses = forced_responses(made(axes, amplitude_max_dynamic=curve))
     assert [response.name for response in responses] == [
         "rigid model, c1.gap = 10 µm, mass = 0.1 kg",
         "rigid model, c1.gap = 10 µm, mass = 0.2 kg",
@@ -89,12 +89,12 @@ def test_points_that_are_not_ok_are_counted_and_left_out():
     status = np.array(["ok", "error: x", "event_budget", "ok"], object)
     undamped, curve = np.array([1.0, 2.0, 1.5, 0.5]), np.array([0.8, np.nan, 1.4, 0.6])
     axes = {"excitation.frequency": [1.0, 2.0, 3.0, 4.0]}
-    (response,) = forced_responses(made(axes, status=status, amplitude_mean=curve, amplitude_undamped=undamped))
+    (response,) = forced_responses(made(axes, status=status, amplitude_mean_dynamic=curve, amplitude_undamped=undamped))
     assert response.headline.points_left_out == 2
     assert (response.headline.damped_peak_at, response.headline.peak_ratio) == (1.0, 0.4)
     assert "2 of 4 points are left out" in response.sentence
     status[:] = "event_budget"
-    (response,) = forced_responses(made(axes, status=status, amplitude_mean=curve, amplitude_undamped=undamped))
+    (response,) = forced_responses(made(axes, status=status, amplitude_mean_dynamic=curve, amplitude_undamped=undamped))
     assert math.isnan(response.headline.peak_ratio)
     assert response.sentence == "rigid model: no damped peak: 4 of 4 points are not ok"
 

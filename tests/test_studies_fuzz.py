@@ -2,25 +2,22 @@
 
 import math
 import signal
-import time
-from contextlib import contextmanager
+import subprocess
+import sys
 
 import numpy as np
 import pytest
-import tomli_w
 
-from tests.tools.fuzz import PRESCRIBED, ROM_SCENE, SCENE, drawn
+from tests.tools.fuzz import PRESCRIBED, ROM_SCENE, SCENE, drawn, write_input
+from tests.tools.fuzz_runs import answer, patient, stuck
+from tests.tools.processes import ROOT, environment
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies import sweep_steps
-from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.commands import optimise as optimise_command
 from vanedamp.studies.commands import run as run_command
-
-#: s without an answer after which a command counts as stuck
-PATIENCE = 10
 
 
 @pytest.fixture
@@ -44,69 +41,17 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-class Stuck(BaseException):
-    """No answer."""
-
-
-class Enough(BaseException):
-    """A command that shows its progress need not come to its end."""
-
-
-def stuck(*_):
-    raise Stuck
-
-
-@contextmanager
-def patient(_):
-    """In place of the progress bar: every step is an answer."""
-    started = time.monotonic()
-
-    def show(*_):
-        signal.setitimer(signal.ITIMER_REAL, PATIENCE)
-        if time.monotonic() - started > PATIENCE / 10:
-            raise Enough
-
-    yield show
-
-
-def fault(command, data, capfd):
-    """What is wrong with the answer to a file; None if it is a result or one line."""
-    try:
-        text = tomli_w.dumps(data)
-    except (TypeError, ValueError):
-        return None  # cannot be written as TOML
-    with open("file.toml", "w", encoding="utf-8") as stream:
-        stream.write(text)
-    extra = ["--workers", "1"] if command in ("sweep", "optimise") else ["--modes", "2"] if command == "reduce" else []
-    signal.setitimer(signal.ITIMER_REAL, PATIENCE)
-    try:
-        status = main([command, "file.toml", *extra])
-    except Stuck:
-        return f"no answer in {PATIENCE} s"
-    except Enough:
-        return None
-    except Exception as error:
-        return f"{type(error).__name__}: {error}"
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-    told = capfd.readouterr().err
-    if status not in (0, BAD_INPUT):
-        return f"status {status}"
-    if status == BAD_INPUT and (told.count("\n") != 1 or not told.startswith("vanedamp: ")):
-        return f"no line: {told[:500]}"
-    return None
-
-
 def faults(seed, count, capfd):
-    before = signal.signal(signal.SIGALRM, stuck)
+    before = signal.signal(signal.SIGPROF, stuck)
     found = []
     try:
         for number, (command, data) in enumerate(drawn(seed, count)):
-            wrong = fault(command, data, capfd)
+            words = write_input(command, data)
+            _, wrong = (None, None) if words is None else answer(words, lambda: capfd.readouterr().err)
             if wrong is not None:
                 found.append((seed, number, command, wrong, data))
     finally:
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGPROF, before)
     return found
 
 
@@ -119,3 +64,13 @@ def test_drawn_files(seed, folder, capfd):
 @pytest.mark.parametrize("seed", range(100, 120))
 def test_many_drawn_files(seed, folder, capfd):
     assert faults(seed, 100, capfd) == []
+
+
+@pytest.mark.parametrize(("first", "count"), [(0, 60), pytest.param(10_000, 400, marks=pytest.mark.slow)])
+def test_damaged_files_of_every_format_and_command_lines(first, count):
+    """In forks of a process of its own, whose end by a signal is a finding."""
+    pytest.importorskip("meshlane")
+    words = [sys.executable, "-m", "tests.tools.fuzz", str(first), str(count)]
+    ended = subprocess.run(words, cwd=ROOT, env=environment(), capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert ended.stdout.count("\nall ") == 2

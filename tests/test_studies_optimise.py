@@ -26,7 +26,7 @@ def study(folder, change=lambda data: None, quick=True):
     """The example, with a tiny budget."""
     data = tomllib.loads(EXAMPLE.read_text())
     if quick:
-        data["time"] = {"periods": 60, "transient": 0}
+        data["time"] = {"periods": 60, "transient": 50, "tolerance": 0.6}  # of the transient half is left
         data["optimise"] |= {"evaluations": 10, "samples": 3, "map": {"mass_ratio": 3, "gap_ratio": 2}}
         data["optimise"]["band"] = {"start": 2380.0, "stop": 2430.0, "num": 3}
     change(data)
@@ -275,6 +275,11 @@ def test_command(tmp_path, capsys, monkeypatch):
             lambda data: data.update(time={"periods": 150, "transient": 100}),
             "time.transient: 100 periods leave 0.29 of the structure's own transient, so that designs cannot be "
             "compared; give transient = 37",
+        ),
+        (
+            lambda data: data.update(time={"periods": 450, "transient": 0}),
+            "time.transient: 0 periods leave 1 of the structure's own transient, so that designs cannot be compared; "
+            "give transient = 37",
         ),
         (lambda data: data["structure"].update(damping_ratio=5e-5) or data.pop("time"), "1000 periods leave 0.7"),
         (lambda data: data["optimise"].update(evaluations=2), "optimise.evaluations: should be greater"),

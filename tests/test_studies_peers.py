@@ -26,7 +26,7 @@ def periodic():
 def needs(name):
     package = peers.PEERS[name].needs.partition(".")[0]
     if find_spec(package) is None:
-        pytest.skip(f"{name} is not installed")
+        pytest.skip(f"{name} is not installed: {peers.PEERS[name].remedy}")
 
 
 def error(periodic, name, setting):

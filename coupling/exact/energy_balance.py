@@ -31,16 +31,36 @@ def account(system, flows, st, rec, scratch, tau):
     """Add what the segment [0, tau] has of its own: slow pairs of modes, parabolas of the bodies, the peak, samples."""
     s, period, constant = st.counters[FLOW], st.counters[PERIOD], st.offset[0]
     rec.square[period] += constant * constant * tau
+    deflected = len(rec.swing) > 0
+    if deflected:
+        rec.swing[period, 2] += constant * tau
     if system.bodies > 0:
         _free_bodies(system, flows, st, rec, scratch, s, period, tau)
     for i in range(flows.slow_count[s]):
         if flows.slow[s, i, 2] == CALM:
-            rec.square[period] += _calm_square(flows, st, s, i, tau, constant)
+            square, mean = _calm_integrals(flows, st, s, i, tau, constant)
+            rec.square[period] += square
+            if deflected:
+                rec.swing[period, 2] += mean
             break
         _slow_pair(flows, st, rec, s, period, i, tau, constant)
-    rec.peak[period] = highest(system, flows, st, scratch, s, tau, constant, rec.peak[period])
+    if deflected:
+        _extremes(system, flows, st, rec, scratch, s, period, tau, constant)
+    else:
+        rec.peak[period] = highest(system, flows, st, scratch, s, tau, constant, rec.peak[period], 0.0)
     if rec.samples.shape[0] > 0:
         _sample(system, flows, st, rec, s, tau, constant)
+
+
+@kernel
+def _extremes(system, flows, st, rec, scratch, s, period, tau, constant):
+    """Record the largest and the smallest response of the segment."""
+    swing = rec.swing[period]
+    for k in range(2):
+        side = 1.0 - 2.0 * k
+        top = highest(system, flows, st, scratch, s, tau, constant, side * swing[k], side)
+        swing[k] = side * top
+        rec.peak[period] = max(rec.peak[period], top)
 
 
 @inlined
@@ -99,6 +119,8 @@ def account_impact(system, flows, st, rec, r, impulse):
     st.ledger[VISCOUS] -= impulse * loss
     st.ledger[CONTACT] -= impulse * contact
     rec.square[period] -= impulse * (square + st.offset[0] * maps[MEAN_MAP // 2])
+    if len(rec.swing) > 0:
+        rec.swing[period, 2] -= 0.5 * impulse * maps[MEAN_MAP // 2]
     rec.harmonic[period] -= impulse * (back * complex(maps[HARMONIC_MAP // 2], maps[HARMONIC_MAP // 2 + 1]))
     rec.momentum[period] -= impulse * (back * complex(maps[MOMENTUM_MAP // 2], maps[MOMENTUM_MAP // 2 + 1]))
     for h in range(e):
@@ -146,6 +168,8 @@ def _linear_forms(system, flows, st, rec, scratch, s, period, count):
     rec.harmonic[period] += 0.5 * harmonic + st.offset[0] * flat
     rec.momentum[period] += 0.5 * momentum
     rec.square[period] += st.offset[0] * mean
+    if len(rec.swing) > 0:
+        rec.swing[period, 2] += 0.5 * mean
     for h in range(len(system.frequency)):
         st.ledger[EXCITATION] += _work_of_harmonic(flows.linear[s], change, total, count, h)
 
@@ -223,7 +247,10 @@ def _slow_pair(flows, st, rec, s, period, i, tau, constant):
     j, k, kind, h = flows.slow[s, i]
     c, rate = st.amplitude[j], flows.eigenvalue[s, j]
     if kind == SINGLE:
-        rec.square[period] += constant * (flows.slow_square[s, i] * c * _slow_integral(rate, tau)).real
+        twice = (flows.slow_square[s, i] * c * _slow_integral(rate, tau)).real
+        rec.square[period] += constant * twice
+        if len(rec.swing) > 0:
+            rec.swing[period, 2] += 0.5 * twice
         return
     other, rate_other = st.amplitude[k], flows.eigenvalue[s, k]
     if kind == DIFFERENCE:
@@ -248,8 +275,8 @@ def _slow_pair(flows, st, rec, s, period, i, tau, constant):
 
 
 @kernel
-def _calm_square(flows, st, s, first, tau, constant):
-    """Return the integral of (constant + x)^2 - constant^2 over [0, tau], x of modes with |rate tau| < 0.005.
+def _calm_integrals(flows, st, s, first, tau, constant):
+    """Return the integrals of (constant + x)^2 - constant^2 and x over [0, tau], x of modes with |rate tau| < 0.005.
 
     By Taylor series: a slow mode that crosses quickly swings out to speed / frequency, and in products of amplitudes
     its place would be lost.
@@ -271,12 +298,13 @@ def _calm_square(flows, st, s, first, tau, constant):
         x5 += part.real
         part *= z * (1 / 6)
         x6 += part.real
-    series, total = (x0, x1, x2, x3, x4, x5, x6), 0.0
+    series, total, mean = (x0, x1, x2, x3, x4, x5, x6), 0.0, 0.0
     for i in range(7):
+        mean += series[i] / (i + 1.0)
         total += 2.0 * constant * series[i] / (i + 1.0)
         for k in range(7):
             total += series[i] * series[k] / (i + k + 1.0)
-    return total * tau
+    return total * tau, mean * tau
 
 
 @inlined

@@ -14,8 +14,8 @@ GRIDS = 5
 
 
 @inlined
-def highest(system, flows, st, scratch, s, tau, constant, peak):
-    """Return the largest |response| on [0, tau] and before.
+def highest(system, flows, st, scratch, s, tau, constant, peak, side):
+    """Return the largest |response| on [0, tau] and before; side 1: of the response, -1: of its negative.
 
     Between points of a grid the response differs from its cubic Hermite interpolant by at most (bound of the fourth
     derivative) h^4/384: the grid keeps this below 1e-3 of the response, and each maximum found is refined by Newton.
@@ -35,8 +35,8 @@ def highest(system, flows, st, scratch, s, tau, constant, peak):
         v0, v1, size, fourth = v0 + more[0], v1 + more[1], size + more[2] * tau, fourth + more[3]
     if size <= peak or tau <= 0.0:
         return peak
-    peak = max(peak, abs(x0), abs(x1))
-    if not _may_exceed(peak, x0, v0, x1, v1, tau, fourth):
+    peak = max(peak, _height(x0, side), _height(x1, side))
+    if not _may_exceed(peak, side, x0, v0, x1, v1, tau, fourth):
         return peak
     h, level = 0.125 * system.period, ZERO
     while level < GRIDS and fourth * min(h, tau) ** 4 > 0.384 * size:
@@ -50,7 +50,7 @@ def highest(system, flows, st, scratch, s, tau, constant, peak):
             turns[j] = exp_minus_one(flows.eigenvalue[s, j] * h) + 1.0
     return _search_grid(
         flows.eigenvalue[s, :count], scratch.wave, scratch.ahead, turns, flows.driven[s], scratch.drive, scratch.growth,
-        constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak,
+        constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak, side,
     )  # fmt: skip
 
 
@@ -95,9 +95,9 @@ def _set_drive(eigenvalue, response, driven, load, phase, change, period, drive)
 
 @inlined
 def _search_grid(
-    rates, waves, ahead, turns, driven, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak
+    rates, waves, ahead, turns, driven, drives, growths, constant, x0, v0, x1, v1, tau, h, pieces, fourth, peak, side
 ):
-    """Return the largest |response| on a grid of `pieces` steps of length h, the last one shorter, and before."""
+    """Return the largest height of the response on a grid of steps of length h, the last one shorter, and before."""
     e = len(driven) - 1
     for k in range(e):
         for j in range(driven[k], driven[k + 1]):
@@ -113,9 +113,10 @@ def _search_grid(
                     ahead[j] += drives[j] * growths[j]
                     x1 += (drives[j] * growths[j]).real
                     v1 += (drives[j] * (rates[j] * growths[j] + turns[k])).real
-            peak = max(peak, abs(x1))
-        if v0 * v1 < 0.0 and _may_exceed(peak, x0, v0, x1, v1, h, fourth):
-            peak = max(peak, _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h))
+            peak = max(peak, _height(x1, side))
+        if v0 * v1 < 0.0 and _may_exceed(peak, side, x0, v0, x1, v1, h, fourth):
+            top = _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h)
+            peak = max(peak, _height(top, side))
         x0, v0 = x1, v1
         waves, ahead = ahead, waves
         for k in range(e):
@@ -137,18 +138,24 @@ def _next_point(rates, waves, ahead, turns, constant):
 
 
 @inlined
-def _may_exceed(peak, x0, v0, x1, v1, h, fourth):
-    """Whether |x| may exceed peak within [0, h]: cubic interpolant of the ends and bound of its error."""
+def _height(x, side):
+    """Return |x|; side 1: x, -1: -x."""
+    return abs(x) if side == 0.0 else side * x
+
+
+@inlined
+def _may_exceed(peak, side, x0, v0, x1, v1, h, fourth):
+    """Whether the height of x may exceed peak within [0, h]: cubic interpolant of the ends and bound of its error."""
     room = peak - fourth * h * h * h * h / 384.0
     # the interpolant's basis functions of the slopes stay below 4/27 h
     rise = max(x0, x1) + (4 / 27) * h * (max(v0, 0.0) + max(-v1, 0.0))
     fall = min(x0, x1) + (4 / 27) * h * (min(v0, 0.0) + min(-v1, 0.0))
-    return rise > room or -fall > room
+    return (side >= 0.0 and rise > room) or (side <= 0.0 and -fall > room)
 
 
 @kernel
 def _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h):
-    """Return |x| where its slope vanishes within [0, h], v0 and v1 of opposite sign: Newton from the interpolant."""
+    """Return x where its slope vanishes within [0, h], v0 and v1 of opposite sign: Newton from the interpolant."""
     # slope v0 + b u + c u^2, u = t/h; the root on [0, 1] by the formula that does not cancel
     b = 6.0 * (x1 - x0) / h - 4.0 * v0 - 2.0 * v1
     c = 3.0 * (v0 + v1) - 6.0 * (x1 - x0) / h
@@ -195,11 +202,11 @@ def _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h):
             square = step * step
             # x has no slope there: a step that is wrong by its square root leaves its digits
             if sixth * square * square * square < 1e-13 * abs(top):
-                return abs(top)
+                return top
             t += step
         else:
             t = 0.5 * (lo + hi)
-    return abs(x)
+    return x
 
 
 @summing

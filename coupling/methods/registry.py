@@ -6,12 +6,15 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from vanedamp.coupling.methods import Method
 from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
 from vanedamp.coupling.response.records import Records, new_records
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart import at_speed_of, marked_with_speed, restart_from, restart_state
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
@@ -54,13 +57,30 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     system = assemble(scene)
     scale = physical_scale(scene, system)
     start = None if start is None else at_speed_of(scene, start)
-    records = new_records(system, scene.time.simulated, samples_per_period, isinstance(scene.structure, Rom))
+    reduced, deflected = isinstance(scene.structure, Rom), is_deflected(scene, system)
+    records = new_records(system, scene.time.simulated, samples_per_period, reduced, deflected)
     if scene.planar:
         return _begin_planar(scene, system, method, records, events, start)
     initial = initial_motion(scene, system) if start is None else restart_from(system, scale, start)
     signal = scene.excitation.signal
     further = {} if signal is None else {"loads": loads_of(scene, signal)}
     return method.begin(system, scene.solver, initial, records, events, **further)
+
+
+def is_deflected(scene: Scene, system: System) -> bool:
+    """Return whether static loads of the bodies move the response of a scene; system: that of its sliders."""
+    functionals, loads = system.floor, system.of_bodies.weight
+    if scene.planar:
+        from vanedamp.coupling.planar.constraints import planar_system
+
+        n, plane = system.modes, planar_system(scene, system)
+        off_floor = plane.along[plane.tilt >= 0] + 1
+        pressed = np.zeros(system.bodies)
+        pressed[plane.tilt >= 0] = plane.weight[off_floor]
+        arm = np.array([scene.cavity[place].gap for place in plane.cavity])
+        functionals = np.vstack([functionals, plane.rise[:, :n], plane.turn[:, :n]])
+        loads = np.concatenate([loads, pressed, pressed * arm])
+    return deflects(system, functionals, loads)
 
 
 def _begin_planar(

@@ -6,7 +6,7 @@ import math
 
 from vanedamp.coupling.numerics.codes import DIVERGED, DONE, EVENT_BUDGET, IMPACTS, LOGGED, PENETRATION, PERIOD, STEPS
 from vanedamp.coupling.numerics.jit import inlined, kernel
-from vanedamp.coupling.response.recorder import cubic_peak, put_section
+from vanedamp.coupling.response.recorder import note_step, put_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 
 #: a motion above this, in m or m/s, has no physical meaning
@@ -132,7 +132,7 @@ def account_step(system, times, motion, records, k, q, v, impulse, before, deepe
 @inlined
 def _record_response(system, times, records, p, h, x0, x1, rate0, rate1, c0, s0, c1, s1, v, after):
     """Record peak, mean square, harmonic and momentum of a step."""
-    records.peak[p] = max(records.peak[p], abs(x1), cubic_peak(h, x0, x1, rate0, rate1))
+    note_step(records, p, h, x0, x1, rate0, rate1)
     records.square[p] += h * (x0 * x0 + x1 * x1) / 2.0
     records.harmonic[p] += h / 2.0 * complex(x0 * c0 + x1 * c1, -x0 * s0 - x1 * s1)
     m0, m1 = 0.0, 0.0

@@ -8,13 +8,15 @@ allows and far more than round-off, lifts them, so that they do not lie flat at 
 periods whether tilts persist. Some starts have a large tilt, since aligned and tilted motion can both be steady.
 
 Where no tilt persists, slider and block have one steady motion. Where some do, these runs go on, and their mean
-amplitude beside the slider's is the slider's error.
+amplitude beside the slider's is the slider's error. A tilt may live for hundreds of periods and then die, and leave the
+structure in another steady motion than the slider's: before a slider is taken beside tilts that persist, all runs go on
+for three times as long, and the error is the larger one of both windows. A block that tilts further than its run
+allows has no amplitude to compare with.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -23,6 +25,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from vanedamp.coupling.methods.registry import final_state, run_of, why_no_restart
+from vanedamp.coupling.model_order.settling import settled_after
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
@@ -31,7 +34,6 @@ from vanedamp.coupling.scene.bodies import Cavity
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.system.body_loads import greatest_pull
-from vanedamp.coupling.system.transient import left_over
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -44,15 +46,16 @@ _TILTS = (_SMALL, -_SMALL, _LARGE, _SMALL, -_SMALL, -_LARGE)
 _LIFT, _BARELY = 0.4, 1e-3
 #: periods for which the small tilts would fall freely, the longest; others take equal steps to it
 _FALL = 2.0
-#: share of the structure's transient that is left as a slider has settled, the fewest periods which that takes, and
 #: periods between two starts
-_LEFT, _SETTLE, _APART = 0.05, 100, 7
+_APART = 7
 #: events in a period, of each body, beyond which a run of the check is not worth its time
 _EVENTS = 1000
 #: periods after which a tilt can have died, can be said to persist, and persists unless it has died
 _EARLY, _WATCH, _LONGEST = 20, 60, 240
 #: tilts that persist after which no more are tried, periods over which means are taken, and batches of each block's
 _ENOUGH, _WINDOW, _SLIDER_WINDOW, _BATCHES = 3, 240, 480, 3
+#: periods for which runs go on before a slider is taken beside tilts that persist
+_LATER = 480
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ def needs_body(scene: Scene) -> bool:
 
 def with_sliders(scene: Scene) -> Scene:
     """Return the scene with its bodies of shape "auto" as sliders."""
-    none = dict.fromkeys(("length", "height", "inertia"))
+    none = dict.fromkeys(("length", "inertia"))
     still = dict.fromkeys(("lift", "tilt", "lift_velocity", "tilt_rate"), 0.0)
     return _changed(scene, {"shape": "slider"} | none | still)
 
@@ -109,7 +112,7 @@ def with_blocks(scene: Scene, share: float = _LARGE) -> tuple[Scene, RestartStat
     bodies = [damper for damper in scene.damper if damper.shape == "auto"]
     if any(body.lift or body.tilt or body.lift_velocity or body.tilt_rate for body in bodies):
         return blocks, None
-    settled = _settled(sliders)
+    settled = settled_after(sliders)
     slider = run_of(replace(sliders, time=Time(settled, 0)))
     if slider.advance_to(settled) is not Status.OK:
         return blocks, None
@@ -135,8 +138,8 @@ def judge(scene: Scene) -> Advice:
     if reason := why_no_restart(scene):
         raise InputError(f'damper.shape: "auto" {reason}; say which body it is')
     tolerance, sliders = _tolerance(scene), with_sliders(scene)
-    settled = _settled(sliders)
-    sliders = _watched(sliders, 2 * settled + _SLIDER_WINDOW)
+    settled = settled_after(sliders)
+    sliders = _watched(sliders, 2 * settled + _SLIDER_WINDOW + _LATER)
     slider = run_of(sliders)
     blocks: list[Run] = []
     persisting: list[Run] = []
@@ -144,7 +147,7 @@ def judge(scene: Scene) -> Advice:
     try:
         for index in range(len(_TILTS)):
             _advance(slider, settled + _APART * index)
-            blocks.append(_begin(scene, index, _state(sliders, slider), settled + _WINDOW, blocks))
+            blocks.append(_begin(scene, index, _state(sliders, slider), settled + _WINDOW + _LATER, blocks))
             if _persists(blocks[-1], _largest_tilts(scene)):
                 persisting.append(blocks[-1])
                 if len(persisting) == _ENOUGH:
@@ -152,9 +155,7 @@ def judge(scene: Scene) -> Advice:
         if persisting:
             error = confidence = math.nan  # unknown of a prescribed motion, which is the same with any body
             if not isinstance(scene.structure, Prescribed):
-                error, confidence = _error(
-                    slider, sliders.time.simulated, settled, persisting, tolerance
-                )  # fmt: skip
+                error, confidence = _error(slider, settled, persisting, tolerance)
     except _Ended as ended:
         error, trouble = math.nan, f"; a run ended as {ended}"
     why = f"of {len(blocks)} tilts given to them as their motion is steady, {len(persisting) or 'none'} persist"
@@ -176,13 +177,6 @@ def judge(scene: Scene) -> Advice:
 def _tolerance(scene: Scene) -> float:
     """Return the smallest tolerance of the bodies of shape "auto"."""
     return min(damper.tolerance or TOLERANCE for damper in scene.damper if damper.shape == "auto")
-
-
-def _settled(sliders: Scene) -> int:
-    """Return how many periods leave little of the structure's transient, at most those that the scene drops."""
-    lengths = range(_SETTLE, max(_SETTLE, sliders.time.dropped) + 1)
-    found = bisect_left(lengths, True, key=lambda periods: left_over(sliders, periods) <= _LEFT)
-    return lengths[min(found, len(lengths) - 1)]
 
 
 def _watched(scene: Scene, periods: int) -> Scene:
@@ -237,29 +231,43 @@ def _persists(run: Run, largest: np.ndarray) -> bool:
     return True
 
 
-def _error(slider: Run, periods: int, settled: int, blocks: Sequence[Run], tolerance: float) -> tuple[float, float]:
+def _error(slider: Run, settled: int, blocks: Sequence[Run], tolerance: float) -> tuple[float, float]:
     """Return the error of the slider's mean amplitude relative to the blocks', and its 95 % confidence.
 
-    The blocks' runs end before they have settled as well, if they show by then that it exceeds the tolerance.
+    The runs end before they have settled as well, if they show by then that it exceeds the tolerance. Where it stays
+    within, they go on, and the worse one of both windows counts. Raises _Ended.
     """
-    _advance(slider, periods)
-    peaks = slider.outcome().records.peak[periods - _SLIDER_WINDOW : periods]
-    mean, own = float(peaks.mean()), mean_confidence(peaks) or 0.0
+    own = 2 * settled + _SLIDER_WINDOW
     early, last = max(settled, 2 * _WATCH), settled + _WINDOW
-    for done, dropped in ((early, early // 2), (last, settled)):
-        for block in blocks:
-            _advance(block, done)
-        size = (done - dropped) // _BATCHES
-        series = np.array([block.outcome().records.peak[done - size * _BATCHES : done] for block in blocks])
-        batches = series.reshape(-1, size).mean(axis=1)
-        other = float(batches.mean())
-        if not other > 0.0:
-            return 0.0, 0.0  # nothing moves
-        width = stdtrit(len(batches) - 1, 0.975) * batches.std(ddof=1) / math.sqrt(len(batches))
-        error, confidence = mean / other - 1.0, math.hypot(own, mean / other * width) / other
-        if abs(error) - confidence > tolerance:
-            break
-    return error, confidence
+    error, confidence = _compared(slider, own, blocks, early, early // 2)
+    if abs(error) - confidence > tolerance:
+        return error, confidence
+    error, confidence = _compared(slider, own, blocks, last, settled)
+    if abs(error) + confidence > tolerance:
+        return error, confidence
+    later = _compared(slider, own + _LATER, blocks, last + _LATER, last)
+    return max((error, confidence), later, key=lambda found: abs(found[0]) + found[1])
+
+
+def _compared(slider: Run, own: int, blocks: Sequence[Run], done: int, dropped: int) -> tuple[float, float]:
+    """Return error and confidence from the last periods of the slider's `own`, and the blocks' from dropped to done."""
+    _advance(slider, own)
+    for block in blocks:
+        _advance(block, done)
+        plane = block.outcome().plane
+        assert plane is not None
+        if np.nanmax(plane.neglected * plane.tilt[dropped:done] ** 2) > plane.bound:
+            raise _Ended(Status.TILTED.value)
+    peaks = slider.outcome().records.peak[own - _SLIDER_WINDOW : own]
+    mean, width = float(peaks.mean()), mean_confidence(peaks) or 0.0
+    size = (done - dropped) // _BATCHES
+    series = np.array([block.outcome().records.peak[done - size * _BATCHES : done] for block in blocks])
+    batches = series.reshape(-1, size).mean(axis=1)
+    other = float(batches.mean())
+    if not other > 0.0:
+        return 0.0, 0.0  # nothing moves
+    spread = stdtrit(len(batches) - 1, 0.975) * batches.std(ddof=1) / math.sqrt(len(batches))
+    return mean / other - 1.0, math.hypot(width, mean / other * spread) / other
 
 
 def _tilted(scene: Scene, state: RestartState, share: float, lift: float) -> RestartState:

@@ -70,4 +70,4 @@ def _amplitude(scene: Scene, modes: int, restitution: float, spring: float) -> f
         solver=options_of({}),
         sweep={},
     )
-    return respond(simple).amplitude_mean
+    return respond(simple).amplitude_mean_dynamic

@@ -22,12 +22,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.model_order.collision_sensitivity import sensitivity
+from vanedamp.coupling.model_order.confirmation import confirmed
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.body_loads import load_warnings
 from vanedamp.coupling.system.reduced_model_file import greatest_speed, reduced_model
-from vanedamp.coupling.system.resonance import excitation_force
+from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force
 from vanedamp.coupling.system.transient import timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.contact_pulse import Collision, pulse
@@ -244,8 +245,21 @@ def _choice(scenes: Sequence[Scene]) -> Choice:
     if not choice.met:
         raise InputError(f"structure.modes: {choice.sentence}: raise structure.tolerance or reduce with more modes")
     if any(scene.contact.rigid for scene in scenes):
-        choice = replace(choice, sentence=choice.sentence + _NEWTON)
-    return choice
+        return replace(choice, sentence=choice.sentence + _NEWTON)
+    return _confirmed(choice, scenes)
+
+
+def _confirmed(choice: Choice, scenes: Sequence[Scene]) -> Choice:
+    """Return the choice as runs of bodies confirm it."""
+    peaks = [_peak(scene) for scene in scenes[:1] if scene.damper]
+    return confirmed(choice, scenes, peaks[0]) if any(peaks) else choice
+
+
+def _peak(scene: Scene) -> float:
+    """Return the amplitude of the resonance without bodies, m."""
+    assert isinstance(scene.structure, Rom)
+    whole = replace(scene, structure=replace(scene.structure, modes=None))
+    return excitation_force(whole) * chosen_resonance(whole).flexibility
 
 
 class _Ladders(NamedTuple):

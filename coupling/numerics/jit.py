@@ -18,6 +18,7 @@ import numpy as np
 from numba import config, njit, typeof, types
 from numba.extending import typeof_impl
 
+from vanedamp.coupling.numerics.code_file import CodeFile
 from vanedamp.coupling.numerics.code_library import ENTRY, INLINED, KERNEL, LOOPS
 from vanedamp.coupling.numerics.record import is_record, lengths, sized_type
 from vanedamp.files.errors import VanedampError
@@ -104,12 +105,13 @@ def _kept(function: Callable[..., Any]) -> Any:
             f"compiled functions have no folder that can be written to, of {folders} and the user's cache: "
             "set NUMBA_CACHE_DIR to one"
         ) from error
-    kept = compiled._cache._cache_file
+    kept = compiled._cache
     # numba dates a cached function by its own file only, but it holds the code of the functions that it calls
-    kept._source_stamp = _sources(Path(function.__code__.co_filename))
-    kept._load_index = _forgiving(kept._load_index)
-    if hasattr(compiled._cache, "_load_overload"):
-        compiled._cache.load_overload = partial(_load, compiled._cache)
+    kept._cache_file = CodeFile(
+        kept.cache_path, kept._impl.filename_base, _sources(Path(function.__code__.co_filename))
+    )  # fmt: skip
+    if hasattr(kept, "_load_overload"):
+        kept.load_overload = partial(_load, kept)
     return compiled
 
 
@@ -117,18 +119,6 @@ def _load(kept: Any, signature: Any, target: Any) -> Any:
     """Load machine code as numba does, without all that it could compile, which takes a quarter of a start."""
     with kept._guard_against_spurious_io_errors():
         return kept._load_overload(signature, target)
-
-
-def _forgiving(load: Callable[[], dict[Any, Any]]) -> Callable[[], dict[Any, Any]]:
-    """Load the index of a cache, or an empty one where it names records that another version of this package had."""
-
-    def index() -> dict[Any, Any]:
-        try:
-            return load()
-        except (AttributeError, ImportError):
-            return {}
-
-    return index
 
 
 @cache

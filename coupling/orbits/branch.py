@@ -14,7 +14,7 @@ from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Displayed
-from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.store import Variable, frozen, load, reader, save
 from vanedamp.files.toml_input import validate
 
 if TYPE_CHECKING:
@@ -221,6 +221,7 @@ class Branches(Displayed):
         save(path, KIND, self.variables(), self.attributes())
 
     @classmethod
+    @reader
     def load(cls, path: str | Path) -> Branches:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         return cls.of(*load(path, KIND), str(path))

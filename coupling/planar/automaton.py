@@ -39,9 +39,11 @@ from vanedamp.coupling.planar.contact_decisions import (
     gap,
     is_rigid,
     is_shut,
+    least_force,
     row_speed,
     rubs,
     speed_scale,
+    spring_force,
     yields,
 )
 from vanedamp.coupling.planar.event_functions import next_event
@@ -197,10 +199,21 @@ def _part(system, st, log, r):
     u, shift, speed = len(system.rest), gap(system, r, st.q), row_speed(system, r, st.v)
     left = 0.5 * system.spring[r] * shift * shift
     st.ledger[CONTACT] += left
-    st.state[r] = LEAVING if system.dashpot[r] > 0.0 and shift < 0.0 and speed > 0.0 else OPEN
+    parts = shift < -SIMULTANEOUS * system.play[r] and speed > AT_REST * st.scale[0]
+    st.state[r] = LEAVING if system.dashpot[r] > 0.0 and parts else OPEN
     if st.state[r] == OPEN:
         _close(system, st, r)
     log_event(system, st, log, DETACHES, r, 0.0, speed, st.pushed[r], st.pushed[u + r], st.lost[r] + left)
+
+
+@inlined
+def _is_spent(system, st, r):
+    """Whether the force of a contact that yields has vanished, but for round-off of its gap, and it parts.
+
+    Its friction is at both of its bounds there, and round-off would tell which of them, or its end, comes first.
+    """
+    spent = spring_force(system, r, st.q, st.v) <= least_force(system, r)
+    return spent and row_speed(system, r, st.v) > AT_REST * st.scale[0]
 
 
 @inlined
@@ -211,7 +224,7 @@ def _happen(system, st, rec, log, work, r, what):
         work.before[i] = st.state[i]
     if what == CLOSES:
         _close(system, st, r)
-    elif what == PARTS and yields(system, r):
+    elif yields(system, r) and (what == PARTS or ((what == AT_LOW or what == AT_HIGH) and _is_spent(system, st, r))):
         _part(system, st, log, r)
     elif what == OPENS:
         st.state[r] = OPEN
@@ -342,7 +355,7 @@ def _shares(system, flows, st):
     if not differs:
         return True
     for r in range(u - len(system.tangential)):
-        if r < system.contacts and st.state[r] < OPEN and _is_beyond(system, flows, st, r, 1.0, 0.0):
+        if is_rigid(system, r) and st.state[r] < OPEN and _is_beyond(system, flows, st, r, 1.0, 0.0):
             return False
         if st.state[r] == STICK:
             for way in (-1.0, 1.0):

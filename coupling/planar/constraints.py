@@ -20,11 +20,11 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import base_acceleration, physical_scale
 from vanedamp.coupling.system.body_loads import body_loads, centres
 from vanedamp.coupling.system.cavities import surface_labels
-from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of, interface_row
+from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of
 from vanedamp.coupling.system.restitution import law_address
+from vanedamp.coupling.system.surfaces import SIDES, Surface, flexibility, heights, surfaces_of
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.reduced import NORMAL, ROTATION
 
 #: the moment after which contacts are looked at again, in periods of the excitation or of the fastest contact
 _MOMENT = 1e-6
@@ -71,9 +71,10 @@ class PlanarSystem(NamedTuple):
     corner: np.ndarray  # (u,) int: 0 to 3, counted from the lower left one against the tilt; -1: none
     along: np.ndarray  # (b,) coordinate x of each body
     tilt: np.ndarray  # (b,) coordinate theta, -1: none
-    floor: np.ndarray  # (b, N) motion of the floor along the cavity
+    floor: np.ndarray  # (b, N) motion of the cavity along itself, at the height of the body's centre
     turn: np.ndarray  # (b, N) rotation of the cavity
     rise: np.ndarray  # (b, N) motion of the floor across the cavity, below the body's centre
+    height: np.ndarray  # (b,) of a body's centre above the floor, m; 0 where a slider has none
     cavity: np.ndarray  # (b,) number of the body's cavity
     neglected: (
         np.ndarray
@@ -81,7 +82,7 @@ class PlanarSystem(NamedTuple):
 
 
 #: names of what a unit touches
-SURFACES = ("left", "right", "floor", "ceiling", "body", "stop", "casing")
+SURFACES = (*SIDES, "body", "stop", "casing")
 LEFT, RIGHT, FLOOR, CEILING, BODY, STOP, CASING = range(len(SURFACES))
 
 
@@ -106,7 +107,7 @@ class _Unit(NamedTuple):
 
 
 class _Body(NamedTuple):
-    """A body: number, its coordinates in q, half length and half height (both the radius of a disc)."""
+    """A body: number, its coordinates in q, half length and height of its centre (both the radius of a disc)."""
 
     number: int
     damper: Damper
@@ -120,25 +121,6 @@ class _Body(NamedTuple):
         return (-self.a, -self.b), (self.a, -self.b), (self.a, self.b), (-self.a, self.b)
 
 
-class _Surface(NamedTuple):
-    """Motion (n,) of a surface of a cavity, along and across at a place (x, y) of it, and its rotation.
-
-    x, y: m, from the middle of the floor, along and across; None: that of the contact, wherever the surface is.
-    """
-
-    along: np.ndarray
-    across: np.ndarray
-    turn: np.ndarray
-    x: float | None = 0.0
-    y: float | None = 0.0
-    labels: tuple[str, str, str] = ("", "", "")  # interface coordinates of these three motions; "": none
-
-    def motion(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the motion along and across, (n,) each, of the surface's point (x, y)."""
-        along = self.along if self.y is None else self.along - self.turn * (y - self.y)
-        return along, self.across if self.x is None else self.across + self.turn * (x - self.x)
-
-
 def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     """Assemble the scene. flat: its system with every body as a slider, which has the same loads.
 
@@ -146,18 +128,17 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     """
     basis, n = basis_of(scene), flat.modes
     bodies, size = [], n
-    for number, damper in enumerate(scene.damper):
+    for number, (damper, height) in enumerate(zip(scene.damper, heights(scene), strict=True)):
         if damper.shape == "auto":
             raise InputError(f'damper[{number}].shape: "auto" is still open; model_order.choices.choose settles it')
-        a, b = damper.half_extent
-        bodies.append(_Body(number, damper, size, a, b))
+        bodies.append(_Body(number, damper, size, damper.half_extent[0], float(height)))
         size += 1 if damper.shape == "slider" else 3
     drawn = [row for row in range(len(bodies), flat.friction_rows) if flat.limit[row] > 0 and flat.spring[row] < np.inf]
     elongation = np.zeros((len(drawn), size + len(drawn)))
     elongation[:, :n], elongation[:, size:] = flat.J[drawn, :n], -np.eye(len(drawn))
     size += len(drawn)
     owner = [[cavity.name for cavity in scene.cavity].index(damper.cavity) for damper in scene.damper]
-    cavities = [_surfaces(scene, basis, index) for index in range(len(scene.cavity))]
+    cavities = [surfaces_of(scene, basis, index) for index in range(len(scene.cavity))]
     base = base_acceleration(scene, basis)
     mass, weight = np.ones(size), np.zeros(size)
     load = np.zeros((len(flat.frequency), size), complex)
@@ -168,7 +149,8 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         k, x = body.number, body.x
         mass[x], weight[x], load[:, x] = body.damper.mass, flat.weight[n + k], flat.load[:, n + k]
         ground = cavities[owner[k]][FLOOR]
-        floor[k, :n], turn[k, :n], rise[k, :n] = ground.along, ground.turn, ground.motion(float(centre[k]), 0.0)[1]
+        floor[k, :n], turn[k, :n] = ground.motion(0.0, body.b)[0], ground.turn
+        rise[k, :n] = ground.motion(float(centre[k]), 0.0)[1]
         if body.damper.shape != "slider":
             normal = basis.across(surface_labels(scene, owner[k])[2])
             mass[x + 1], weight[x + 1] = body.damper.mass, -body.damper.mass * float(loads.across[k])
@@ -247,7 +229,8 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
         surface=column("surface").astype(np.int64), corner=column("corner").astype(np.int64),
         along=np.array([body.x for body in bodies], np.int64),
         tilt=np.array([-1 if body.damper.shape == "slider" else body.x + 2 for body in bodies], np.int64),
-        floor=floor, turn=turn, rise=rise, cavity=np.array(owner, np.int64),
+        floor=floor, turn=turn, rise=rise, height=np.array([body.b for body in bodies]),
+        cavity=np.array(owner, np.int64),
         neglected=np.array([_neglected(body, scene.cavity[owner[body.number]]) for body in bodies]),
     )  # fmt: skip
 
@@ -268,65 +251,6 @@ def _neglected(body: _Body, cavity: Cavity) -> float:
     return max(body.a, body.b) / 2 / min(cavity.gap, cavity.play or np.inf)
 
 
-def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> tuple[_Surface, ...]:
-    """Return left wall, right wall, floor and ceiling of a cavity; a rigid structure's one mode moves them alike.
-
-    A surface whose label has no coordinates across and of rotation moves as the floor's rigid motion has it.
-    """
-    cavity, (left, right, below) = scene.cavity[index], surface_labels(scene, index)
-    labels, key = (left, right, below, cavity.ceiling or below), f"cavity[{index}]"
-    rows = [interface_row(basis, label, f"{key}.{SURFACES[side]}") for side, label in enumerate(labels)]
-    floor = rows[FLOOR]
-    for suffix, name in ((NORMAL, "normal_motion"), (ROTATION, "rotation")):
-        if getattr(cavity, name) and below + suffix in basis.rows:
-            raise InputError(f"{key}.{name}: the reduced model has '{below}{suffix}', which gives it; leave it out")
-    none = np.zeros(len(basis.stiffness))
-    across = basis.rows.get(below + NORMAL, cavity.normal_motion * floor) + none
-    turn = basis.rows.get(below + ROTATION, cavity.rotation * floor) + none
-    places = _places(basis, labels)
-    x_floor = 0.0 if places is None else places[FLOOR][0]
-    surfaces = []
-    for side, label in enumerate(labels):
-        x: float | None
-        y: float | None
-        x, y = (0.0, 0.0) if places is None else places[side]
-        own = label != below and label + NORMAL in basis.rows
-        if label != below and label + ROTATION in basis.rows and (places is None or not own):
-            raise InputError(
-                f"{key}.{SURFACES[side]}: '{label}' has a rotation, but '{label}' or '{below}' lacks its place or its "
-                'motion across; take kind = "patch" for both'
-            )
-        if not own:
-            x = x_floor
-        elif side != CEILING:
-            x = None  # a wall is touched on its plane, and a ceiling, wherever they are
-        if side == CEILING and label != below:
-            y = None
-        moves_across = basis.rows[label + NORMAL] if own else across
-        names = (
-            label,
-            (label if own else below) + NORMAL,
-            (label if label + ROTATION in basis.rows else below) + ROTATION,
-        )
-        first, second, third = (name if name in basis.rows else "" for name in names)
-        turns = basis.rows.get(label + ROTATION, turn)
-        surfaces.append(_Surface(rows[side], moves_across, turns, x, y, (first, second, third)))
-    return tuple(surfaces)
-
-
-def _places(basis: ModalBasis, labels: tuple[str, ...]) -> list[tuple[float, float]] | None:
-    """Return the places (x, y) of a cavity's surfaces, m from the middle of the floor; None where these are unknown.
-
-    labels: of left wall, right wall, floor and ceiling.
-    """
-    left, right, floor, _ = labels
-    across, along, at = basis.across(floor), basis.directions[floor], basis.positions
-    if across is None or not all(label in at for label in labels):
-        return None
-    middle = at[floor] if floor in (left, right) else 0.5 * (at[left] + at[right])
-    return [(float((at[label] - middle) @ along), float((at[label] - at[floor]) @ across)) for label in labels]
-
-
 class _Law(NamedTuple):
     """The contact law at the walls of a structure, with the masses (N,) of the coordinates, modes first."""
 
@@ -343,15 +267,9 @@ class _Law(NamedTuple):
         mobility[1 : len(self.basis.stiffness)] = 0.0
         return self.contact.element(restitution, 1 / float(mobility.sum()), flexibility)
 
-    def flexibility(self, surface: _Surface, is_wall: bool, lever: float = 0.0) -> float:
-        """Return the residual flexibility, m/N, of a surface against a force on it; lever: m, that turns it."""
-        moves, turns = surface.labels[0 if is_wall else 1], surface.labels[2]
-        shares = {moves: 1.0} | ({turns: lever} if turns and lever else {})
-        return self.basis.flexibility(shares) if moves else 0.0
-
 
 def _contacts(
-    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], bodies: list[_Body], centre: np.ndarray, size: int
+    law: _Law, cavity: Cavity, surfaces: tuple[Surface, ...], bodies: list[_Body], centre: np.ndarray, size: int
 ) -> list[_Unit]:
     """Contacts in a cavity, from left to right, in each body's walls, floor and ceiling."""
     units: list[_Unit] = []
@@ -379,7 +297,7 @@ def _point(body: _Body, a: float, b: float, size: int) -> tuple[np.ndarray, np.n
 
 
 def _at_walls(
-    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], body: _Body, surface: int, wall: float, size: int
+    law: _Law, cavity: Cavity, surfaces: tuple[Surface, ...], body: _Body, surface: int, wall: float, size: int
 ) -> list[_Unit]:
     """Contacts with the left or the right wall, at `wall` (m) along the cavity."""
     sign = 1.0 if surface == LEFT else -1.0
@@ -395,17 +313,17 @@ def _at_walls(
         along, across = _point(body, a, b, size)
         extended, moving = body.damper.shape != "slider", surfaces[surface]
         moved_along, moved_across = moving.motion(wall, body.b + b)
-        # a slider has no height: it meets the wall where the wall's motion is known
-        along[: len(moving.along)] -= moved_along if extended else moving.along
+        # a slider without a height meets the wall where the wall's motion is known
+        along[: len(moving.along)] -= moved_along if body.b > 0.0 else moving.along
         across[: len(moving.along)] -= moved_across
-        lever = 0.0 if moving.y is None or not extended else moving.y - body.b - b
+        lever = 0.0 if moving.y is None or not body.b else moving.y - body.b - b
         units.append(
             _Unit(
                 sign * along,
                 across * extended,
                 cavity.gap / 2,
                 body.damper.friction * extended,
-                law.element(sign * along, body.damper.restitution, law.flexibility(moving, True, lever)),
+                law.element(sign * along, body.damper.restitution, flexibility(law.basis, moving, True, lever)),
                 cavity.gap,
                 body.number,
                 surface,
@@ -416,7 +334,7 @@ def _at_walls(
 
 
 def _at_floor(
-    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], body: _Body, surface: int, centre: float, size: int
+    law: _Law, cavity: Cavity, surfaces: tuple[Surface, ...], body: _Body, surface: int, centre: float, size: int
 ) -> list[_Unit]:
     """Contacts with floor or ceiling of a body whose centre is at `centre` (m) along the cavity."""
     below, play = surface == FLOOR, cavity.play or 0.0
@@ -440,7 +358,7 @@ def _at_floor(
                 0.0 if below else play,
                 body.damper.friction,
                 law.element(
-                    sign * across, body.damper.restitution, law.flexibility(surfaces[surface], False, lever)
+                    sign * across, body.damper.restitution, flexibility(law.basis, surfaces[surface], False, lever)
                 ),
                 play,
                 body.number,
@@ -464,7 +382,7 @@ def _check_friction(units: list[_Unit], size: int, mass: np.ndarray) -> None:
 
 
 def _between(
-    law: _Law, cavity: Cavity, surfaces: tuple[_Surface, ...], left: _Body, right: _Body, size: int
+    law: _Law, cavity: Cavity, surfaces: tuple[Surface, ...], left: _Body, right: _Body, size: int
 ) -> list[_Unit]:
     """Contacts of two neighbours: blocks face to face at the ends of the common height, discs at one point."""
     shapes = {left.damper.shape, right.damper.shape}
@@ -491,7 +409,7 @@ def _between(
         heights = [round_one.b]
     coefficients = left.damper.restitution, right.damper.restitution
     friction = 0.0 if shapes == {"slider"} else (left.damper.friction * right.damper.friction) ** 0.5
-    units, yields = [], 0.5 * sum(law.flexibility(surfaces[side], True) for side in (LEFT, RIGHT))
+    units, yields = [], 0.5 * sum(flexibility(law.basis, surfaces[side], True) for side in (LEFT, RIGHT))
     for height in heights:
         right_along, right_across = _point(right, -right.a, height - right.b, size)
         left_along, left_across = _point(left, left.a, height - left.b, size)
@@ -512,7 +430,7 @@ def _between(
 
 
 def planar_motion(scene: Scene, flat: System, system: PlanarSystem) -> PlanarMotion:
-    """The motion that a scene begins with. Raises InputError for bodies that would overlap a surface."""
+    """The motion that a scene begins with. Raises InputError for what would overlap a surface or a stop."""
     n, size = flat.modes, len(system.mass)
     q, v = np.zeros(size), np.zeros(size)
     scale = physical_scale(scene, flat)
@@ -530,6 +448,11 @@ def planar_motion(scene: Scene, flat: System, system: PlanarSystem) -> PlanarMot
     gaps = system.rest + system.J[: len(system.rest)] @ q
     for unit in range(system.contacts):
         if gaps[unit] < -1e-12 * system.play[unit]:
+            if system.surface[unit] == STOP:
+                raise InputError(
+                    f"initial.displacement: the structure would begin {-gaps[unit]:.3g} m beyond "
+                    f"stop[{system.body[unit]}]"
+                )
             raise InputError(
                 f"damper[{system.body[unit]}]: begins {-gaps[unit]:.3g} m beyond the cavity's "
                 f"{SURFACES[system.surface[unit]]}; change position, lift or tilt"

@@ -66,6 +66,12 @@ def spring_force(system, unit, q, v):
 
 
 @inlined
+def least_force(system, unit):
+    """Return the force of a contact that yields by the resolution of its gap, N: below, it carries nothing."""
+    return SIMULTANEOUS * system.spring[unit] * system.play[unit]
+
+
+@inlined
 def rubs(system, unit):
     """Whether a unit has friction."""
     return unit >= system.contacts or system.friction[unit] > 0.0
@@ -444,8 +450,19 @@ def decide(system, st, work, scale):
         if work.resting[r] == _OPENS or work.resting[r] == _RESTS:
             st.state[r] = OPEN if work.resting[r] == _OPENS else TOUCHING
             st.other[r] = st.state[r]
+        if work.resting[r] == _PRESSED or work.resting[r] == _RESTS:
+            _rest(system, st, r)
         st.fresh[r] = 1
     return True
+
+
+@inlined
+def _rest(system, st, r):
+    """Take the round-off of its speed from a contact that touches without speed: its force would end as it begins."""
+    speed = row_speed(system, r, st.v)
+    if speed != 0.0:
+        for i in range(len(st.v)):
+            st.v[i] -= system.J[r, i] / system.mass[i] * speed / system.delassus[r, r]
 
 
 @inlined
@@ -476,7 +493,8 @@ def _press_or_open(system, work, count, nothing):
             acceleration = work.speed[r]
             for row in range(2 * u):
                 acceleration += system.delassus[r, row] * work.impulse[row]
-            if abs(acceleration) <= nothing * math.sqrt(system.delassus[r, r]):
+            least = least_force(system, r) * system.delassus[r, r]
+            if abs(acceleration) <= max(nothing * math.sqrt(system.delassus[r, r]), least):
                 doubts += 1
             else:
                 work.resting[r] = _PRESSED if acceleration < 0.0 else _OPENS
@@ -499,6 +517,8 @@ def loaded_acceleration(system, st, work, q, v, time):
         work.bound[r] = system.limit[r]
         if yields(system, r) and st.state[r] < OPEN:
             force = spring_force(system, r, q, v)
+            if work.resting[r] == _RESTS and force <= least_force(system, r):
+                force = 0.0  # it would press others
             work.bound[r] = system.friction[r] * force
             for i in range(len(q)):
                 part = system.J[r, i] * force / system.mass[i]
@@ -524,11 +544,14 @@ def _look_ahead(system, st, work, count):
 
     Where forces have only begun, they may all be others after that moment: a decision made anew looks less far ahead.
     """
-    u, size, moment = len(system.rest), len(st.q), system.moment * _SOONER ** work.attempt[0]
+    u, size = len(system.rest), len(st.q)
     for i in range(size):
-        total = work.free[i]
+        work.ahead[1, i] = work.free[i]
         for r in range(2 * u):
-            total += system.J[r, i] * work.impulse[r] / system.mass[i]
+            work.ahead[1, i] += system.J[r, i] * work.impulse[r] / system.mass[i]
+    moment = _before_end(system, st, work, count, work.ahead[1], system.moment * _SOONER ** work.attempt[0])
+    for i in range(size):
+        total = work.ahead[1, i]
         work.ahead[0, i] = st.q[i] + moment * (st.v[i] + 0.5 * moment * total)
         work.ahead[1, i] = st.v[i] + moment * total
     if len(system.tangential) > 0:
@@ -551,6 +574,20 @@ def _look_ahead(system, st, work, count):
     if len(system.tangential) > 0:
         _draw_sliders(system, st, work, _NEXT_TO_NOTHING * terms)
     return True
+
+
+@inlined
+def _before_end(system, st, work, count, acceleration, moment):
+    """Return the moment, or a shorter one in which no contact that yields ends whose slip is in doubt: without force
+    there is nothing to decide."""
+    for p in range(count):
+        r = work.listed[p]
+        if yields(system, r) and work.doubtful[p] == _SLIP and work.resting[r] == 0:
+            force, speed = spring_force(system, r, st.q, st.v), row_speed(system, r, st.v)
+            falls = system.spring[r] * speed + system.dashpot[r] * row_speed(system, r, acceleration)
+            if force > least_force(system, r) and falls * moment > 0.5 * force:
+                moment = 0.5 * force / falls
+    return moment
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.exact.event_functions import AT_START, RESOLUTION, step_or_stop
+from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.exact.root_search import DEGREE, expand, first_root_of_parabola
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
@@ -37,6 +38,8 @@ from vanedamp.coupling.planar.contact_decisions import AT_REST, rubs, yields
 _ROUND_OFF, _NOTHING = 4.0 * 2.0**-52, 1e-9
 #: what counts as zero where contacts have just been decided: of a gap, as a share of the play; of a speed
 _ZERO = 1e-12
+#: gap, as a share of the play, at which a contact that yields and touches without force has closed or opened
+_DRIFT = 2 * SIMULTANEOUS
 #: exponent of the growth of modes until the period's end above which the search looks less far
 _GROWN = 20.0
 
@@ -97,7 +100,11 @@ def _watch(system, flows, st, guards, s, grows):
                 count = _add(system, flows, st, guards, s, r, POSITION, OPENS, -1.0, 0.0, grows, count)
                 on_gap, on_rate = system.spring[r], system.dashpot[r]
                 count = _add(system, flows, st, guards, s, r, POSITION, RECLOSES, on_gap, on_rate, grows, count)
-            elif state != TOUCHING:
+            elif state == TOUCHING:
+                if yields(system, r):  # nothing presses it now
+                    count = _add(system, flows, st, guards, s, r, POSITION, CLOSES, 1.0, 0.0, grows, count)
+                    count = _add(system, flows, st, guards, s, r, POSITION, OPENS, -1.0, 0.0, grows, count)
+            else:
                 count = _add(system, flows, st, guards, s, r, FORCE, PARTS, 1.0, 0.0, grows, count)
         if state == STICK and rubs(system, r):
             bound = system.friction[r]
@@ -147,6 +154,8 @@ def _add(system, flows, st, guards, s, r, order, what, on_normal, on_slip, grows
             k0 += part
             noise += abs(part)
             k1 += on_slip * system.J[u + r, i] * st.bend[i]
+    if st.state[r] == TOUCHING:  # as far as round-off of its gap may have it drift
+        k0 += _DRIFT * system.play[r]
     # derivatives at the start, and bounds of them at all later times
     first, second, third, second_bound, third_bound, fourth_bound, swing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     value = k0

@@ -144,6 +144,17 @@ def _product(work, one, other, m, tau):
 
 
 @inlined
+def _integral(work, signal, m, tau):
+    """Integral of a signal."""
+    c, total = work.constant[signal], 0.0
+    for k in range(3):
+        total += c[k] * tau ** (k + 1) / (k + 1)
+    for j in range(m):
+        total += (work.signal[signal, j] * work.moment[0, j]).real
+    return total
+
+
+@inlined
 def _harmonic(st, work, signal, m):
     """Integral of a signal times the conjugate phase of the first harmonic."""
     c, g, total = work.constant[signal], work.signal[signal], complex(0.0, 0.0)
@@ -170,6 +181,8 @@ def integrate(system, flows, st, rec, work, tau):
     rec.harmonic[period] += _harmonic(st, work, _X, m)
     rec.momentum[period] += _harmonic(st, work, _MOMENTUM, m)
     rec.square[period] += _product(work, _X, _X, m, tau)
+    if len(rec.swing) > 0:
+        rec.swing[period, 2] += _integral(work, _X, m, tau)
 
 
 @inlined

@@ -18,6 +18,7 @@ from vanedamp.coupling.planar.constraints import FLOOR
 from vanedamp.coupling.planar.contact_decisions import row_speed, yields
 from vanedamp.coupling.planar.exponential_integrals import integrate, response_after, set_up
 from vanedamp.coupling.planar.recorder import note_tilts
+from vanedamp.coupling.response.recorder import note_response
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, VISCOUS
 
 _TURN = 1.5
@@ -57,7 +58,7 @@ def add_up(system, flows, st, rec, work, tau):
         fastest = max(fastest, abs(rate.real) + abs(rate.imag))
         slowest = min(slowest, abs(rate.real) + abs(rate.imag))
     x0, rate0 = response_at(system, st.q, st.v, st.time[0])
-    rec.peak[period] = max(rec.peak[period], abs(x0))
+    note_response(rec, period, x0)
     note_tilts(system, st, st.q, period)
     for b in range(len(system.along)):
         if system.tilt[b] >= 0 and not _on_floor(system, st, b):
@@ -76,9 +77,9 @@ def add_up(system, flows, st, rec, work, tau):
         end = h * (piece + 1)
         motion_at(system, flows, st, work, end, q, v)
         x1, rate1 = response_at(system, q, v, st.time[0] + end)
-        rec.peak[period] = max(rec.peak[period], abs(x1))
+        note_response(rec, period, x1)
         if rate0 * rate1 < 0.0:
-            rec.peak[period] = max(rec.peak[period], _extremum(system, flows, st, work, q, v, end - h, end, rate0))
+            note_response(rec, period, _extremum(system, flows, st, work, q, v, end - h, end, rate0))
         rate0 = rate1
 
 
@@ -97,7 +98,7 @@ def _add_closed_forms(system, flows, st, rec, work, tau, pieces, x0, rate0):
     h = tau / pieces
     for piece in range(pieces):
         x1, rate1, _ = response_after(flows, st, work, h * (piece + 1))
-        rec.peak[period] = max(rec.peak[period], abs(x1))
+        note_response(rec, period, x1)
         if rate0 * rate1 < 0.0:
             low, high, t = h * piece, h * (piece + 1), h * (piece + 0.5)
             for _ in range(_STEPS):  # Newton's method, held between the bounds
@@ -108,7 +109,7 @@ def _add_closed_forms(system, flows, st, rec, work, tau, pieces, x0, rate0):
                 if abs(step - t) <= _FINE * h:
                     break
                 t = step
-            rec.peak[period] = max(rec.peak[period], abs(x))
+            note_response(rec, period, x)
         rate0 = rate1
 
 
@@ -179,6 +180,8 @@ def _add_node(system, flows, st, rec, work, q, v, t, weight):
     rec.harmonic[period] += weight * x * back
     rec.momentum[period] += weight * momentum * back
     rec.square[period] += weight * x * x
+    if len(rec.swing) > 0:
+        rec.swing[period, 2] += weight * x
 
 
 @inlined
@@ -199,7 +202,7 @@ def response_at(system, q, v, time):
 
 @kernel
 def _extremum(system, flows, st, work, q, v, low, high, rate):
-    """Return |response| where its speed vanishes between two times, by bisection."""
+    """Return the response where its speed vanishes between two times, by bisection."""
     x = 0.0
     for _ in range(30):
         middle = 0.5 * (low + high)
@@ -211,4 +214,4 @@ def _extremum(system, flows, st, work, q, v, low, high, rate):
             low = middle
         else:
             high = middle
-    return abs(x)
+    return x

@@ -61,7 +61,8 @@ def _samples(
         lift[:, body] = gap[:, stands].mean(axis=1)
         across[:, body] = -q[:, :first] @ system.J[stands, :first].mean(axis=0)
     return PlanarSamples(
-        body_lift=lift, body_tilt=tilt, floor_along=base[:, None] + q @ system.floor.T, floor_across=across,
+        body_lift=lift, body_tilt=tilt, floor_along=base[:, None] + q @ system.floor.T + rotation * system.height,
+        floor_across=across,
         floor_rotation=rotation, contact_gap=gap, contact_closed=shut[: len(x), :contacts].astype(bool),
         contacts=tuple(places[:contacts]),
     )  # fmt: skip

@@ -13,9 +13,11 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics import codes
+from vanedamp.coupling.response.at_rest import at_rest
 from vanedamp.coupling.response.records import DETACHES, ENERGIES, EXCITATION, IMPACT, KINDS, STORED, VISCOUS, Records
 from vanedamp.coupling.response.response import Event, PlanarSamples, Response, Status, classify
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.static_deflection import about_mean
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import InitialMotion
@@ -114,7 +116,7 @@ def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | Non
         if scene.time.steady != "auto":
             continue
         outcome = run.outcome()
-        peaks = outcome.records.peak[: outcome.periods]
+        _, peaks = about_mean(outcome.records, slice(0, outcome.periods), outcome.system.period)
         transient = transient_length(peaks)
         if transient is None:
             status, dropped = Status.NOT_STEADY, scene.time.dropped
@@ -126,7 +128,8 @@ def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | Non
     if scene.time.steady != "auto":
         outcome, window = run.outcome(), slice(dropped, scene.time.simulated)
         records = outcome.records
-        steady = not dropped or outlasted(scene, records.peak[window], records.impacts[window], outcome.system)
+        _, peaks = about_mean(records, window, outcome.system.period)
+        steady = not dropped or outlasted(scene, peaks, records.impacts[window], outcome.system)
         status = Status.OK if steady else Status.NOT_STEADY
     return status, dropped
 
@@ -143,6 +146,8 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
     harmonic = 2 / span * records.harmonic[window].sum()
     evaluated = {name: float(value) for name, value in zip(ENERGIES, ledger[-1], strict=True)}
     peaks = records.peak[window]
+    static, dynamic = about_mean(records, window, system.period)
+    scale = _state_scale(system, section[first:])
     balance = residual(
         records.ledger[: done + 1], records.parts[: done + 1], exchanged_energy(system, records.collided)
     )
@@ -161,6 +166,9 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         amplitude_max=float(peaks.max(initial=0.0)),
         amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
         amplitude_mean_confidence=mean_confidence(peaks),
+        static_deflection=static,
+        amplitude_max_dynamic=float(dynamic.max(initial=0.0)),
+        amplitude_mean_dynamic=float(dynamic.mean()) if len(dynamic) else 0.0,
         amplitude_rms=float(np.sqrt(max(records.square[window].sum() / span, 0.0))),
         amplitude_harmonic=float(abs(harmonic)),
         phase=float(np.angle(1j * harmonic)),
@@ -168,9 +176,9 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         events=run.events,
         classification=classify(
             section[first:],
-            _state_scale(system, section[first:]),
+            scale,
             records.impacts[window],
-            evaluated["friction"],
+            not evaluated["friction"] > 0.0 and at_rest(scene, system, section[first:], scale),
         ),
         energy=evaluated,
         energy_residual=balance,

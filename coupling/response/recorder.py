@@ -60,10 +60,28 @@ def _dot(a, b):
 
 
 @entry
-def cubic_peak(h, x0, x1, rate0, rate1):
-    """Return |x| on the cubic through both ends where the line through both velocities is zero; 0 if nowhere."""
+def cubic_extremum(h, x0, x1, rate0, rate1):
+    """Return x on the cubic through both ends where the line through both velocities is zero; x1 if nowhere."""
     if not rate0 * rate1 < 0.0:
-        return 0.0
+        return x1
     t = rate0 / (rate0 - rate1)
     u = 1.0 - t
-    return abs(x0 * u * u * (1.0 + 2.0 * t) + x1 * t * t * (3.0 - 2.0 * t) + h * t * u * (u * rate0 - t * rate1))
+    return x0 * u * u * (1.0 + 2.0 * t) + x1 * t * t * (3.0 - 2.0 * t) + h * t * u * (u * rate0 - t * rate1)
+
+
+@entry
+def note_response(records, period, x):
+    """Let a value x of the response count among the period's largest and smallest."""
+    records.peak[period] = max(records.peak[period], abs(x))
+    if len(records.swing) > 0:
+        swing = records.swing[period]
+        swing[0], swing[1] = max(swing[0], x), min(swing[1], x)
+
+
+@entry
+def note_step(records, period, h, x0, x1, rate0, rate1):
+    """Let the response on a step of length h count: its end, its extremum, and its integral by both ends."""
+    note_response(records, period, x1)
+    note_response(records, period, cubic_extremum(h, x0, x1, rate0, rate1))
+    if len(records.swing) > 0:
+        records.swing[period, 2] += h * (0.5 * (x0 + x1) + h * (rate0 - rate1) / 12.0)

@@ -32,6 +32,7 @@ class Records(NamedTuple):
     samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples a period
     coordinates: np.ndarray  # (periods * s, n) modal coordinates there, (., 0): not wanted; nan: not kept
     log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
+    swing: np.ndarray  # (., 3): largest and smallest x, m, and its integral, m s; (0, 3): bodies bring no static load
 
     @property
     def samples_per_period(self) -> int:
@@ -39,8 +40,13 @@ class Records(NamedTuple):
         return len(self.samples) // max(len(self.peak) - 1, 1)
 
 
-def new_records(system: System, periods: int, samples: int, coordinates: bool = False) -> Records:
-    """Return empty records for `periods` periods with `samples` samples each; coordinates: of these as well."""
+def new_records(
+    system: System, periods: int, samples: int, coordinates: bool = False, deflected: bool = False
+) -> Records:
+    """Return empty records for `periods` periods with `samples` samples each.
+
+    coordinates: of these samples as well; deflected: whether loads of the bodies deflect the structure.
+    """
     b = system.bodies
     return Records(
         peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
@@ -50,4 +56,5 @@ def new_records(system: System, periods: int, samples: int, coordinates: bool = 
         samples=np.zeros((periods * samples, 1 + b)),
         coordinates=np.full((periods * samples, system.modes if coordinates else 0), np.nan),
         log=np.zeros((4096 + 4 * len(system.delassus), 6)),
+        swing=np.tile([-np.inf, np.inf, 0.0], ((periods + 1) * deflected, 1)),
     )  # fmt: skip

@@ -120,6 +120,7 @@ class PlanarSamples(NamedTuple):
 #: units of the figures of a response that have one
 UNITS = {
     "frequency": "Hz", "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m",
+    "static_deflection": "m", "amplitude_max_dynamic": "m", "amplitude_mean_dynamic": "m",
     "amplitude_rms": "m", "amplitude_harmonic": "m", "phase": "rad", "wall_time_s": "s",
 }  # fmt: skip
 
@@ -138,6 +139,13 @@ class Response(Displayed):
     """mean of the largest displacements of the periods [m]"""
     amplitude_mean_confidence: float | None
     """half width of the 95 % confidence interval of that mean; None if there are too few periods [m]"""
+    static_deflection: float
+    """displacement that static loads of the bodies hold, their weight or centrifugal pull: the mean position of the
+    motion; 0 without such loads [m]"""
+    amplitude_max_dynamic: float
+    """largest distance from the static deflection [m]"""
+    amplitude_mean_dynamic: float
+    """mean of the periods' largest distances from the static deflection, to be compared with linear amplitudes [m]"""
     amplitude_rms: float
     """root mean square of the displacement [m]"""
     amplitude_harmonic: float
@@ -206,7 +214,8 @@ class Response(Displayed):
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
         names = (
-            "frequency", "amplitude_max", "amplitude_mean", "amplitude_mean_confidence", "amplitude_rms",
+            "frequency", "amplitude_max", "amplitude_mean", "amplitude_mean_confidence",
+            "static_deflection", "amplitude_max_dynamic", "amplitude_mean_dynamic", "amplitude_rms",
             "amplitude_harmonic", "phase",
             "impacts_per_period", "events", "classification", "energy", "energy_residual", "attached_mass_fraction",
             "wall_time_s", "periods", "transient", "counters", "penetration",
@@ -275,16 +284,15 @@ class Response(Displayed):
         return [name for name in Event.__dataclass_fields__ if self.tilt_max is not None or name not in planar]
 
 
-def classify(
-    section: np.ndarray, scale: np.ndarray, impacts: np.ndarray, friction_loss: float, longest: int = 16
-) -> str:
+def classify(section: np.ndarray, scale: np.ndarray, impacts: np.ndarray, at_rest: bool, longest: int = 16) -> str:
     """Return "periodic-k", "non-periodic", "no-contact" or "stuck" from the section (periods + 1, states) of a run.
 
     A response has period k if the last section equals those k, 2k, ... periods before it within 1e-6 of each
-    state's scale (states,), over at least 8 repetitions or half of the section.
+    state's scale (states,), over at least 8 repetitions or half of the section. at_rest: whether no body moves
+    relative to its cavity.
     """
     if not impacts.any():
-        return "no-contact" if friction_loss > 0 else "stuck"
+        return "stuck" if at_rest else "no-contact"
     available = len(section) - 1
     for k in range(1, longest + 1):
         span = min(8 * k, available - k)

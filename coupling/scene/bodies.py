@@ -77,7 +77,8 @@ class Damper:
     length: Positive | None = None
     """extent of a block along the cavity [m]"""
     height: Positive | None = None
-    """extent of a block across the cavity [m]"""
+    """extent of a block across the cavity; of a slider, optional: its centre is half of it above the floor, and moves
+    with a cavity that turns [m]"""
     radius: Positive | None = None
     """radius of a disc [m]"""
     inertia: Positive | None = None
@@ -103,6 +104,8 @@ class Damper:
         block = ("length", "height")
         wanted = {"slider": (), "block": block, "disc": ("radius",), "auto": block}[self.shape]
         for key in ("length", "height", "radius"):
+            if (self.shape, key) == ("slider", "height"):
+                continue  # says how high its centre is, if it is known
             if (getattr(self, key) is not None) != (key in wanted):
                 raise ValueError(f'{key}: {"missing" if key in wanted else "not a measure"} of shape = "{self.shape}"')
         if self.shape == "slider":
@@ -130,7 +133,7 @@ class Damper:
 
     @property
     def half_extent(self) -> tuple[float, float]:
-        """Half the length and half the height, m; 0 of a slider."""
+        """Half the length and half the height, m; 0 where a slider has none."""
         if self.shape == "disc":
             assert self.radius is not None
             return self.radius, self.radius

@@ -77,7 +77,8 @@ class Rom:
     attached: bool = False
     """add residual attachment modes to natural ones, which keep the model's flexibility"""
     tolerance: Annotated[Real, Field(gt=0, lt=1)] = 0.01
-    """of modes = "auto": estimated error that is allowed, relative [-]"""
+    """of modes = "auto": error of the mean amplitude that is allowed, relative to the resonance's peak without bodies,
+    with errors of the model's forces counted in full [-]"""
 
     def __post_init__(self) -> None:
         if self.attached and not (self.natural and isinstance(self.modes, int)):

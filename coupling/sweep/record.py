@@ -15,7 +15,7 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.coupling.sweep.worker import IN_PLANE, LOSSES, MEASURES
 from vanedamp.files.display import Displayed
-from vanedamp.files.store import Variable, dataset, frozen, load, save
+from vanedamp.files.store import Variable, dataset, frozen, load, reader, save
 from vanedamp.files.toml_input import validate
 
 _KIND = "sweep"
@@ -34,7 +34,9 @@ class Sweep(Displayed):
     axes                  dotted path -> values
     amplitude_*           m, of the displacement at excitation.at; `undamped` and `fixed` are those of the linear
                           structure without bodies and with every body glued to its cavity; `mean_confidence` is the
-                          half width of the mean's 95 % confidence interval, nan where there are too few periods
+                          half width of the mean's 95 % confidence interval, nan where there are too few periods;
+                          `max_dynamic` and `mean_dynamic` count from the static deflection under the bodies' loads,
+                          as `undamped` and `fixed` do
     attached_mass_fraction  share of the bodies' mass that the structure feels; nan without bodies or motion
     energy_share          (*grid, 4) share of viscous, friction, impact and contact loss; nan where nothing is lost
     status                "ok", another response.response.Status, or "error: ..." for a run that broke, without measures
@@ -55,6 +57,8 @@ class Sweep(Displayed):
     amplitude_max: np.ndarray
     amplitude_mean: np.ndarray
     amplitude_mean_confidence: np.ndarray
+    amplitude_max_dynamic: np.ndarray
+    amplitude_mean_dynamic: np.ndarray
     amplitude_rms: np.ndarray
     amplitude_harmonic: np.ndarray
     amplitude_undamped: np.ndarray
@@ -123,9 +127,12 @@ class Sweep(Displayed):
         return variables, attributes
 
     @classmethod
+    @reader
     def load(cls, path: str | Path) -> Sweep:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, _KIND)
+        for name in ("amplitude_max", "amplitude_mean"):  # all that earlier files have
+            values.setdefault(f"{name}_dynamic", values[name])
         axes = {axis: values[_dimension(axis)] for axis in attributes["axes"]}
         return cls(
             scene=validate(Scene, json.loads(attributes["scene"]), str(path)),

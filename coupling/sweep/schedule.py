@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.sweep.grid import Grid, PointList
-from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, broken, run_points, tasks_of, width_of
-from vanedamp.files.errors import VanedampError
+from vanedamp.coupling.sweep.worker import (
+    SweepError,
+    SweepTable,
+    Task,
+    TaskResult,
+    broken,
+    run_points,
+    tasks_of,
+    width_of,
+)
 
 #: s that a task takes at least, unless few points are left: long enough that handing it out costs nothing
 _SECONDS = 1.0
@@ -21,11 +30,6 @@ _RATE = 100
 _PER_WORKER = 4
 #: workers of an executor that does not tell how many it has
 _UNKNOWN = 256
-
-
-class SweepError(VanedampError):
-    """A sweep that cannot go on: its workers are gone."""
-
 
 #: a task and the rest of its chain
 _Entry = tuple[Task, Sequence[int]]
@@ -93,8 +97,12 @@ def _submit(grid: Grid | PointList, task: Task, executor: Executor | None) -> Fu
         future: Future[TaskResult] = Future()
         future.set_result(run_points(grid.base, grid.choices, points, task))
         return future
+    return _handed_out(executor, run_points, grid.base, grid.choices, points, task)
+
+
+def _handed_out(executor: Executor, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
     try:
-        return executor.submit(run_points, grid.base, grid.choices, points, task)
+        return executor.submit(function, *arguments)
     except (BrokenExecutor, RuntimeError) as error:
         raise SweepError(f"the workers are gone ({error}); run the same again to go on from the checkpoint") from error
 
@@ -105,7 +113,7 @@ def _ended(
     """Yield tasks that have ended, taken from those that run.
 
     A process pool that loses a worker gives up all of its tasks: their points run again, one by one, to find the point
-    that breaks it.
+    that breaks it. Raises SweepError for what is no fault of a point.
     """
     done = wait(running, return_when=FIRST_COMPLETED).done
     if any(isinstance(future.exception(), BrokenExecutor) for future in done if not future.cancelled()):
@@ -117,6 +125,8 @@ def _ended(
             lost.append((entry, future))
         else:
             yield entry, future.result()
+    for _, future in lost:
+        _raise_sweep_error(future)
     for (task, rest), future in lost:
         yield (task, rest), _one_by_one(grid, task, future, executor)
 
@@ -130,7 +140,17 @@ def _one_by_one(grid: Grid | PointList, task: Task, lost: Future[TaskResult], ex
         known = len(task.points) == 1 and not lost.cancelled() and not isinstance(lost.exception(), BrokenExecutor)
         future = lost if known else _submit(grid, single, executor)
         error = future.exception()
+        if error is not None:
+            _raise_sweep_error(future)
+            if executor is not None and _handed_out(executor, width_of, grid.base).exception() is not None:
+                raise SweepError(f"the workers end as they begin ({error}); run the same again to go on") from error
         results.append(future.result() if error is None else broken(error, width_of(grid.base)))
         state = state if results[-1].final is None else results[-1].final
     texts = [text for result in results for text in result.texts]
     return TaskResult(np.concatenate([result.values for result in results]), texts, state if task.linked else None)
+
+
+def _raise_sweep_error(future: Future[TaskResult]) -> None:
+    """Raise what a worker found that is no fault of a point."""
+    if not future.cancelled() and isinstance(future.exception(), SweepError):
+        future.result()

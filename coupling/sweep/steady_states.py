@@ -15,7 +15,7 @@ _BODY = ("position", "velocity", "lift", "lift_velocity", "tilt", "tilt_rate")
 #: tables that say how a run begins
 _TABLES = ("initial", "continuation")
 #: measures that tell steady states apart, and the size below which their differences count as absolute ones
-_FINGERPRINT = {"amplitude_mean": 0.0, "attached_mass_fraction": 1.0, "impacts_per_period": 1.0}
+_FINGERPRINT = {"amplitude_mean_dynamic": 0.0, "attached_mass_fraction": 1.0, "impacts_per_period": 1.0}
 
 
 class SteadyState(NamedTuple):
@@ -96,7 +96,7 @@ def _states(sweep: Sweep, place: np.ndarray, tolerance: float) -> tuple[np.ndarr
         return np.zeros(0, int), []
     classification = sweep.classification.ravel()[place]
     measures = {name: np.nan_to_num(getattr(sweep, name).ravel()[place]) for name in _FINGERPRINT}
-    amplitude = measures["amplitude_mean"]
+    amplitude = measures["amplitude_mean_dynamic"]
     confidence = np.nan_to_num(sweep.amplitude_mean_confidence.ravel()[place])
     relative = np.divide(confidence, amplitude, out=np.zeros_like(amplitude), where=amplitude > 0)
     half = np.maximum(tolerance / 2, np.where(classification == "non-periodic", relative, 0.0))
@@ -109,7 +109,10 @@ def _states(sweep: Sweep, place: np.ndarray, tolerance: float) -> tuple[np.ndarr
     label, found = np.argsort(by_amplitude)[group], []
     for number in range(count):
         own = label == number
-        means = {name: float(values[own].mean()) for name, values in measures.items()}
+        means = {
+            name: float(np.nan_to_num(getattr(sweep, name).ravel()[place][own]).mean())
+            for name in ("amplitude_mean", "attached_mass_fraction", "impacts_per_period")
+        }
         found.append(SteadyState(classification[own][0], **means, runs=int(own.sum())))
     return label, found
 

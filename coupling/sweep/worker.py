@@ -11,16 +11,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.numerics.jit import CacheError
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points
 from vanedamp.coupling.system.linear_response import linear_responses
+from vanedamp.files.errors import VanedampError
+from vanedamp.files.store import StoreError
 
 #: measures of a run and their units, each an array over the grid
 MEASURES = {
-    "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m", "amplitude_rms": "m",
-    "amplitude_harmonic": "m", "amplitude_undamped": "m", "amplitude_fixed": "m",
+    "amplitude_max": "m", "amplitude_mean": "m", "amplitude_mean_confidence": "m", "amplitude_max_dynamic": "m",
+    "amplitude_mean_dynamic": "m", "amplitude_rms": "m", "amplitude_harmonic": "m", "amplitude_undamped": "m",
+    "amplitude_fixed": "m",
     "impacts_per_period": "1", "attached_mass_fraction": "1", "energy_residual": "1",
 }  # fmt: skip
 #: measures of each body in the plane and their units, each an array over the grid and the bodies
@@ -30,8 +34,15 @@ LOSSES = ("viscous", "friction", "impact", "contact")
 TEXTS = ("status", "classification")
 #: columns of every point: measures, then shares of the losses; behind them IN_PLANE, body by body
 COLUMNS = (*MEASURES, *LOSSES)
+#: faults of a point: what its parameters may cause; all others, such as of imports, files and memory, would meet the
+#: next point as well
+_OF_A_POINT = (ArithmeticError, LookupError, RuntimeError, ValueError)
 _LINEAR = [COLUMNS.index(name) for name in ("amplitude_undamped", "amplitude_fixed")]
 _OF_RUN = [(name, place) for place, name in enumerate(MEASURES) if place not in _LINEAR]
+
+
+class SweepError(VanedampError):
+    """A sweep that cannot go on: its workers are gone, or the machine lacks what every run needs."""
 
 
 class Task(NamedTuple):
@@ -53,7 +64,10 @@ class TaskResult(NamedTuple):
 
 
 def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> TaskResult:
-    """Run some points, given by the values of the axes: the task of a worker."""
+    """Run some points, given by the values of the axes: the task of a worker.
+
+    Raises SweepError for what is no fault of a point.
+    """
     started = time.perf_counter()
     maker, state = Points(base, choices), task.start
     values = np.full((len(points), width_of(base)), np.nan)
@@ -130,6 +144,11 @@ def _run(
         row[_LINEAR] = _linear(chosen.scene)
         response = simulate(chosen.scene, start=start or chosen.start)
     except Exception as error:  # one broken point must not cost the others
+        if isinstance(error, StoreError | CacheError) or not isinstance(error, _OF_A_POINT):
+            where = ", ".join(f"{path} = {value}" for path, value in point.items())
+            raise SweepError(
+                f"stopped at {where}: {type(error).__name__}: {error}; run the same again to go on from the checkpoint"
+            ) from error
         texts.extend(broken(error).texts)
         return None
     for name, place in _OF_RUN:

@@ -6,6 +6,10 @@ wall to first body, body to body, last body to right wall; one a stop).
 
 A gap between a body and a wall that moves with the floor, and every gap between two bodies, is the difference of slips,
 which are the state, so that slips and gaps can never disagree.
+
+A body whose height is known lies flat in a cavity that turns by theta: its centre, h/2 above the floor, moves by
+u - theta h/2 where the floor moves by u. So all its rows are those of surfaces at that height; without a height they
+are those of the interface coordinates themselves.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.body_loads import body_loads
 from vanedamp.coupling.system.cavities import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
+from vanedamp.coupling.system.surfaces import SIDES, flexibility, heights, surfaces_of
 
 #: coefficients of friction below this are none
 _SMOOTH = 1e-9
@@ -77,11 +82,15 @@ def constraints_of(scene: Scene, basis: ModalBasis, at: str) -> Constraints:
     cavities = [_surfaces(scene, basis, index) for index in range(len(scene.cavity))]
     names = [cavity.name for cavity in scene.cavity]
     owner = [names.index(damper.cavity) for damper in scene.damper]
+    around = [
+        _at_height(scene, basis, index, float(height)) if height else cavities[index]
+        for index, height in zip(owner, heights(scene), strict=True)
+    ]
     n, bodies = len(basis.stiffness), len(owner)
-    floor = np.reshape([cavities[index].floor for index in owner], (bodies, n))
-    floors = [cavities[index].labels[2] for index in owner]
+    floor = np.reshape([surfaces.floor for surfaces in around], (bodies, n))
+    floors = [surface_labels(scene, index)[2] for index in owner]
     friction = [*_slips(scene, floor, body_loads(scene, basis).across), *_friction_dampers(scene, basis, at)]
-    rows = [*friction, *_gaps(scene, cavities, owner), *_stops(scene, basis)]
+    rows = [*friction, *_gaps(scene, cavities, around, owner), *_stops(scene, basis)]
     structure = np.reshape([row.structure for row in rows], (len(rows), n))
     left, right = (np.array([getattr(row, side) for row in rows], np.int64) for side in ("left", "right"))
     numbers = np.arange(bodies)
@@ -103,9 +112,8 @@ def constraints_of(scene: Scene, basis: ModalBasis, at: str) -> Constraints:
 
 
 class _Surfaces(NamedTuple):
-    """Labels of left wall, right wall and floor of a cavity, functionals (n,), flexibilities of the walls (m/N)."""
+    """Functionals (n,) of left wall, right wall and floor as a body meets them, flexibilities of the walls (m/N)."""
 
-    labels: tuple[str, str, str]
     left: np.ndarray
     right: np.ndarray
     floor: np.ndarray
@@ -113,13 +121,20 @@ class _Surfaces(NamedTuple):
 
 
 def _surfaces(scene: Scene, basis: ModalBasis, index: int) -> _Surfaces:
+    """Return the surfaces of a cavity where their motions are known."""
     labels = surface_labels(scene, index)
     left, right, floor = (
-        interface_row(basis, label, f"cavity[{index}].{side}")
-        for label, side in zip(labels, ("left", "right", "floor"), strict=True)
+        interface_row(basis, label, f"cavity[{index}].{side}") for label, side in zip(labels, SIDES, strict=False)
     )
-    yields = basis.flexibility({labels[0]: 1.0}), basis.flexibility({labels[1]: 1.0})
-    return _Surfaces(labels, left, right, floor, yields)
+    return _Surfaces(left, right, floor, (basis.flexibility({labels[0]: 1.0}), basis.flexibility({labels[1]: 1.0})))
+
+
+def _at_height(scene: Scene, basis: ModalBasis, index: int, height: float) -> _Surfaces:
+    """Return the surfaces of a cavity at a height above its floor, m."""
+    left, right, floor, _ = surfaces_of(scene, basis, index)
+    yields = [flexibility(basis, wall, True, 0.0 if wall.y is None else wall.y - height) for wall in (left, right)]
+    motions = [surface.motion(0.0, height)[0] for surface in (left, right, floor)]
+    return _Surfaces(motions[0], motions[1], motions[2], (yields[0], yields[1]))
 
 
 def _slips(scene: Scene, floor: np.ndarray, across: np.ndarray) -> list[_Row]:
@@ -141,21 +156,29 @@ def _friction_dampers(scene: Scene, basis: ModalBasis, at: str) -> list[_Row]:
     return rows
 
 
-def _gaps(scene: Scene, cavities: list[_Surfaces], owner: list[int]) -> list[_Row]:
-    """Return the rows of all gaps, cavity by cavity from left to right."""
+def _gaps(scene: Scene, cavities: list[_Surfaces], around: list[_Surfaces], owner: list[int]) -> list[_Row]:
+    """Return the rows of all gaps, cavity by cavity from left to right.
+
+    around: (b,) the surfaces as each body meets them.
+    """
     rows = []
-    for index, (cavity, surfaces) in enumerate(zip(scene.cavity, cavities, strict=True)):
+    for index, cavity in enumerate(scene.cavity):
         inside = [i for i, where in enumerate(owner) if where == index]
         for left, right in itertools.pairwise([-1, *inside, -1]) if inside else ():
-            wall: np.ndarray = (right < 0) * surfaces.right - (left < 0) * surfaces.left
+            if right < 0:
+                wall = around[left].right
+            elif left < 0:
+                wall = -around[right].left
+            else:  # the cavity turns their faces, and centres of blocks may have two heights
+                wall = around[left].floor - around[right].floor
             pair = [scene.damper[i] for i in (left, right) if i >= 0]
             coefficients = [damper.restitution for damper in pair]
             restitution = coefficients[0] if len(pair) == 1 else scene.contact.pair_restitution(*coefficients)
             # the wall's mass is that of the structure's first mode, the same for every number of modes
             mobility = float(sum(1 / damper.mass for damper in pair) + (wall[:1] ** 2).sum())
             # between two bodies, the mean flexibility of the cavity's walls
-            yields = surfaces.flexibility[0] if left < 0 else surfaces.flexibility[1]
-            yields = yields if len(pair) == 1 else 0.5 * sum(surfaces.flexibility)
+            yields = around[right].flexibility[0] if left < 0 else around[left].flexibility[1]
+            yields = yields if len(pair) == 1 else 0.5 * sum(cavities[index].flexibility)
             element = scene.contact.element(restitution, 1 / mobility, yields)
             rest = 0.5 * cavity.gap if len(pair) == 1 else 0.0
             rows.append(_Row(wall, left, right, element=element, rest=rest, free_travel=cavity.gap))

@@ -47,6 +47,9 @@ class _Transient:
             # displacement or velocity to make up for, and the initial state
             self.begun = (np.abs(self.steady) * np.maximum(1.0, rate / own)).sum(axis=0)
             self.begun += np.abs(modes.response) * (np.abs(start.p) + np.abs(start.p_rate) / own)
+            # a structure that begins unloaded oscillates about its static deflection under the bodies' loads
+            static = system.of_bodies.weight @ system.floor
+            self.begun += np.where(static == 0.0, 0.0, np.abs(modes.response * static / modes.stiffness))
             # the slower one of an overdamped mode's two
             self.rates = dashpot / 2 - np.sqrt(np.maximum(dashpot**2 / 4 - modes.stiffness, 0.0))
 

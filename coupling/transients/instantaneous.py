@@ -169,14 +169,15 @@ def cycles(
     if len(time) <= half:
         return Cycles(*np.zeros((5, 0)))
     swing = np.abs(np.diff(coordinate))
-    decrement = np.log(swing[: len(swing) - half + 1] / swing[half - 1 :]) / (half - 1)
     loss = energy[:-half] - energy[half:]
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):  # at rest there is none
+        decrement = np.log(swing[: len(swing) - half + 1] / swing[half - 1 :]) / (half - 1)
+        ratio = damping_ratio(decrement)
         left = np.log1p(-loss / structure_energy[:-half])
         by_energy = damping_ratio(-left / (2 * half))
     total = np.concatenate([[0.0], np.cumsum(swing)])
     return Cycles(
-        (time[half:] + time[:-half]) / 2, (total[half:] - total[:-half]) / (2 * half), damping_ratio(decrement),
+        (time[half:] + time[:-half]) / 2, (total[half:] - total[:-half]) / (2 * half), ratio,
         np.where(np.isfinite(left), by_energy, np.nan), loss,
     )  # fmt: skip
 

@@ -17,7 +17,7 @@ import numpy as np
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact.event_driven import EngineRun
 from vanedamp.coupling.exact.subsystem_assembly import Subsystem
-from vanedamp.coupling.methods.registry import final_state
+from vanedamp.coupling.methods.registry import final_state, is_deflected
 from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.evaluation import Outcome, Run, exchanged_energy, residual
@@ -25,6 +25,7 @@ from vanedamp.coupling.response.records import EXCITATION, STORED, VISCOUS, new_
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import at_speed_of, restart_from
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.static_deflection import about_mean
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
@@ -133,7 +134,9 @@ class _Run(Iterator[int]):
         p, b = len(course.time), self.system.bodies
         travel = {cavity.name: cavity.gap for cavity in scene.cavity}
         self.travel = np.array([travel[damper.cavity] for damper in scene.damper])
-        self.amplitude, self.impacts, self.collided = np.zeros((3, p))
+        self.amplitude, self.dynamic, self.impacts, self.collided = np.zeros((4, p))
+        ends = [scene_at(scene, table, float(value)) for value in course.value[[0, -1]]]
+        self.deflected = any(is_deflected(end, assemble(end)) for end in ends)
         self.stuck = np.zeros((p, b), bool)
         self.section, self.parts = np.zeros((p + 1, 2)), np.zeros((p + 1, 1 + b))
         # the ledger without the work of the rotation, which is counted apart
@@ -167,7 +170,7 @@ class _Run(Iterator[int]):
         else:
             self.system = at_frequency(self.system, float(self.course.frequency[k]))
         scene, system, solver = self.scene, self.system, self.scene.solver
-        records, left = new_records(system, 1, 0), solver.max_events - self.events
+        records, left = new_records(system, 1, 0, deflected=self.deflected), solver.max_events - self.events
         if scene.planar:
             from vanedamp.coupling.planar.planar_run import begin_run
 
@@ -192,6 +195,7 @@ class _Run(Iterator[int]):
         self.ledger[k + 1, :STORED] += self.ledger[k, :STORED] if k else 0.0
         self.ledger[k + 1, STORED] -= self.rotation
         self.amplitude[k], self.impacts[k], self.collided[k] = records.peak[0], records.impacts[0], records.collided[0]
+        self.dynamic[k] = about_mean(records, slice(0, 1), self.system.period)[1][0]
         slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
         same = np.abs(section[1, 3 : 3 + b] - section[0, 3 : 3 + b]) <= _AT_REST * self.travel
         self.stuck[k] = slow.all(axis=0) & same & ~_named(outcome)
@@ -213,7 +217,8 @@ class _Run(Iterator[int]):
         works = *change[:STORED], self.rotation, change[STORED] + self.rotation
         return RampRun(
             rate=course.rate, status=status.value, time=course.time[:p], frequency=course.frequency[:p],
-            speed=course.speed[:p], amplitude=frozen(self.amplitude[:p]), impacts=frozen(self.impacts[:p]),
+            speed=course.speed[:p], amplitude=frozen(self.amplitude[:p]),
+            amplitude_dynamic=frozen(self.dynamic[:p]), impacts=frozen(self.impacts[:p]),
             stuck=frozen(self.stuck[:p], bool), displacement=frozen(self.section[: p + 1, 0]),
             velocity=frozen(self.section[: p + 1, 1]),
             energy={name: float(value) for name, value in zip(WORKS, works, strict=True)}, energy_residual=balance,

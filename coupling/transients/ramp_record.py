@@ -13,7 +13,7 @@ import numpy as np
 from vanedamp.coupling.response.records import ENERGIES
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.store import Variable, frozen, load, reader, save
 from vanedamp.files.toml_input import validate
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ DIRECTIONS = ("up", "down")
 #: entries of a run's energies, J: `rotation` is the work of a speed that changes stiffness and loads
 WORKS = (*ENERGIES[:-1], "rotation", ENERGIES[-1])
 #: series of a run, an entry a period, and their units
-SERIES = {"time": "s", "frequency": "Hz", "speed": "rad/s", "amplitude": "m", "impacts": "1"}
+SERIES = {"time": "s", "frequency": "Hz", "speed": "rad/s", "amplitude": "m", "amplitude_dynamic": "m", "impacts": "1"}
 #: states at both ends of every period, and their units
 STATES = {"displacement": "m", "velocity": "m/s"}
 #: curves of the linear structure in steady state, and their units
@@ -40,6 +40,8 @@ class RampRun:
     time             (p,) s, at the start of each period
     frequency, speed  (p,) Hz and rad/s in it: the means of the ramp over the period
     amplitude        (p,) m, the largest |x| in it
+    amplitude_dynamic  (p,) m, the largest distance in it from the static deflection under the bodies' loads, which
+                     linear amplitudes leave out, too
     impacts          (p,) in it
     stuck            (p, b) whether a body stays at rest in its cavity over the period
     displacement, velocity  (p + 1,) m and m/s at the start of each period, and at the end
@@ -53,6 +55,7 @@ class RampRun:
     frequency: np.ndarray
     speed: np.ndarray
     amplitude: np.ndarray
+    amplitude_dynamic: np.ndarray
     impacts: np.ndarray
     stuck: np.ndarray
     displacement: np.ndarray
@@ -106,9 +109,9 @@ class Ramp:
         return self.scene.ramp
 
     def share(self, run: RampRun) -> float:
-        """Return the peak of a run over that of the linear structure without bodies in steady state."""
+        """Return the dynamic peak of a run over that of the linear structure without bodies in steady state."""
         top = self.tops["undamped_peak"]
-        return run.peak / top if 0.0 < top < np.inf else np.nan
+        return float(run.amplitude_dynamic.max(initial=0.0)) / top if len(run.time) and 0.0 < top < np.inf else np.nan
 
     def lewis_rate(self, run: RampRun) -> float:
         """Return the rate of a run in the measure of transients.lewis.peak_ratio; nan without a resonance or damping.
@@ -174,9 +177,11 @@ class Ramp:
         save(path, KIND, self.variables(), attributes)
 
     @classmethod
+    @reader
     def load(cls, path: str | Path) -> Ramp:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, KIND)
+        values.setdefault("amplitude_dynamic", values["amplitude"])  # all that earlier files have
         scene = validate(Scene, json.loads(attributes["scene"]), str(path))
         runs = []
         for number, rate in enumerate(values["rate"]):

@@ -28,7 +28,7 @@ from vanedamp.coupling.system.system import System
 from vanedamp.coupling.transients.instantaneous import TurningPoint, TurningPoints, without_rebounds
 from vanedamp.coupling.transients.ring_down_record import PARTS, LinearMode, RingDown
 from vanedamp.coupling.transients.ring_down_segments import Walk
-from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, free_scene, table_of
+from vanedamp.coupling.transients.ring_down_start import blown_or_pulled, check_impacts, free_scene, table_of
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -55,6 +55,8 @@ def ring_down(
     drive = _drive(chosen, periods, progress) if table.start == "steady" else None
     start = blown_or_pulled(chosen.scene, table) if drive is None else drive.final
     system = assemble(free)
+    if start is not None:
+        check_impacts(free, system, start)
     mode = _followed(chosen.scene, system, table, start)
     record = RingDown(
         scene=scene, status=Status.OK, linear=_linear(system, mode),

@@ -15,7 +15,7 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
-from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.store import Variable, frozen, load, reader, save
 from vanedamp.files.toml_input import validate
 
 if TYPE_CHECKING:
@@ -97,9 +97,9 @@ class RingDown:
     def bins(self) -> dict[str, Bins]:
         """Means over `table.bins` bins of amplitude (m), of equal ratio: of frequency (Hz) and both damping ratios."""
         half, whole = self.half_cycles, self.cycles
-        edges = np.zeros(0)
-        if self.table.bins and len(half.time):
-            edges = np.geomspace(half.amplitude.min(), half.amplitude.max(), self.table.bins + 1)
+        edges, moving = np.zeros(0), half.amplitude[half.amplitude > 0.0]
+        if self.table.bins and len(moving):
+            edges = np.geomspace(moving.min(), moving.max(), self.table.bins + 1)
         stride = 2 * self.table.cycles
         return {
             "frequency": bins(half.amplitude, half.frequency, edges),
@@ -177,6 +177,7 @@ class RingDown:
         save(path, KIND, self.variables(), attributes)
 
     @classmethod
+    @reader
     def load(cls, path: str | Path) -> RingDown:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, KIND)

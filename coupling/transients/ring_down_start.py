@@ -108,6 +108,28 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     return replace(state, **{name: frozen(values) for name, values in moved.items()})
 
 
+def check_impacts(free: Scene, system: System, start: RestartState) -> None:
+    """Refuse a motion whose impacts nobody would wait for, such as one of a blow that slipped by powers of ten.
+
+    A body that meets its walls at a speed u loses it as exp(-n log(1/e)) in n impacts at restitution e, each a free
+    travel g apart: in a time T these are log(1 + (1 - e) u T / g) / log(1/e). Every period begins anew. InputError.
+    """
+    rows = slice(system.friction_rows, None)
+    rigid, bounce = np.isinf(system.spring[rows]), np.clip(system.restitution[rows], 0.01, 1.0 - 1e-12)
+    if free.solver.method != "exact" or not rigid.any():
+        return
+    structure = system.of_structure
+    reach = np.hypot(np.sqrt(structure.stiffness) * start.displacement, start.velocity) / physical_scale(free, system)
+    speed = np.abs(structure.J[rows]) @ reach + np.abs(start.slip_velocity).max(initial=0.0)
+    travels = speed * system.period / system.free_travel[rows]
+    impacts = free.time.simulated * np.sum((np.log1p((1.0 - bounce) * travels) / -np.log(bounce))[rigid])
+    if impacts > free.solver.max_events:
+        raise InputError(
+            f"ring_down: begins at {speed.max():.3g} m/s between walls, and takes about {impacts:.2g} impacts; at most "
+            f"solver.max_events = {free.solver.max_events}: begin slower, or take fewer periods"
+        )
+
+
 def _initial(scene: Scene, system: System) -> RestartState:
     """Return the state that the scene begins with."""
     scale = physical_scale(scene, system)

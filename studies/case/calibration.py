@@ -14,7 +14,7 @@ from scipy import sparse
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable, save
 from vanedamp.files.toml_input import InputError, nearest
-from vanedamp.modal.frf import UNITS, Frf, FrfError, Poles, identify
+from vanedamp.modal.frf import UNITS, Frf, FrfError, Poles, identify, is_in_decibels
 from vanedamp.modal.measurements import read_frf, read_shapes
 from vanedamp.modal.model_updating import Tuning, tune
 from vanedamp.modal.rigid_model import RigidModel, rigid_model
@@ -189,6 +189,8 @@ def calibrate(case: Case) -> Calibration:
     if analysis.first_bending is None or analysis.functional is None:
         raise InputError("; ".join(analysis.warnings))
     damping, ratio, warnings = None, case.damping_ratio, analysis.warnings
+    if tuning is not None:
+        warnings += tuple(f"calibration.tune: {warning}" for warning in tuning.warnings)
     frequency = float(analysis.modes.frequencies_hz[analysis.first_bending])
     if table.damping is not None:
         damping, doubts = _damping(table.damping, frequency)
@@ -249,7 +251,11 @@ def _damping(table: DampingTable, frequency: float) -> tuple[MeasuredDamping, li
 def _poles(frf: Frf, band: tuple[float, float], count: int, frequency: float) -> Poles:
     """Return the modes of the band. A refusal names the response's peak and the computed mode."""
     try:
-        return identify(frf.band(*band), count)
+        inside = frf.band(*band)
+        poles = identify(inside, count)
+        if is_in_decibels(inside, poles):
+            raise FrfError("columns: the magnitudes fit a mode far better as decibels; give them linear")
+        return poles
     except FrfError as error:
         peak = frf.peak_hz()
         raise InputError(

@@ -17,6 +17,7 @@ from scipy import linalg
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError
+from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.campbell import Campbell, campbell
 from vanedamp.modal.correlation import mode_like
 from vanedamp.modal.eigen import Modes, factorize, solve_modes
@@ -376,7 +377,8 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, mo
     """Return the model with stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
 
     A hot spot is where a natural mode of the model at the case's speed has its largest von Mises stress, or the largest
-    one away from the spots before it; the first `modes` modes have `spots` each. Needs a model with its recovery.
+    one away from the spots before it; the first `modes` modes have `spots` each. Of places with equal stress it is the
+    first. Needs a model with its recovery.
     """
     assert model.recovery is not None
     solid = structure.solid
@@ -392,7 +394,7 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1, mo
         for _ in range(spots):
             if not stress.any():
                 raise InputError(f"hot spots: {len(picked)} are all that lie 2 % of the structure's size apart")
-            picked.append(int(np.argmax(stress)))
+            picked.append(first_largest(stress))
             stress[np.linalg.norm(places - places[picked[-1]], axis=1) < apart] = 0.0
     values = solid.stress_components(model.recovery.T, np.array(picked))
     residual = None

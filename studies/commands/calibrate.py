@@ -25,9 +25,9 @@ def run(arguments: Namespace) -> None:
     """Update the model, and find damping, rigid model and excitation."""
     from vanedamp.studies.case.tables import Case
     from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
 
-    outputs = check_outputs(arguments, case=(".toml",), scene=(".toml",))
+    outputs = check_outputs(arguments, output=RECORD, case=(".toml",), scene=(".toml",))
     case = Case.load(arguments.input)
     outputs.keep(case.files)
     from vanedamp.studies.case.calibrated_files import save_calibration

@@ -32,9 +32,9 @@ def run(arguments: Namespace) -> None:
     from vanedamp.files.toml_input import InputError
     from vanedamp.studies.case.tables import Case
     from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
 
-    outputs = check_outputs(arguments, picture=(".png",))
+    outputs = check_outputs(arguments, output=RECORD, picture=(".png",))
     case = Case.load(arguments.input)
     outputs.keep(case.files)
     if case.campbell is None:

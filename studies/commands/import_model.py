@@ -24,9 +24,9 @@ def run(arguments: Namespace) -> None:
 
     from vanedamp.studies.case.external_model import External
     from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
 
-    outputs = check_outputs(arguments)
+    outputs = check_outputs(arguments, output=RECORD)
     external = External.read(arguments.input)
     outputs.keep(external.files(arguments.input))
     model, findings, warnings = external.model(arguments.input)

@@ -26,9 +26,9 @@ def run(arguments: Namespace) -> None:
     """Compute the modes, and what follows from them."""
     from vanedamp.studies.case.tables import Case
     from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
 
-    outputs = check_outputs(arguments, vtk=(".vtu", ".vtk"))
+    outputs = check_outputs(arguments, output=RECORD, vtk=(".vtu", ".vtk"))
     if arguments.vtk and importlib.util.find_spec("pyvista") is None:  # before the work
         raise ModuleNotFoundError("--vtk writes with it", name="pyvista")
     case = Case.load(arguments.input)

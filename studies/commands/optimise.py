@@ -22,10 +22,10 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> None:
     """Search for the best damper."""
     from vanedamp.studies.commands.support.messages import write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
     from vanedamp.studies.workers import workers
 
-    outputs = check_outputs(arguments)
+    outputs = check_outputs(arguments, output=RECORD)
     from vanedamp.files.provenance import versions
     from vanedamp.studies.commands.support.budget import check_optimise
     from vanedamp.studies.commands.support.scenes import print_resonance

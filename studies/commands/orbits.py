@@ -28,10 +28,10 @@ def run(arguments: Namespace) -> None:
     """Follow the branches."""
     from vanedamp.files.store import clear_leftovers
     from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs, check_resume, checkpoint_file
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs, check_resume, checkpoint_file
 
     checkpoint = checkpoint_file(arguments.output)
-    outputs = check_outputs(arguments, beside=checkpoint)
+    outputs = check_outputs(arguments, beside=checkpoint, output=RECORD)
     check_resume(arguments, checkpoint)
     from vanedamp.studies.commands.support.scenes import load_scene, print_resonance
 

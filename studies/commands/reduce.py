@@ -52,9 +52,9 @@ def run(arguments: Namespace) -> None:
     from vanedamp.rom.reduction import check_basis
     from vanedamp.studies.case.tables import Case, check_interface
     from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
 
-    outputs = check_outputs(arguments)
+    outputs = check_outputs(arguments, output=RECORD)
     check_basis(arguments.basis)
     case = Case.load(arguments.input)
     outputs.keep(case.files)

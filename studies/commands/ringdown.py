@@ -27,9 +27,9 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> None:
     """Let the scene ring down."""
     from vanedamp.studies.commands.support.messages import write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
 
-    outputs = check_outputs(arguments)
+    outputs = check_outputs(arguments, output=RECORD)
     from vanedamp.studies.commands.support.scenes import load_any_scene, print_choices, print_resonance
 
     scene = load_any_scene(arguments.input, outputs)

@@ -24,9 +24,9 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> None:
     """Simulate the scene."""
     from vanedamp.studies.commands.support.messages import write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
 
-    outputs = check_outputs(arguments)
+    outputs = check_outputs(arguments, output=RECORD)
     from vanedamp.studies.commands.support.scenes import load_scene, print_choices, print_resonance
 
     scene = load_scene(arguments.input, outputs)

@@ -36,11 +36,11 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> None:
     """Run the grid."""
     from vanedamp.studies.commands.support.messages import print_note, write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs, check_resume, checkpoint_file
+    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs, check_resume, checkpoint_file
     from vanedamp.studies.workers import workers
 
     checkpoint = checkpoint_file(arguments.output)
-    outputs = check_outputs(arguments, beside=checkpoint, peak=(".h5",))
+    outputs = check_outputs(arguments, beside=checkpoint, output=RECORD, peak=(".h5",))
     check_resume(arguments, checkpoint)
     from vanedamp.studies.commands.support.scenes import load_scene, print_choices, print_resonance
 

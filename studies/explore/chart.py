@@ -46,8 +46,8 @@ def response_figure(
             "hovertemplate": f"{name}: %{{y:.3f}}, %{{text}}, at %{{x:.6g}} Hz<extra></extra>",
         }
         for values, name, line, symbol, size in (
-            (sweep.amplitude_max, "damped, maximum", {"color": _MAXIMUM, "width": 0.9}, "diamond", 5),
-            (sweep.amplitude_mean, "damped, mean of peaks", {"color": _MEAN, "width": 2.6}, "circle", 7),
+            (sweep.amplitude_max_dynamic, "damped, maximum", {"color": _MAXIMUM, "width": 0.9}, "diamond", 5),
+            (sweep.amplitude_mean_dynamic, "damped, mean of peaks", {"color": _MEAN, "width": 2.6}, "circle", 7),
         )
     ]  # fmt: skip
     return {"data": lines + points, "layout": _layout() | {"meta": dict(marks)}}

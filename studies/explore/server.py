@@ -7,17 +7,21 @@ import secrets
 import socket
 import sys
 import threading
+import traceback
 import webbrowser
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from http import HTTPStatus
 from pathlib import Path
+from typing import Any
 
 from dash import Dash, html
 from flask import Flask, Response, redirect, request
+from werkzeug.exceptions import HTTPException
 from werkzeug.serving import WSGIRequestHandler, make_server
 
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import warm_up
+from vanedamp.files.errors import shortened
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.explore import page, sweep_files
 from vanedamp.studies.explore.curves import Submit
@@ -27,6 +31,8 @@ from vanedamp.studies.workers import WorkerPool
 HOST = "127.0.0.1"
 #: of the workers: the browser draws on the same cores, and first
 _NICENESS = 5
+#: where the page asks for its callbacks, and bytes of a request: it sends the curves that it shows
+_UPDATE, _MOST_BYTES = "/_dash-update-component", 64_000_000
 _INDEX = """<!DOCTYPE html>
 <html lang="en">
 <head>{%metas%}<title>{%title%}</title>{%favicon%}{%css%}</head>
@@ -73,6 +79,7 @@ def guard(app: Dash, port: int, token: str) -> None:
     """Refuse requests under another host's name or without the token, and forbid the page all other addresses."""
     hosts, cookie = {f"{name}:{port}" for name in (HOST, "localhost")}, f"vanedamp-{port}"
     server: Flask = app.server
+    server.config["MAX_CONTENT_LENGTH"] = _MOST_BYTES
     scripts = " ".join(["'self'", *app.csp_hashes(), script_source()])
     policy = (
         f"default-src 'none'; script-src {scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
@@ -88,9 +95,21 @@ def guard(app: Dash, port: int, token: str) -> None:
             answer = redirect("/")
             answer.set_cookie(cookie, token, httponly=True, samesite="Lax")
             return answer  # type: ignore[return-value]
-        if secrets.compare_digest(request.cookies.get(cookie, "").encode(), token.encode()):
-            return None
-        return "open the address that vanedamp has printed, with its token\n", HTTPStatus.FORBIDDEN
+        if not secrets.compare_digest(request.cookies.get(cookie, "").encode(), token.encode()):
+            return "open the address that vanedamp has printed, with its token\n", HTTPStatus.FORBIDDEN
+        if request.path == _UPDATE and not _well_formed(_body(), app.callback_map):
+            return "this is no request of the page\n", HTTPStatus.BAD_REQUEST
+        return None
+
+    @server.errorhandler(Exception)
+    def fail(error: Exception) -> tuple[str, int] | HTTPException:
+        """Say in a line what a request of odd values has met; a page that fails says so, too."""
+        if isinstance(error, HTTPException):
+            return error
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        told = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
+        print(f"vanedamp: explore: a request failed: {shortened(' '.join(told.split()))}", file=sys.stderr, flush=True)
+        return "the request failed; the terminal says why\n", HTTPStatus.INTERNAL_SERVER_ERROR
 
     @server.after_request
     def harden(answer: Response) -> Response:
@@ -99,6 +118,28 @@ def guard(app: Dash, port: int, token: str) -> None:
         answer.headers["Referrer-Policy"] = "no-referrer"
         answer.headers["Cross-Origin-Resource-Policy"] = "same-origin"
         return answer
+
+
+def _body() -> Any:
+    """Return the data of a request; None for no JSON."""
+    try:
+        return request.get_json(silent=True)
+    except RecursionError:
+        return None
+
+
+def _well_formed(data: Any, callbacks: Container[str]) -> bool:
+    """Say whether the body of a request is one of dash's for a callback of the page; the values are checked by that."""
+    if not isinstance(data, dict) or not isinstance(data.get("output"), str) or data["output"] not in callbacks:
+        return False
+    given, changed = [data.get("inputs"), data.get("state", [])], data.get("changedPropIds")
+    if not all(isinstance(items, list) for items in given) or not isinstance(changed, list):
+        return False
+    items = [item for group in given for entry in group for item in (entry if isinstance(entry, list) else [entry])]
+    return all(isinstance(name, str) for name in changed) and all(
+        isinstance(item, dict) and isinstance(item.get("id"), str | dict) and isinstance(item.get("property"), str)
+        for item in items
+    )
 
 
 class _Quiet(WSGIRequestHandler):

@@ -66,13 +66,13 @@ def best_design(sweep: Sweep) -> Best | None:
     complete = ok.all(axis=over)
     if not complete.any():
         return None
-    peak = np.where(ok, sweep.amplitude_mean, 0.0).max(axis=over)
+    peak = np.where(ok, sweep.amplitude_mean_dynamic, 0.0).max(axis=over)
     relative = peak / _undamped_maximum(sweep, swept, over)
     # designs that share their undamped maximum rank by either figure
     figure = relative if np.isfinite(relative[complete]).all() else peak
     chosen = np.unravel_index(np.argmin(np.where(complete, figure, np.inf)), complete.shape)
     places = dict(zip([path for k, path in enumerate(paths) if k not in over], map(int, chosen), strict=True))
-    runs = sweep.amplitude_mean[tuple(places.get(path, slice(None)) for path in paths)]
+    runs = sweep.amplitude_mean_dynamic[tuple(places.get(path, slice(None)) for path in paths)]
     highest = np.unravel_index(np.argmax(runs), runs.shape)
     places |= dict(zip([paths[k] for k in over], map(int, highest), strict=True))
     return Best(
@@ -162,7 +162,7 @@ def curve_figure(sweep: Sweep, response: ForcedResponse, places: Mapping[str, in
 def _others(sweep: Sweep, along: str, places: Mapping[str, int]) -> np.ndarray:
     """Return the other curves along an axis (curves, n), m, nan at points that are not ok; the chosen one left out."""
     at = list(sweep.axes).index(along)
-    values = np.where(sweep.status == "ok", sweep.amplitude_mean, np.nan)
+    values = np.where(sweep.status == "ok", sweep.amplitude_mean_dynamic, np.nan)
     order = np.argsort(sweep.axes[along], kind="stable")
     curves = np.moveaxis(values, at, -1)[..., order]
     shape = curves.shape[:-1]
@@ -177,7 +177,7 @@ def _others(sweep: Sweep, along: str, places: Mapping[str, int]) -> np.ndarray:
 def _add_troubles(figure: go.Figure, sweep: Sweep, along: str, places: Mapping[str, int], x: np.ndarray) -> None:
     """Mark the points that are not ok with their status: at their amplitude if they ran to the end, else at zero."""
     point = _point(sweep, along, places)
-    states, means = sweep.status[point], sweep.amplitude_mean[point]
+    states, means = sweep.status[point], sweep.amplitude_mean_dynamic[point]
     bad, ended = states != "ok", np.isin(states, _UNSURE) & np.isfinite(means)
     if bad.any():
         figure.add_scatter(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import inspect
 import os
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Protocol
 
 from vanedamp.files.extensions import ExtensionPoint
+from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.export.options import Option
 from vanedamp.studies.export.record import Record, Saved, read_record
@@ -71,7 +73,8 @@ def write(record: Record, chosen: Format, path: str | os.PathLike[str], options:
             raise InputError(
                 f"--{_flag(name)}: is no option of {_named(record.kind)} in {Path(path).suffix}, which has {known}"
             )
-    return tuple(writer(record, Path(path), **options) or ())
+    with decoding(record.source) if isinstance(record.source, str | os.PathLike) else nullcontext():
+        return tuple(writer(record, Path(path), **options) or ())
 
 
 def _named(kind: str) -> str:

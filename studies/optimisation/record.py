@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.files.store import Variable, frozen, load, save
+from vanedamp.files.store import Variable, frozen, load, reader, save
 from vanedamp.studies.optimisation.study import Design
 
 _KIND = "optimisation"
@@ -120,6 +120,7 @@ class Optimisation:
         save(path, _KIND, variables, self._plain() | tables)
 
     @classmethod
+    @reader
     def load(cls, path: str | Path) -> Optimisation:
         """Read the record that `save` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, _KIND)

@@ -210,7 +210,7 @@ class _Trial:
             self.scenes += len(points)
             ok = finished.text("status") == "ok"
             self.trouble += int(np.count_nonzero(~ok))
-            for name, amplitudes in ((table.measure, damped), ("amplitude_undamped", undamped)):
+            for name, amplitudes in ((f"{table.measure}_dynamic", damped), ("amplitude_undamped", undamped)):
                 values = finished.values[:, COLUMNS.index(name)]
                 if amplitudes is damped:
                     values = np.where(ok, values, np.nan)

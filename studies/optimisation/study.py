@@ -111,7 +111,7 @@ class Optimise:
     map: Map = field(default_factory=Map)
     """map over mass ratio and gap ratio"""
     measure: Literal["amplitude_mean", "amplitude_max"] = "amplitude_mean"
-    """amplitude of a run that counts: mean of the peaks of its periods, or largest"""
+    """amplitude of a run that counts: mean of the peaks of its periods, or largest; without static deflection"""
     over_band: Literal["worst", "mean"] = "worst"
     """what counts of the band's amplitudes"""
     over_tolerances: Literal["worst", "mean"] = "worst"
@@ -338,7 +338,7 @@ def _check_settled(scene: Scene, band: np.ndarray) -> None:
     Bodies may end it sooner, but those that do are not the best ones for that.
     """
     ends = [timed(scene.replace(_drive(scene, float(frequency)))) for frequency in (band[0], band[-1])]
-    if scene.time.steady == "auto" or not scene.time.dropped:
+    if scene.time.steady == "auto":
         return
     left, dropped = max((left_over(end, end.time.dropped), end.time.dropped) for end in ends)
     if left > scene.time.tolerance:

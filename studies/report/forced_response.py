@@ -42,7 +42,8 @@ class ForcedResponse:
 
     reference          what amplitudes are divided by in charts: the undamped maximum over the range
     undamped, fixed    linear amplitudes at the points, of all that have any
-    damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks
+    damped_max, _mean  absolute maximum of the evaluated periods and mean of the periods' peaks, from the static
+                       deflection under the bodies' loads, which linear amplitudes leave out, too
     energy_share       (n, 4) of viscous, friction, impact and contact loss
     in_plane           by the names of coupling.sweep.worker.IN_PLANE, (n, bodies), nan for sliders; empty without
                        bodies in the plane
@@ -135,8 +136,8 @@ def response_along(
     """
     ok = sweep.status[point] == "ok"
     damped = {
-        "damped_max": sweep.amplitude_max, "damped_mean": sweep.amplitude_mean, "impacts_per_period":
-        sweep.impacts_per_period, "attached_mass_fraction": sweep.attached_mass_fraction,
+        "damped_max": sweep.amplitude_max_dynamic, "damped_mean": sweep.amplitude_mean_dynamic,
+        "impacts_per_period": sweep.impacts_per_period, "attached_mass_fraction": sweep.attached_mass_fraction,
     }  # fmt: skip
     cut: dict[str, Any] = {key: frozen(np.where(ok, values[point], np.nan)) for key, values in damped.items()}
     x = sweep.axes[axis][point[list(sweep.axes).index(axis)]]

@@ -57,7 +57,7 @@ def map_rows(sweep: Sweep) -> Iterator[list[object]]:
 def map_panels(sweep: Sweep) -> list[Panel]:
     """Return the panels of a sweep's map."""
     tops = {name: np.nanmax(values, initial=0.0) for name, values in sweep.peaks.items()}
-    relative = np.where(sweep.status == "ok", sweep.amplitude_mean, np.nan)
+    relative = np.where(sweep.status == "ok", sweep.amplitude_mean_dynamic, np.nan)
     return list(panels(sweep, sweep.axes, relative / reference_of(sweep.amplitude_undamped, tops), map_axes(sweep)))
 
 

@@ -225,10 +225,8 @@ class _Drawing:
         return CavityMotion(cavity.name, left, right, ceiling, shift, self.scale * highest, bodies, contacts)
 
     def _pose(self, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return along, lift and tilt (n,) of a body in the frame of its floor: at its centre, not at its foot."""
-        b = 0.0 if self.kinds[k] == "slider" else self.half[k][1]
-        along = self.along[:, k] + b * self.plane.floor_rotation[:, k]
-        return along, np.nan_to_num(self.plane.body_lift[:, k]), np.nan_to_num(self.plane.body_tilt[:, k])
+        """Return along, lift and tilt (n,) of a body's centre in the frame of its floor."""
+        return self.along[:, k], np.nan_to_num(self.plane.body_lift[:, k]), np.nan_to_num(self.plane.body_tilt[:, k])
 
     def _body(self, k: int, place: float) -> BodyMotion:
         along, lift, tilt = self._pose(k)

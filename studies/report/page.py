@@ -14,7 +14,7 @@ import plotly.graph_objects as go
 import plotly.offline
 
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import csv_text, digest, replacing
+from vanedamp.files.store import csv_text, decoding, digest, replacing
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.report.body_advice import body_note_of_run
 from vanedamp.studies.report.charts import Chart, chart
@@ -75,13 +75,21 @@ class Page:
 
 
 def write_report(results: Results, path: str | Path) -> None:
-    """Write the page. A picture that cannot be rendered is left out, and the page says so."""
+    """Write the page. A picture that cannot be rendered is left out, and the page says so. Raises StoreError."""
+    with decoding(*results.records):
+        html = _html(results)
+    with replacing(path) as temporary:
+        temporary.write_text(html, encoding="utf-8")
+
+
+def _html(results: Results) -> str:
+    """Return the text of the page."""
     names, by_file = results.names, results.by_file
     page = Page(results, sections(), names, _environment(names))
     within = {part for file in by_file for part in results.parts(file)}
     blocks = page.blocks([file for file in by_file if file not in within])
     scenes = {names[file]: _flat(result.scene) for file, result in by_file.items() if result.scene is not None}
-    html = page.environment.get_template("report.html").render(
+    return page.environment.get_template("report.html").render(
         plotly=plotly.offline.get_plotlyjs() if page.charts else None,
         curves=(_FOLDER / "curves.js").read_text(encoding="utf-8") if page.charts["response"] else None,
         player=(_FOLDER / "motion.js").read_text(encoding="utf-8") if page.charts["motion"] else None,
@@ -90,8 +98,6 @@ def write_report(results: Results, path: str | Path) -> None:
         scenes=scenes,
         **_compared(scenes),
     )
-    with replacing(path) as temporary:
-        temporary.write_text(html, encoding="utf-8")
 
 
 def _environment(names: Mapping[str, str]) -> jinja2.Environment:

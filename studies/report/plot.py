@@ -15,6 +15,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.coupling.transients.ring_down_record import RingDown
+from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
 from vanedamp.modal.campbell import Campbell
 from vanedamp.modal.frf import UNITS
@@ -25,7 +26,7 @@ from vanedamp.studies.report.forced_response import best_first, forced_responses
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.mode_chart import mode_figure, small_surface
 from vanedamp.studies.report.ramp_charts import ramp_figure
-from vanedamp.studies.report.results import collect
+from vanedamp.studies.report.results import Result, Results, collect
 from vanedamp.studies.report.ring_down_chart import ring_down_figure
 from vanedamp.studies.report.time_history import History, history_figure
 
@@ -90,6 +91,11 @@ def _(result: str | Path, scene: Scene | None = None) -> go.Figure:
     if len(found.files) > 1:
         raise InputError(f"{result}: holds several results; name one file")
     ((file, entry),) = found.by_file.items()
+    with decoding(*found.records):
+        return _of_file(found, file, entry)
+
+
+def _of_file(found: Results, file: str, entry: Result) -> go.Figure:
     if file in found.kinds["calibration"]:
         return _of_calibration(file, *entry.record)
     if file not in found.kinds["modes"]:

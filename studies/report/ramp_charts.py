@@ -44,7 +44,7 @@ def ramp_figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]])
     for run in ramp.runs:
         kept = _thinned(run)
         figure.add_scatter(
-            x=getattr(run, x)[kept], y=1e6 * run.amplitude[kept], name=run_name(ramp, run), mode="lines",
+            x=getattr(run, x)[kept], y=1e6 * run.amplitude_dynamic[kept], name=run_name(ramp, run), mode="lines",
             line={
                 "color": COLOURS[rates.index(abs(run.rate)) % len(COLOURS)], "width": 1.8,
                 "dash": "solid" if run.rate > 0.0 else "dash",
@@ -70,7 +70,7 @@ def _thinned(run: RampRun) -> np.ndarray:
     if p <= _MOST_POINTS:
         return np.arange(p)
     edges = np.linspace(0, p, _MOST_POINTS + 1).astype(int)
-    return np.array([begin + np.argmax(run.amplitude[begin:end]) for begin, end in itertools.pairwise(edges)])
+    return np.array([begin + np.argmax(run.amplitude_dynamic[begin:end]) for begin, end in itertools.pairwise(edges)])
 
 
 def ramp_header(ramp: Ramp) -> list[str]:
@@ -83,7 +83,7 @@ def ramp_rows(ramp: Ramp) -> Iterator[list[float]]:
     """Yield a line for each period that is drawn, in SI units."""
     for run in ramp.runs:
         kept = _thinned(run)
-        columns = (run.time, run.frequency, run.speed, run.amplitude, run.impacts, *run.stuck.T.astype(float))
+        columns = (run.time, run.frequency, run.speed, run.amplitude_dynamic, run.impacts, *run.stuck.T.astype(float))
         yield from ([run.rate, *values] for values in np.column_stack([c[kept] for c in columns]).tolist())
 
 

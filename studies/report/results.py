@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import h5py
-
 from vanedamp.files.extensions import ExtensionError, ExtensionPoint
-from vanedamp.files.store import StoreError
+from vanedamp.files.store import decoding, kind_of
 from vanedamp.files.toml_input import InputError
 
 SECTIONS = ExtensionPoint(
@@ -65,6 +64,11 @@ class Results:
         return list(self.by_file)
 
     @property
+    def records(self) -> list[str]:
+        """Every file that is HDF5."""
+        return [file for kind, results in self.kinds.items() if not _endings([kind]) for file in results]
+
+    @property
     def names(self) -> dict[str, str]:
         """The short name of every file whose provenance is on the page."""
         return short_names(file for file, result in self.by_file.items() if result.provenance is not None)
@@ -112,7 +116,8 @@ def collect(paths: Sequence[str | Path]) -> Results:
         for file in _candidates(path, known) if path.is_dir() else [path]:
             kind = _kind(file, known)
             if kind in known:
-                results.kinds[kind][str(file)] = known[kind].load(file)
+                with contextlib.nullcontext() if kind in _endings(known) else decoding(file):
+                    results.kinds[kind][str(file)] = known[kind].load(file)
             elif not path.is_dir():
                 raise InputError(f"{file}: holds no result that a report shows ({', '.join(known)})")
     if not results.files:
@@ -135,8 +140,4 @@ def _kind(path: Path, kinds: Iterable[str]) -> str:
     for ending in _endings(kinds):
         if path.name.endswith(ending):
             return ending
-    try:
-        with h5py.File(path, "r") as file:
-            return str(file.attrs.get("kind"))
-    except OSError as error:
-        raise StoreError(f"{path}: not a readable HDF5 file ({error})") from error
+    return kind_of(path)

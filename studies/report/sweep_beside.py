@@ -18,8 +18,10 @@ from vanedamp.files.toml_input import InputError
 _ABOUT_RUNS = ("time", "initial", "continuation", "sweep", "orbit", "ramp", "ring_down")
 
 
-def points_beside(scene: Scene, parameter: str, sweep: Sweep) -> tuple[np.ndarray, np.ndarray]:
-    """Return parameter (n,) and mean amplitude (n,) m of the runs that are ok of a sweep of a scene.
+def points_beside(
+    scene: Scene, parameter: str, sweep: Sweep, measure: str = "amplitude_mean"
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return parameter (n,) and a measure (n,) of the runs that are ok of a sweep of a scene.
 
     Scenes are the same but for their parameter and how their runs begin. Empty where the sweep has another scene, or
     not the parameter as an axis.
@@ -37,7 +39,7 @@ def points_beside(scene: Scene, parameter: str, sweep: Sweep) -> tuple[np.ndarra
         shown[tuple(place)] = system_of(sweep.scene, values, parameter) == mine
     shown &= sweep.status == "ok"
     along = np.meshgrid(*sweep.axes.values(), indexing="ij")[paths.index(parameter)]
-    return along[shown], sweep.amplitude_mean[shown]
+    return along[shown], getattr(sweep, measure)[shown]
 
 
 def system_of(scene: Scene, values: Mapping[str, Any], parameter: str) -> dict[str, Any] | None:

@@ -14,7 +14,7 @@ from plotly.subplots import make_subplots
 
 from vanedamp.coupling.response.response import PlanarSamples, Response
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import frozen, load
+from vanedamp.files.store import frozen, load, reader
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
 from vanedamp.studies.report.motion import Motion, motion_of
@@ -51,6 +51,7 @@ class History:
     scene: Scene | None
 
     @classmethod
+    @reader
     def load(cls, path: str | Path) -> History:
         """Read what `vanedamp run` wrote. Raises files.store.StoreError."""
         values, attributes = load(path, "response")

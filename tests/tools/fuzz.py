@@ -1,12 +1,26 @@
-"""Files of every kind with something wrong in them: keys of wrong types, without bounds, missing, of other tables."""
+"""Input files and command lines with something wrong in them: keys of wrong types, without bounds, missing.
+
+    python -m tests.tools.fuzz [FIRST [COUNT [FOLDER]]]
+
+runs cases FIRST to FIRST + COUNT (0 and 2,000), damaged files of every format (fuzz_files) and as many inputs. Prints
+how many of each kind ended how, and each fault with its number. Status 1: there are faults. FOLDER, which must not be
+there yet, keeps the files of the last case.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import datetime
 import random
-from collections.abc import Iterator
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
+
+import tomli_w
 
 #: what takes the place of a value
 NUMBERS: tuple[Any, ...] = (
@@ -97,6 +111,33 @@ FILES: dict[str, tuple[dict[str, Any], ...]] = {
 }  # fmt: skip
 
 
+#: command lines, and what takes the place of a word
+LINES = (
+    "run scene.toml --samples 10 -o out.h5 --json -", "sweep swept.toml --workers 1 -o out.h5 --resume",
+    "ramp ramp.toml -o out.h5 --json -", "ringdown down.toml -o out.h5", "orbits scene.toml -o out.h5",
+    "export rom.h5 -o out.uff --frequencies 1 100 10", "export run.h5 -o out.csv --table time",
+    "export modes.h5 -o out.vtkhdf --mode 1 --frames 4", "report run.h5 sweep.h5 -o out.html",
+    "reduce case.toml --modes 2 -o out.h5", "import external.toml -o out.h5 --json out.json",
+    "check scene.toml --json -", "matrices case.toml -o out", "calibrate case.toml -o out.h5", "new scene -o new.toml",
+    "schema scene -o out.json",
+)  # fmt: skip
+WORDS = (
+    "", "-", "--", "-1", "0", "nan", "inf", "1e9", "999999999", "100000", "1" * 5000, "x" * 5000, "/", ".", "..",
+    "/dev/zero", "/dev/null", "none.toml", "out.txt", "out.h5", "scene.toml", "rom.h5", "--help", "--json",
+    "--resume", "--workers", "-o", "--version", "\udcff.toml", "\udcff.h5", "\N{SNOWMAN}", "run", "auto",
+)  # fmt: skip
+
+
+def drawn_line(seed: int) -> list[str]:
+    """The words of a command line with one to three faults: the same for a seed."""
+    draw = random.Random(f"line {seed}")
+    words = draw.choice(LINES).split()
+    for _ in range(draw.choice((1, 1, 2, 3))):
+        place = draw.randrange(len(words) + 1)
+        words[place : place + draw.choice((0, 1, 1, 2))] = draw.choices(WORDS, k=draw.choice((0, 1, 1, 1, 2)))
+    return words
+
+
 def drawn(seed: int, count: int) -> Iterator[tuple[str, dict[str, Any]]]:
     """Commands with files that have one or two faults each: the same for a seed."""
     draw = random.Random(seed)
@@ -135,3 +176,94 @@ def _places(node: Any) -> Iterator[tuple[Any, Any]]:
         yield node, key
         if isinstance(value, dict | list):
             yield from _places(value)
+
+
+def write_input(command: str, data: dict[str, Any]) -> list[str] | None:
+    """Write a drawn file; return the words of the command, None for what cannot be written as TOML."""
+    try:
+        text = tomli_w.dumps(data)
+    except (TypeError, ValueError):
+        return None
+    Path("file.toml").write_text(text, encoding="utf-8")
+    extra = ["--workers", "1"] if command in ("sweep", "optimise") else ["--modes", "2"] if command == "reduce" else []
+    return [command, "file.toml", *extra]
+
+
+def run_all(first: int, count: int, folder: Path) -> int:
+    """Run the cases of a range of numbers, print the table and the faults; return the number of these."""
+    from tests.tools import fuzz_runs
+    from tests.tools.fuzz_files import damaged, write_samples
+    from vanedamp.coupling.engine import simulate
+    from vanedamp.coupling.scene.scene import Scene
+    from vanedamp.files.toml_input import validate
+    from vanedamp.modal import measurements
+    from vanedamp.studies import sweep_steps
+    from vanedamp.studies.cli import main
+    from vanedamp.studies.commands import optimise, ramp, ringdown, run
+
+    for command in (run, sweep_steps, optimise, ramp, ringdown):
+        command.progress = fuzz_runs.patient  # type: ignore[attr-defined]
+    explicit = PRESCRIBED | {"solver": {"method": "penalty"}}
+    for scene in (SCENE, PRESCRIBED, explicit):  # compiled functions are loaded once
+        simulate(validate(Scene, scene, "warm-up"))
+    readers: dict[str, Callable[[], object]] = {
+        "read_frf": lambda: measurements.read_frf(_damaged_file()),
+        "read_shapes": lambda: measurements.read_shapes(_damaged_file()),
+        "read_temperature": lambda: measurements.read_temperature(_damaged_file(), 20.0),
+    }
+    samples, work = folder / "samples", folder / "work"
+    samples.mkdir(parents=True)
+    work.mkdir()
+
+    def prepare(_: int, told: Callable[[], str]) -> tuple[str, str, str | None]:
+        write_samples(samples, main)
+        return "samples", "written", None
+
+    def file_case(number: int, told: Callable[[], str]) -> tuple[str, str, str | None]:
+        for left in Path().glob("damaged.*"):
+            left.unlink()
+        name, words = damaged(number, samples)
+        found = fuzz_runs.call(readers[words[0]]) if words[0] in readers else fuzz_runs.answer(words, told)
+        return name, *found
+
+    def input_case(number: int, told: Callable[[], str]) -> tuple[str, str, str | None]:
+        line = number % 4 == 0
+        words = drawn_line(number) if line else write_input(*next(drawn(number, 1)))
+        if words is None:
+            return "inputs", "no TOML", None
+        return "command lines" if line else f"inputs of {words[0]}", *fuzz_runs.answer(words, told)
+
+    with contextlib.chdir(folder):
+        _, wrong = fuzz_runs.run_cases(range(1), prepare)
+    if wrong:
+        raise RuntimeError(f"the samples cannot be written: {wrong}")
+    numbers = range(first, first + count)
+    faults = 0
+    for title, case in (("damaged files", file_case), ("inputs", input_case)):
+        for sample in samples.iterdir():
+            Path(work, sample.name).write_bytes(sample.read_bytes())
+        with contextlib.chdir(work):
+            counts, wrong = fuzz_runs.run_cases(numbers, case)
+        _print_table(title, counts, wrong)
+        faults += len(wrong)
+    return faults
+
+
+def _damaged_file() -> Path:
+    return next(Path().glob("damaged.*"))
+
+
+def _print_table(title: str, counts: Counter[tuple[str, str]], faults: list[tuple[int, str, str]]) -> None:
+    ends = ("result", "one line", "no TOML", "fault")
+    print(f"{title:24}" + "".join(f"{end:>10}" for end in ends))
+    for kind in sorted({kind for kind, _ in counts}):
+        print(f"{kind:24}" + "".join(f"{counts[kind, end]:10}" for end in ends))
+    print(f"{'all':24}" + "".join(f"{sum(n for (_, e), n in counts.items() if e == end):10}" for end in ends))
+    for number, kind, what in faults:
+        print(f"  case {number}, {kind}: {what}")
+
+
+if __name__ == "__main__":
+    first, count = [int(word) for word in sys.argv[1:3]] + [0, 2000][len(sys.argv) - 1 :]
+    with tempfile.TemporaryDirectory() as place:
+        sys.exit(bool(run_all(first, count, Path(*sys.argv[3:4] or [place, "fuzz"]).resolve())))

@@ -19,7 +19,8 @@ RANKS = {
 
 def environment(**variables: str) -> dict[str, str]:
     """Variables of such a process."""
-    return os.environ | {"PYTHONPATH": str(ROOT)} | variables
+    paths = [os.environ["PYTHONPATH"]] if "PYTHONPATH" in os.environ else []
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *paths])} | variables
 
 
 def vanedamp(*arguments, cwd, **variables: str) -> subprocess.CompletedProcess[str]:

@@ -21,7 +21,7 @@ from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.planar.constraints import FLOOR, PlanarMotion, PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import elongation, gap
 from vanedamp.coupling.planar.recorder import note_tilts, put_sample, record_section
-from vanedamp.coupling.response.recorder import cubic_peak
+from vanedamp.coupling.response.recorder import note_step
 from vanedamp.coupling.response.records import (
     CONTACT,
     ENERGIES,
@@ -134,7 +134,7 @@ def account_step(system, times, motion, records, k, deepest):
     x0, rate0 = _response(system, times, k, q, v)
     x1, rate1 = _response(system, times, k + 1, motion.q, motion.v)
     c0, s0, c1, s1 = times.phase[k, 0], times.phase[k, 1], times.phase[k + 1, 0], times.phase[k + 1, 1]
-    records.peak[p] = max(records.peak[p], abs(x1), cubic_peak(h, x0, x1, rate0, rate1))
+    note_step(records, p, h, x0, x1, rate0, rate1)
     records.square[p] += h * (x0 * x0 + x1 * x1) / 2.0
     records.harmonic[p] += h / 2.0 * complex(x0 * c0 + x1 * c1, -x0 * s0 - x1 * s1)
     m0, m1 = 0.0, 0.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
 from vanedamp.coupling.methods.scipy_ivp.motion import LOOSE, SLIDE, SPRUNG, Unforced
-from vanedamp.coupling.response.recorder import cubic_peak, record_section
+from vanedamp.coupling.response.recorder import note_step, record_section
 from vanedamp.coupling.response.records import (
     CONTACT,
     ENERGIES,
@@ -104,8 +104,7 @@ class Recorder:
         u = self.unforced
         x, rate, _ = self._parts(self.functionals @ u.extended(t, y[: u.size]))[2]
         last, before, rate_before = self.last
-        largest = max(abs(x), cubic_peak(t - last, before, x, rate_before, rate))
-        self.records.peak[self.period] = max(self.records.peak[self.period], largest)
+        note_step(self.records, self.period, t - last, before, x, rate_before, rate)
         self.last = (t, x, rate)
 
     def _sample(self, index: int, y: np.ndarray) -> None:

@@ -10,7 +10,7 @@ from vanedamp.coupling.methods.scipy_ivp.planar_contacts import OPEN, ROUND_OFF,
 from vanedamp.coupling.numerics.codes import COUNTERS, PERIOD
 from vanedamp.coupling.planar.constraints import FLOOR
 from vanedamp.coupling.planar.recorder import record_section
-from vanedamp.coupling.response.recorder import cubic_peak
+from vanedamp.coupling.response.recorder import cubic_extremum, note_step
 from vanedamp.coupling.response.records import ENERGIES, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS, Records
 
 #: the integrals
@@ -107,12 +107,12 @@ class PlanarRecorder:
         extended = self.free.extended(t, y[: self.free.size])
         value, rate = self.watched @ extended, self.speeds @ extended
         begun, before, rate_before = self.last
+        note_step(self.records, self.period, t - begun, before[0], value[0], rate_before[0], rate[0])
         largest = [
-            max(abs(value[i]), cubic_peak(t - begun, before[i], value[i], rate_before[i], rate[i]))
-            for i in range(len(value))
+            max(abs(value[i]), abs(cubic_extremum(t - begun, before[i], value[i], rate_before[i], rate[i])))
+            for i in range(1, len(value))
         ]
-        self.records.peak[self.period] = max(self.records.peak[self.period], largest[0])
-        self.tilt[self.period, self.tilts] = np.maximum(self.tilt[self.period, self.tilts], largest[1:])
+        self.tilt[self.period, self.tilts] = np.maximum(self.tilt[self.period, self.tilts], largest)
         self.last = t, value, rate
 
     def flight(self, duration: float) -> None:

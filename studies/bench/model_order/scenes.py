@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate
@@ -125,6 +126,47 @@ def _trial(name: str, file: Path, generator: np.random.Generator) -> Trial:
     if kind == "wide":
         band = tuple(sorted([*frequencies, *(first * np.linspace(*_WIDE, _POINTS)).tolist()]))
     return Trial(name, validate(Scene, data, "scene"), frequencies, ratio, band)
+
+
+def chain_trial(file: Path, seed: int) -> Trial:
+    """Return a random chain of 5 to 18 masses, driven at one of its two lowest modes; its model is left in the file.
+
+    tip: its last mass, where force and response are; floor: one in its outer half.
+    """
+    generator = np.random.default_rng(seed)
+    n = int(generator.integers(5, 19))
+    mass, spring = generator.uniform(0.5, 1.5, n), generator.uniform(0.5, 1.5, n) * n * n
+    stiffness = np.diag(spring + np.r_[spring[1:], 0.0]) - np.diag(spring[1:], 1) - np.diag(spring[1:], -1)
+    floor = int(generator.integers(n // 2, n))
+    damping = _spread(generator, (2e-3, 2e-2))
+    rows = {"tip": np.eye(n)[-1], "floor": np.eye(n)[floor]}
+    ReducedModel.from_matrices(np.diag(mass), stiffness, rows, damping_ratio=damping).save(file)
+    squares, shapes = eigh(stiffness, np.diag(mass))
+    mode = int(generator.integers(0, 2))
+    natural, wall = math.sqrt(squares[mode]) / (2.0 * math.pi), 1.0 / shapes[floor, mode] ** 2
+    body = wall * _spread(generator, _MASS)
+    ratio = _spread(generator, _CONTACT)
+    contact = (2.0 * math.pi * natural * ratio) ** 2 / (1.0 / body + 1.0 / wall)
+    amplitude = 1e-3 * abs(float(shapes[-1, mode] / shapes[floor, mode]))
+    gap = 1e-3 * _spread(generator, _GAP)
+    fixed = natural / math.sqrt(1.0 + body / wall)
+    frequency = natural + generator.uniform(-0.3, 1.3) * (fixed - natural)
+    data = {
+        "structure": {"model": "rom", "file": str(file), "modes": "auto"},
+        "excitation": {
+            "frequency": frequency, "resonance_amplitude": amplitude, "resonance_near": natural, "at": "tip"
+        },
+        "gravity": {"acceleration": _GRAVITY * 1e-3 * (2.0 * math.pi * natural) ** 2},
+        "cavity": [{"name": "c", "gap": gap, "floor": "floor"}],
+        "damper": [
+            {
+                "cavity": "c", "mass": body, "friction": generator.uniform(*_FRICTION),
+                "restitution": generator.uniform(*_RESTITUTION),
+            }
+        ],
+        "contact": {"law": "compliant", "stiffness": contact, "residual": bool(generator.random() < 0.5)},
+    }  # fmt: skip
+    return Trial("chain", validate(Scene, data, "scene"), (frequency,), ratio, (frequency,))
 
 
 def _spread(generator: np.random.Generator, limits: tuple[float, float]) -> float:

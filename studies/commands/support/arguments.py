@@ -6,6 +6,9 @@ import math
 from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 
+#: processes: more than any machine has cores
+_MOST_WORKERS = 1024
+
 
 def add_input(parser: ArgumentParser, source: str) -> None:
     """Take an input file."""
@@ -34,7 +37,7 @@ def add_resume(parser: ArgumentParser) -> None:
 
 def add_workers(parser: ArgumentParser) -> None:
     """Take `--workers`: a number of processes."""
-    parser.add_argument("--workers", type=positive_count, metavar="N", help="processes (default: one for every core)")
+    parser.add_argument("--workers", type=worker_count, metavar="N", help="processes (default: one for every core)")
 
 
 def count(text: str) -> int:
@@ -48,6 +51,13 @@ def positive_count(text: str) -> int:
     """Return a whole number of at least one."""
     if count(text) == 0:
         raise ArgumentTypeError("expected at least 1")
+    return int(text)
+
+
+def worker_count(text: str) -> int:
+    """Return a number of processes."""
+    if positive_count(text) > _MOST_WORKERS:
+        raise ArgumentTypeError(f"expected at most {_MOST_WORKERS}, not {text}")
     return int(text)
 
 

@@ -14,6 +14,9 @@ from typing import NamedTuple
 from vanedamp.files.store import destination
 from vanedamp.files.toml_input import InputError
 
+#: endings of a result, which is HDF5; a device has none
+RECORD = (".h5", ".hdf5", ".nc", "")
+
 
 class Outputs(NamedTuple):
     """The files that a command writes, each with the option that names it."""
@@ -48,8 +51,9 @@ def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: 
         if trouble is not None:
             raise InputError(f"{option} {path}: {trouble}")
         endings = suffixes.get(option.removeprefix("--"), (path.suffix,))
-        if path.suffix not in endings:
-            raise InputError(f"{option} {path}: expected a file name ending in {' or '.join(endings)}")
+        if path.suffix not in endings and path != beside:
+            expected = " or ".join(filter(None, endings))
+            raise InputError(f"{option} {path}: expected a file name ending in {expected}")
         if _is_stdout(path):
             raise InputError(f"{option} {path}: is standard output, where the summary goes; name another file")
     for (one, first), (other, second) in itertools.combinations(outputs.files, 2):

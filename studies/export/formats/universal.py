@@ -43,8 +43,11 @@ OPTIONS = (
 _SOLIDS = {4: (4, 111), 10: (4, 111), 8: (8, 115), 20: (8, 115), 27: (8, 115), 6: (6, 112), 15: (6, 112), 18: (6, 112)}
 _CURVES = {
     "amplitude_mean": "mean of the peaks", "amplitude_max": "largest peak", "amplitude_harmonic": "harmonic",
+    "amplitude_mean_dynamic": "mean of the peaks from the static deflection",
     "amplitude_undamped": "undamped", "amplitude_fixed": "bodies fixed",
 }  # fmt: skip
+#: of the receptances of a file: frequencies, and bytes in memory
+_MOST, _MOST_BYTES = 1_000_000, 8e9
 
 
 def modes(record: Record, path: Path) -> None:
@@ -81,12 +84,18 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
     """Write the receptances between all interface coordinates, m/N, at evenly spaced frequencies.
 
     frequencies: first and last (Hz) and their number; left out: 1000 up to the estimate's highest frequency, or 1.5
-    times the first natural one. Raises InputError for frequencies that are no range.
+    times the first natural one. Raises InputError for frequencies that are no range, or too many.
     """
     model = record.reduced_model()
     start, step, count = _range(frequencies, _top(record, model.natural_frequencies_hz, model.rigid_modes))
     if start == 0.0 and model.rigid_modes:
         raise InputError("--frequencies: a structure that moves freely has no receptance at 0 Hz; begin above")
+    size = 16 * count * len(model.interface) ** 2
+    if count > _MOST or size > _MOST_BYTES:
+        raise InputError(
+            f"--frequencies: {count} frequencies of {len(model.interface)} interface coordinates take "
+            f"{size / 1e9:.3g} GB; at most {_MOST} frequencies and {_MOST_BYTES / 1e9:g} GB: take fewer"
+        )
     x = start + step * np.arange(count)
     receptance = model.receptance(x)
     directions = [_direction(row) for row in model.directions]
@@ -122,7 +131,8 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
     x = record.values(_dimension(swept))[upwards]
     others = [axis for axis in axes if axis != swept]
     given = {axis: record.values(_dimension(axis)) for axis in others}
-    curves = {name: np.moveaxis(record.values(name), axes.index(swept), -1)[..., upwards] for name in _CURVES}
+    kept = {name: record.values(name) for name in _CURVES if name in record.variables}
+    curves = {name: np.moveaxis(value, axes.index(swept), -1)[..., upwards] for name, value in kept.items()}
 
     def sets() -> Iterator[dict[str, Any]]:
         yield from _headers(record)
@@ -130,11 +140,11 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
             at = ", ".join(f"{axis} = {given[axis][index]}" for axis, index in zip(others, place, strict=True))
             lines = textwrap.wrap(_ascii(at), 80)
             names: dict[str, Any] = dict(zip(("id2", "id3", "id4", "id5"), lines, strict=False))
-            for name, words in _CURVES.items():
-                curve = curves[name][place]
+            for name, values in curves.items():
+                curve = values[place]
                 known = np.isfinite(curve)
                 if np.count_nonzero(known) > 1:
-                    yield _curve(words, x[known], curve[known], GENERAL, FREQUENCY, **names)
+                    yield _curve(_CURVES[name], x[known], curve[known], GENERAL, FREQUENCY, **names)
 
     write_universal(sets(), path)
     lost = sum(int(np.count_nonzero(~np.isfinite(curve))) for curve in curves.values())

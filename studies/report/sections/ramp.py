@@ -39,7 +39,7 @@ def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
 
 def _ramp(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
     beside = {
-        other: points_beside(ramp.scene, ramp.table.path, result.record)
+        other: points_beside(ramp.scene, ramp.table.path, result.record, "amplitude_mean_dynamic")
         for other, result in page.results.kinds["sweep"].items()
     }
     beside = {other: points for other, points in beside.items() if len(points[0])}

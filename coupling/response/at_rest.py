@@ -1,0 +1,39 @@
+"""Which bodies do not move relative to their cavities over a window without impacts and friction loss."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.system import System
+
+#: gap to a wall, over the free travel, below which a body rests on it; changes of slips and speeds relative to their
+#: scales, and motions of floors relative to that of the response, that are none
+_CLOSED, _STILL, _ROUND_OFF = 1e-3, 1e-6, 1e-12
+
+
+def at_rest(scene: Scene, system: System, section: np.ndarray, scale: np.ndarray) -> bool:
+    """Return whether all bodies are at rest in their cavities, from the sections (periods + 1, 3 + 2b) of a window.
+
+    scale: (3 + 2b,) of the states. The window has no impacts, and friction took no energy. A body that friction holds
+    is at rest then: it would lose energy if it slid; a disc, though, rolls. Others have to keep their place at all
+    sections, and a reason to stay: a wall or a body at rest on which they lie, or a floor that does not move along the
+    cavity. A section alone does not tell: at a resonance the motion turns round at the start of every period.
+    """
+    b = system.bodies
+    slip, speed = section[:, 3 : 3 + b], section[:, 3 + b :]
+    still = np.abs(speed).max(axis=0) <= _STILL * (scale[1] + scale[3 + b :])
+    same = still & (np.ptp(slip, axis=0) <= _STILL * scale[3 : 3 + b])
+    shapes = np.array([damper.shape for damper in scene.damper], object)
+    held = (system.limit[:b] > 0.0) & (shapes != "disc")
+    moves = np.abs(system.floor) > _ROUND_OFF * np.abs(system.of_structure.response).max(initial=0.0)
+    held |= same & ~moves.any(axis=1) & ~system.of_bodies.load.any(axis=0)
+    gaps = (system.rest + slip @ system.of_bodies.J.T).max(axis=0)
+    lying = (gaps <= _CLOSED * system.free_travel) & (np.arange(len(gaps)) >= system.friction_rows)
+    contacts = np.flatnonzero(lying & np.isinf(system.spring) & system.of_bodies.J.any(axis=1))
+    for _ in range(b):  # from the walls inwards
+        for row in contacts:
+            pair = [body for body in (system.left_body[row], system.right_body[row]) if body >= 0]
+            for body in pair:
+                held[body] |= bool(same[body] and all(held[other] for other in pair if other != body))
+    return bool(held.all())
