@@ -4,8 +4,7 @@ Newton's law in Moreau's form (Moreau 1988): after the impact v_N + k v_N- >= 0 
 other, and P_T stays within Coulomb's cone, at its edge where the contact still slips. Without friction one
 coefficient for all contacts never brings energy; with friction, or with several coefficients, the law can (Kane's
 paradox). Then all coefficients are smaller by one factor, the largest that brings none; it is zero for a wedged block
-whose contacts cannot part. One contact alone brings energy above k = sqrt(1 - G_NT^2/(G_NN G_TT)) at the earliest, G its
-mobility.
+whose contacts cannot part. One contact alone, of mobility G, brings none up to k = sqrt(1 - G_NT^2/(G_NN G_TT)).
 
 Poisson's law (Glocker and Pfeiffer 1995) is two such problems: one of compression, without restitution, and one of
 expansion, in which P_N exceeds k times that of compression only where v_N+ would be negative.

@@ -141,8 +141,8 @@ def _numbers(curves: Curves, sliders: Curves) -> list[Claim]:
             f"best row of blocks: {best} ({level[best]:.3f}) horizontally, {best_upright} "
             f"({upright[best_upright]:.3f}) vertically; {text}",
             verdict(best == best_upright == "double", "double" in (best, best_upright)),
-            "Each more block in the row leaves more above the resonance; rows of sliders go on gaining. It goes with the "
-            f"restitution: with 0.9 {_text(elastic)}, with 0.5 {_text(soft)}.",
+            "Each more block in the row leaves more above the resonance; rows of sliders go on gaining. It goes with "
+            f"the restitution: with 0.9 {_text(elastic)}, with 0.5 {_text(soft)}.",
             figures
             | {f"{name}_restitution_0.9": value for name, value in elastic.items()}
             | {f"{name}_restitution_0.5": value for name, value in soft.items()},

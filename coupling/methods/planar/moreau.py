@@ -170,7 +170,7 @@ def _two_phases(system, motion, mobility, h, tolerance):
 
 @inlined
 def _list_units(system, motion, turn, h, theta):
-    """List the units that take part in a turn, with their speeds and what Newton's law asks for. Return their number."""
+    """List the units that take part in a turn, their speeds and what Newton's law asks for. Return their number."""
     u, count, free, slowest = len(system.rest), 0, motion.free[1], motion.slowest[0]
     first = u - len(system.tangential)
     for r in range(u):
