@@ -18,6 +18,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
@@ -25,6 +26,7 @@ import h5py
 import numpy as np
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.interrupts import uninterrupted
 
 SCHEMA_VERSION = 1
 
@@ -34,6 +36,8 @@ _TRACK_ORDER = False
 _NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable."
 #: where links stand for the files that processes have open
 _OPEN_FILES = Path("/proc")
+#: files that wait for others to be put in place with (`together`)
+_WAITING: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
 
 
 class StoreError(VanedampError):
@@ -52,7 +56,8 @@ class Variable(NamedTuple):
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` on success, remove it on any failure.
 
-    A killed or failing writer thus leaves the old file or none, never half a file. The temporary file keeps the suffix.
+    A killed or failing writer thus leaves the old file or none, never half a file; an interrupt waits for its end. The
+    temporary file keeps the suffix.
     A link stays one, and the file that it leads to is replaced. A device or a pipe gets the content once it is
     complete. Raises StoreError when it cannot be written: a full disk, no permission, no folder.
     """
@@ -66,21 +71,53 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
             return
         if not target.parent.is_dir():
             raise StoreError(f"{path}: the folder {target.parent} does not exist; create it first")
-        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
-        os.close(handle)
-        temporary = Path(name)
-        try:
-            yield temporary
-            _sync(temporary)
-            mask = os.umask(0)
-            os.umask(mask)
-            temporary.chmod(0o666 & ~mask)
-            os.replace(temporary, target)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+        with uninterrupted():
+            handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+            os.close(handle)
+            temporary = Path(name)
+            try:
+                yield temporary
+                _sync(temporary)
+                mask = os.umask(0)
+                os.umask(mask)
+                temporary.chmod(0o666 & ~mask)
+                if (waiting := _WAITING.get()) is None:
+                    os.replace(temporary, target)
+                else:
+                    waiting.append((temporary, target))
+            except BaseException:
+                temporary.unlink(missing_ok=True)
+                raise
     except OSError as error:
         raise StoreError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+@contextlib.contextmanager
+def together() -> Iterator[None]:
+    """Put the files that `replacing` makes meanwhile in place at the end: all of them, or none after an error.
+
+    Raises StoreError where one cannot be put in place.
+    """
+    waiting: list[tuple[Path, Path]] = []
+    outer = _WAITING.set(waiting)
+    try:
+        yield
+        with uninterrupted():
+            while waiting:
+                _put_in_place(*waiting[0])
+                waiting.pop(0)
+    finally:
+        _WAITING.reset(outer)
+        with uninterrupted():
+            for temporary, _ in waiting:
+                temporary.unlink(missing_ok=True)
+
+
+def _put_in_place(temporary: Path, target: Path) -> None:
+    try:
+        os.replace(temporary, target)
+    except OSError as error:
+        raise StoreError(f"{target}: cannot be written ({error.strerror or error})") from error
 
 
 def destination(path: str | os.PathLike[str]) -> Path | None:
@@ -176,12 +213,22 @@ def save(
     Strings and lists of strings become UTF-8 text; dictionaries among the attributes become JSON text. Equal records
     become equal files, byte by byte. Raises StoreError when the file cannot be written: a full disk, no permission.
     """
+    with uninterrupted():  # HDF5 calls Python, and would lose an interrupt there
+        image = _image(kind, variables, attributes or {}, compressed)
+    with replacing(path) as temporary:
+        temporary.write_bytes(image.getbuffer())
+
+
+def _image(
+    kind: str, variables: Mapping[str, Variable], attributes: Mapping[str, Any], compressed: bool
+) -> io.BytesIO:  # fmt: skip
+    """Return the content of a record's file."""
     # in memory first: a write that fails within HDF5 ends the whole process, sooner or later
     image = io.BytesIO()
     with h5py.File(image, "w", track_order=_TRACK_ORDER) as file:
         file.attrs["kind"] = kind
         file.attrs["schema_version"] = SCHEMA_VERSION
-        for name, value in (attributes or {}).items():
+        for name, value in attributes.items():
             file.attrs[name] = json.dumps(value, sort_keys=True) if isinstance(value, dict) else value
         for name, variable in variables.items():
             _create(file, name, variable, compressed)
@@ -197,8 +244,7 @@ def save(
             for axis, dimension in enumerate(variable.dims):
                 if name != dimension:
                     file[name].dims[axis].attach_scale(file[dimension])
-    with replacing(path) as temporary:
-        temporary.write_bytes(image.getbuffer())
+    return image
 
 
 def dataset(variables: Mapping[str, Variable], attributes: Mapping[str, Any]) -> Any:
