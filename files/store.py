@@ -20,6 +20,7 @@ import stat
 import tempfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextvars import ContextVar
 from functools import lru_cache, wraps
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO, TypeVar
@@ -29,6 +30,7 @@ import numpy as np
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.foreign import apart, existing, reading
+from vanedamp.files.interrupts import uninterrupted
 
 SCHEMA_VERSION = 1
 
@@ -42,7 +44,11 @@ _OPEN_FILES = Path("/proc")
 _SEAL, _SEAL_LENGTH = "\nvanedamp {:08x}\n", 19
 #: bytes that are read at once
 _PART = 1 << 20
-_Class, _Path, _Record = TypeVar("_Class"), TypeVar("_Path", bound="str | os.PathLike[str]"), TypeVar("_Record")
+_Class = TypeVar("_Class")
+_Path = TypeVar("_Path", bound="str | os.PathLike[str]")
+_Record = TypeVar("_Record")
+#: files that wait for others to be put in place with (`together`)
+_WAITING: ContextVar[list[tuple[Path, Path]] | None] = ContextVar("waiting", default=None)
 
 
 class StoreError(VanedampError):
@@ -61,7 +67,8 @@ class Variable(NamedTuple):
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` on success, remove it on any failure.
 
-    A killed or failing writer thus leaves the old file or none, never half a file. The temporary file keeps the suffix.
+    A killed or failing writer thus leaves the old file or none, never half a file; an interrupt waits for its end. The
+    temporary file keeps the suffix.
     A link stays one, and the file that it leads to is replaced. A device or a pipe gets the content once it is
     complete. Raises StoreError when it cannot be written: a full disk, no permission, no folder.
     """
@@ -75,21 +82,53 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
             return
         if not target.parent.is_dir():
             raise StoreError(f"{path}: the folder {target.parent} does not exist; create it first")
-        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
-        os.close(handle)
-        temporary = Path(name)
-        try:
-            yield temporary
-            _sync(temporary)
-            mask = os.umask(0)
-            os.umask(mask)
-            temporary.chmod(0o666 & ~mask)
-            os.replace(temporary, target)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+        with uninterrupted():
+            handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
+            os.close(handle)
+            temporary = Path(name)
+            try:
+                yield temporary
+                _sync(temporary)
+                mask = os.umask(0)
+                os.umask(mask)
+                temporary.chmod(0o666 & ~mask)
+                if (waiting := _WAITING.get()) is None:
+                    os.replace(temporary, target)
+                else:
+                    waiting.append((temporary, target))
+            except BaseException:
+                temporary.unlink(missing_ok=True)
+                raise
     except OSError as error:
         raise StoreError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+@contextlib.contextmanager
+def together() -> Iterator[None]:
+    """Put the files that `replacing` makes meanwhile in place at the end: all of them, or none after an error.
+
+    Raises StoreError where one cannot be put in place.
+    """
+    waiting: list[tuple[Path, Path]] = []
+    outer = _WAITING.set(waiting)
+    try:
+        yield
+        with uninterrupted():
+            while waiting:
+                _put_in_place(*waiting[0])
+                waiting.pop(0)
+    finally:
+        _WAITING.reset(outer)
+        with uninterrupted():
+            for temporary, _ in waiting:
+                temporary.unlink(missing_ok=True)
+
+
+def _put_in_place(temporary: Path, target: Path) -> None:
+    try:
+        os.replace(temporary, target)
+    except OSError as error:
+        raise StoreError(f"{target}: cannot be written ({error.strerror or error})") from error
 
 
 def destination(path: str | os.PathLike[str]) -> Path | None:
@@ -185,12 +224,23 @@ def save(
     Strings and lists of strings become UTF-8 text; dictionaries among the attributes become JSON text. Equal records
     become equal files, byte by byte. Raises StoreError when the file cannot be written: a full disk, no permission.
     """
+    with uninterrupted():  # HDF5 calls Python, and would lose an interrupt there
+        image = _image(kind, variables, attributes or {}, compressed)
+    with replacing(path) as temporary, temporary.open("wb") as stream:
+        stream.write(image.getbuffer())
+        stream.write(_SEAL.format(zlib.crc32(image.getbuffer())).encode())
+
+
+def _image(
+    kind: str, variables: Mapping[str, Variable], attributes: Mapping[str, Any], compressed: bool
+) -> io.BytesIO:  # fmt: skip
+    """Return the content of a record's file."""
     # in memory first: a write that fails within HDF5 ends the whole process, sooner or later
     image = io.BytesIO()
     with h5py.File(image, "w", track_order=_TRACK_ORDER) as file:
         file.attrs["kind"] = kind
         file.attrs["schema_version"] = SCHEMA_VERSION
-        for name, value in (attributes or {}).items():
+        for name, value in attributes.items():
             file.attrs[name] = json.dumps(value, sort_keys=True) if isinstance(value, dict) else value
         for name, variable in variables.items():
             _create(file, name, variable, compressed)
@@ -206,9 +256,7 @@ def save(
             for axis, dimension in enumerate(variable.dims):
                 if name != dimension:
                     file[name].dims[axis].attach_scale(file[dimension])
-    with replacing(path) as temporary, temporary.open("wb") as stream:
-        stream.write(image.getbuffer())
-        stream.write(_SEAL.format(zlib.crc32(image.getbuffer())).encode())
+    return image
 
 
 def dataset(variables: Mapping[str, Variable], attributes: Mapping[str, Any]) -> Any:

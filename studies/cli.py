@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Sequence
 from typing import NoReturn
@@ -46,6 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line. Returns the exit status: 0; 2 for bad input, or for files, memory or packages that are not
     to be had, with one line on standard error; 130 when interrupted.
 
+    argv: the words after the command's name; None: those of this process, whose end is not interrupted any more.
     Under mpirun the first rank runs it, and the others help with the factorisations.
     """
     if sys.stderr is None:
@@ -53,16 +56,31 @@ def main(argv: Sequence[str] | None = None) -> int:
     if sys.stdout is None:  # a file that is opened would take its place, and what libraries print
         return _refuse("standard output is closed; send it to a file, or to /dev/null")
     try:
-        with swallowed_interrupts_again():
-            if not _under_mpi():
-                return _main(argv)
-            from vanedamp.modal.petsc import ranks
-
-            with ranks() as first:
-                return _main(argv) if first else 0
+        status = _interruptible(argv)
+        if argv is None:
+            _ignore_interrupts()
     except KeyboardInterrupt:
+        if argv is None:
+            _ignore_interrupts()
         print("vanedamp: interrupted", file=sys.stderr)
-        return _INTERRUPTED
+        status = _INTERRUPTED
+    return status
+
+
+def _ignore_interrupts() -> None:
+    """Ignore interrupts while the interpreter and libraries end: one there would end the process without a line."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _interruptible(argv: Sequence[str] | None) -> int:
+    with swallowed_interrupts_again():
+        if not _under_mpi():
+            return _main(argv)
+        from vanedamp.modal.petsc import ranks
+
+        with ranks() as first:
+            return _main(argv) if first else 0
 
 
 def _main(argv: Sequence[str] | None) -> int:

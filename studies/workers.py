@@ -16,7 +16,7 @@ from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
 
-from vanedamp.studies.interrupts import uninterrupted_children
+from vanedamp.files.interrupts import uninterrupted
 
 #: folder that holds the package vanedamp
 _ROOT = Path(__file__).parents[2]
@@ -35,7 +35,7 @@ class WorkerPool(Executor):
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
         """Run a call in a worker. What a broken pool has lost is not run again."""
-        with uninterrupted_children():  # submit starts them
+        with uninterrupted():  # submit starts them
             try:
                 return self._pool.submit(function, *arguments, **options)
             except BrokenExecutor:
@@ -56,7 +56,7 @@ class WorkerPool(Executor):
 
     def _new(self) -> ProcessPoolExecutor:
         resource_tracker.ensure_running()  # its start ends with interrupts unblocked, for the server to come as well
-        with uninterrupted_children():  # a semaphore that was made and not noted yet is warned of at the end
+        with uninterrupted():  # a semaphore that was made and not noted yet is warned of at the end
             return ProcessPoolExecutor(
                 self._max_workers, mp_context=_context(), initializer=_begin, initargs=(self._niceness,)
             )

@@ -12,9 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.tools.input_files import SCENE, changed
+from tests.tools.input_files import BLOCK, SCENE, changed
 from tests.tools.processes import environment
-from vanedamp.studies.interrupts import swallowed_interrupts_again, uninterrupted_children
+from vanedamp.files.interrupts import uninterrupted
+from vanedamp.files.store import StoreError, replacing, together
+from vanedamp.studies.interrupts import swallowed_interrupts_again
 
 
 @pytest.fixture(autouse=True)
@@ -146,7 +148,7 @@ def test_interrupts_wait_while_processes_start_whichever_thread_gets_them():
     other = threading.Thread(target=end.wait)
     other.start()  # does not block interrupts, so the system gives it those of the process
     try:
-        with pytest.raises(KeyboardInterrupt), uninterrupted_children():
+        with pytest.raises(KeyboardInterrupt), uninterrupted():
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.05)
             whole = True
@@ -155,3 +157,115 @@ def test_interrupts_wait_while_processes_start_whichever_thread_gets_them():
         other.join()
     assert whole
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_interrupts_wait_for_files(tmp_path):
+    with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "a.txt") as temporary:
+        interrupt()
+        temporary.write_text("whole")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "whole"}
+
+
+@pytest.mark.parametrize("place", ["within the first", "between", "within the last"])
+def test_an_interrupt_leaves_no_part_of_files_that_belong_together(place, tmp_path):
+    (tmp_path / "a.txt").write_text("before")
+    with pytest.raises(KeyboardInterrupt), together():
+        with replacing(tmp_path / "a.txt") as temporary:
+            temporary.write_text("a")
+            if place == "within the first":
+                interrupt()
+        if place == "between":
+            interrupt()
+        with replacing(tmp_path / "b.txt") as temporary:
+            temporary.write_text("b")
+            if place == "within the last":
+                interrupt()
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "before"}
+
+
+def test_an_interrupt_while_files_are_put_in_place_comes_after_them(tmp_path, monkeypatch):
+    def rename(*arguments):
+        interrupt()
+        os.rename(*arguments)
+
+    monkeypatch.setattr("vanedamp.files.store.os.replace", rename)
+    with pytest.raises(KeyboardInterrupt), together():
+        for name in ("a.txt", "b.txt"):
+            with replacing(tmp_path / name) as temporary:
+                temporary.write_text(name)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.txt", "b.txt"]
+
+
+def test_files_that_belong_together_fail_together(tmp_path):
+    (tmp_path / "b.txt").mkdir()
+    with pytest.raises(StoreError, match=r"c.txt: cannot be written"), together():
+        with replacing(tmp_path / "a.txt") as temporary:
+            temporary.write_text("a")
+        with replacing(tmp_path / "c.txt"):
+            raise OSError("full")
+    assert [path.name for path in tmp_path.iterdir()] == ["b.txt"]
+
+
+#: the command as the process's own; it sends itself the signal at an event, or at its end
+OWN = """
+import atexit, os, signal, sys
+event, end = sys.argv[1:3]
+sys.argv = ["vanedamp", *sys.argv[3:]]
+left = [True]
+def watch(name, arguments):
+    if left and name == event and str(arguments[0]).endswith(end):
+        left.clear()
+        os.kill(os.getpid(), signal.SIGINT)
+sys.addaudithook(watch)
+atexit.register(lambda: event == "end" and os.kill(os.getpid(), signal.SIGINT))
+from vanedamp.studies.cli import main
+sys.exit(main())
+"""
+
+
+def own(folder, event, end, *command):
+    """Whether the command was interrupted, which it says in a line, or came to its end; and the files that it left."""
+    before = {path.name for path in folder.iterdir()}
+    done = subprocess.run(
+        [sys.executable, "-c", OWN, event, end, *command], cwd=folder, start_new_session=True, env=environment(),
+        capture_output=True, text=True, check=False, preexec_fn=heed_interrupts,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) in [(0, ""), (130, "vanedamp: interrupted\n")]
+    return done.returncode == 130, {path.name for path in folder.iterdir()} - before
+
+
+@pytest.mark.parametrize(
+    ("event", "end", "interrupted", "left"),
+    [
+        ("open", ".h5", True, set()),
+        ("open", ".json", True, set()),
+        ("os.rename", ".h5", True, {"response.h5", "response.json"}),
+        ("os.rename", ".json", True, {"response.h5", "response.json"}),
+        ("end", "", False, {"response.h5", "response.json"}),
+    ],
+)
+def test_interrupt_while_a_run_is_written(event, end, interrupted, left, tmp_path):
+    (tmp_path / "scene.toml").write_text(SCENE)
+    command = ["run", "scene.toml", "-o", "response.h5", "--json", "response.json"]
+    assert own(tmp_path, event, end, *command) == (interrupted, left)
+
+
+@pytest.mark.parametrize(
+    ("event", "end", "interrupted", "left"),
+    [
+        ("import", "vtkmodules.vtkCommonCore", True, set()),
+        ("import", "vtkmodules.vtkIOXML", True, set()),
+        ("os.rename", ".h5", True, {"modes.h5", "modes.vtu"}),
+    ],
+)
+def test_interrupt_while_modes_are_written(event, end, interrupted, left, tmp_path):
+    """Two files, by HDF5 and VTK."""
+    pytest.importorskip("dolfinx")
+    pytest.importorskip("pyvista")
+    (tmp_path / "case.toml").write_text(BLOCK)
+    command = ["modal", "case.toml", "-o", "modes.h5", "--vtk", "modes.vtu"]
+    assert own(tmp_path, event, end, *command) == (interrupted, left)

@@ -19,7 +19,7 @@ from vanedamp.coupling.exact.contact_states import (
     stop_attached_bodies,
 )
 from vanedamp.coupling.exact.energy_balance import account, account_impact, account_spell
-from vanedamp.coupling.exact.event_functions import AT_START, carry_over_period, hop_speed, next_event
+from vanedamp.coupling.exact.event_functions import AT_START, ENDLESS, carry_over_period, hop_speed, next_event
 from vanedamp.coupling.exact.gap_kinematics import (
     SIMULTANEOUS,
     align_gaps,
@@ -44,12 +44,13 @@ from vanedamp.coupling.numerics.codes import (
     EVENTS,
     FLOW,
     HELD,
+    ILL_CONDITIONED,
     LEAVING,
-    LOG_FULL,
     LOGGED,
     NEEDS_FLOW,
     NO_SOLUTION,
     OPEN,
+    PAUSED,
     PERIOD,
     POSITION,
     RECLOSES,
@@ -69,6 +70,8 @@ from vanedamp.coupling.numerics.jit import comparing, entry, inlined, kernel, su
 from vanedamp.coupling.numerics.vectors import whole_vectors
 from vanedamp.coupling.response.records import FRICTION
 
+#: segments after which a run returns to Python, which sees interrupts
+_SLICE = 4096
 #: differences below this share of their terms are round-off
 _EQUAL = 1e-14
 #: modes whose acceleration is below this share of the largest sleep until the next impact
@@ -78,7 +81,7 @@ _ASLEEP = 1e-14
 @entry
 def advance(system, flows, st, watched, rec, scratch, periods, max_events):
     """Run until all periods are done or something is needed. Return the code (numerics.codes) of why it returns."""
-    deciding = False
+    deciding, segments = False, 0
     while True:
         if deciding:
             # one place only: its code is compiled into the loop, as a call costs more than it does
@@ -102,9 +105,12 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
             return DONE
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
-        if st.counters[LOGGED] + 2 * len(system.delassus) >= len(rec.log):
-            return LOG_FULL
+        if segments == _SLICE or st.counters[LOGGED] + 2 * len(system.delassus) >= len(rec.log):
+            return PAUSED
+        segments += 1
         tau, event, side = next_event(system, flows, st, watched)
+        if event == ENDLESS:
+            return ILL_CONDITIONED
         amplitude_changes(flows, st, scratch, tau)
         account(system, flows, st, rec, scratch, tau)
         _advance_motion(system, flows, st, scratch, tau)

@@ -18,9 +18,9 @@ from vanedamp.coupling.numerics.codes import (
     FLOW,
     ILL_CONDITIONED,
     IMPACTS,
-    LOG_FULL,
     LOGGED,
     NEEDS_FLOW,
+    PAUSED,
     PERIOD,
     SEGMENTS,
     UNDECIDED,
@@ -110,7 +110,7 @@ class EngineRun:
                     continue
             self.log.take(self.records.log, int(self.state.counters[LOGGED]))
             self.state.counters[LOGGED] = 0
-            if code != LOG_FULL:
+            if code != PAUSED:
                 return int(code)
 
     def _add_flow(self) -> int:

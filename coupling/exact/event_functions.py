@@ -44,6 +44,9 @@ ADHESION = 1e-13
 #: Relative displacement and speed are zero at its end either way: the structure's motion is changed by the order of
 #: (2 pi CHATTER)^3 of it
 CHATTER = 3e-7
+#: evaluations in the search for one event, beyond which it is given up, and what it returns then. Ordinary ones take a
+#: few; where a mode is a million times faster than the excitation, or a function stays at round-off, there is no end
+MOST, ENDLESS = 1_000_000, -3
 #: in periods: what is known without a root at a period's start is left out from here on, at the price of exponentials
 _AHEAD = 0.02
 
@@ -52,7 +55,8 @@ _AHEAD = 0.02
 def next_event(system, flows, st, watched):
     """Return the time to the next event, its event function and its side, or to the period's end and -1.
 
-    Results beyond the period's end are kept for the next segment (`carry_over_period`).
+    ENDLESS in place of -1 if it finds neither. Results beyond the period's end are kept for the next segment
+    (`carry_over_period`).
     """
     s = st.counters[FLOW]
     driven = _is_driven(flows, s)
@@ -60,6 +64,7 @@ def next_event(system, flows, st, watched):
     shortest = RESOLUTION * system.period
     count, taylor = _list_functions(system, flows, st, watched, s), watched.expansion.taylor
     st.counters[SEGMENTS] += 1
+    most = st.counters[EVALUATIONS] + MOST
     while True:
         k, tau, longest = -1, left, system.period
         for i in range(count):
@@ -77,6 +82,8 @@ def next_event(system, flows, st, watched):
             return (tau if tau > shortest else 0.0), k, watched.side[k]
         if watched.status[k] == BOUNDED:
             tau = 0.0  # where exponentials cost nothing
+        elif st.counters[EVALUATIONS] == most:
+            return tau, ENDLESS, 0
         else:
             st.counters[EVALUATIONS] += 1
         noise, second, calm, fast = expand(

@@ -18,6 +18,9 @@ _OPEN_LEDGER = 0.1
 #: entries of the log of impacts between two looks at it
 _LOG = 100_000
 
+#: steps after which compiled functions return to Python, which sees interrupts, at a period's end
+_SLICE = 100_000
+
 #: step the motion to the end of a number of periods with this log; returns a code of numerics.codes
 March = Callable[[Any, np.ndarray, int], int]
 
@@ -48,9 +51,10 @@ class SteppedRun:
         """Continue to the end of `periods`, unless the run ends before."""
         counters = self.motion.counters
         while True:
+            done = int(counters[PERIOD])
             # with a log, period by period, so that it can be emptied
-            target = min(periods, int(counters[PERIOD]) + 1) if len(self.log) else periods
-            code = self.march(self.motion, self.log, target)
+            more = 1 if len(self.log) or not done else max(1, _SLICE * done // int(counters[STEPS]))
+            code = self.march(self.motion, self.log, min(periods, done + more))
             self.chunks.append(self.log[: counters[LOGGED]].copy())
             counters[LOGGED] = 0
             if code != DONE:

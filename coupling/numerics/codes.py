@@ -42,9 +42,10 @@ HARMONIC_MAP, MOMENTUM_MAP, MEAN_MAP, FREE_MOMENTUM_MAP, WORK_MAP = 0, 4, 8, 10,
 # outcome of an event: the contact states go on, they must be decided, or its impact has no solution
 STATES_GO_ON, STATES_OPEN, NO_SOLUTION = range(30, 33)
 
-# why a compiled run returns: all periods are done, it needs something, or it has ended (response.evaluation.STATUS_OF)
+# why a compiled run returns: all periods are done, it needs something, it lets Python empty the log and see interrupts
+# (PAUSED), or it has ended (response.evaluation.STATUS_OF)
 (
-    DONE, NEEDS_FLOW, LOG_FULL, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED, ILL_CONDITIONED, DIVERGED, PENETRATION,
+    DONE, NEEDS_FLOW, PAUSED, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED, ILL_CONDITIONED, DIVERGED, PENETRATION,
 ) = range(40, 49)  # fmt: skip
 
 # counters of a run, of any method

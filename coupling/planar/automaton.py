@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from vanedamp.coupling.exact.event_functions import ENDLESS
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
@@ -15,13 +16,14 @@ from vanedamp.coupling.numerics.codes import (
     EVENT_BUDGET,
     EVENTS,
     FLOW,
+    ILL_CONDITIONED,
     LEAVING,
-    LOG_FULL,
     LOGGED,
     NEEDS_FLOW,
     OPEN,
     OPENS,
     PARTS,
+    PAUSED,
     PERIOD,
     RECLOSES,
     SLIP_LEFT,
@@ -58,6 +60,8 @@ _LOST = 1e-7
 _CLOSE = 1e-11
 #: events at one instant after which contacts are said to be undecided, for each unit
 _AT_ONCE = 20
+#: segments after which a run returns to Python, which sees interrupts
+_SLICE = 1024
 #: events at one instant after which a decision that repeats itself is made anew, for each unit
 _REPEATED = 4
 #: how often a decision is made anew where its forces break their laws
@@ -88,6 +92,7 @@ def begin(system, st, rec, log, work):
 @entry
 def advance(system, flows, st, guards, rec, log, work, periods, max_events):
     """Advance to the end of `periods`. Returns a code."""
+    segments = 0
     while st.counters[PERIOD] < periods:
         if st.counters[FLOW] < 0:
             s = _find(flows, st)
@@ -114,11 +119,14 @@ def advance(system, flows, st, guards, rec, log, work, periods, max_events):
             _begin_segment(system, flows, st)
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
-        if st.counters[LOGGED] + 4 * len(system.rest) >= len(log):
-            return LOG_FULL
+        if segments == _SLICE or st.counters[LOGGED] + 4 * len(system.rest) >= len(log):
+            return PAUSED
+        segments += 1
         if st.counters[PERIOD] == 0 and st.time[0] == 0.0:
             record_section(system, st, rec, _spring_energy(system, st))
         tau, who = next_event(system, flows, st, guards)
+        if who == ENDLESS:
+            return ILL_CONDITIONED
         if tau > 0.0:
             add_up(system, flows, st, rec, work, tau)
             _sample(system, flows, st, rec, work, tau)
@@ -131,6 +139,7 @@ def advance(system, flows, st, guards, rec, log, work, periods, max_events):
         if who == -2:
             st.time[0] += tau
             _phase(system, st)
+            segments = _SLICE
             continue
         if who < 0:
             st.counters[PERIOD] += 1

@@ -28,6 +28,8 @@ _DEPENDENT = 1e-9
 _SQUARED = 1e-13
 #: frequencies below this share of the excitation's are refused: displacements would be quotients of round-off
 _SLOW = 1e-6
+#: and those beyond this many times it: forces would be, and following them would not end
+_FAST = 1e6
 #: and springs of Jenkins elements beyond the square of this many times it: their forces would be round-off
 _STIFF = 1e4
 
@@ -58,6 +60,7 @@ class ContactFlows(NamedTuple):
     loss: np.ndarray  # (s, m, m): G^T C G
     loss_apart: np.ndarray  # (s, m, m): G^T C conj G
     growth: np.ndarray  # (s,) largest rate of growth, 1/s
+    fastest: np.ndarray  # (s,) largest |real| + |imaginary part| of an eigenvalue, 1/s
 
 
 def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
@@ -73,6 +76,7 @@ def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
         rows=z(2 * u, m), bend=f(size), bend_held=f(size, size), force=z(2 * u, m), force_constant=f(2 * u),
         force_held=f(2 * u, size), self_stress=f(2 * u, 2 * u), snap=f(size, u), snap_rate=f(size, 2 * u),
         held=np.zeros((capacity, u), np.bool_), drag=z(size, m), loss=z(m, m), loss_apart=z(m, m), growth=f(),
+        fastest=f(),
     )  # fmt: skip
 
 
@@ -234,6 +238,7 @@ def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) 
     flows.drag[s, :, :count] = drag
     flows.loss[s, :count, :count], flows.loss_apart[s, :count, :count] = speeds.T @ drag, speeds.T @ drag.conj()
     flows.growth[s] = max(eigenvalue.real.max(initial=0.0), 0.0)
+    flows.fastest[s] = (np.abs(rate.real) + np.abs(rate.imag)).max()
 
 
 def _spread(
@@ -301,6 +306,8 @@ def _modes(stiffness: np.ndarray, damping: np.ndarray, omega: float) -> tuple[np
     matrix = np.block([[np.zeros((k, k)), np.eye(k) * scale], [-stiffness / scale, -damping]])
     values, vectors = eig(matrix)
     vectors /= np.linalg.norm(vectors, axis=0)
+    if np.abs(values).max() > _FAST * omega:
+        raise IllConditioned("a mode is too fast for the excitation")
     if np.abs(values).min() < _SLOW * omega or np.linalg.cond(vectors) > DEFECTIVE:
         raise IllConditioned("its modes are one to round-off, or it has no stiffness")
     inverse = np.linalg.inv(vectors)

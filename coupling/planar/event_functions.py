@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.exact.event_functions import AT_START, RESOLUTION, step_or_stop
+from vanedamp.coupling.exact.event_functions import AT_START, ENDLESS, MOST, RESOLUTION, step_or_stop
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.exact.root_search import DEGREE, expand, first_root_of_parabola
 from vanedamp.coupling.numerics.codes import (
@@ -42,23 +42,29 @@ _ZERO = 1e-12
 _DRIFT = 2 * SIMULTANEOUS
 #: exponent of the growth of modes until the period's end above which the search looks less far
 _GROWN = 20.0
+#: angle by which the fastest mode turns in the longest segment: the integrals over one follow every turn
+_LONGEST = 3e4
 
 
 @inlined
 def next_event(system, flows, st, guards):
     """Time to the next event and its function, to the period's end and -1, or to a time without an event and -2.
 
-    The last where modes grow so much until the period's end that bounds for all of it say nothing.
+    The last where modes grow so much until the period's end that bounds for all of it say nothing, or turn so often
+    that Python would see no interrupt. ENDLESS if it finds none of them.
     """
     s = st.counters[FLOW]
     left, last = max(system.period - st.time[0], 0.0), -1
     if flows.growth[s] * left > _GROWN:
         left, last = 1.0 / flows.growth[s], -2
+    if flows.fastest[s] * left > _LONGEST:
+        left, last = _LONGEST / flows.fastest[s], -2
     shortest = RESOLUTION * system.period
     eigenvalue, modes = flows.eigenvalue[s], flows.modes[s]
     grows = math.exp(flows.growth[s] * left)
     count = _watch(system, flows, st, guards, s, grows)
     st.counters[SEGMENTS] += 1
+    most = st.counters[EVALUATIONS] + MOST
     while True:
         k, tau = -1, left
         for i in range(count):
@@ -70,6 +76,8 @@ def next_event(system, flows, st, guards):
             return (tau if tau > shortest else 0.0), k
         if guards.status[k] == BOUNDED:
             tau = 0.0
+        elif st.counters[EVALUATIONS] == most:
+            return tau, ENDLESS
         else:
             st.counters[EVALUATIONS] += 1
         noise, second, calm, fast = expand(

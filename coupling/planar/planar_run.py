@@ -10,9 +10,9 @@ from vanedamp.coupling.numerics.codes import (
     EVALUATIONS,
     EVENTS,
     IMPACTS,
-    LOG_FULL,
     LOGGED,
     NEEDS_FLOW,
+    PAUSED,
     PERIOD,
     REDUCED,
     SEGMENTS,
@@ -87,7 +87,7 @@ class PlanarRun:
                 except (IllConditioned, np.linalg.LinAlgError):  # the latter: an excitation at an undamped resonance
                     self.ended = True
                     return Status.ILL_CONDITIONED
-            elif code != LOG_FULL:
+            elif code != PAUSED:
                 self.ended = code != DONE
                 return STATUS_OF[int(code)]
 

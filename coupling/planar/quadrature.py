@@ -52,10 +52,9 @@ def motion_at(system, flows, st, work, t, q, v):
 def add_up(system, flows, st, rec, work, tau):
     """Add a segment of length tau to ledger and records; st is at its start."""
     s, period = st.counters[FLOW], st.counters[PERIOD]
-    fastest, slowest = 0.0, math.inf
+    fastest, slowest = flows.fastest[s], math.inf
     for j in range(flows.modes[s]):
         rate = flows.eigenvalue[s, j]
-        fastest = max(fastest, abs(rate.real) + abs(rate.imag))
         slowest = min(slowest, abs(rate.real) + abs(rate.imag))
     x0, rate0 = response_at(system, st.q, st.v, st.time[0])
     note_response(rec, period, x0)

@@ -31,7 +31,8 @@ class Status(StrEnum):
     """the complementarity problem of the contacts found no solution"""
     ILL_CONDITIONED = "ill_conditioned"
     """while some contacts are closed, modes are critically damped to round-off or masses and stiffnesses so far apart
-    that doubles cannot resolve the motion; change a damping, a mass or a stiffness"""
+    that doubles cannot resolve the motion, or one vibrates a million times within a period and the search for the next
+    event does not end; change a damping, a mass or a stiffness"""
     PENETRATION = "penetration"
     """a body is deeper in a wall than `solver.penetration` allows: an impact was missed, or the steps are too long"""
     DIVERGED = "diverged"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
@@ -34,9 +35,11 @@ def run(arguments: Namespace) -> None:
     from vanedamp.studies.case.calibration import calibrate
 
     calibration = calibrate(case)
-    save_calibration(arguments.input, calibration, arguments.output, arguments.case, arguments.scene)
     result = calibration.to_json()
-    write_result(arguments.json, result)
+    files = partial(
+        save_calibration, arguments.input, calibration, arguments.output, arguments.case, arguments.scene
+    )  # fmt: skip
+    write_result(arguments.json, result, files)
     print_warnings(arguments.input, calibration.warnings)
     if arguments.json != "-":
         _print_summary(result)

@@ -48,15 +48,18 @@ def run(arguments: Namespace) -> None:
     structure = assemble(case)
     with progress("campbell") as report:
         diagram = campbell_diagram(structure, report)
-    if arguments.output:
-        diagram.save(arguments.output)
-    if arguments.picture:
-        from vanedamp.studies.report.campbell_picture import campbell_picture
-
-        campbell_picture(diagram, Path(arguments.picture))
     seconds = time.perf_counter() - started
     warnings = [*diagram.warnings, *unit_doubts(structure)]
-    write_result(arguments.json, diagram.to_json() | {"warnings": warnings, "wall_time_s": seconds})
+
+    def files() -> None:
+        if arguments.output:
+            diagram.save(arguments.output)
+        if arguments.picture:
+            from vanedamp.studies.report.campbell_picture import campbell_picture
+
+            campbell_picture(diagram, Path(arguments.picture))
+
+    write_result(arguments.json, diagram.to_json() | {"warnings": warnings, "wall_time_s": seconds}, files)
     print_warnings(arguments.input, warnings)
     if arguments.json != "-":
         _print_summary(diagram)

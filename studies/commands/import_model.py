@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
 
@@ -30,15 +31,14 @@ def run(arguments: Namespace) -> None:
     external = External.read(arguments.input)
     outputs.keep(external.files(arguments.input))
     model, findings, warnings = external.model(arguments.input)
-    if arguments.output:
-        model.save(arguments.output)
     result = {
         "frequency_hz": model.natural_frequencies_hz.tolist(),
         "interface": list(model.interface),
         "checks": asdict(findings),
         "warnings": list(warnings),
     }
-    write_result(arguments.json, result)
+    files = partial(model.save, arguments.output) if arguments.output else None
+    write_result(arguments.json, result, files)
     print_warnings(arguments.input, warnings)
     if arguments.json != "-":
         print(f"{model.size} coordinates; interface: {', '.join(model.interface)}")

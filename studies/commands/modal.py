@@ -36,15 +36,18 @@ def run(arguments: Namespace) -> None:
     from vanedamp.studies.case.stages import assemble, modal_analysis
 
     analysis = modal_analysis(assemble(case))
-    if arguments.output:
-        analysis.save(arguments.output)
-    if arguments.vtk:
-        from vanedamp.studies.report.pictures import save_vtk
-
-        variables, cell_type = analysis.mesh()
-        save_vtk(analysis.modes, variables["coordinates"].values, variables["cell"].values, cell_type, arguments.vtk)
     result = analysis.to_json()
-    write_result(arguments.json, result)
+
+    def files() -> None:
+        if arguments.output:
+            analysis.save(arguments.output)
+        if arguments.vtk:
+            from vanedamp.studies.report.pictures import save_vtk
+
+            mesh, cell_type = analysis.mesh()
+            save_vtk(analysis.modes, mesh["coordinates"].values, mesh["cell"].values, cell_type, arguments.vtk)
+
+    write_result(arguments.json, result, files)
     print_warnings(arguments.input, analysis.warnings)
     if arguments.json != "-":
         _print_summary(result)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, add_workers
 from vanedamp.studies.terminal import progress
@@ -38,9 +39,8 @@ def run(arguments: Namespace) -> None:
     print_resonance(arguments.input, study.scene)
     with workers(arguments.workers) as pool, progress("optimise") as report:
         optimisation = optimise(study, pool, report, {"versions": versions()})
-    if arguments.output:
-        optimisation.save(arguments.output)
-    write_result(arguments.json, optimisation.to_json())
+    files = partial(optimisation.save, arguments.output) if arguments.output else None
+    write_result(arguments.json, optimisation.to_json(), files)
     if arguments.json != "-":
         print(optimisation.sentence)
         if optimisation.trouble:

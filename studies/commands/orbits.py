@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, add_resume
@@ -46,12 +47,11 @@ def run(arguments: Namespace) -> None:
     started = time.perf_counter()
     with progress("orbits") as report:
         result = orbits(scene, report, checkpoint, {"versions": versions()})
-    if arguments.output:
-        result.save(arguments.output)
     seconds = time.perf_counter() - started
     print_warnings(arguments.input, result.warnings)
     # times are not kept in the result, which is the same however it came about
-    write_result(arguments.json, result.to_json() | {"wall_time_s": seconds} | resonance)
+    files = partial(result.save, arguments.output) if arguments.output else None
+    write_result(arguments.json, result.to_json() | {"wall_time_s": seconds} | resonance, files)
     if checkpoint is not None:
         clear(checkpoint)
         clear_leftovers(arguments.output)
@@ -69,9 +69,10 @@ def _print_summary(result: Branches) -> None:
             parent, place = branch.source
             source = f", from the {result.branches[parent].special[place].kind} of branch {parent}"
         low, high = branch.parameter.min(), branch.parameter.max()
+        open_ones = f", {branch.undetermined.sum()} undetermined" if branch.undetermined.any() else ""
         print(
             f"branch {number}{source}: {len(branch.parameter)} orbits of {branch.periods} period(s), {name} = "
-            f"{low:.6g} to {high:.6g}, {branch.stable.sum()} of them stable; {branch.end}"
+            f"{low:.6g} to {high:.6g}, {branch.stable.sum()} of them stable{open_ones}; {branch.end}"
         )
         for point in branch.special:
             if point.kind != "end":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
@@ -40,12 +41,11 @@ def run(arguments: Namespace) -> None:
     started = time.perf_counter()
     with progress("ramp") as report:
         result = ramp(scene, report, {"versions": versions()})
-    if arguments.output:
-        result.save(arguments.output)
     seconds = time.perf_counter() - started
     print_warnings(arguments.input, result.warnings)
     # times are not kept in the result, which is the same however it came about
-    write_result(arguments.json, result.to_json() | {"wall_time_s": seconds} | resonance)
+    files = partial(result.save, arguments.output) if arguments.output else None
+    write_result(arguments.json, result.to_json() | {"wall_time_s": seconds} | resonance, files)
     if arguments.json != "-":
         _print_table(result)
         periods = sum(len(run.time) for run in result.runs)

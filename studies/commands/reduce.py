@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, count, hertz, ratio
@@ -68,8 +69,6 @@ def run(arguments: Namespace) -> None:
         arguments.recovery,
     )  # fmt: skip
     estimate, rotation = model.provenance["estimate"], model.provenance.get("rotation")
-    if arguments.output:
-        model.save(arguments.output)
     result = {
         "frequency_hz": model.natural_frequencies_hz.tolist(),
         "modes": model.modes,
@@ -85,7 +84,8 @@ def run(arguments: Namespace) -> None:
         result["rotation"] = rotation | {"frequency_hz": fastest.natural_frequencies_hz.tolist()}
         if case.rotation is not None and case.rotation.gyroscopic:
             result["warnings"].append("rotation.gyroscopic: the reduced model leaves the gyroscopic coupling out")
-    write_result(arguments.json, result)
+    files = partial(model.save, arguments.output) if arguments.output else None
+    write_result(arguments.json, result, files)
     print_warnings(arguments.input, result["warnings"])
     if arguments.json != "-":
         kind = "natural" if model.free_modes else "fixed-interface"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
@@ -45,10 +46,9 @@ def run(arguments: Namespace) -> None:
     resonance = print_resonance(arguments.input, scene)
     with progress("ringdown") as report:
         result = ring_down(scene, report, {"versions": versions()})
-    if arguments.output:
-        result.save(arguments.output)
     print_choices(arguments.input, result.estimate, result.advice, result.warnings)
-    write_result(arguments.json, result.to_json() | resonance)
+    files = partial(result.save, arguments.output) if arguments.output else None
+    write_result(arguments.json, result.to_json() | resonance, files)
     if arguments.json != "-":
         _print_summary(result)
 

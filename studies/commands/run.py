@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from typing import Any
 
 from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, count
@@ -39,11 +40,14 @@ def run(arguments: Namespace) -> None:
 
     with progress("run") as report:
         response = simulate(scene, arguments.events, arguments.samples, progress=report)
-    if arguments.output:
-        response.save(arguments.output, {"versions": versions(), "scene": scene.to_dict()})
     result = response.to_json(events=arguments.events) | print_resonance(arguments.input, scene)
     print_choices(arguments.input, response.estimate, response.advice, response.warnings)
-    write_result(arguments.json, result)
+    files = (
+        partial(response.save, arguments.output, {"versions": versions(), "scene": scene.to_dict()})
+        if arguments.output
+        else None
+    )
+    write_result(arguments.json, result, files)
     if arguments.json != "-":
         for name, value in result.items():
             if not isinstance(value, dict | list):

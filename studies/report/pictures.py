@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vanedamp.files.interrupts import uninterrupted
 from vanedamp.files.store import load, replacing
 from vanedamp.studies.report.mode_chart import viewpoint
 from vanedamp.studies.workers import run_module
@@ -67,11 +68,13 @@ def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path
 
 def save_vtk(modes: Modes, coordinates: np.ndarray, cells: np.ndarray, cell_type: int, path: str | Path) -> None:
     """Write all mode shapes as point data on their mesh (.vtu or .vtk, for ParaView)."""
-    grid = _grid(coordinates, cells, cell_type)
-    for number, (frequency, shape) in enumerate(zip(modes.frequencies_hz, modes.shapes, strict=True), start=1):
-        grid.point_data[f"mode {number}: {frequency:.6g} Hz"] = shape.reshape(-1, 3)
+    with uninterrupted():  # an interrupt within VTK may crash the process as it ends
+        grid = _grid(coordinates, cells, cell_type)
+        for number, (frequency, shape) in enumerate(zip(modes.frequencies_hz, modes.shapes, strict=True), start=1):
+            grid.point_data[f"mode {number}: {frequency:.6g} Hz"] = shape.reshape(-1, 3)
+        content = _vtk_bytes(grid, xml=Path(path).suffix == ".vtu")
     with replacing(path) as temporary:
-        temporary.write_bytes(_vtk_bytes(grid, xml=Path(path).suffix == ".vtu"))
+        temporary.write_bytes(content)
 
 
 def _vtk_bytes(grid: Any, xml: bool) -> bytes:

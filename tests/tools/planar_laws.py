@@ -31,6 +31,7 @@ from vanedamp.coupling.numerics.codes import (
     LOGGED,
     NEEDS_FLOW,
     OPEN,
+    PAUSED,
     PERIOD,
     SLIP_LEFT,
     SLIP_RIGHT,
@@ -311,6 +312,8 @@ class Stepper:
                 run.system, run.flows, run.state, run.guards, run.records, run.log, run.scratch, periods,
                 events,
             )  # fmt: skip
+            if self.code == PAUSED:
+                continue
             if self.code != NEEDS_FLOW:
                 return self._take()
             try:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from vanedamp.files.store import finite, json_text, write_json
+from vanedamp.files.store import finite, json_text, together, write_json
 
 
-def write_result(target: str | None, result: Mapping[str, Any]) -> None:
-    """Write a result as JSON: to a file, to standard output (-), or nowhere."""
-    if target is None:
-        return
+def write_result(target: str | None, result: Mapping[str, Any], files: Callable[[], object] | None = None) -> None:
+    """Write a result as JSON: to a file, to standard output (-), or nowhere.
+
+    files: writes the command's other files; all of them appear together, or none.
+    """
+    with together():
+        if files is not None:
+            files()
+        if target is not None and target != "-":
+            write_json(target, finite(result))
     if target == "-":
         print(json_text(finite(result)), end="")
-    else:
-        write_json(target, finite(result))
 
 
 def print_note(source: str, message: str) -> None:

@@ -1,0 +1,128 @@
+"""Runs that would neither end nor heed an interrupt: compiled functions return to Python, and give up at last."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from tests.tools.planar import open_run
+from tests.tools.processes import environment
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.exact.event_driven import EngineRun
+from vanedamp.coupling.methods.time_stepping import SteppedRun
+from vanedamp.coupling.numerics.codes import COUNTERS, DONE, PERIOD, SEGMENTS, STEPS
+from vanedamp.coupling.planar import planar_run
+from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.files.toml_input import validate
+
+
+def on_a_track(radius):
+    """A disc on a track whose frequency grows with the centrifugal load, by the root of the radius."""
+    return validate(Scene, {
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
+        "excitation": {"frequency": 15.9, "force": 2.0}, "rotation": {"rpm": 600.0},
+        "cavity": [{"name": "c", "gap": 1e-3, "play": 1e-4, "radius": radius}],
+        "damper": [{
+            "cavity": "c", "mass": 0.05, "friction": 0.3, "restitution": 0.6, "shape": "disc", "radius": 5e-3,
+            "track_radius": 0.02,
+        }],
+        "time": {"periods": 2, "transient": 0},
+    }, "scene")  # fmt: skip
+
+
+def test_a_mode_too_fast_for_the_excitation_is_refused():
+    assert simulate(on_a_track(1.0)).status is Status.OK
+    assert simulate(on_a_track(1e12)).status is Status.ILL_CONDITIONED
+
+
+def counted(function, calls):
+    def call(*arguments):
+        calls.append(1)
+        return function(*arguments)
+
+    return call
+
+
+def test_segments_with_many_turns_are_cut(monkeypatch):
+    """Two periods of 89,000 radians each: their integrals follow every turn."""
+    calls, run = [], open_run(on_a_track(1e7), 2, 10**6)
+    monkeypatch.setattr(planar_run, "advance", counted(planar_run.advance, calls))
+    assert run.advance_to(2) is Status.OK
+    angle = run.system.period * run.flows.fastest.max()
+    assert angle == pytest.approx(2 * np.pi * 62.832 * np.sqrt(1e7 / 0.02) / (2 * np.pi * 15.9), rel=0.3)
+    assert run.state.counters[SEGMENTS] >= 2 * angle / 3e4
+    assert len(calls) > 4
+
+
+@pytest.fixture
+def resting():
+    """A run of a body that never moves: a segment is a period."""
+    scene = validate(Scene, {
+        "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
+        "excitation": {"frequency": 15.9, "force": 1e-3},
+        "cavity": [{"name": "c", "gap": 1e-3}],
+        "damper": [{"cavity": "c", "mass": 0.05, "friction": 0.3, "restitution": 0.6, "normal_load": 1.0}],
+        "time": {"periods": 10_000, "transient": 0},
+    }, "scene")  # fmt: skip
+    system = assemble(scene)
+    return EngineRun(system, initial_motion(scene, system), new_records(system, 10_000, 0), False, 10**6)
+
+
+def test_runs_of_sliders_return_now_and_then(resting):
+    calls = []
+    resting._advance_compiled = counted(resting._advance_compiled, calls)
+    assert resting.advance_to(10_000) is Status.OK
+    assert resting.state.counters[SEGMENTS] >= 10_000
+    assert len(calls) >= 3
+
+
+class Stepping:
+    """A motion of some steps a period."""
+
+    def __init__(self, steps):
+        self.counters, self.deepest, self.steps, self.calls = np.zeros(COUNTERS, np.int64), np.zeros(1), steps, []
+
+    def march(self, motion, log, periods):
+        self.calls.append(periods - int(self.counters[PERIOD]))
+        self.counters[STEPS] += self.calls[-1] * self.steps
+        self.counters[PERIOD] = periods
+        return DONE
+
+
+@pytest.mark.parametrize(("steps", "calls"), [(1000, [1, 99]), (25_000, [1] + [4] * 24 + [3]), (200_000, [1] * 100)])
+def test_methods_with_steps_return_now_and_then(steps, calls):
+    motion = Stepping(steps)
+    assert SteppedRun(None, motion.march, motion, None, False).advance_to(100) is Status.OK
+    assert motion.calls == calls
+
+
+_GIVEN_UP = """
+import sys
+from tests.test_coupling_endless import on_a_track
+from tests.tools.input_files import SCENE
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.exact import event_functions
+from vanedamp.coupling.planar import event_functions as planar
+import tomllib
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import validate
+
+slider = tomllib.loads(SCENE) | {"time": {"periods": 2, "transient": 0}}
+del slider["sweep"]
+for most in (1000, 0):
+    event_functions.MOST = planar.MOST = most
+    print(simulate(validate(Scene, slider, "slider")).status.value, simulate(on_a_track(1.0)).status.value)
+"""
+
+
+def test_a_search_without_end_is_given_up():
+    """In plain Python, where the most evaluations of one search can be set."""
+    done = subprocess.run(
+        [sys.executable, "-c", _GIVEN_UP], env=environment(NUMBA_DISABLE_JIT="1"), capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    assert done.stdout.splitlines() == ["ok ok", "ill_conditioned ill_conditioned"]
