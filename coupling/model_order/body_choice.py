@@ -31,7 +31,7 @@ from vanedamp.coupling.scene.bodies import Cavity
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.structures import Prescribed
 from vanedamp.coupling.system.body_loads import greatest_pull
-from vanedamp.coupling.system.transient import left_over
+from vanedamp.coupling.system.transient import Transient, timed
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -180,8 +180,9 @@ def _tolerance(scene: Scene) -> float:
 
 def _settled(sliders: Scene) -> int:
     """Return how many periods leave little of the structure's transient, at most those that the scene drops."""
-    lengths = range(_SETTLE, max(_SETTLE, sliders.time.dropped) + 1)
-    found = bisect_left(lengths, True, key=lambda periods: left_over(sliders, periods) <= _LEFT)
+    lengths = range(_SETTLE, max(_SETTLE, timed(sliders).time.dropped) + 1)
+    transient = Transient(sliders)
+    found = bisect_left(lengths, True, key=lambda periods: transient.left_over(periods) <= _LEFT)
     return lengths[min(found, len(lengths) - 1)]
 
 
