@@ -43,7 +43,7 @@ def judge(transient: Transient, records: Records, first: int, done: int) -> Judg
     scene, peaks = transient.scene, records.peak[first:done]
     n, mean, tolerance = len(peaks), float(peaks.mean()), scene.time.tolerance
     touched = _touched(scene, records, 0, done)
-    left = transient.left_over(first, held=True)
+    left = transient.left_over(first)
     if not peaks.any() or (not touched and left <= tolerance):
         own = mean_confidence(peaks)
         return Judgement(True, np.inf, None if own is None else own + left * mean)

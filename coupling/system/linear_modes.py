@@ -1,8 +1,7 @@
 """The linear systems that bodies make of a structure, and how long what is not steady lasts in them.
 
 Two of them bound what contacts do: `loose`, in which bodies on springs, dashpots or tracks are attached as they are (a
-disc with friction rolls) and the others are not there, and `held`, in which friction holds every body that has some,
-and those that nothing binds move with their floor. Their complex modes decay by themselves:
+disc with friction rolls) and the others are not there, and `held`, in which friction and walls hold those that they can. Their complex modes decay by themselves:
 
     x(t) = steady + Re sum_k a_k exp(lambda_k t)
 
@@ -58,10 +57,13 @@ class _Matrices(NamedTuple):
 def linear_modes(scene: Scene, system: System) -> list[LinearModes]:
     """Return the modes of the loose system of a scene and, where it is another one, of that in which bodies are held."""
     sprung = np.array([damper.sprung for damper in scene.damper], bool)
+    rough = np.array([damper.friction > 0 for damper in scene.damper], bool)
+    rolls = np.array([damper.shape == "disc" for damper in scene.damper], bool)
     made = [_matrices(scene, system, sprung, np.zeros(len(sprung), bool))]
-    if scene.damper or np.isfinite(_jenkins(system)[1]).any():
-        rolls = np.array([damper.friction == 0 or damper.shape == "disc" for damper in scene.damper], bool)
-        made.append(_matrices(scene, system, sprung & rolls, ~(sprung & rolls), True))
+    # what pulls a body along its cavity presses it on a wall
+    held = np.where(sprung, rough & ~rolls, rough | (system.of_bodies.weight != 0.0))
+    if held.any() or np.isfinite(_jenkins(system)[1]).any():
+        made.append(_matrices(scene, system, sprung & ~held, held, True))
     return [_modes(matrices, system.frequency) for matrices in made]
 
 
@@ -141,7 +143,7 @@ def _modes(made: _Matrices, frequency: np.ndarray) -> LinearModes:
     """Return the modes of a system that is loaded at the angular frequencies (e,)."""
     k, still = len(made.q), _static(made.stiffness, made.weight)
     pairs = zip(frequency, made.load, strict=True)
-    wave = np.reshape([_wave(made, omega, load) for omega, load in pairs], (-1, k))
+    wave = np.reshape([_wave(made, omega, load) for omega, load in pairs], (len(frequency), k))
     with np.errstate(invalid="ignore"):
         # displacements and rates that are not those of the steady motion
         q, v = made.q - still - wave.real.sum(axis=0), made.v + (frequency[:, None] * wave.imag).sum(axis=0)
@@ -154,7 +156,7 @@ def _modes(made: _Matrices, frequency: np.ndarray) -> LinearModes:
             values, shapes, inverse = _complex(k, *(matrix.tobytes() for matrix in together))
             moved, part = made.response @ shapes, inverse @ np.r_[q, v]
         felt, begun = np.abs(moved), np.abs(moved * part)
-    steady = float(np.linalg.norm(wave @ made.response))
+        steady = float(np.linalg.norm(wave @ made.response))
     return LinearModes(steady, begun, -values.real, np.abs(values.imag), felt > _FELT * felt.max(initial=0.0))
 
 

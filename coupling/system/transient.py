@@ -28,7 +28,7 @@ MOST = 24_000
 def left_over(scene: Scene, periods: float) -> float:
     """Return an upper bound of the transient left after `periods` periods, as a share of the steady response.
 
-    Of the structure with the bodies on springs and tracks attached, without contacts. 0 where nothing excites it.
+    Of the structure with bodies on springs and tracks attached, other bodies loose or held by friction, without impacts. 0 where nothing excites it.
     """
     return Transient(scene).left_over(periods)
 
@@ -49,11 +49,9 @@ class Transient:
         self.systems = linear_modes(scene, self.system)
         self.excited = bool(self.system.of_structure.load.any())
 
-    def left_over(self, periods: float, held: bool = False) -> float:
-        """Return the bound of what is left, as left_over; held: with the bodies held as well, the larger of both."""
-        if not self.excited:
-            return 0.0
-        return max(self._left(modes, periods) for modes in self.systems[: None if held else 1])
+    def left_over(self, periods: float) -> float:
+        """Return the bound of what is left, as left_over."""
+        return max(self._left(modes, periods) for modes in self.systems) if self.excited else 0.0
 
     def _left(self, modes: LinearModes, periods: float) -> float:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
