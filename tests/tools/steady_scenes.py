@@ -7,7 +7,7 @@ which the second half is evaluated. A scene that ends as `ok` is covered where
 
     |mean - reference| <= sqrt(confidence^2 + reference's confidence^2) + FLOOR mean.
 
-Printed are, for each kind, scenes, those said to be ok, those covered, the largest relative error of the ok ones, the
+Printed are each scene as it is done and, for each kind, scenes, those said to be ok, those covered, the largest relative error of the ok ones, the
 periods of the longest run, and the time of the judgement relative to that of the runs.
 """
 
@@ -162,7 +162,7 @@ class Outcome(NamedTuple):
     @property
     def error(self) -> float:
         """Error of the mean, relative to the reference's."""
-        return abs(self.run.amplitude_mean / self.reference.amplitude_mean - 1.0)
+        return abs(self.run.amplitude_mean - self.reference.amplitude_mean) / max(self.reference.amplitude_mean, 1e-300)
 
     @property
     def covered(self) -> bool:
@@ -210,17 +210,17 @@ def _clock() -> Any:
 
 
 def main(first: int = 0, scenes: int = 300) -> None:
-    """Print a line for each scene that is not covered, then the table."""
+    """Print a line for each scene as it is done, then the table."""
     found: dict[str, list[Outcome]] = {kind.__name__: [] for kind in KINDS}
     for seed in range(first, first + scenes):
         kind, outcome = KINDS[seed % len(KINDS)].__name__, outcome_of(seed)
         found[kind].append(outcome)
-        run = outcome.run
-        if run.status not in ("ok", "not_steady") or (run.status == "ok" and not outcome.covered):
-            print(
-                f"{seed} {kind}: {run.status}, {run.amplitude_mean:.4g} +- {run.amplitude_mean_confidence or 0:.2g} m, "
-                f"reference {outcome.reference.amplitude_mean:.4g}, {run.periods} periods", flush=True,
-            )  # fmt: skip
+        run, told = outcome.run, "" if outcome.covered else "NOT COVERED, "
+        print(
+            f"{seed} {kind}: {run.status}, {run.amplitude_mean:.5g} +- {run.amplitude_mean_confidence or 0:.2g} m, "
+            f"reference {outcome.reference.amplitude_mean:.5g}, {told}{run.periods} periods in {outcome.seconds:.3g} s, "
+            f"judged in {outcome.judged:.2g} s", flush=True,
+        )  # fmt: skip
     print("| kind | scenes | ok | covered | largest error of ok | longest run | judgement |\n|---|---|---|---|---|---|---|")
     for kind, outcomes in [*found.items(), ("all", [outcome for kind in found.values() for outcome in kind])]:
         ok = [outcome for outcome in outcomes if outcome.run.status == "ok"]
