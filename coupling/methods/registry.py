@@ -20,6 +20,7 @@ from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import InitialMotion, assemble, initial_motion, loads_of, physical_scale
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.transient import most_periods
 from vanedamp.files.toml_input import InputError
 
 
@@ -33,8 +34,8 @@ def respond(
     """Return the response of a scene without open choices. Arguments as in coupling.engine.simulate."""
     started = time.perf_counter()
     run = run_of(scene, events, samples_per_period, start)
-    status, transient = run_scene(run, scene, progress)
-    return replace(evaluate(scene, run.outcome(), status, transient, started), final=final_state(scene, run))
+    ended = run_scene(run, scene, progress)
+    return replace(evaluate(scene, run.outcome(), ended, started), final=final_state(scene, run))
 
 
 def final_state(scene: Scene, run: Run) -> RestartState | None:
@@ -58,7 +59,7 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
     scale = physical_scale(scene, system)
     start = None if start is None else at_speed_of(scene, start)
     reduced, deflected = isinstance(scene.structure, Rom), is_deflected(scene, system)
-    records = new_records(system, scene.time.simulated, samples_per_period, reduced, deflected)
+    records = new_records(system, most_periods(scene), samples_per_period, reduced, deflected)
     if scene.planar:
         return _begin_planar(scene, system, method, records, events, start)
     initial = initial_motion(scene, system) if start is None else restart_from(system, scale, start)

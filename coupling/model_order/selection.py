@@ -29,7 +29,6 @@ from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.body_loads import load_warnings
 from vanedamp.coupling.system.reduced_model_file import greatest_speed, reduced_model
 from vanedamp.coupling.system.resonance import chosen_resonance, excitation_force
-from vanedamp.coupling.system.transient import timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.contact_pulse import Collision, pulse
 from vanedamp.rom.dense_modes import spectrum
@@ -125,9 +124,9 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
     """Return the scene with the choice that was made for it."""
     structure, choice = scene.structure, choices.get(_group(scene))
     if not isinstance(structure, Rom):
-        return Selected(timed(scene), None)
+        return Selected(scene, None)
     if choice is None:
-        return Selected(timed(scene), _warning(_shared(scene, structure)))
+        return Selected(scene, _warning(_shared(scene, structure)))
     structure = replace(structure, modes=choice.chosen.modes, natural=True, attached=choice.chosen.attached)
     scene = replace(scene, structure=structure)
     contacts = _collisions(scene, reduced_model(structure, scene.speed))
@@ -140,7 +139,7 @@ def with_choice(scene: Scene, choices: Choices) -> Selected:
         sentences.append(warning["sentence"])
     if any(damper.shape != "slider" for damper in scene.damper):
         sentences.append("bodies with extent count as sliders")
-    return Selected(timed(scene), estimate | {"sentence": "; ".join(sentences)})
+    return Selected(scene, estimate | {"sentence": "; ".join(sentences)})
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from vanedamp.coupling.scene.bodies import Cavity, Damper
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import base_acceleration, physical_scale
-from vanedamp.coupling.system.body_loads import body_loads, centres
+from vanedamp.coupling.system.body_loads import binding, body_loads, centres
 from vanedamp.coupling.system.cavities import surface_labels
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of
 from vanedamp.coupling.system.restitution import law_address
@@ -194,13 +194,12 @@ def planar_system(scene: Scene, flat: System) -> PlanarSystem:
     J = np.reshape([unit.normal for unit in units] + [unit.slip for unit in units], (2 * len(units), size))
     stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
     stiffness[:n, :n], damping[:n, :n] = np.diag(flat.stiffness[:n]), flat.damping[:n, :n]
-    for body in bodies:
-        spring = (body.damper.stiffness or 0.0) + float(loads.track[body.number])
-        if spring or body.damper.dashpot:
+    for body, spring, dashpot in zip(bodies, *binding(scene, loads), strict=True):
+        if spring or dashpot:
             own = -floor[body.number]
             own[body.x] = 1.0
             stiffness += spring * np.outer(own, own)
-            damping += (body.damper.dashpot or 0.0) * np.outer(own, own)
+            damping += dashpot * np.outer(own, own)
         stiffness[body.x, body.x] -= loads.gradient[body.number]
     response = np.zeros(size)
     response[:n] = flat.response[:n]

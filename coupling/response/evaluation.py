@@ -18,14 +18,17 @@ from vanedamp.coupling.response.records import DETACHES, ENERGIES, EXCITATION, I
 from vanedamp.coupling.response.response import Event, PlanarSamples, Response, Status, classify
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import about_mean
+from vanedamp.coupling.response.steadiness import judge
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
-from vanedamp.coupling.system.transient import outlasted
+from vanedamp.coupling.system.transient import Transient
 
 #: periods between two looks at whether the response is steady
 _CHUNK = 100
+#: relaxations within the longest run below which an open one does not go on
+_HOPELESS = 3.0
 #: share of the energy there is that counts as flow in any case
 _CARRIED = 1e-3
 #: share of the largest order's load below which that of order 1 is none
@@ -100,44 +103,72 @@ class Outcome:
     plane: Plane | None = None
 
 
-def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | None = None) -> tuple[Status, int]:
-    """Run all periods, or until the mean amplitude is known well enough. Returns status and length of the transient.
+class Ended(NamedTuple):
+    """How a run ended: status, periods left out, and the confidence of the mean of the others, m (None: unknown)."""
+
+    status: Status
+    transient: int
+    confidence: float | None = None
+
+
+def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | None = None) -> Ended:
+    """Run all periods; where their number is open, until the response is steady; with steady = "auto", until its mean
+    is known well enough.
 
     progress: called with the number of periods done and of those to do.
-    """
-    status, dropped = Status.NOT_STEADY, scene.time.dropped
-    for periods in range(_CHUNK, scene.time.simulated + _CHUNK, _CHUNK):
-        # compiled functions hear of no interrupt before they return
-        ended = run.advance_to(min(periods, scene.time.simulated))
-        if ended is not Status.OK:
-            return ended, dropped
+    """  # fmt: skip
+    transient = Transient(scene, run.outcome().system)
+    dropped, periods, most = transient.length()
+    if scene.time.steady == "auto":
+        return _run_until_known(run, transient, periods, progress)
+    done = 0
+    while True:
+        for done in [*range(done + _CHUNK, periods, _CHUNK), periods]:
+            # compiled functions hear of no interrupt before they return
+            ended = run.advance_to(done)
+            if ended is not Status.OK:
+                return Ended(ended, dropped)
+            if progress is not None:
+                progress(done, periods)
+        found = judge(transient, run.outcome().records, dropped, periods)
+        if found.steady or not dropped:
+            return Ended(Status.OK, dropped, found.confidence)
+        if 2 * periods > most or found.rate * most < _HOPELESS:
+            return Ended(Status.NOT_STEADY, dropped, found.confidence)
+        dropped, periods = periods, 2 * periods
+
+
+def _run_until_known(
+    run: Run, transient: Transient, periods: int, progress: Callable[[int, int], None] | None
+) -> Ended:
+    """Run until the mean amplitude is known well enough, at most some periods."""
+    tolerance, ended = transient.scene.time.tolerance, Ended(Status.NOT_STEADY, transient.scene.time.dropped)
+    for done in [*range(_CHUNK, periods, _CHUNK), periods]:
+        status = run.advance_to(done)
+        if status is not Status.OK:
+            return Ended(status, ended.transient)
         if progress is not None:
-            progress(min(periods, scene.time.simulated), scene.time.simulated)
-        if scene.time.steady != "auto":
-            continue
+            progress(done, periods)
         outcome = run.outcome()
-        _, peaks = about_mean(outcome.records, slice(0, outcome.periods), outcome.system.period)
-        transient = transient_length(peaks)
-        if transient is None:
-            status, dropped = Status.NOT_STEADY, scene.time.dropped
+        records, (_, peaks) = outcome.records, about_mean(outcome.records, slice(0, done), outcome.system.period)
+        dropped = transient_length(peaks)
+        if dropped is None:
+            ended = Ended(Status.NOT_STEADY, transient.scene.time.dropped)
             continue
-        confidence = mean_confidence(peaks[transient:])
-        if confidence is not None and confidence <= scene.time.tolerance * peaks[transient:].mean():
-            return Status.OK, transient
-        status, dropped = Status.UNCERTAIN, transient
-    if scene.time.steady != "auto":
-        outcome, window = run.outcome(), slice(dropped, scene.time.simulated)
-        records = outcome.records
-        _, peaks = about_mean(records, window, outcome.system.period)
-        steady = not dropped or outlasted(scene, peaks, records.impacts[window], outcome.system)
-        status = Status.OK if steady else Status.NOT_STEADY
-    return status, dropped
+        found = judge(transient, records, dropped, done)
+        if found.confidence is not None and found.confidence <= tolerance * peaks[dropped:].mean():
+            if found.steady or not dropped:
+                return Ended(Status.OK, dropped, found.confidence)
+            ended = Ended(Status.NOT_STEADY, dropped, found.confidence)
+        else:
+            ended = Ended(Status.UNCERTAIN, dropped, found.confidence)
+    return ended
 
 
-def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started: float) -> Response:
-    """Return the response of a run that began at `started` (time.perf_counter) and dropped `transient` periods."""
+def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Response:
+    """Return the response of a run that began at `started` (time.perf_counter)."""
     system, records, done = run.system, run.records, run.periods
-    first = min(transient, max(done - 1, 0))
+    status, first = ended.status, min(ended.transient, max(done - 1, 0))
     window = slice(first, done)
     span = max(done - first, 1) * system.period
     ledger = records.ledger[: done + 1] - records.ledger[first]
@@ -165,7 +196,7 @@ def evaluate(scene: Scene, run: Outcome, status: Status, transient: int, started
         frequency=scene.frequency,
         amplitude_max=float(peaks.max(initial=0.0)),
         amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
-        amplitude_mean_confidence=mean_confidence(peaks),
+        amplitude_mean_confidence=mean_confidence(peaks) if ended.confidence is None else ended.confidence,
         static_deflection=static,
         amplitude_max_dynamic=float(dynamic.max(initial=0.0)),
         amplitude_mean_dynamic=float(dynamic.mean()) if len(dynamic) else 0.0,

@@ -30,7 +30,7 @@ class Records(NamedTuple):
     parts: np.ndarray  # (periods + 1, 1 + b): energy of the structure with all springs, and of each body, J
     collided: np.ndarray  # energy of the relative motion that impacts turned round or took, J
     samples: np.ndarray  # (periods * s, 1 + b): x and the slips, s equidistant samples a period
-    coordinates: np.ndarray  # (periods * s, n) modal coordinates there, (., 0): not wanted; nan: not kept
+    coordinates: np.ndarray  # (periods * s, n) modal coordinates there, (., 0): not wanted; first nan: not kept
     log: np.ndarray  # (capacity, 6): time, kind, row, relative velocity before and after, impulse
     swing: np.ndarray  # (., 3): largest and smallest x, m, and its integral, m s; (0, 3): bodies bring no static load
 
@@ -48,13 +48,15 @@ def new_records(
     coordinates: of these samples as well; deflected: whether loads of the bodies deflect the structure.
     """
     b = system.bodies
+    kept = np.empty((periods * samples, system.modes if coordinates else 0))
+    kept[:1] = np.nan  # those of a run that ends early take no memory
     return Records(
         peak=np.zeros(periods + 1), harmonic=np.zeros(periods + 1, complex), square=np.zeros(periods + 1),
         momentum=np.zeros(periods + 1, complex), impacts=np.zeros(periods + 1, np.int64),
         section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
         parts=np.zeros((periods + 1, 1 + b)), collided=np.zeros(periods + 1),
         samples=np.zeros((periods * samples, 1 + b)),
-        coordinates=np.full((periods * samples, system.modes if coordinates else 0), np.nan),
+        coordinates=kept,
         log=np.zeros((4096 + 4 * len(system.delassus), 6)),
         swing=np.tile([-np.inf, np.inf, 0.0], ((periods + 1) * deflected, 1)),
     )  # fmt: skip

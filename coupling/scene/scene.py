@@ -44,14 +44,14 @@ class Time:
     """Excitation periods simulated, and those evaluated.
 
     With neither `periods` nor `transient` the transient is 1000 of 1500 periods, or longer where the structure's
-    damping leaves more than `tolerance` of the steady response (system.transient). steady = "auto" drops it by a
+    damping leaves more than `tolerance` of the steady response (system.transient); a run that is not steady then goes
+    on, each time for as long as it has taken, and leaves out what was before. steady = "auto" drops it by a
     statistical rule and ends the run once the 95 % confidence interval of the mean amplitude is narrower than
     `tolerance` of it on either side.
     """
 
     periods: Annotated[Whole, Field(gt=0)] | None = None
-    """excitation periods simulated (default: 1500, or more where the structure's damping asks for a longer
-    transient)"""
+    """excitation periods simulated (default: 1500, or more, up to 24000, until the response is steady)"""
     transient: Annotated[Whole, Field(ge=0)] | None = None
     """periods of these that are left out of the evaluation (default: two thirds); 0 evaluates from the start"""
     steady: Literal["auto"] | None = None
@@ -67,8 +67,13 @@ class Time:
             raise ValueError(f"transient ({self.transient}) must be less than periods ({self.simulated})")
 
     @property
+    def open(self) -> bool:
+        """Whether the length of a run is left open: it suits the scene's damping (system.transient)."""
+        return self.periods is None and self.transient is None
+
+    @property
     def simulated(self) -> int:
-        """Largest number of periods simulated: 1500 by default."""
+        """Largest number of periods simulated: 1500 by default, where it is not open."""
         return 1500 if self.periods is None else self.periods
 
     @property

@@ -82,6 +82,12 @@ def body_loads(scene: Scene, basis: ModalBasis) -> BodyLoads:
     return BodyLoads(*np.reshape(loads, (-1, 4)).T)
 
 
+def binding(scene: Scene, loads: BodyLoads) -> tuple[np.ndarray, np.ndarray]:
+    """Return stiffness, N/m, and dashpot, N s/m, (b,) each, that bind the bodies to their floors."""
+    springs = np.array([damper.stiffness or 0.0 for damper in scene.damper]) + loads.track
+    return springs, np.array([damper.dashpot or 0.0 for damper in scene.damper])
+
+
 def centres(scene: Scene) -> np.ndarray:
     """Return where the centres of the bodies (b,) stand in their cavities, m from the middle, side by side."""
     places = np.zeros(len(scene.damper))

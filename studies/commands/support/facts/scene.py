@@ -148,7 +148,8 @@ def _of_bodies(scene: Scene) -> Iterator[Fact]:
 def _of_cost(scene: Scene, whole: Scene) -> Iterator[Fact]:
     """Yield the length of a run, and the time that it and the sweep of the whole scene take by the estimate."""
     lasting = timed(scene)
-    yield Fact("periods", lasting.time.simulated, "", "at most" if lasting.time.steady else "")
+    bound = "at least" if scene.time.open else ""
+    yield Fact("periods", lasting.time.simulated, "", "at most" if lasting.time.steady else bound)
     if not lasting.time.steady:
         yield Fact("transient", lasting.time.dropped, "", "of these are not evaluated")
         yield Fact("transient_left", left_over(lasting, lasting.time.dropped), "", "of the linear transient, after it")
