@@ -22,7 +22,6 @@ from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.solver_options import options_of
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.modal_basis import ModalBasis, basis_of
-from vanedamp.coupling.system.transient import timed
 from vanedamp.files.store import frozen
 from vanedamp.rom.error_estimate import Choice, Rung
 
@@ -100,7 +99,7 @@ class _Pair:
     def __init__(self, scene: Scene, whole: Rung, peak: float, tolerance: float) -> None:
         self.peak, self.tolerance = peak, tolerance
         self.scene = replace(scene, solver=options_of({}), sweep={})
-        settled = min(settled_after(timed(self._with(whole))), _LONGEST)
+        settled = min(settled_after(self._with(whole)), _LONGEST)
         self.scene = replace(self.scene, time=Time(settled + _WINDOW, settled))
         self.whole = self._with(whole)
         self.reference = respond(self.whole)
