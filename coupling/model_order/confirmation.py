@@ -66,11 +66,16 @@ def confirmed(choice: Choice, scenes: Sequence[Scene], peak: float) -> Confirmed
         if (rung.modes, rung.attached) == (whole.modes, whole.attached):
             break
         difference, several = _worst([pair.compare(rung) for pair in pairs])
-        found = _with(choice, rung, difference, several)
+        found = _with(choice, rung, difference, several, _from_one_start(pairs))
         if _SAFETY * difference <= tolerance:
             return found
         alike = alike or (found if several else None)
     return alike or _with(choice, whole, 0.0, False)
+
+
+def _from_one_start(pairs: Sequence[_Pair]) -> str:
+    """Return the end of a sentence on runs that leave no state for another."""
+    return "" if why_no_restart(pairs[0].whole) is None else ", from one start: other steady states were not tried"
 
 
 def _worst(found: Sequence[tuple[float, bool]]) -> tuple[float, bool]:
@@ -78,7 +83,7 @@ def _worst(found: Sequence[tuple[float, bool]]) -> tuple[float, bool]:
     return max(found)
 
 
-def _with(choice: Choice, rung: Rung, difference: float, several: bool) -> Confirmed:
+def _with(choice: Choice, rung: Rung, difference: float, several: bool, remark: str = "") -> Confirmed:
     """Return the choice of a model, with the sentence on its runs."""
     what = f"{rung.modes} mode{'s' * (rung.modes != 1)}"
     if rung.attached:
@@ -86,7 +91,7 @@ def _with(choice: Choice, rung: Rung, difference: float, several: bool) -> Confi
     sentence = choice.sentence
     if rung != choice.chosen:
         sentence = f"{what}, as the estimate's choice did not hold in runs: {sentence}"
-    sentence += f"; in runs of both {100 * difference:.2g} % off the whole model's mean amplitude"
+    sentence += f"; in runs of both {100 * difference:.2g} % off the whole model's mean amplitude{remark}"
     if several:
         sentence += ", as both have several steady states and the start decides which is reached"
     values = {item.name: getattr(choice, item.name) for item in fields(Choice)} | {"chosen": rung, "sentence": sentence}
