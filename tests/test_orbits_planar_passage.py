@@ -1,6 +1,7 @@
 """Period maps of bodies in the plane: derivatives against 40 digits and differences, statuses, symmetry."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,9 @@ import pytest
 from tests.reference.planar_sequence import PlanarSequence, walk
 from tests.tools.planar import planar_scene
 from tests.tools.planar_laws import scene_of, tables
+from vanedamp.coupling.orbits.branch import Branch, Branches, BranchPoint
+from vanedamp.coupling.orbits.multipliers import decided
+from vanedamp.coupling.orbits.newton import OrbitStatus, find_orbit
 from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.orbits.planar_segment import Segment
@@ -15,8 +19,10 @@ from vanedamp.coupling.planar.constraints import PlanarMotion, planar_motion
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.report.branch_charts import branches_figure
 
 EPS = np.finfo(float).eps
 LAWS = {
@@ -256,6 +262,35 @@ def test_an_aligned_block_that_hits_rigid_walls_has_no_derivative_of_its_tilt():
     along[found.names.index("body 0 slip")] = found.scale[found.names.index("body 0 slip")]
     ends = [found(x + way * 1e-5 * along).state for way in (1, -1)]
     np.testing.assert_allclose((ends[0] - ends[1]) / 2e-5, passage.derivative @ along, rtol=1e-6, atol=1e-8)
+
+
+def test_an_orbit_without_derivative_is_not_called_stable():
+    """An aligned block between rigid walls: multipliers below one, and a tilt that leaves the orbit however small."""
+    table = STRUCTURE | {
+        "excitation": {"frequency": 1.05 / (2 * math.pi), "force": 0.3}, "gravity": {"acceleration": 0.0},
+        "contact": {"law": "newton"},
+    }  # fmt: skip
+    body = BLOCK | {"friction": 0.0, "restitution": 0.6, "lift": 0.2, "velocity": 0.3}
+    found, _, _, z = frame_of(planar_scene(table, body, gap=3.0, play=0.5))
+    state = start_of(found, z)
+    for _ in range(250):
+        state = found(state).state
+    orbit = find_orbit(found, state)
+    assert orbit.status is OrbitStatus.OK and len(orbit.passage.sequence) == 2
+    assert np.abs(decided(orbit.multipliers, orbit.neutral)).max() < 0.9
+    tilted = orbit.state.copy()
+    tilted[found.names.index("body 0 tilt")] += 1e-9
+    assert np.abs(found(tilted).state - orbit.state).max() > 1e-3
+    assert orbit.undetermined and not orbit.stable
+    point = BranchPoint.of(orbit)
+    branches = Branches(
+        replace(found.scene, orbit=Orbit()), found.names, found.scale, (Branch.of([point], 1, (), "", None),), 0
+    )  # fmt: skip
+    told = branches.to_json()["branches"][0]
+    assert (told["stable_points"], told["undetermined_points"]) == (0, 1)
+    assert [trace.name for trace in branches_figure(branches, {}).data if trace.name] == [
+        "branch 0, stability undetermined"
+    ] * 2
 
 
 # --- the contract

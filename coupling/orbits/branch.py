@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 KIND = "orbits"
 #: measures of an orbit and their units, each an array over the points of a branch
 MEASURES = {"amplitude_mean": "m", "amplitude_max": "m", "impacts_per_period": "1"}
-FLAGS = ("stable", "symmetric")
+FLAGS = ("stable", "symmetric", "undetermined")
 
 
 class BranchPoint(NamedTuple):
@@ -39,6 +39,7 @@ class BranchPoint(NamedTuple):
     impacts_per_period: float
     sequence: str
     symmetric: bool
+    undetermined: bool
 
     @classmethod
     def of(cls, orbit: Orbit) -> BranchPoint:
@@ -46,6 +47,7 @@ class BranchPoint(NamedTuple):
         return cls(
             orbit.parameter, orbit.state, orbit.multipliers, orbit.neutral, orbit.stable, orbit.amplitude_mean,
             orbit.amplitude_max, orbit.impacts_per_period, "; ".join(orbit.passage.sequence), orbit.symmetric,
+            orbit.undetermined,
         )  # fmt: skip
 
 
@@ -73,12 +75,13 @@ class Branch:
     state               (m, k) at the start of a period, in the units of Branches.names
     multipliers         (m, k) complex, the largest first
     neutral             (m,) how many of them are 1 because the orbit may be moved, as a body at rest or in free flight
-    stable              (m,) whether all others lie inside the unit circle
+    stable              (m,) whether all others lie inside the unit circle; False where that decides nothing
     amplitude_mean      (m,) m, mean of the periods' largest displacements of the response, as a sweep's
     amplitude_max       (m,) m
     impacts_per_period  (m,)
     sequence            (m,) names of the events in order, joined by "; "
     symmetric           (m,) whether an orbit is its own mirror image half a period later
+    undetermined        (m,) whether stability is open: events meet or graze, and multipliers hold on one side only
     special             bifurcations, changes of the sequence, and the end
     end                 why it was not followed further
     source              the branch, and its special point, from which this one goes out; None for the first
@@ -95,6 +98,7 @@ class Branch:
     impacts_per_period: np.ndarray
     sequence: np.ndarray
     symmetric: np.ndarray
+    undetermined: np.ndarray
     special: tuple[SpecialPoint, ...]
     end: str
     source: tuple[int, int] | None = None
@@ -121,7 +125,7 @@ class Branch:
         return {
             "points": len(self.parameter), "parameter_min": float(self.parameter.min()),
             "parameter_max": float(self.parameter.max()), "stable_points": int(self.stable.sum()),
-            "periods": self.periods, "end": self.end,
+            "undetermined_points": int(self.undetermined.sum()), "periods": self.periods, "end": self.end,
             "from": None if self.source is None else {"branch": self.source[0], "special_point": self.source[1]},
         }  # fmt: skip
 

@@ -90,9 +90,14 @@ class Orbit:
         return self._multipliers[1]
 
     @property
+    def undetermined(self) -> bool:
+        """Whether multipliers say nothing of stability: the period map has no derivative that holds on all sides."""
+        return self.passage.status is not PassageStatus.OK
+
+    @property
     def stable(self) -> bool:
-        """Whether all multipliers but the neutral ones lie inside the unit circle."""
-        return bool(np.all(np.abs(decided(*self._multipliers)) < 1.0))
+        """Whether all multipliers but the neutral ones lie inside the unit circle, and decide the stability."""
+        return not self.undetermined and bool(np.all(np.abs(decided(*self._multipliers)) < 1.0))
 
     @property
     def amplitude_mean(self) -> float:

@@ -61,7 +61,7 @@ _CLOSE = 1e-11
 #: events at one instant after which contacts are said to be undecided, for each unit
 _AT_ONCE = 20
 #: segments after which a run returns to Python, which sees interrupts
-_SLICE = 1024
+_SLICE = 4096
 #: events at one instant after which a decision that repeats itself is made anew, for each unit
 _REPEATED = 4
 #: how often a decision is made anew where its forces break their laws

@@ -39,16 +39,20 @@ def branches_figure(branches: Branches, sweeps: Mapping[str, tuple[np.ndarray, n
         )  # fmt: skip
     for number, branch in enumerate(branches.branches):
         name, look = branch_name(number, branch), {"color": _COLOURS[number % len(_COLOURS)]}
-        for stable, kind, dash in ((True, "stable", "solid"), (False, "unstable", "dash")):
-            kept = _drawn(branch.stable == stable)
-            if not (branch.stable == stable).any():
+        unstable = ~(branch.stable | branch.undetermined)
+        for own, kind, dash, width in (
+            (branch.stable, "stable", "solid", 2.2), (unstable, "unstable", "dash", 1.6),
+            (branch.undetermined, "stability undetermined", "dot", 1.6),
+        ):  # fmt: skip
+            kept = _drawn(own)
+            if not own.any():
                 continue
             measures = ((1e6 * branch.amplitude_mean, "%{y:.6g} µm"), (branch.impacts_per_period, "%{y:.4g} impacts"))
             for row, (values, shown) in enumerate(measures, start=1):
                 figure.add_scatter(
                     x=np.where(kept, wide * branch.parameter, np.nan), y=np.where(kept, values, np.nan), mode="lines",
                     name=f"{name}, {kind}", legendgroup=name, showlegend=row == 1, row=row, col=1,
-                    line=look | {"dash": dash, "width": 2.2 if stable else 1.6},
+                    line=look | {"dash": dash, "width": width},
                     hovertemplate=f"{name}, {kind}, %{{x:.10g}}: {shown}<extra></extra>",
                 )  # fmt: skip
     _add_special_points(figure, branches, wide)
@@ -108,7 +112,7 @@ def _add_special_points(figure: go.Figure, branches: Branches, wide: float) -> N
 
 def branches_header(branches: Branches) -> list[str]:
     """Return the names of the columns of `branches_rows`."""
-    measures = ("amplitude_mean", "amplitude_max", "impacts_per_period", "largest_multiplier", "stable")
+    measures = ("amplitude_mean", "amplitude_max", "impacts_per_period", "largest_multiplier", "stable", "undetermined")
     return ["branch", "periods", branches.parameter, *measures]
 
 
@@ -118,7 +122,7 @@ def branches_rows(branches: Branches) -> Iterator[list[object]]:
         columns = (branch.parameter, branch.amplitude_mean, branch.amplitude_max, branch.impacts_per_period)
         largest = np.abs(branch.multipliers).max(axis=1, initial=0.0)
         for index, values in enumerate(np.column_stack([*columns, largest]).tolist()):
-            yield [number, branch.periods, *values, bool(branch.stable[index])]
+            yield [number, branch.periods, *values, bool(branch.stable[index]), bool(branch.undetermined[index])]
 
 
 def multipliers_figure(branches: Branches) -> go.Figure:
