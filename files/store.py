@@ -42,7 +42,9 @@ _OPEN_FILES = Path("/proc")
 _SEAL, _SEAL_LENGTH = "\nvanedamp {:08x}\n", 19
 #: bytes that are read at once
 _PART = 1 << 20
-_Class, _Path, _Record = TypeVar("_Class"), TypeVar("_Path", bound="str | os.PathLike[str]"), TypeVar("_Record")
+_Class = TypeVar("_Class")
+_Path = TypeVar("_Path", bound="str | os.PathLike[str]")
+_Record = TypeVar("_Record")
 
 
 class StoreError(VanedampError):
