@@ -50,10 +50,6 @@ def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: 
         trouble = _trouble(path)
         if trouble is not None:
             raise InputError(f"{option} {path}: {trouble}")
-        endings = suffixes.get(option.removeprefix("--"), (path.suffix,))
-        if path.suffix not in endings and path != beside:
-            expected = " or ".join(filter(None, endings))
-            raise InputError(f"{option} {path}: expected a file name ending in {expected}")
         if _is_stdout(path):
             raise InputError(f"{option} {path}: is standard output, where the summary goes; name another file")
     for (one, first), (other, second) in itertools.combinations(outputs.files, 2):
@@ -61,6 +57,11 @@ def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: 
             raise InputError(f"{one} and {other}: both are {second}; name two files")
     named_input = getattr(arguments, "input", None)
     outputs.keep(getattr(arguments, "inputs", []) if named_input is None else [named_input])
+    for option, path in outputs.files:
+        endings = suffixes.get(option.removeprefix("--"), (path.suffix,))
+        if path.suffix not in endings and path != beside:
+            expected = " or ".join(filter(None, endings))
+            raise InputError(f"{option} {path}: expected a file name ending in {expected}")
     return outputs
 
 
