@@ -4,8 +4,9 @@ A library differs from the next one in the order of its sums and in what it leav
 an order drawn from the seed and the length, LAPACK gets rows and columns in such an order, and signs of eigenvectors,
 turns of bases of multiple eigenvalues and starts of iterations are drawn as well. What every library returns exactly
 stays exact that way: zeros, products with unit vectors, sums of integers, diagonal matrices, symmetric products.
-Matrices that are factorised and kept, and right-hand sides of factors that are kept, change by 1 ulp per entry; exp,
-log and sine by 1 ulp. An entry's value decides how, so that equal entries stay equal.
+Matrices change by 1 ulp in what is not on their diagonal, exp, log and sine by 1 ulp; an entry's value decides how, so
+that equal entries stay equal. Right-hand sides of factors that are not ours change by a few ulps. Rows whose sizes are
+far apart keep their order: what LAPACK does for graded matrices, every LAPACK does.
 """
 
 import functools
@@ -19,6 +20,8 @@ _SEED = os.environ.get("VANEDAMP_LAST_BITS", "0")
 _EPS = np.finfo(float).eps
 # up to so many products are rounded one by one, without fused multiplication and addition
 _SMALL = 4096
+# rows whose sizes are farther apart stay in their order
+_GRADED = 1e3
 # eigenvalues at most this many units in the last place of the largest one apart are one
 _SAME = 4.0
 
@@ -28,8 +31,8 @@ def _random(*names):
 
 
 @functools.lru_cache(maxsize=4096)
-def _order(size):
-    return _random("order", size).permutation(size)
+def _order(size, name="order"):
+    return _random(name, size).permutation(size)
 
 
 def _signs(size):
@@ -141,7 +144,17 @@ exp, expm1, log, log1p, log2, log10, sin, cos, tan = map(
 
 
 def _orders(matrix):
-    return _order(matrix.shape[-2]), _random("columns", matrix.shape[-1]).permutation(matrix.shape[-1])
+    """Return orders of rows and columns."""
+    return _rows(matrix), _rows(np.swapaxes(matrix, -1, -2), "columns")
+
+
+def _rows(matrix, name="order", other=None):
+    """Return an order of rows; that which they have if their sizes are far apart, on which accuracy depends then."""
+    for each in (matrix, matrix if other is None else other):
+        size = np.abs(each).max(axis=-1, initial=0.0)
+        if not size.max(initial=0.0) <= _GRADED * size[size > 0.0].min(initial=np.inf):
+            return np.arange(matrix.shape[-2])
+    return _order(matrix.shape[-2], name)
 
 
 def _placed(values, order, axis):
@@ -159,8 +172,10 @@ def _like(found, *values):
 
 
 def _matrix(values):
+    """Return a matrix to work with, by ulps another one unless it is diagonal."""
     values = np.asarray(values)
-    return values.astype(float) if values.dtype.kind in "iub" else values
+    values = values.astype(float) if values.dtype.kind in "iub" else values
+    return _off_diagonal(values) if _plain(values) else values
 
 
 def _plain(matrix):
@@ -205,7 +220,7 @@ def _similar(function, a, *rest, **options):
     a = _matrix(a)
     if not _plain(a):
         return function(a, *rest, **options)
-    order = _order(a.shape[-1])
+    order = _rows(a)
     found = function(a[..., order, :][..., order], *rest, **options)
     return _placed(_placed(found, order, -2), order, -1)
 
@@ -215,9 +230,8 @@ def _invariant(function, a, *rest, **options):
     a = _matrix(a)
     if not _plain(a):
         return function(a, *rest, **options)
-    order = _order(a.shape[-1])
-    rows = order if a.shape[-2] == a.shape[-1] else _order(a.shape[-2])
-    return function(a[..., rows, :][..., order], *rest, **options)
+    rows, columns = _orders(a)
+    return function(a[..., rows, :][..., columns], *rest, **options)
 
 
 def _turned(values, vectors, diagonal):
@@ -242,9 +256,10 @@ def _eigh(function, a, *rest, lower=True, **options):
     if not _plain(a) or a.shape[-1] != a.shape[-2] or not np.all(np.isfinite(a)):
         return function(a, *rest, **options) if lower is True else function(a, *rest, lower=lower, **options)
     lower = options.pop("UPLO", "L" if lower else "U") == "L"
-    order = _order(a.shape[-1])
     b = rest[0] if rest else options.pop("b", None)
-    pair = [_whole(_matrix(each), lower)[..., order, :][..., order] for each in (a, b) if each is not None]
+    pair = [_whole(each, lower) for each in (a, None if b is None else _matrix(b)) if each is not None]
+    order = _rows(pair[0], other=pair[-1])
+    pair = [each[..., order, :][..., order] for each in pair]
     found = function(*pair, *rest[1:], **options)
     if not isinstance(found, tuple):
         return found
@@ -256,7 +271,7 @@ def _eig(function, a, *rest, **options):
     a = _matrix(a)
     if not _plain(a) or a.shape[-1] != a.shape[-2] or not np.all(np.isfinite(a)):
         return function(a, *rest, **options)
-    order = _order(a.shape[-1])
+    order = _rows(a)
     rest = [each if np.ndim(each) < 2 else np.asarray(each)[order][:, order] for each in rest]
     if options.get("b") is not None:
         options["b"] = np.asarray(options["b"])[order][:, order]
@@ -304,7 +319,7 @@ def _qr(function, a, *rest, **options):
     a = _matrix(a)
     if not _plain(a) or "raw" in (*rest, options.get("mode")):
         return function(a, *rest, **options)
-    rows = _order(a.shape[-2])
+    rows = _rows(a)
     found = function(a[..., rows, :], *rest, **options)
     if not isinstance(found, tuple) or len(found) == 1 or found[0].shape[-2] != len(rows):
         return found
@@ -328,8 +343,7 @@ def _norm(function, x, *rest, **options):
 
 
 def _of_factor(function, a, *rest, **options):
-    a = _matrix(a)
-    return function(_off_diagonal(a) if _plain(a) else a, *rest, **options)
+    return function(_matrix(a), *rest, **options)
 
 
 # --- sparse
