@@ -213,6 +213,53 @@ def test_matches_differences_in_many_scenes(law):
     assert compared > 20
 
 
+def beside_elements(law, body, **excitation):
+    """A block or a disc in a structure that draws two Jenkins elements and a rigid friction damper."""
+    elements = [
+        {"normal_force": 0.1, "friction": 0.5, "stiffness": 0.7}, {"normal_force": 0.05, "friction": 0.4},
+        {"normal_force": 0.3, "friction": 0.2, "stiffness": 2.0},
+    ]  # fmt: skip
+    scene = shaken(excitation.get("frequency", 1.05), excitation.get("force", 0.3), 0.05, law, body)
+    return scene.replace({"friction_damper": elements})
+
+
+@pytest.mark.parametrize(
+    ("law", "body"),
+    [
+        ("newton", BLOCK | {"friction": 0.3, "restitution": 0.7, "tilt": 0.2, "lift": 0.01, "tilt_rate": 0.2}),
+        ("poisson", DISC | {"friction": 0.2, "restitution": 0.5, "velocity": 0.15}),
+    ],
+)
+def test_jenkins_elements_beside_bodies(law, body):
+    """Their elongations are states; one that slides forgets its own, as differences of the engine say."""
+    found, _, _, z = frame_of(beside_elements({"law": law}, body))
+    assert found.names[-2:] == ("friction damper 0 elongation", "friction damper 2 elongation")
+    x = found(start_of(found, z)).state
+    assert np.all(np.abs(x[-2:]) > 1e-3)
+    passage = found(x)
+    assert passage.status is PassageStatus.OK
+    names = {part for name in passage.sequence for part in name.split(", ")}
+    assert {"slips casing.0 right", "sticks casing.0", "slips casing.2 left"} <= names
+    derivative, h = passage.derivative / found.scale[:, None] * found.scale, 1e-5
+    steps = h * found.scale * np.eye(len(x))
+    ends = [(found(x + step).state - found(x - step).state) / (2 * h * found.scale) for step in steps]
+    np.testing.assert_allclose(derivative, np.array(ends).T, rtol=0, atol=1e-5 * np.abs(derivative).max())
+
+
+def test_a_jenkins_element_is_the_same_beside_sliders_and_bodies():
+    """Two systems and two derivatives of one motion: a body that hardly weighs, as a slider and as a disc."""
+    element = [{"normal_force": 0.1, "friction": 0.5, "stiffness": 0.7}]
+    lone, parts = {"mass": 1e-9, "friction": 0.0, "restitution": 0.5}, []
+    for shape in ({}, {"shape": "disc", "radius": 0.4}):
+        scene = shaken(1.05, 0.3, 0.05, {"law": "newton"}, lone | shape)
+        found = period_map(scene.replace({"friction_damper": element, "cavity.c1.gap": 100.0}))
+        passage = found.over(3)(found.linear_orbit())
+        assert passage.status is PassageStatus.OK
+        places = [found.names.index(name) for name in ("mode 0", "mode 0 rate", "friction damper 0 elongation")]
+        parts.append(np.column_stack([passage.state[places], passage.derivative[np.ix_(places, places)]]))
+    np.testing.assert_allclose(parts[1], parts[0], rtol=0, atol=1e-7)
+
+
 # --- motions that stay aligned
 
 
@@ -398,10 +445,3 @@ def test_an_impact_that_friction_would_feed_takes_no_energy():
     passage = found(x)
     assert passage.status is not PassageStatus.UNDETERMINED
     assert np.all(np.isfinite(passage.derivative))
-
-
-def test_springs_of_friction_dampers_in_the_plane_are_refused_in_one_line():
-    scene = shaken(1.05, 0.3, 0.05, {"law": "newton"}, BLOCK)
-    data = scene.to_dict() | {"friction_damper": [{"normal_force": 1.0, "friction": 0.1, "stiffness": 2.0}]}
-    with pytest.raises(InputError, match=r"^friction_damper\[0\].stiffness: .* leave it out$"):
-        period_map(Scene.of(data, "scene.toml"))

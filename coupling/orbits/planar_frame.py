@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from vanedamp.coupling.numerics.codes import STICK
 from vanedamp.coupling.orbits.planar_names import UnitNames
 from vanedamp.coupling.planar.constraints import PlanarSystem, planar_system
 from vanedamp.coupling.planar.contact_flow import ContactFlows
@@ -25,10 +26,16 @@ class Frame:
         self.names, self.scene = UnitNames(scene, self.system), scene
         self.flows: list[ContactFlows] = []  # that all passages share
         self.extended = np.flatnonzero(self.system.tilt >= 0)
-        size = len(self.system.mass)
+        size, sliders = len(self.system.mass), len(self.system.tangential)
+        #: friction dampers that are Jenkins elements (j,), each with its elongation as a state; its slider has no rate
+        self.drawn = self.system.body[len(self.system.body) - sliders :]
+        #: their elongations (j,) at their bounds, m
+        self.longest = self.system.limit[len(self.system.limit) - sliders :] / self.system.tangential
         units = np.eye(2 * size)
         self.to_state = np.column_stack([self.state_of(self.restart_at(z[:size], z[size:])) for z in units])
-        self.from_state = np.linalg.inv(self.to_state)
+        moves = slice(0, 2 * size - sliders)
+        self.from_state = np.zeros((2 * size, len(self.to_state)))
+        self.from_state[moves] = np.linalg.inv(self.to_state[:, moves])
 
     def gaps(self, q: np.ndarray) -> np.ndarray:
         """Return the gaps (u,) at coordinates (N,), m."""
@@ -44,18 +51,16 @@ class Frame:
         out_of_line = (restart.lift, restart.lift_velocity, restart.tilt, restart.tilt_rate)
         return np.concatenate([
             restart.displacement, restart.velocity, restart.slip, restart.slip_velocity,
-            *(part[self.extended] for part in out_of_line),
+            *(part[self.extended] for part in out_of_line), restart.elongation[self.drawn],
         ])  # fmt: skip
 
     def restart_of(self, state: np.ndarray) -> RestartState:
         """Return the restart state of a state (k,)."""
         n, b, more, friction = self.flat.modes, self.flat.bodies, len(self.extended), self.flat.friction_rows
-        parts = np.split(np.asarray(state, float), np.cumsum([n, n, b, b, more, more, more]))
-        whole = np.zeros((4, b))
-        whole[:, self.extended] = parts[4:]
-        return RestartState(
-            *map(frozen, (*parts[:4], np.zeros(friction - b), self.flat.free_travel[friction:], *whole))
-        )
+        parts = np.split(np.asarray(state, float), np.cumsum([n, n, b, b, more, more, more, more]))
+        whole, elongation = np.zeros((4, b)), np.zeros(friction - b)
+        whole[:, self.extended], elongation[self.drawn] = parts[4:8], parts[8]
+        return RestartState(*map(frozen, (*parts[:4], elongation, self.flat.free_travel[friction:], *whole)))
 
     def glued(self) -> tuple[np.ndarray, np.ndarray]:
         """Return complex amplitudes (e, n) of the structure with all bodies at rest on their floors; its sag (n,).
@@ -79,6 +84,20 @@ class Frame:
         except np.linalg.LinAlgError:
             return np.full((len(omega), n), np.inf + 0j), sag
 
+    def followed(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return maps (N, N) of coordinates and of rates to those with sliders where they are in states (u,).
+
+        Those of Jenkins elements that slip follow what draws them, others rest.
+        """
+        system, size, sliders = self.system, len(self.system.mass), len(self.system.tangential)
+        places, rates = np.eye(size), np.eye(size)
+        for j, row in enumerate(system.elongation):
+            a, drawn = size - sliders + j, np.r_[row[: size - sliders], np.zeros(sliders)]
+            slips = state[len(state) - sliders + j] != STICK
+            rates[a] = drawn if slips else 0.0
+            places[a] = drawn if slips else places[a]
+        return places, rates
+
     def rates(self, amplitude: np.ndarray) -> np.ndarray:
         """Return the rates (n,) at phase zero of complex amplitudes (e, n)."""
         rates: np.ndarray = ((1j * self.system.frequency) @ amplitude).real
@@ -99,8 +118,10 @@ class Frame:
         largest = np.abs(reach).max(initial=0.0)
         largest = largest if 0.0 < largest < np.inf else float(gap.max(initial=0.0)) or 1.0
         reach = np.where(np.isfinite(reach), np.maximum(np.abs(reach), 1e-6 * largest), largest)
+        most = np.zeros(self.flat.friction_rows - len(gap))
+        most[self.drawn] = self.longest
         size = RestartState(
-            *map(frozen, (reach, omega * reach, gap, omega * gap, (), (), lift, omega * lift, tilt, omega * tilt))
+            *map(frozen, (reach, omega * reach, gap, omega * gap, most, (), lift, omega * lift, tilt, omega * tilt))
         )
         return frozen(self.state_of(size))
 

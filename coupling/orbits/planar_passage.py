@@ -42,7 +42,7 @@ class PlanarMap:
         )]  # fmt: skip
         return tuple(
             f"{who} {i}{name}{rate}" for who, numbers, name in groups for rate in ("", " rate") for i in numbers
-        )
+        ) + tuple(f"friction damper {i} elongation" for i in self._frame.drawn)
 
     def __call__(self, state: np.ndarray) -> Passage:
         """Return the passage that begins with a state (k,)."""
@@ -78,7 +78,8 @@ class PlanarMap:
             raise InputError("excitation.frequency: at a resonance without damping no motion repeats; change it")
         p, rate = frame.scale * (amplitude.sum(axis=0).real + sag), frame.scale * frame.rates(amplitude)
         slip, none = np.array([damper.position for damper in self.scene.damper]), np.zeros(frame.flat.bodies)
-        lying = RestartState(*map(frozen, (p, rate, slip, none, (), (), none, none, none, none)))
+        unloaded = np.zeros(frame.flat.friction_rows - frame.flat.bodies)
+        lying = RestartState(*map(frozen, (p, rate, slip, none, unloaded, (), none, none, none, none)))
         return frame.state_of(lying)
 
     def mirrored(self, state: np.ndarray) -> np.ndarray | None:
@@ -100,10 +101,4 @@ class PlanarMap:
 def planar_map(scene: Scene, parameter: str, periods: int) -> PlanarMap:
     """Return the period map of a scene with bodies in the plane. Raises InputError for one that it cannot run."""
     check_waveform(scene, "exact")
-    for index, damper in enumerate(scene.friction_damper):
-        if damper.stiffness is not None:
-            raise InputError(
-                f"friction_damper[{index}].stiffness: beside bodies with extent, stiffness or dashpot, and with "
-                "impacts of two phases, orbits are those of rigid friction dampers; leave it out"
-            )
     return PlanarMap(scene, parameter, periods, Frame(scene).sizes())

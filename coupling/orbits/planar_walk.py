@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from vanedamp.coupling.exact.event_functions import RESOLUTION
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
@@ -74,7 +75,12 @@ class Walk:
         self.frame, self.system, self.scale, self.periods = frame, frame.system, scale, periods
         self.status, self.clearance = PassageStatus.OK, (np.inf, "")
         self.crossings: list[Crossing] = []
-        motion = PlanarMotion(*np.split(frame.from_state @ frame.state_of(start), 2))
+        begun = frame.state_of(start)
+        self.given = frame.from_state * scale  # derivative at the start
+        elongation, most = begun[len(begun) - len(frame.drawn) :], frame.longest
+        self.given[:, len(begun) - len(frame.drawn) :][:, np.abs(elongation) > most] = 0.0
+        elongation[:] = np.clip(elongation, -most, most)
+        motion = PlanarMotion(*np.split(frame.from_state @ begun, 2))
         gap, speed = frame.gaps(motion.q), frame.system.J[: len(frame.system.rest)] @ motion.v
         yields = np.isfinite(self.system.spring)
         if np.any((gap < -_NOTHING * self.system.play)[~yields & (np.arange(len(gap)) < self.system.contacts)]):
@@ -121,7 +127,8 @@ class Walk:
         self._look_at_idle_contacts(segment, self.frame.from_state * self.scale)
         if self._is_jammed(segment):
             self._worsen(PassageStatus.UNDETERMINED)
-        M = segment.begun() @ self.frame.from_state * self.scale
+        places, rates = self.frame.followed(segment.state)
+        M = block_diag(places, rates) @ segment.begun() @ self.given
         while counters[PERIOD] < self.periods:
             if counters[PERIOD] == 0 and segment.time <= 0.5 * self.system.period:
                 self.middle = segment
@@ -265,20 +272,22 @@ class Walk:
         struck: entries of the log of the impacts.
         """
         system, run, n, u = self.system, self.run, len(self.system.mass), len(self.system.rest)
+        _, follow = self.frame.followed(new.state)
         v, units = z[n:], struck[:, 2].astype(int)
         jump = Jump(v, np.eye(n))
         impulse = np.zeros(2 * u)
         impulse[units], impulse[u + units] = struck[:, 5], struck[:, 6]
         if len(units):
             jump = impact(system, v, impulse, run.scratch.compression, plastic, speed)
-        left = v + system.J.T @ impulse / system.mass
+        left = follow @ (v + system.J.T @ impulse / system.mass)
+        jump = Jump(follow @ jump.v, follow @ jump.derivative)
         unique = len(np.unique(units)) == len(units)
         known = unique and self._agrees(np.r_[z[:n], jump.v], np.r_[z[:n], left], speed)
         derivative = jump.derivative
         if not self._agrees(np.r_[z[:n], left], np.r_[z[:n], new.v], speed):  # a chatter has been completed
             shut = np.zeros(u, bool)
             shut[: system.contacts] = (self.frame.gaps(new.q) <= SIMULTANEOUS * system.play)[: system.contacts]
-            held = stopped(system, new.v, shut, speed)
+            held = follow @ stopped(system, new.v, shut, speed)
             derivative = held @ derivative
             known = known and self._agrees(np.r_[z[:n], held @ left], np.r_[z[:n], new.v], speed)
         known = known and self._agrees(np.r_[new.q, new.v], np.r_[z[:n], new.v], speed)

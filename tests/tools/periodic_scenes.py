@@ -1,0 +1,123 @@
+"""Random periodic scenes of sliders, blocks and discs, of all contact laws and elements: how their passages end.
+
+Each scene is run until its motion repeats; the passage of its period is then evaluated with its derivative. Scenes that
+do not repeat are counted and left out. A passage that is "grazing" or "coincident" has no derivative on both sides; one
+that is "undetermined", "stopped" or refused lacks what could be derived. Run as a script, it prints how many end in
+each way, and the seeds of all that are not "ok":
+
+    .venv/bin/python -m tests.tools.periodic_scenes [FIRST_SEED [SCENES]]
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+
+from tests.tools.planar_laws import crowd, jenkins, tables
+from tests.tools.random_scenes import random_compliant, random_jenkins, random_scene
+from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.orbits.passage import PassageStatus, PeriodMap
+from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.toml_input import InputError, validate
+
+#: periods before a motion is to repeat, and the most periods after which it does so
+SETTLED, LONGEST = 100, 4
+#: largest change of a coordinate over that time, as a share of its typical size
+REPEATS = 1e-6
+LAWS = (
+    {"law": "newton"}, {"law": "newton"}, {"law": "poisson"}, {"law": "viscoelastic", "coefficient": 0.2},
+    {"law": "compliant", "stiffness": 300.0},
+)  # fmt: skip
+_ORDER = list(PassageStatus)
+
+
+class Found(NamedTuple):
+    """How the passage of a scene's period ended: a status, "refused", "no run" or "not periodic", and more of it."""
+
+    end: str
+    kind: str
+    why: str = ""
+
+
+def scene_of(seed: int, folder: Path) -> tuple[str, Scene]:
+    """Return the kind of a random scene and the scene, damped so that most motions repeat. Raises InputError."""
+    rng = np.random.default_rng([seed, 23])
+    kind = ("slider", "slider", "jenkins", "planar", "planar", "planar", "crowd", "beside")[rng.integers(8)]
+    if kind == "slider":
+        scene = random_compliant(seed)[0] if rng.random() < 0.3 else random_scene(seed)
+        return kind, _damped(scene.to_dict(), rng)
+    if kind == "jenkins":
+        return kind, _damped(random_jenkins(seed)[0].to_dict(), rng)
+    law = LAWS[rng.integers(len(LAWS))]
+    data = {
+        "planar": lambda: tables(seed),
+        "crowd": lambda: crowd(seed, folder),
+        "beside": lambda: jenkins(seed, folder),
+    }
+    table = data[kind]() | {"contact": law}
+    for damper in table["damper"]:
+        if law["law"] == "viscoelastic":
+            damper.pop("restitution", None)
+        else:
+            damper["restitution"] = float(min(max(damper["restitution"], 0.05), 0.8))
+    return f"{kind}, {law['law']}", _damped(table, rng)
+
+
+def _damped(data: dict, rng: np.random.Generator) -> Scene:
+    if data["structure"]["model"] == "rigid":
+        data["structure"] = data["structure"] | {"damping_ratio": float(rng.uniform(0.05, 0.2))}
+    return validate(Scene, data | {"time": {"periods": SETTLED, "transient": 0}}, "scene")
+
+
+def passage_of(seed: int, folder: Path) -> Found:
+    """Return how the passage of a random scene's period ends."""
+    kind = "none"
+    try:
+        kind, scene = scene_of(seed, folder)
+        response = simulate(scene)
+    except InputError as error:
+        return Found("no scene", kind, str(error))
+    if response.final is None:
+        return Found("no run", kind, str(response.status))
+    try:
+        found = period_map(scene)
+    except InputError as error:
+        return Found("refused", kind, str(error))
+    return _ended(found, found.state_of(response.final), kind)
+
+
+def _ended(found: PeriodMap, start: np.ndarray, kind: str) -> Found:
+    x, worst, last = start, PassageStatus.OK, ""
+    for _ in range(LONGEST):
+        passage = found(x)
+        if _ORDER.index(passage.status) > _ORDER.index(worst):
+            worst, last = passage.status, passage.sequence[-1] if passage.sequence else ""
+        if worst is PassageStatus.STOPPED:
+            break
+        x = passage.state
+        if np.all(np.abs(x - start) <= REPEATS * found.scale):
+            return Found(str(worst), kind, last)
+    return Found("not periodic" if worst is not PassageStatus.STOPPED else str(worst), kind, last)
+
+
+def main(first: int = 0, count: int = 500) -> None:
+    """Print the counts of endings of so many periodic scenes, from a seed on, and the seeds of all but "ok"."""
+    ends, seed = Counter[str](), first
+    with TemporaryDirectory() as folder:
+        while sum(ends.values()) - ends["not periodic"] - ends["no scene"] - ends["no run"] < count:
+            found = passage_of(seed, Path(folder))
+            ends[found.end] += 1
+            if found.end not in ("ok", "not periodic", "no scene"):
+                print(f"{found.end}: {found.kind} (seed {seed}) {found.why}", flush=True)
+            seed += 1
+    print(*(f"{end}: {number}" for end, number in ends.most_common()), sep="\n")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:3]))
