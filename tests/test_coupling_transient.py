@@ -7,11 +7,11 @@ import pytest
 
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import select_model_order
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.response.records import IMPACT_LOSS, new_records
 from vanedamp.coupling.response.steadiness import judge
-from vanedamp.coupling.system.transient import LIMIT, MOST, Transient, left_over, settled_after
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.sweep import sweep
+from vanedamp.coupling.system.transient import LIMIT, Transient, left_over, settled_after
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 
