@@ -89,6 +89,15 @@ def test_an_absorber_of_hardly_any_damping():
     assert abs(response.amplitude_mean - right) <= response.amplitude_mean_confidence <= 0.02 * right
 
 
+def test_weight_on_a_spring():
+    """A spring that carries a body by its weight m g holds (m g)^2/(2 k), and the body has given twice that."""
+    hanging = absorber().replace({"gravity.orientation_deg": 90.0, "gravity.acceleration": 10.0})
+    body = hanging.damper[0]
+    # the structure yields to it as well
+    expected = (10.0 * body.mass) ** 2 / 2 * (1 / body.stiffness + 1 / STIFFNESS)
+    assert Transient(hanging).weight_energy() == pytest.approx(expected, rel=1e-9)
+
+
 @pytest.mark.parametrize("rpm", [6000.0, 6600.0])
 def test_a_ball_on_a_track(rpm):
     """docs/examples/self_tuning.toml: as long as it says it is not steady, and by default it is where it belongs."""
@@ -101,7 +110,9 @@ def test_a_ball_on_a_track(rpm):
     response, ball = simulate(free), free.damper[0]
     # m W^2 (R/rho) brings the ball back on its track, and m W^2 drives it outwards; it rolls
     load = ball.mass * free.speed**2
-    right = steady(free, load * 0.42 / ball.track_radius, inertia=ball.moment_of_inertia / ball.radius**2, outwards=load)
+    right = steady(
+        free, load * 0.42 / ball.track_radius, inertia=ball.moment_of_inertia / ball.radius**2, outwards=load
+    )
     assert response.status == "ok"
     assert abs(response.amplitude_mean - right) <= response.amplitude_mean_confidence <= 0.02 * right
     assert given.amplitude_mean > 50 * right

@@ -273,7 +273,7 @@ def test_command(tmp_path, capsys, monkeypatch):
         (lambda data: data["structure"].update(damping_ratio=0.0), "an undamped resonance has no amplitude"),
         (
             lambda data: data.update(time={"periods": 150, "transient": 100}),
-            "time.transient: 100 periods leave 0.29 of the structure's own transient, so that designs cannot be "
+            "time.transient: 100 periods leave 0.3 of the structure's own transient, so that designs cannot be "
             "compared; give transient = 37",
         ),
         (

@@ -123,8 +123,9 @@ def run_scene(run: Run, scene: Scene, progress: Callable[[int, int], None] | Non
         return _run_until_known(run, transient, periods, progress)
     done = 0
     while True:
-        for done in [*range(done + _CHUNK, periods, _CHUNK), periods]:
+        while done < periods:
             # compiled functions hear of no interrupt before they return
+            done = min(done + _CHUNK, periods)
             ended = run.advance_to(done)
             if ended is not Status.OK:
                 return Ended(ended, dropped)

@@ -22,6 +22,8 @@ from vanedamp.coupling.system.transient import Transient
 _BATCHES, _SHORTEST, _CERTAIN = 10, 25, 5.0
 #: how often a motion that does not repeat must have forgotten its past within the window
 _RELAXATIONS = 3.0
+#: the same of a window that was given, where the linear transient is over; and how many tolerances its mean may move
+_GIVEN, _ROOM = 1.0, 5.0
 #: correlation of neighbouring twentieths of a window in which the motion moves too slowly for statistics
 _SLOW = 0.7
 #: longest period, in those of the excitation, with which a motion is seen to repeat
@@ -55,14 +57,23 @@ def judge(transient: Transient, records: Records, first: int, done: int) -> Judg
     if not quiet:
         rate, beat = _energy_rate(transient, records, first, done), 0.0
     remaining, allowed = _remaining(peaks, rate, tolerance), tolerance * mean
-    repeats = bool(remaining <= allowed and n >= beat)
+    # where the start is forgotten, a window that was given may be short: its confidence says what it is worth
+    given = left <= tolerance and not scene.time.open
+    repeats = bool(remaining <= (_ROOM * allowed if given else allowed) and (given or n >= beat))
     relaxations = rate * n
     own = mean_confidence(peaks, np.inf if repeats else relaxations)
     if own is not None and repeats:
         own += remaining
-    mixed = not quiet and (left <= tolerance or n >= 2 * _BATCHES * _SHORTEST) and relaxations >= _RELAXATIONS
-    slow = own is not None and own > allowed and lag_correlation(peaks) > _SLOW
-    return Judgement(repeats or (mixed and not slow and not _drifts(peaks, allowed)), rate, own)
+    if quiet or repeats:
+        return Judgement(repeats, rate, own)
+    mixed = relaxations >= (_GIVEN if given else _RELAXATIONS) and (given or not _moves_slowly(peaks, own, allowed))
+    known = left <= tolerance or n >= 2 * _BATCHES * _SHORTEST
+    return Judgement(mixed and known and not _drifts(peaks, allowed), rate, own)
+
+
+def _moves_slowly(peaks: np.ndarray, confidence: float | None, allowed: float) -> bool:
+    """Whether neighbouring parts of a window are too much alike for statistics, beyond what is allowed of its mean."""
+    return confidence is not None and confidence > allowed and lag_correlation(peaks) > _SLOW
 
 
 def _touched(scene: Scene, records: Records, first: int, done: int) -> bool:

@@ -1,7 +1,8 @@
 """The linear systems that bodies make of a structure, and how long what is not steady lasts in them.
 
 Two of them bound what contacts do: `loose`, in which bodies on springs, dashpots or tracks are attached as they are (a
-disc with friction rolls) and the others are not there, and `held`, in which friction and walls hold those that they can. Their complex modes decay by themselves:
+disc with friction rolls) and the others are not there, and `held`, in which friction and walls hold those that they
+can. Their complex modes decay by themselves:
 
     x(t) = steady + Re sum_k a_k exp(lambda_k t)
 
@@ -55,7 +56,7 @@ class _Matrices(NamedTuple):
 
 
 def linear_modes(scene: Scene, system: System) -> list[LinearModes]:
-    """Return the modes of the loose system of a scene and, where it is another one, of that in which bodies are held."""
+    """Return the modes of the loose system of a scene and, where that is another one, of the held one."""
     sprung = np.array([damper.sprung for damper in scene.damper], bool)
     rough = np.array([damper.friction > 0 for damper in scene.damper], bool)
     rolls = np.array([damper.shape == "disc" for damper in scene.damper], bool)
@@ -73,12 +74,10 @@ def weight_energy(scene: Scene, system: System) -> float:
     if not system.of_bodies.weight[sprung].any():
         return 0.0
     made = _matrices(scene, system, sprung, np.zeros(len(sprung), bool))
-    return float(made.weight @ _solved(made.stiffness, made.weight)) / 2
+    return float(made.weight @ _static(made.stiffness, made.weight)) / 2
 
 
-def _matrices(
-    scene: Scene, system: System, moving: np.ndarray, held: np.ndarray, stuck: bool = False
-) -> _Matrices:
+def _matrices(scene: Scene, system: System, moving: np.ndarray, held: np.ndarray, stuck: bool = False) -> _Matrices:
     """Return the system whose coordinates are the modes and the bodies `moving` (b,); those `held` follow their floor.
 
     stuck: sliders of Jenkins elements hold.

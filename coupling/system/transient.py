@@ -28,7 +28,8 @@ MOST = 24_000
 def left_over(scene: Scene, periods: float) -> float:
     """Return an upper bound of the transient left after `periods` periods, as a share of the steady response.
 
-    Of the structure with bodies on springs and tracks attached, other bodies loose or held by friction, without impacts. 0 where nothing excites it.
+    Of the structure with bodies on springs and tracks attached, others loose or held by friction, without impacts.
+    0 where nothing excites it.
     """
     return Transient(scene).left_over(periods)
 
@@ -78,7 +79,9 @@ class Transient:
         return weight_energy(self.scene, self.system)
 
     def settled_after(self, lengths: range) -> int:
-        """Return the first of rising numbers of periods that leaves at most `time.tolerance`; their end if none does."""
+        """Return the first of rising numbers of periods that leaves at most `time.tolerance`; their end where none
+        does.
+        """
         tolerance = self.scene.time.tolerance
         place = bisect_left(lengths, True, key=lambda periods: self.left_over(periods) <= tolerance)
         return lengths.start + place * lengths.step

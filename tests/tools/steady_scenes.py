@@ -7,8 +7,8 @@ which the second half is evaluated. A scene that ends as `ok` is covered where
 
     |mean - reference| <= sqrt(confidence^2 + reference's confidence^2) + FLOOR mean.
 
-Printed are each scene as it is done and, for each kind, scenes, those said to be ok, those covered, the largest relative error of the ok ones, the
-periods of the longest run, and the time of the judgement relative to that of the runs.
+Printed are each scene as it is done and, for each kind, scenes, those said to be ok, those covered, the largest relative
+error of the ok ones, the periods of the longest run, and the time of the judgement relative to that of the runs.
 """
 
 from __future__ import annotations
@@ -218,11 +218,12 @@ def main(first: int = 0, scenes: int = 300) -> None:
         run, told = outcome.run, "" if outcome.covered else "NOT COVERED, "
         print(
             f"{seed} {kind}: {run.status}, {run.amplitude_mean:.5g} +- {run.amplitude_mean_confidence or 0:.2g} m, "
-            f"reference {outcome.reference.amplitude_mean:.5g}, {told}{run.periods} periods in {outcome.seconds:.3g} s, "
-            f"judged in {outcome.judged:.2g} s", flush=True,
+            f"reference {outcome.reference.amplitude_mean:.5g}, {told}{run.periods} periods "
+            f"in {outcome.seconds:.3g} s, judged in {outcome.judged:.2g} s", flush=True,
         )  # fmt: skip
-    print("| kind | scenes | ok | covered | largest error of ok | longest run | judgement |\n|---|---|---|---|---|---|---|")
-    for kind, outcomes in [*found.items(), ("all", [outcome for kind in found.values() for outcome in kind])]:
+    print("| kind | scenes | ok | covered | largest error of ok | longest run | judgement |")
+    print("|---|---|---|---|---|---|---|")
+    for kind, outcomes in [*found.items(), ("all", [outcome for several in found.values() for outcome in several])]:
         ok = [outcome for outcome in outcomes if outcome.run.status == "ok"]
         if not outcomes:
             continue
