@@ -7,8 +7,9 @@ which the second half is evaluated. A scene that ends as `ok` is covered where
 
     |mean - reference| <= sqrt(confidence^2 + reference's confidence^2) + FLOOR mean.
 
-Printed are each scene as it is done and, for each kind, scenes, those said to be ok, those covered, the largest relative
-error of the ok ones, the periods of the longest run, and the time of the judgement relative to that of the runs.
+Printed are each scene as it is done and, for each kind, scenes, those said to be ok, those covered, the largest
+relative error of the ok ones, the periods of the longest run, and the time of the judgement relative to that of the
+runs.
 """
 
 from __future__ import annotations
