@@ -21,7 +21,7 @@ def within_shape(matrix: Any) -> Any:
     try:
         if matrix.format in ("csr", "csc", "bsr"):
             matrix.check_format(full_check=True)
-        elif matrix.format == "coo":
+        elif hasattr(matrix, "col"):
             for places, size in zip((matrix.row, matrix.col), matrix.shape, strict=True):
                 if places.size and not (places.min() >= 0 and places.max() < size):
                     raise ValueError(f"indices {places.min()} to {places.max()} for {size} rows or columns")
