@@ -69,7 +69,11 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
         elastic_inverse @ (strain * frequency),
     )
     project = np.where(_reach(r.T) < _reach(elastic.T) / frequency, r.T @ v, (elastic.T @ strain) / frequency).T
-    damping, noise = strain.T @ loss @ strain, np.abs(strain.T) @ np.abs(loss) @ np.abs(strain)
+    size, lossy = np.abs(strain), np.abs(loss)
+    damping, noise = strain.T @ loss @ strain, size.T @ lossy @ size
+    # strains are known to round-off of a mode's whole strain: by that alone, equal modes would be coupled and mixed
+    whole = lossy.sum(axis=0) @ size
+    noise = np.where(np.eye(len(whole), dtype=bool), noise, np.maximum(noise, np.maximum(whole, whole[:, None])))
     damping[np.abs(damping) <= 8 * _EPS * noise] = 0.0
     return RealModes(frequency, shape, project, frequency[:, None] * (damping + damping.T) / 2 * frequency)
 
