@@ -163,10 +163,15 @@ def _run_until_known(
     return ended
 
 
-def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Response:
-    """Return the response of a run that began at `started` (time.perf_counter)."""
+def evaluate(
+    scene: Scene, run: Outcome, status: Status, transient: int, started: float, confidence: float | None = None
+) -> Response:
+    """Return the response of a run that began at `started` (time.perf_counter) and dropped `transient` periods.
+
+    confidence: that of the mean, m, where the run was judged.
+    """
     system, records, done = run.system, run.records, run.periods
-    status, first = ended.status, min(ended.transient, max(done - 1, 0))
+    first = min(transient, max(done - 1, 0))
     window = slice(first, done)
     span = max(done - first, 1) * system.period
     ledger = records.ledger[: done + 1] - records.ledger[first]
@@ -192,7 +197,7 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         frequency=scene.frequency,
         amplitude_max=float(peaks.max(initial=0.0)),
         amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
-        amplitude_mean_confidence=mean_confidence(peaks) if ended.confidence is None else ended.confidence,
+        amplitude_mean_confidence=mean_confidence(peaks) if confidence is None else confidence,
         amplitude_rms=float(np.sqrt(max(records.square[window].sum() / span, 0.0))),
         amplitude_harmonic=float(abs(harmonic)),
         phase=float(np.angle(1j * harmonic)),
