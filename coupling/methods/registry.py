@@ -35,7 +35,8 @@ def respond(
     started = time.perf_counter()
     run = run_of(scene, events, samples_per_period, start)
     ended = run_scene(run, scene, progress)
-    return replace(evaluate(scene, run.outcome(), ended, started), final=final_state(scene, run))
+    response = evaluate(scene, run.outcome(), ended.status, ended.transient, started, ended.confidence)
+    return replace(response, final=final_state(scene, run))
 
 
 def final_state(scene: Scene, run: Run) -> RestartState | None:

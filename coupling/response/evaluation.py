@@ -166,10 +166,15 @@ def _run_until_known(
     return ended
 
 
-def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Response:
-    """Return the response of a run that began at `started` (time.perf_counter)."""
+def evaluate(
+    scene: Scene, run: Outcome, status: Status, transient: int, started: float, confidence: float | None = None
+) -> Response:
+    """Return the response of a run that began at `started` (time.perf_counter) and dropped `transient` periods.
+
+    confidence: that of the mean, m, where the run was judged.
+    """
     system, records, done = run.system, run.records, run.periods
-    status, first = ended.status, min(ended.transient, max(done - 1, 0))
+    first = min(transient, max(done - 1, 0))
     window = slice(first, done)
     span = max(done - first, 1) * system.period
     ledger = records.ledger[: done + 1] - records.ledger[first]
@@ -197,7 +202,7 @@ def evaluate(scene: Scene, run: Outcome, ended: Ended, started: float) -> Respon
         frequency=scene.frequency,
         amplitude_max=float(peaks.max(initial=0.0)),
         amplitude_mean=float(peaks.mean()) if len(peaks) else 0.0,
-        amplitude_mean_confidence=mean_confidence(peaks) if ended.confidence is None else ended.confidence,
+        amplitude_mean_confidence=mean_confidence(peaks) if confidence is None else confidence,
         static_deflection=static,
         amplitude_max_dynamic=float(dynamic.max(initial=0.0)),
         amplitude_mean_dynamic=float(dynamic.mean()) if len(dynamic) else 0.0,
