@@ -15,7 +15,7 @@ from vanedamp.coupling.methods.registry import respond, run_of
 from vanedamp.coupling.model_order.choices import Chosen, choose
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.planar.planar_run import PlanarRun
-from vanedamp.coupling.response.evaluation import Ended, evaluate
+from vanedamp.coupling.response.evaluation import evaluate
 from vanedamp.coupling.response.records import STORED, VISCOUS
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
@@ -139,7 +139,7 @@ def _rung_down(
         if int(since / system.period) > done:
             report(done := int(since / system.period))
     outcome = run.outcome()
-    response = evaluate(free, outcome, Ended(walk.status, 0), began)
+    response = evaluate(free, outcome, walk.status, 0, began)
     points = without_rebounds([*turning.found, *([] if turning.rest is None else [turning.rest])])
     moments, coordinate, energy, structure = np.array(points or np.zeros((0, len(TurningPoint._fields)))).T
     hit = np.array([event.time for event in response.event_list if event.kind == "impact"])
