@@ -225,11 +225,13 @@ def test_results_of_a_study_stand_within_it(vanedamp, tmp_path):
 
 
 def test_outputs_of_the_command_are_checked_like_ours(vanedamp):
-    finished = vanedamp("body-masses", "scene.toml", "-o", "masses.h5", "--table", "scene.toml")
-    assert finished.returncode == BAD_INPUT
-    assert finished.stderr == (
-        "vanedamp: scene.toml: --table scene.toml: expected a file name ending in .csv\n"
-    )  # fmt: skip
+    for table, expected in (
+        ("scene.toml", "is an input (scene.toml), which would be lost; name another file"),
+        ("masses.txt", "expected a file name ending in .csv"),
+    ):
+        finished = vanedamp("body-masses", "scene.toml", "-o", "masses.h5", "--table", table)
+        assert finished.returncode == BAD_INPUT
+        assert finished.stderr == f"vanedamp: scene.toml: --table {table}: {expected}\n"
 
 
 def test_benchmark_is_one_of_bench(vanedamp, tmp_path):

@@ -67,7 +67,7 @@ def test_headline_from_the_files(tmp_path, monkeypatch, seed, structure, bodies,
     with h5py.File("s.h5") as file:
         status = np.array([text.decode() for text in file["status"][:]])
         x, mean, attached = (
-            file[name][:] for name in ("excitation_frequency", "amplitude_mean", "attached_mass_fraction")
+            file[name][:] for name in ("excitation_frequency", "amplitude_mean_dynamic", "attached_mass_fraction")
         )
     ok = status == "ok"
     assert told["points_left_out"] == np.count_nonzero(~ok)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.modal.campbell import Campbell
 from vanedamp.studies.case.tables import Case
@@ -93,14 +94,15 @@ def test_a_body_sticks_where_the_amplitude_is_below_friction_times_radius_over_t
 
 
 def test_a_body_that_leans_on_a_wall_moves_along():
-    """The harmonic is that of the fixed body; the mean of the peaks has the static offset m W^2 r sin(angle)/c."""
-    scene = scenes("rotating_body")["inclined"]
-    (curve,) = along(scene, [2350.0, 2400.0], **{"cavity.c1.centrifugal_deg": 45.0})
+    """Harmonic and mean are those of the fixed body; the static deflection m W^2 r sin(angle)/c is apart."""
+    scene = scenes("rotating_body")["inclined"].replace({"cavity.c1.centrifugal_deg": 45.0})
+    (curve,) = along(scene, [2350.0, 2400.0])
     np.testing.assert_allclose(curve.harmonic, curve.fixed, rtol=2e-3)
-    speeds = 2 * math.pi * curve.frequency / 12
-    pull = scene.damper[0].mass * speeds**2 * scene.cavity[0].radius * math.sin(math.pi / 4)
-    offset = pull / np.array([scene.structure.stiffness_at(speed) for speed in speeds]) / AMPLITUDE
-    np.testing.assert_allclose(curve.mean - curve.harmonic, offset, rtol=5e-3)
+    np.testing.assert_allclose(curve.mean, curve.harmonic, rtol=1e-6)
+    speed = 2 * math.pi * 2350.0 / 12
+    pull = scene.damper[0].mass * speed**2 * scene.cavity[0].radius * math.sin(math.pi / 4)
+    response = simulate(scene.replace({"sweep": {}, "rotation.speed": speed}))
+    assert abs(response.static_deflection) == pytest.approx(pull / scene.structure.stiffness_at(speed), rel=5e-3)
 
 
 def test_orders_of_tracks():
@@ -115,7 +117,7 @@ def test_a_tuned_body_keeps_every_blade_at_rest_and_a_sliding_one_does_not():
     3 % of the amplitude beside the resonance."""
     found = scenes("self_tuning")
     for name, factor in (("track_low", 0.9), ("tuned", 1.0), ("track_high", 1.1)):
-        (curve,) = along(found[name], FREQUENCY * factor * np.array([0.97, 1.0, 1.006, 1.03]))
+        (curve,) = along(found[name], FREQUENCY * factor * np.array([0.97, 1.0, 1.006, 1.03]), 6000, 5000)
         assert curve.undamped.max() > 0.5
         assert curve.mean.max() < 0.01
     (curve,) = along(found["tuned"], [2400.0, 2410.0, 2426.0], **{"damper.0.friction": 0.1})
@@ -142,9 +144,9 @@ def test_there_is_no_resonance_for_a_track_little_below_its_order():
     assert resonance_on_track(12, 12 / math.sqrt(1.03), 0.02) == pytest.approx(math.sqrt(3), rel=1e-9)
 
 
-@pytest.mark.parametrize("name", BOTH)
+@pytest.mark.parametrize("name", ["rotating_body", pytest.param("self_tuning", marks=pytest.mark.slow)])
 def test_claims_of_quick_studies(name, tmp_path):
-    found = study(name, Session(STRUCTURE, tmp_path, effort=Effort(points=5, periods=1200, transient=700)))
+    found = study(name, Session(STRUCTURE, tmp_path, effort=Effort(points=5)))
     assert (tmp_path / f"{name}.png").stat().st_size > 10_000
     assert json.loads((tmp_path / f"{name}.claims.json").read_text())["study"] == name
     for claim in found.claims:

@@ -47,7 +47,8 @@ def judge(transient: Transient, records: Records, first: int, done: int) -> Judg
     n, mean, tolerance = len(peaks), float(peaks.mean()), scene.time.tolerance
     touched = _touched(scene, records, 0, done)
     left = transient.left_over(first)
-    if not peaks.any() or (not touched and left <= tolerance):
+    # a motion that nothing excites is what was asked for, whatever is left of it
+    if not peaks.any() or not transient.driven or (not touched and left <= tolerance):
         own = mean_confidence(peaks)
         return Judgement(True, np.inf, None if own is None else own + left * mean)
     if n < 2:
@@ -109,8 +110,9 @@ def _remaining(peaks: np.ndarray, rate: float, tolerance: float) -> float:
     means = peaks[n - parts * size :].reshape(parts, size).mean(axis=1)
     found = [np.ptp(means) / _gone(rate * (n - size), tolerance)]
     for period in range(1, min(_LONGEST, n // 2) + 1):
-        change = float(np.abs(peaks[period:] - peaks[:-period]).max())
-        found.append(change / _gone(rate * period, 0.0))
+        change = np.abs(peaks[period:] - peaks[:-period]).max()
+        with np.errstate(over="ignore"):
+            found.append(change / _gone(rate * period, 0.0))
     return float(min(found))
 
 

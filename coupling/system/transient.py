@@ -23,6 +23,9 @@ from vanedamp.coupling.system.system import System
 LIMIT = 10_000
 #: periods up to which a run whose length is open is made longer until it is steady
 MOST = 24_000
+#: steady response, relative to what begins with it, below which a structure is at rest: an absorber without damping
+#: leaves round-off, of which no share is ever reached
+_NOTHING = 1e-6
 
 
 def left_over(scene: Scene, periods: float) -> float:
@@ -49,6 +52,8 @@ class Transient:
         self.scene, self.system = scene, assemble(scene) if system is None else system
         self.systems = linear_modes(scene, self.system)
         self.excited = bool(self.system.of_structure.load.any())
+        signal = scene.excitation.signal
+        self.driven = self.excited or signal is not None or isinstance(scene.structure, Prescribed)
 
     def left_over(self, periods: float) -> float:
         """Return the bound of what is left, as left_over."""
@@ -56,7 +61,8 @@ class Transient:
 
     def _left(self, modes: LinearModes, periods: float) -> float:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            share = np.sum(modes.begun * np.exp(-modes.rate * self.system.period * periods)) / modes.steady
+            steady = max(modes.steady, _NOTHING * modes.begun.sum())
+            share = np.sum(modes.begun * np.exp(-modes.rate * self.system.period * periods)) / steady
         return float(share) if np.isfinite(share) else np.inf
 
     def slowest(self, periods: int) -> tuple[float, float]:

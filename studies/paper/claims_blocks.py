@@ -12,7 +12,7 @@ import numpy as np
 
 from vanedamp.studies.paper import claims_reduced, claims_rigid
 from vanedamp.studies.paper.claims_rigid import Curves, claim, verdict
-from vanedamp.studies.paper.curve import Curve
+from vanedamp.studies.paper.curve import Curve, means_of
 from vanedamp.studies.paper.figure_file import Bar
 from vanedamp.studies.report.claims import Claim
 
@@ -171,10 +171,10 @@ def fit(curves: Curves, play: np.ndarray, friction: np.ndarray, slider: Curve) -
     _, row, column = np.unravel_index(np.argmin(tops), tops.shape)
     alike = slider.peak().height
     apart = float(np.abs(tops[0] - tops[1])[-1].max())
-    level, upright = np.split(np.array([curve.mean for curve in curves["starts"]]), 2)
-    usual = np.median(upright, axis=0)
-    settled = level > (1 + _SETTLED) * usual
-    worst, vertical = float(level.max()), float(upright.max())
+    level, upright = np.split(means_of(curves["starts"]), 2)
+    usual = np.nanmedian(upright, axis=0)
+    settled = (level > (1 + _SETTLED) * usual)[np.isfinite(level)]
+    worst, vertical = float(np.nanmax(level)), float(np.nanmax(upright))
     return [
         claim(
             "The fit of the bodies decides how much is gained.",

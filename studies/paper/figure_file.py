@@ -111,14 +111,16 @@ class Bar:
 
 @dataclass(frozen=True)
 class Effort:
-    """Less than a figure's file says: frequencies a curve, periods of a run and its transient."""
+    """Less than a figure's file says: frequencies per curve, periods of a run and its transient (None: the file's)."""
 
     points: int
-    periods: int
-    transient: int
+    periods: int | None = None
+    transient: int | None = None
 
     def of(self, scene: Scene) -> Scene:
         """Return the scene with this many periods."""
+        if self.periods is None:
+            return scene
         return scene.replace({"time.periods": self.periods, "time.transient": self.transient})
 
 
