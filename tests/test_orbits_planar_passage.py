@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from tests.reference.planar_sequence import PlanarSequence, walk
+from tests.tools import periodic_scenes
 from tests.tools.planar import planar_scene
 from tests.tools.planar_laws import scene_of, tables
+from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.branch import Branch, Branches, BranchPoint
 from vanedamp.coupling.orbits.multipliers import decided
 from vanedamp.coupling.orbits.newton import OrbitStatus, find_orbit
@@ -192,6 +194,23 @@ def test_matches_differences_of_the_engine(law, seed, periods):
     for _ in range(periods):
         x = found(x).state
     assert compare(found, x) >= 4
+
+
+@pytest.mark.parametrize("seed", [146, 645])
+def test_periodic_blocks_that_stick_to_springs_with_two_corners(seed, tmp_path):
+    """How their friction is divided does not matter; closing springs stop the slips of tilted neighbours at once."""
+    _, scene = periodic_scenes.scene_of(seed, tmp_path)
+    found = period_map(scene)
+    assert compare(found, found.state_of(simulate(scene).final)) >= 4
+
+
+def test_passages_of_periodic_scenes(tmp_path):
+    """One scene of each kind; the table counts them."""
+    found = [periodic_scenes.passage_of(seed, tmp_path) for seed in (5, 6, 8, 12, 18, 28)]
+    assert [each.end for each in found] == ["ok", "ok", "ok", "ok", "grazing", "ok"]
+    head, *_, last = periodic_scenes.table(found).splitlines()
+    assert head.split() == ["grazing", "ok"]
+    assert last.split() == ["all", "1", "5"]
 
 
 @pytest.mark.slow

@@ -11,9 +11,11 @@ from scipy.optimize import brentq
 from tests.test_rom_massless import TIP, rod_scene
 from tests.tools.input_files import SCENE
 from tests.tools.planar import ledger, open_run, planar_run, planar_scene, run_planar, still_table
-from tests.tools.planar_laws import laws_of
+from tests.tools.periodic_scenes import scene_of
+from tests.tools.planar_laws import check_laws, laws_of, tables
 from tests.tools.small_structures import rod, truss
 from vanedamp.coupling.engine import simulate
+from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET
 from vanedamp.coupling.response.records import CONTACT, DETACHES, FRICTION, IMPACT, IMPACT_LOSS, SLIPS, STICKS
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
@@ -286,6 +288,21 @@ def test_a_block_that_stands_as_good_as_upright(off):
     """A weight across the cavity of a billionth of g still has a motion."""
     for orientation in (90.0 - off, -90.0 + off):
         assert upright(orientation, 2400.0, 1e8, speed=0.5).status is Status.OK
+
+
+def test_contacts_that_lose_their_forces_together():
+    """Two contacts end within a millionth of a second: round-off of the second force, which pulls, decides nothing."""
+    for copy in range(8):
+        data = tables(301101) | {"contact": {"law": "compliant", "stiffness": 1e4}}
+        for damper in data["damper"]:
+            damper["mass"] *= 1 + 3e-14 * copy
+        assert check_laws(301101, data=data)[1] in (DONE, EVENT_BUDGET)
+
+
+def test_a_slip_that_stops_within_the_resolution_of_time(tmp_path):
+    """What is left of it, 1.1e-12 of the fastest speed, is rest: the same stop does not repeat for ever."""
+    _, scene = scene_of(72, tmp_path)
+    assert simulate(scene).status is Status.OK
 
 
 def test_steps_refuse_springs():

@@ -19,6 +19,8 @@ from vanedamp.coupling.numerics.record import record
 _PIVOT = 1e-11
 #: share of its terms by which a row of a solution may be wrong
 _RESIDUAL = 1e-9
+#: round-off of a solution relative to its largest term: forces of a wedge nearly balance each other
+_ROUND_OFF = 1e-14
 #: covering vectors that are tried, and the ratio that spreads their entries
 _ATTEMPTS, _GOLDEN = 4, 0.6180339887498949
 
@@ -110,13 +112,16 @@ def _solve(problem, k, attempt):
 @kernel
 def _fits(problem, k):
     """Whether w = M z + q: pivots of round-off may have spoilt a solution."""
+    largest = 0.0
+    for i in range(k):
+        largest = max(largest, problem.z[i])
     for i in range(k):
         error, size = problem.q[i] - problem.w[i], abs(problem.q[i]) + abs(problem.w[i])
         for j in range(k):
             part = problem.matrix[i, j] * problem.z[j]
             error += part
             size += abs(part)
-        if abs(error) > _RESIDUAL * max(size, 1.0):
+        if abs(error) > max(_RESIDUAL * max(size, 1.0), _ROUND_OFF * largest):
             return False
     return True
 

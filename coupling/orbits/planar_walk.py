@@ -28,7 +28,6 @@ from vanedamp.coupling.numerics.codes import (
     ROOT,
     SLIP_LEFT,
     SLIP_RIGHT,
-    STICK,
     STOPS,
     TOUCHING,
 )
@@ -125,8 +124,6 @@ class Walk:
         if np.any(self._taken()[:, 1] == IMPACT) or self._begins_at_event(segment):
             self._worsen(PassageStatus.GRAZING)
         self._look_at_idle_contacts(segment, self.frame.from_state * self.scale)
-        if self._is_jammed(segment):
-            self._worsen(PassageStatus.UNDETERMINED)
         places, rates = self.frame.followed(segment.state)
         M = block_diag(places, rates) @ segment.begun() @ self.given
         while counters[PERIOD] < self.periods:
@@ -166,16 +163,6 @@ class Walk:
         slides = np.isin(segment.state, (SLIP_LEFT, SLIP_RIGHT)) & ~segment.held & (~contact | (system.friction > 0.0))
         slips = slides & (np.abs(system.J[u:] @ segment.v) <= _ROUND_OFF * segment.speed)
         return bool(np.any(parts | slips))
-
-    def _is_jammed(self, segment: Segment) -> bool:
-        """Return whether springs press contacts that stick and whose slips depend on each other.
-
-        Their friction forces are left open, and what they have been the state does not say.
-        """
-        system, u = self.system, len(self.system.rest)
-        sticks = (segment.state == STICK) & np.isfinite(system.spring) & (system.friction > 0.0)
-        rows = system.J[u:][sticks] / np.sqrt(system.mass)
-        return bool(len(rows)) and int(np.linalg.matrix_rank(rows)) < len(rows)
 
     def _taken(self) -> np.ndarray:
         """Return the new entries of the log."""
@@ -247,6 +234,8 @@ class Walk:
             M = saltation(jump, f, jump @ f + kick, guard.gradient, guard.rate) @ M
         else:
             M = jump @ M
+        if closing:
+            M = new.carried() @ M  # friction stops the slips of neighbours at once where this motion has none
         if matters:
             self.last = time, shifts
             tangential = guard.rate**2 <= 2.0 * _TANGENTIAL * guard.scale * abs(guard.curvature)

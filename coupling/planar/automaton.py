@@ -29,6 +29,7 @@ from vanedamp.coupling.numerics.codes import (
     SLIP_LEFT,
     SLIP_RIGHT,
     STICK,
+    STOPS,
     TOUCHING,
     UNDECIDED,
 )
@@ -225,6 +226,15 @@ def _is_spent(system, st, r):
     return spent and row_speed(system, r, st.v) > AT_REST * st.scale[0]
 
 
+@kernel
+def _part_spent(system, st, log, r, what):
+    """End the other contacts whose forces vanish as good as at the event of unit r: their round-off may pull."""
+    for i in range(system.contacts):
+        presses = yields(system, i) and st.state[i] < OPEN and st.fresh[i] == 0 and not (what == RECLOSES and i == r)
+        if presses and _is_spent(system, st, i):
+            _part(system, st, log, i)
+
+
 @inlined
 def _happen(system, st, rec, log, work, r, what):
     """The event of unit r. Returns False if it cannot be decided."""
@@ -243,6 +253,10 @@ def _happen(system, st, rec, log, work, r, what):
         st.ledger[CONTACT] -= 0.5 * system.spring[r] * gap(system, r, st.q) ** 2
     elif r >= len(system.rest) - len(system.tangential) and (what == AT_LOW or what == AT_HIGH):
         st.state[r] = SLIP_RIGHT if what == AT_LOW else SLIP_LEFT  # decided next: its spring is at its bound
+    elif what == STOPS and r < len(system.rest) - len(system.tangential):
+        # what the resolution of time leaves of its slip is rest
+        st.scale[0] = max(st.scale[0], abs(row_speed(system, len(system.rest) + r, st.v)) / AT_REST)
+    _part_spent(system, st, log, r, what)
     # at any event another gap may be closed as well, within the resolution of gaps
     if _approaches(system, st) and not collide(system, st, rec, log, work):
         return False

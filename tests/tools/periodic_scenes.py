@@ -1,9 +1,9 @@
 """Random periodic scenes of sliders, blocks and discs, of all contact laws and elements: how their passages end.
 
-Each scene is run until its motion repeats; the passage of its period is then evaluated with its derivative. Scenes that
-do not repeat are counted and left out. A passage that is "grazing" or "coincident" has no derivative on both sides; one
-that is "undetermined", "stopped" or refused lacks what could be derived. Run as a script, it prints how many end in
-each way, and the seeds of all that are not "ok":
+The engine runs each scene until its motion repeats; the passage of its period is then evaluated with its derivative.
+Scenes that do not repeat after 100 periods are counted apart. A passage that is "grazing" or "coincident" has no
+derivative on both sides; one that is "undetermined", "stopped" or "refused" lacks what could be derived. Run as a
+script, it prints the seeds of all that are not "ok", and a table:
 
     .venv/bin/python -m tests.tools.periodic_scenes [FIRST_SEED [SCENES]]
 """
@@ -23,6 +23,7 @@ from tests.tools.random_scenes import random_compliant, random_jenkins, random_s
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.passage import PassageStatus, PeriodMap
 from vanedamp.coupling.orbits.period_map import period_map
+from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
 
@@ -34,11 +35,15 @@ LAWS = (
     {"law": "newton"}, {"law": "newton"}, {"law": "poisson"}, {"law": "viscoelastic", "coefficient": 0.2},
     {"law": "compliant", "stiffness": 300.0},
 )  # fmt: skip
+#: events after which a run is given up: some motions end in chatters without an end
+MOST_EVENTS = 400 * SETTLED
+#: endings of scenes that are no periodic motion
+_UNUSED = ("not periodic", "no scene", "no run", "too many events")
 _ORDER = list(PassageStatus)
 
 
 class Found(NamedTuple):
-    """How the passage of a scene's period ended: a status, "refused", "no run" or "not periodic", and more of it."""
+    """How the passage of a scene's period ended: a status, "refused" or why there is none, its kind, and the last event."""
 
     end: str
     kind: str
@@ -72,7 +77,8 @@ def scene_of(seed: int, folder: Path) -> tuple[str, Scene]:
 def _damped(data: dict, rng: np.random.Generator) -> Scene:
     if data["structure"]["model"] == "rigid":
         data["structure"] = data["structure"] | {"damping_ratio": float(rng.uniform(0.05, 0.2))}
-    return validate(Scene, data | {"time": {"periods": SETTLED, "transient": 0}}, "scene")
+    solver = data.get("solver", {}) | {"max_events": MOST_EVENTS}
+    return validate(Scene, data | {"time": {"periods": SETTLED, "transient": 0}, "solver": solver}, "scene")
 
 
 def passage_of(seed: int, folder: Path) -> Found:
@@ -84,7 +90,11 @@ def passage_of(seed: int, folder: Path) -> Found:
     except InputError as error:
         return Found("no scene", kind, str(error))
     if response.final is None:
-        return Found("no run", kind, str(response.status))
+        crowded = response.status is Status.EVENT_BUDGET
+        return Found("too many events" if crowded else "no run", kind, str(response.status))
+    _, _, periods = response.classification.partition("periodic-")
+    if response.classification == "non-periodic" or int(periods or 1) > LONGEST:
+        return Found("not periodic", kind)
     try:
         found = period_map(scene)
     except InputError as error:
@@ -98,25 +108,35 @@ def _ended(found: PeriodMap, start: np.ndarray, kind: str) -> Found:
         passage = found(x)
         if _ORDER.index(passage.status) > _ORDER.index(worst):
             worst, last = passage.status, passage.sequence[-1] if passage.sequence else ""
-        if worst is PassageStatus.STOPPED:
-            break
         x = passage.state
-        if np.all(np.abs(x - start) <= REPEATS * found.scale):
+        if worst is PassageStatus.STOPPED or np.all(np.abs(x - start) <= REPEATS * found.scale):
             return Found(str(worst), kind, last)
-    return Found("not periodic" if worst is not PassageStatus.STOPPED else str(worst), kind, last)
+    return Found("not periodic", kind, last)
+
+
+def table(found: list[Found]) -> str:
+    """Return the counts of endings by the kinds of scenes."""
+    columns = sorted({each.end for each in found})
+    counts = Counter((each.kind, each.end) for each in found)
+    kinds = sorted({each.kind for each in found})
+    rows = [["", *columns]] + [[kind, *(str(counts[kind, end]) for end in columns)] for kind in kinds]
+    rows.append(["all", *(str(sum(counts[kind, end] for kind in kinds)) for end in columns)])
+    return "\n".join("".join(f"{cell:>22}" if i else f"{cell:22}" for i, cell in enumerate(row)) for row in rows)
 
 
 def main(first: int = 0, count: int = 500) -> None:
-    """Print the counts of endings of so many periodic scenes, from a seed on, and the seeds of all but "ok"."""
-    ends, seed = Counter[str](), first
+    """Print how so many periodic scenes end, from a seed on: a table, and the seeds of all but "ok"."""
+    found: list[Found] = []
+    periodic, seed = 0, first
     with TemporaryDirectory() as folder:
-        while sum(ends.values()) - ends["not periodic"] - ends["no scene"] - ends["no run"] < count:
-            found = passage_of(seed, Path(folder))
-            ends[found.end] += 1
-            if found.end not in ("ok", "not periodic", "no scene"):
-                print(f"{found.end}: {found.kind} (seed {seed}) {found.why}", flush=True)
+        while periodic < count:
+            each = passage_of(seed, Path(folder))
+            found.append(each)
+            periodic += each.end not in _UNUSED
+            if each.end not in ("ok", *_UNUSED) or each.end == "no run":
+                print(f"{each.end}: {each.kind} (seed {seed}) {each.why}", flush=True)
             seed += 1
-    print(*(f"{end}: {number}" for end, number in ends.most_common()), sep="\n")
+    print(table(found), f"{periodic} periodic scenes of {len(found)}", sep="\n")
 
 
 if __name__ == "__main__":
