@@ -29,6 +29,7 @@ from vanedamp.coupling.model_order.settling import settled_after
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.response.static_deflection import about_mean
 from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.bodies import Cavity
 from vanedamp.coupling.scene.scene import Scene, Time
@@ -249,6 +250,12 @@ def _error(slider: Run, settled: int, blocks: Sequence[Run], tolerance: float) -
     return max((error, confidence), later, key=lambda found: abs(found[0]) + found[1])
 
 
+def _peaks(run: Run, first: int, done: int) -> np.ndarray:
+    """Return the largest distances of the periods from first to done from the static deflection, m."""
+    outcome = run.outcome()
+    return about_mean(outcome.records, slice(first, done), outcome.system.period)[1]
+
+
 def _compared(slider: Run, own: int, blocks: Sequence[Run], done: int, dropped: int) -> tuple[float, float]:
     """Return error and confidence from the last periods of the slider's `own`, and the blocks' from dropped to done."""
     _advance(slider, own)
@@ -258,10 +265,10 @@ def _compared(slider: Run, own: int, blocks: Sequence[Run], done: int, dropped: 
         assert plane is not None
         if np.nanmax(plane.neglected * plane.tilt[dropped:done] ** 2) > plane.bound:
             raise _Ended(Status.TILTED.value)
-    peaks = slider.outcome().records.peak[own - _SLIDER_WINDOW : own]
+    peaks = _peaks(slider, own - _SLIDER_WINDOW, own)
     mean, width = float(peaks.mean()), mean_confidence(peaks) or 0.0
     size = (done - dropped) // _BATCHES
-    series = np.array([block.outcome().records.peak[done - size * _BATCHES : done] for block in blocks])
+    series = np.array([_peaks(block, done - size * _BATCHES, done) for block in blocks])
     batches = series.reshape(-1, size).mean(axis=1)
     other = float(batches.mean())
     if not other > 0.0:
