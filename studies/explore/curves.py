@@ -96,7 +96,7 @@ def transient_note(scene: Scene) -> str | None:
         return None
     return (
         f"the structure is damped so little that after {scene.time.dropped} periods {min(left, 1.0):.0%} of its own "
-        "transient is left unless the bodies have ended it: points may not be steady responses, whatever their status"
+        "transient is left unless the bodies have ended it: points may not be steady"
     )
 
 
