@@ -299,6 +299,12 @@ def test_contacts_that_lose_their_forces_together():
         assert check_laws(301101, data=data)[1] in (DONE, EVENT_BUDGET)
 
 
+@pytest.mark.parametrize("seed", [301221, 301445])
+def test_friction_at_its_bound_begins_to_slip(seed):
+    """The forces of motion and decision differ by round-off of a stiff spring: their events do not repeat for ever."""
+    assert check_laws(seed, law={"law": "compliant", "stiffness": 1e4})[1] in (DONE, EVENT_BUDGET)
+
+
 def test_a_slip_that_stops_within_the_resolution_of_time(tmp_path):
     """What is left of it, 1.1e-12 of the fastest speed, is rest: the same stop does not repeat for ever."""
     _, scene = scene_of(72, tmp_path)
