@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 
 from tests.test_rom_massless import TIP, rod_scene
 from tests.tools.input_files import SCENE
-from tests.tools.planar import ledger, open_run, planar_run, planar_scene, run_planar, still_table
 from tests.tools.periodic_scenes import scene_of
+from tests.tools.planar import ledger, open_run, planar_run, planar_scene, run_planar, still_table
 from tests.tools.planar_laws import check_laws, laws_of, tables
 from tests.tools.small_structures import rod, truss
 from vanedamp.coupling.engine import simulate
