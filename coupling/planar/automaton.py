@@ -263,6 +263,11 @@ def _happen(system, st, rec, log, work, r, what):
     _press(system, st, rec, log)
     if not _settle(system, st, rec, log, work):
         return False
+    own = yields(system, r) or system.contacts <= r < len(system.rest) - len(system.tangential)
+    if own and (what == AT_LOW or what == AT_HIGH) and work.attempt[0] > 0 and st.state[r] == STICK:
+        # again and again: the decision's force is short of its known bound by round-off, that of the motion is not
+        st.state[r] = SLIP_RIGHT if what == AT_LOW else SLIP_LEFT
+        st.other[r] = st.state[r]
     for i in range(len(system.rest)):
         changed = work.before[i] != st.state[i] or st.other[i] != st.state[i]
         if changed or st.prestress[i] != 0.0 or st.prestress[len(system.rest) + i] != 0.0:

@@ -43,7 +43,7 @@ _ORDER = list(PassageStatus)
 
 
 class Found(NamedTuple):
-    """How the passage of a scene's period ended: a status, "refused" or why there is none, its kind, and the last event."""
+    """How the passage of a scene's period ended, or why there is none; the scene's kind; the last event."""
 
     end: str
     kind: str
