@@ -74,7 +74,8 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
     # strains are known to round-off of a mode's whole strain: by that alone, equal modes would be coupled and mixed
     whole = lossy.sum(axis=0) @ size
     noise = np.where(np.eye(len(whole), dtype=bool), noise, np.maximum(noise, np.maximum(whole, whole[:, None])))
-    damping[np.abs(damping) <= 8 * _EPS * noise] = 0.0
+    # sums of as many terms, and rotations of as many columns
+    damping[np.abs(damping) <= max(8, 2 * len(whole)) * _EPS * noise] = 0.0
     return RealModes(frequency, shape, project, frequency[:, None] * (damping + damping.T) / 2 * frequency)
 
 
