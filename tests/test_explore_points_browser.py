@@ -84,9 +84,7 @@ def test_click_shows_history_phase_planes_and_motion(tmp_path):
         assert {"structure", "body 1 in its cavity"} <= set(names)
         assert page.locator("#point-phase .xaxislayer-above").count() == 2
         frame = page.frame_locator("#point-motion")
-        before = frame.locator("polygon.body").get_attribute("points")
-        frame.get_by_role("button", name="Play").click()
-        playwright.expect(frame.locator("polygon.body")).not_to_have_attribute("points", before)
+        playwright.expect(frame.locator("polygon.body")).to_be_visible()
 
         # without a mouse: the next point, a frequency, nonsense
         page.locator("#point-higher").press("Enter")
@@ -95,6 +93,10 @@ def test_click_shows_history_phase_planes_and_motion(tmp_path):
         field.fill("15.8")
         field.press("Enter")
         says(page, "#point-status", "15.8 Hz: mean of peaks")
+        # beside the resonance the body moves in every period; at the point of a curve that is still coarse it may stick
+        before = frame.locator("polygon.body").get_attribute("points")
+        frame.get_by_role("button", name="Play").click()
+        playwright.expect(frame.locator("polygon.body")).not_to_have_attribute("points", before)
         field.fill("-1")
         field.press("Enter")
         says(page, "#point-status", "should be greater than 0")
