@@ -13,7 +13,7 @@ import numpy as np
 
 from vanedamp.coupling.response.records import CONTACT, FRICTION, IMPACT_LOSS, STORED, VISCOUS, Records
 from vanedamp.coupling.response.static_deflection import about_mean
-from vanedamp.coupling.response.steady_state import lag_correlation, mean_confidence
+from vanedamp.coupling.response.steady_state import batch_means, lag_correlation, mean_confidence
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.transient import Transient
 
@@ -107,8 +107,7 @@ def _remaining(peaks: np.ndarray, rate: float, tolerance: float) -> float:
     n = len(peaks)
     parts = min(4, n)
     size = n // parts
-    means = peaks[n - parts * size :].reshape(parts, size).mean(axis=1)
-    found = [np.ptp(means) / _gone(rate * (n - size), tolerance)]
+    found = [np.ptp(batch_means(peaks, parts)) / _gone(rate * (n - size), tolerance)]
     for period in range(1, min(_LONGEST, n // 2) + 1):
         change = np.abs(peaks[period:] - peaks[:-period]).max()
         with np.errstate(over="ignore"):
@@ -128,5 +127,5 @@ def _drifts(peaks: np.ndarray, allowed: float) -> bool:
     if size < _SHORTEST:
         return False
     before, after = peaks[:half].mean(), peaks[-half:].mean()
-    late = peaks[-size * _BATCHES :].reshape(_BATCHES, size).mean(axis=1)
+    late = batch_means(peaks[-half:], _BATCHES)
     return bool(abs(after - before) > max(allowed, _CERTAIN * np.sqrt(2 / _BATCHES) * late.std(ddof=1)))

@@ -48,7 +48,7 @@ def mean_confidence(series: np.ndarray, relaxations: float = np.inf) -> float | 
     """
     if len(series) < 2 * _BATCHES:
         return None
-    scatter = _batch_means(series, _BATCHES).std(ddof=1) / np.sqrt(_BATCHES)
+    scatter = batch_means(series, _BATCHES).std(ddof=1) / np.sqrt(_BATCHES)
     freedom = float(np.clip(relaxations - 1, 1, _BATCHES - 1))
     return float(stdtrit(freedom, 0.975) * scatter / np.sqrt(1.0 - max(lag_correlation(series), 0.0)))
 
@@ -58,7 +58,7 @@ def lag_correlation(series: np.ndarray) -> float:
     count = 2 * _BATCHES
     if len(series) < _LEAST * count:
         return 0.0
-    means = _batch_means(series, count)
+    means = batch_means(series, count)
     means = means - means.mean()
     square = means @ means
     if not square > 0.0:
@@ -68,7 +68,7 @@ def lag_correlation(series: np.ndarray) -> float:
     return float(np.clip((found + 1 / count) / (1 - 3 / count), -0.9, 0.9))
 
 
-def _batch_means(series: np.ndarray, count: int) -> np.ndarray:
+def batch_means(series: np.ndarray, count: int) -> np.ndarray:
     """Return the means (count,) of the last batches of a series."""
     size = len(series) // count
     return np.asarray(series[-size * count :].reshape(count, size).mean(axis=1))
