@@ -177,11 +177,11 @@ def _write_users(file: str) -> None:
     }  # fmt: skip
     history = {
         "structure": SCENE["structure"], "cavity": SCENE["cavity"], "damper": rom["damper"], "time": {"periods": 3},
-        "excitation": {"frequency": 15.9, "force": 1.0, "waveform": {"shape": "history", "file": file}},
+        "excitation": {"force": 1.0, "waveform": {"shape": "history", "file": file}},
         "solver": {"method": "moreau", "steps_per_period": 20},
     }  # fmt: skip
     pattern = rom | {
-        "structure": {"model": "rom", "file": "rom.h5"}, "excitation": {"frequency": 150.0, "pattern": file},
+        "structure": {"model": "rom", "file": "rom.h5"}, "excitation": {"frequency": 150.0, "at": "tip", "pattern": file},
     }  # fmt: skip
     for name, tables in {
         "on_mesh.toml": mesh, "on_rom.toml": rom, "on_history.toml": history,
@@ -249,7 +249,8 @@ def _change_record(path: Path, draw: random.Random) -> None:
                 del file[name]
                 file[name] = np.asarray(values)[..., :-1]
             case 3:
-                file[name][...] = draw.choice((np.nan, np.inf, -1, 1e308, 10**9))
+                with np.errstate(over="ignore"):
+                    file[name][...] = draw.choice((np.nan, np.inf, -1, 1e308, 10**9))
             case 4:
                 del file.attrs[attribute]
             case 5:
