@@ -181,7 +181,8 @@ def _write_users(file: str) -> None:
         "solver": {"method": "moreau", "steps_per_period": 20},
     }  # fmt: skip
     pattern = rom | {
-        "structure": {"model": "rom", "file": "rom.h5"}, "excitation": {"frequency": 150.0, "at": "tip", "pattern": file},
+        "structure": {"model": "rom", "file": "rom.h5"},
+        "excitation": {"frequency": 150.0, "at": "tip", "pattern": file},
     }  # fmt: skip
     for name, tables in {
         "on_mesh.toml": mesh, "on_rom.toml": rom, "on_history.toml": history,
