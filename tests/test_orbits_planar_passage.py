@@ -10,6 +10,7 @@ from tests.reference.planar_sequence import PlanarSequence, walk
 from tests.tools import periodic_scenes
 from tests.tools.planar import planar_scene
 from tests.tools.planar_laws import scene_of, tables
+from vanedamp.coupling.system.assembly import Motion, initial_motion
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.branch import Branch, Branches, BranchPoint
 from vanedamp.coupling.orbits.multipliers import decided
@@ -17,7 +18,6 @@ from vanedamp.coupling.orbits.newton import OrbitStatus, find_orbit
 from vanedamp.coupling.orbits.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.orbits.planar_segment import Segment
-from vanedamp.coupling.planar.constraints import PlanarMotion, planar_motion
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
@@ -121,7 +121,7 @@ def test_matches_a_fixed_sequence_in_40_digits(case):
 def directions(found, x):
     """Directions (k, m), in units of the scale, in which a state may move without breaking closed contacts."""
     frame = found._frame
-    motion = PlanarMotion(*np.split(frame.from_state @ x, 2))
+    motion = Motion(*np.split(frame.from_state @ x, 2))
     run = PlanarRun(frame.flat, frame.system, motion, new_records(frame.flat, 1, 0), True, 0)
     run.advance_to(1)
     held = frame.to_state @ Segment(run).begun() @ frame.from_state
@@ -301,7 +301,7 @@ def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
     for way in (1, -1):
         tilted = x.copy()
         tilted[tilt] += way * 1e-8
-        start = PlanarMotion(*np.split(found._frame.from_state @ tilted, 2))
+        start = Motion(*np.split(found._frame.from_state @ tilted, 2))
         run = PlanarRun(flat, system, start, new_records(flat, periods, 0), False, 10**6)
         assert run.advance_to(periods) is Status.OK
         ends.append(found._frame.to_state @ np.r_[run.state.q, run.state.v])

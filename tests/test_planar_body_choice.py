@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.coupling.system.system import FLOOR
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods.registry import respond, run_of
 from vanedamp.coupling.model_order.body_choice import judge, judge_all, with_blocks, with_sliders
 from vanedamp.coupling.model_order.choices import choose
-from vanedamp.coupling.planar.constraints import FLOOR, planar_motion, planar_system
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.sweep.sweep import sweep

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from tests.tools.planar import Run, ledger, open_run, planar_run, planar_scene, still_table
+from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.system import CEILING, FLOOR
 from vanedamp.coupling.numerics.codes import OPEN
-from vanedamp.coupling.planar.constraints import CEILING, FLOOR, PlanarMotion
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
 
@@ -104,7 +105,7 @@ def test_unequal_restitution_brings_no_energy():
         coefficients = np.where(np.arange(u) == floor[0], *rng.permutation([0.1, 0.9]))
         system = opened.system._replace(restitution=coefficients)
         v = opened.state.v.copy()
-        run = Run(opened.flat, system, PlanarMotion(opened.state.q, v), new_records(opened.flat, 1, 0), True, 1)
+        run = Run(opened.flat, system, Motion(opened.state.q, v), new_records(opened.flat, 1, 0), True, 1)
         before = system.J @ v
         run.advance_to(1)
         hits = [hit for hit in run.events(IMPACT) if hit[0] == 0.0]

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tests.tools.planar import Run, ledger, open_run, planar_scene, still_table
-from vanedamp.coupling.planar.constraints import LEFT, RIGHT, PlanarMotion, PlanarSystem
+from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.system import LEFT, RIGHT, System
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
 
@@ -31,7 +32,7 @@ def woodpecker():
     weight = turned @ (-G * (m * np.array([1.0, 0.0, 0.0]) + bird * arm))
     twist = turned @ np.array([0.0, 1.0, -1.0])
     one, three = np.zeros((1, 3)), np.zeros(3)
-    system = PlanarSystem(
+    system = System(
         contacts=3, mass=np.ones(3), stiffness=SPRING * np.outer(twist, twist), damping=np.zeros((3, 3)),
         load=one.astype(complex), weight=weight, response=turned.T[0].copy(), table=np.zeros(1, complex),
         frequency=np.array([2 * np.pi / RECORDED]), period=RECORDED,
@@ -54,7 +55,7 @@ def test_its_limit_cycle_takes_146_ms():
     # near the limit cycle, as the sleeve's lower edge has come to the pole
     q, v = np.array([0.0, -(R_M - R_0) / H_M, -0.2788]), np.array([-0.3411, 0.0, -7.4583])
     flat, periods = open_run(planar_scene(still_table(1 / RECORDED), {"mass": 1.0}), 1, 1).flat, 60
-    run = Run(flat, system, PlanarMotion(root.T @ q, root.T @ v), new_records(flat, periods, 0), True, 10**6)
+    run = Run(flat, system, Motion(root.T @ q, root.T @ v), new_records(flat, periods, 0), True, 10**6)
     assert run.advance_to(periods) is Status.OK
     impacts = run.events(IMPACT)
     beak = impacts[(impacts[:, 2] == 0) & (impacts[:, 3] < -0.05)]

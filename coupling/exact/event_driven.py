@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.exact import automaton
 from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes
 from vanedamp.coupling.exact.state import new_event_functions, new_scratch, new_state
@@ -26,9 +27,11 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
 )
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
+from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.system.assembly import InitialMotion
+from vanedamp.coupling.response.restart import restart_state
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
@@ -48,7 +51,7 @@ class _Log:
             self.chunks.append(log[:count].copy())
 
 
-def is_common(system: System, modes: int) -> bool:
+def is_common(system: LineSystem, modes: int) -> bool:
     """Whether this is the most common scene, for whose lengths the engine is compiled.
 
     One mode, one body between two rigid walls, one harmonic.
@@ -59,15 +62,15 @@ def is_common(system: System, modes: int) -> bool:
 class EngineRun:
     """The mutable state of one run and the subsystems it has met.
 
-    known: subsystems that earlier runs have met, of this system or of one that differs by its frequency only; new ones
+    whole: the scene's system, whose rows are `system`; known: subsystems that earlier runs have met, of this system or of one that differs by its frequency only; new ones
     are added.
     """
 
     def __init__(
-        self, system: System, initial: InitialMotion, records: Records, events: bool, max_events: int,
-        known: dict[bytes, Subsystem] | None = None,
+        self, whole: System, system: LineSystem, initial: InitialMotion, records: Records, events: bool,
+        max_events: int, known: dict[bytes, Subsystem] | None = None,
     ) -> None:  # fmt: skip
-        self.system, self.records, self.max_events = system, records, max_events
+        self.whole, self.system, self.records, self.max_events = whole, system, records, max_events
         self.known = {} if known is None else known
         self.begun, self.ended = False, False
         self.flows = empty_flows(system)
@@ -128,26 +131,26 @@ class EngineRun:
         self.ended = code != DONE
         return STATUS_OF[code]
 
-    def final(self) -> InitialMotion | None:
-        """Return the motion at the end of the periods done; None for a run that ended within one."""
+    def final(self) -> RestartState | None:
+        """Return the state at the end of the periods done; None for a run that ended within one."""
         if self.ended:
             return None
         state, s, n = self.state, int(self.state.counters[FLOW]), self.system.modes
         awake = slice(state.counters[AWAKE])
         y = (state.amplitude[awake] @ self.flows.shape[s, awake]).real
         y[: len(state.constant)] += state.constant
-        return InitialMotion(y[:n], y[n:], state.displacement, state.velocity)
+        return restart_state(self.system, InitialMotion(y[:n], y[n:], state.displacement, state.velocity))
 
     def outcome(self) -> Outcome:
         """Return the results of the run."""
         counters = self.state.counters
         return Outcome(
-            self.system, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER,
+            self.whole, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER,
             {
                 "impacts": int(counters[IMPACTS]),
                 "segments": int(counters[SEGMENTS]),
                 "evaluations": int(counters[EVALUATIONS]),
                 "subsystems": int(np.count_nonzero(self.flows.modes)),
             },
-            self.log.chunks,
+            self.log.chunks, rows_of_line(self.whole),
         )  # fmt: skip

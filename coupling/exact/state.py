@@ -10,13 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.exact.root_search import Expansion, new_expansion
 from vanedamp.coupling.numerics.codes import COAST, COUNTERS, OPEN
 from vanedamp.coupling.numerics.complementarity import Problem, new_problem
 from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.response.records import ENERGIES
-from vanedamp.coupling.system.assembly import InitialMotion
-from vanedamp.coupling.system.system import System
 
 
 @record
@@ -128,7 +127,7 @@ class Scratch(NamedTuple):
     problem: Problem
 
 
-def new_state(system: System, modes: int, initial: InitialMotion) -> State:
+def new_state(system: LineSystem, modes: int, initial: InitialMotion) -> State:
     """Return the state at time zero; `modes` is the room for complex modes."""
     r, n, b = len(system.delassus), system.modes, system.bodies
     state = State(
@@ -160,7 +159,7 @@ def new_state(system: System, modes: int, initial: InitialMotion) -> State:
     return state
 
 
-def new_event_functions(system: System, modes: int) -> EventFunctions:
+def new_event_functions(system: LineSystem, modes: int) -> EventFunctions:
     """Return room for two event functions a row."""
     k = 2 * len(system.delassus)
     return EventFunctions(
@@ -181,7 +180,7 @@ def new_event_functions(system: System, modes: int) -> EventFunctions:
     )
 
 
-def new_scratch(system: System, modes: int) -> Scratch:
+def new_scratch(system: LineSystem, modes: int) -> Scratch:
     """Return scratch space for a scene."""
     r, n, b = len(system.delassus), system.modes, system.bodies
     return Scratch(

@@ -23,11 +23,11 @@ from scipy.linalg import block_diag, null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.exact.complex_modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
 from vanedamp.coupling.exact.peaks import GRIDS
 from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
 from vanedamp.coupling.numerics.record import record_with
-from vanedamp.coupling.system.system import System
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
@@ -111,7 +111,7 @@ class Flows(NamedTuple):
     slow_square: np.ndarray  # (s, p) complex: its share of the squared response
 
 
-def empty_flows(system: System, capacity: int = 4) -> Flows:
+def empty_flows(system: LineSystem, capacity: int = 4) -> Flows:
     """Return room for `capacity` subsystems, none of them filled (modes 0)."""
     s, n, b, r, e = capacity, system.modes, system.bodies, len(system.delassus), len(system.frequency)
     m = 2 * n + e + 2 * b * bool(np.isfinite(system.spring[system.friction_rows :]).any())
@@ -183,7 +183,7 @@ class Subsystem(NamedTuple):
     static: np.ndarray  # (n + b, n + b): z under constant loads on (p, x)
 
 
-def add_flow(flows: Flows, system: System, closed: np.ndarray, known: dict[bytes, Subsystem] | None = None) -> Flows:
+def add_flow(flows: Flows, system: LineSystem, closed: np.ndarray, known: dict[bytes, Subsystem] | None = None) -> Flows:
     """Return the stack with the subsystem of the closed rows (r,) in its first free place.
 
     known: subsystems of this system by their closed rows, or of one that differs by its frequency only, to which new
@@ -210,7 +210,7 @@ def add_flow(flows: Flows, system: System, closed: np.ndarray, known: dict[bytes
     return flows
 
 
-def _subsystem(system: System, closed: np.ndarray) -> Subsystem:
+def _subsystem(system: LineSystem, closed: np.ndarray) -> Subsystem:
     n, b = system.modes, system.bodies
     rigid, sprung = closed[np.isinf(system.spring[closed])], closed[np.isfinite(system.spring[closed])]
     carrier, cluster, inner = _attachment(system, rigid)
@@ -248,7 +248,7 @@ def _subsystem(system: System, closed: np.ndarray) -> Subsystem:
     )  # fmt: skip
 
 
-def _fill(flows: Flows, system: System, s: int, subsystem: Subsystem) -> None:
+def _fill(flows: Flows, system: LineSystem, s: int, subsystem: Subsystem) -> None:
     n, b, e = system.modes, system.bodies, len(system.frequency)
     rigid, sprung, carrier, functional = subsystem.rigid, subsystem.sprung, subsystem.carrier, subsystem.functional
     lift, drop, loads, free = subsystem.lift, subsystem.drop, subsystem.loads, subsystem.free
@@ -306,7 +306,7 @@ def _fill(flows: Flows, system: System, s: int, subsystem: Subsystem) -> None:
 
 
 def _check_split(
-    system: System, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, shape: np.ndarray, project: np.ndarray
+    system: LineSystem, felt: np.ndarray, law: np.ndarray, sprung: np.ndarray, shape: np.ndarray, project: np.ndarray
 ) -> None:
     """Refuse a subsystem whose modes cancel: round-off in a state (p, xi, p', xi') grows to more than LOST, or to FAR.
 
@@ -326,7 +326,7 @@ def _check_split(
         raise IllConditioned("its modes cancel")
 
 
-def _check_rest(system: System, felt: np.ndarray, static: np.ndarray) -> None:
+def _check_rest(system: LineSystem, felt: np.ndarray, static: np.ndarray) -> None:
     """Refuse a subsystem that weight would carry so far that its round-off there is more than FAR of a gap."""
     n, eps = system.modes, np.finfo(float).eps
     far = felt @ np.abs(static[:n, n:] @ system.of_bodies.weight)
@@ -334,7 +334,7 @@ def _check_rest(system: System, felt: np.ndarray, static: np.ndarray) -> None:
         raise IllConditioned("at rest under its weight the structure is too far away")
 
 
-def _fill_forces(flows: Flows, system: System, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
+def _fill_forces(flows: Flows, system: LineSystem, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
     m = flows.modes[s]
     rate, load, e = flows.eigenvalue[s, :m], _growth(flows, s), len(system.frequency)
     spring, dashpot = system.spring[sprung, None], system.dashpot[sprung, None]
@@ -357,7 +357,7 @@ def _fill_forces(flows: Flows, system: System, s: int, full: np.ndarray, rigid: 
 
 
 def _excite(
-    system: System, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
+    system: LineSystem, damping: np.ndarray, stiffness: np.ndarray, load: np.ndarray, modes: _Modes
 ) -> tuple[_Modes, np.ndarray, np.ndarray, np.ndarray]:
     """Return the modes, driven ones first, in order of the harmonics that drive them; eta (k, e) in step with the
     harmonics of a load (k, e), without the share of driven modes; harmonic and growth (d,) of each driven mode.
@@ -404,7 +404,7 @@ def _rate(flows: Flows, s: int, functional: np.ndarray) -> np.ndarray:
     return rate
 
 
-def _fill_energy(flows: Flows, system: System, s: int, full: np.ndarray, body: np.ndarray) -> None:
+def _fill_energy(flows: Flows, system: LineSystem, s: int, full: np.ndarray, body: np.ndarray) -> None:
     n, m, e = system.modes, flows.modes[s], len(system.frequency)
     velocity, rate, load = full[n:], flows.eigenvalue[s, :m], _growth(flows, s)
     body_rate = _rate(flows, s, body)
@@ -526,7 +526,7 @@ def _real_form(both: np.ndarray, mixed: np.ndarray) -> np.ndarray:
     return form.reshape(m, m, 2, 2).swapaxes(1, 2).reshape(2 * m, 2 * m)
 
 
-def _attachment(system: System, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _attachment(system: LineSystem, closed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the functional (b, n) of each body that moves with the structure, free clusters and inner constraints.
 
     Cluster (b,): number of the bodies that move freely together, -1 for one that moves with the structure. An inner
@@ -562,14 +562,14 @@ def _connected(links: list[np.ndarray], count: int) -> np.ndarray:
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def _decided(system: System, r: int, known: np.ndarray) -> bool:
+def _decided(system: LineSystem, r: int, known: np.ndarray) -> bool:
     """Whether all but one of the bodies of a closed row are known to move with the structure."""
     bodies = system.of_bodies.J[r] != 0
     free = np.count_nonzero(bodies & ~known)
     return free == 0 or (free == 1 and (np.count_nonzero(bodies) == 1 or bool(known[bodies].any())))
 
 
-def _functional(system: System, carrier: np.ndarray) -> np.ndarray:
+def _functional(system: LineSystem, carrier: np.ndarray) -> np.ndarray:
     """Return the functional of p in each row (r, n); exactly zero where both sides of the row move alike."""
     functional: np.ndarray = system.of_structure.J + system.of_bodies.J @ carrier
     scale = (np.abs(system.of_structure.J) + np.abs(system.of_bodies.J) @ np.abs(carrier)).max(axis=1, initial=0)
@@ -586,7 +586,7 @@ class _SprungBodies(NamedTuple):
     cluster: np.ndarray  # (b,) number of the bodies that move freely together
 
 
-def _sprung_bodies(system: System, cluster: np.ndarray, sprung: np.ndarray) -> _SprungBodies:
+def _sprung_bodies(system: LineSystem, cluster: np.ndarray, sprung: np.ndarray) -> _SprungBodies:
     """Return coordinates of bodies on springs: some move with the structure, others about a common centre of mass."""
     b, groups = len(cluster), cluster.max(initial=-1) + 1
     if not len(sprung):

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 if TYPE_CHECKING:
     from vanedamp.coupling.response.evaluation import Run
     from vanedamp.coupling.response.records import Records
+    from vanedamp.coupling.scene.scene import Scene
     from vanedamp.coupling.scene.solver_options import SolverOptions
-    from vanedamp.coupling.system.assembly import InitialMotion
     from vanedamp.coupling.system.system import System
 
 
@@ -39,22 +39,23 @@ class Variant(NamedTuple):
 class Method(Protocol):
     """The contract of a method.
 
-    It may also have RESTARTS = True: its runs leave a state, and begin with any (those in the plane by a further
-    argument, the RestartState or None). And WAVEFORMS = True: `begin` has one more argument, `loads`, for an
-    excitation that is no sum of the system's harmonics: its loads (k, N), N, at angles omega t (k,) in [0, 2 pi), in
-    place of those of the system. Other methods refuse such an excitation.
+    It may also have RESTARTS = True: its runs leave a state, and `begin` takes one as a further argument `start`. And
+    WAVEFORMS = True: it takes an excitation that is no sum of the system's harmonics, whose loads (k, N), N, at angles
+    omega t (k,) in [0, 2 pi), system.assembly.loads_of returns, in place of those of the system. Other methods reject
+    such an excitation.
+
+    A method that takes bodies in the plane has PLANAR_LAWS: what it takes there apart from rigid contacts of one
+    restitution, "yields", springs; "two_phases", Poisson's law; "depends_on_speed". It may have RUBBING_WARNING, a
+    sentence that every run of such bodies with friction carries.
     """
 
     Options: type[SolverOptions]
     VARIANTS: Sequence[Variant]
 
-    def begin(self, system: System, options: Any, initial: InitialMotion, records: Records, events: bool) -> Run:
-        """Return a run of a system at time zero.
+    def begin(self, scene: Scene, system: System, records: Records, events: bool) -> Run:
+        """Return a run of a scene at time zero; `scene.solver` is an instance of Options.
 
-        options: an instance of Options; initial: the motion at time zero; records: room for all periods, to be filled
-        (response.recorder); events: whether to keep a log of them. Raises InputError for an impossible scene.
-        A method that takes bodies in the plane (coupling.planar) also has begin_planar(scene, system, options, records,
-        events), system with all of them as sliders; and PLANAR_LAWS, what it takes there beside rigid contacts of one
-        restitution: "yields", springs; "two_phases", Poisson's law; "depends_on_speed". It may have RUBBING_WARNING,
-        a sentence that every run of such bodies with friction carries.
+        system: of the scene; a method for bodies that only slide may take its rows (system.line_system). records: room
+        for all periods, to be filled (response.recorder); events: whether to keep a log of them. Raises InputError for
+        an impossible scene.
         """

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load, row_force
 from vanedamp.coupling.methods.step_records import (
@@ -24,10 +25,9 @@ from vanedamp.coupling.methods.step_records import (
 )
 from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.jit import entry
-from vanedamp.coupling.system.system import System
 
 
-def central_difference_matrix(system: System, times: TimeGrid) -> np.ndarray:
+def central_difference_matrix(system: LineSystem, times: TimeGrid) -> np.ndarray:
     """Return the inverse (N, N) of the mass with half a step of damping."""
     inverse: np.ndarray = np.linalg.inv(np.diag(system.mass) + 0.5 * times.step * system.damping)
     return inverse

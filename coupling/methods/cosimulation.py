@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field
 from scipy.linalg import expm
 
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, net_load, row_force, with_penalty
@@ -24,8 +25,7 @@ from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.jit import entry, kernel
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.system.assembly import InitialMotion, Loads
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import Loads
 from vanedamp.files.toml_input import Whole
 
 VARIANTS = (
@@ -54,7 +54,7 @@ class Options(PenaltyOptions):
 
 
 def begin(
-    system: System, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
+    system: LineSystem, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
 ) -> Run:
     """Return a run. Raises InputError for a rigid contact of restitution 0."""
     times = time_grid(system, options.steps_per_period, loads)
@@ -74,7 +74,7 @@ def begin(
 
 
 def cosimulation_matrices(
-    system: System, times: TimeGrid, substeps: int, loads: Loads | None
+    system: LineSystem, times: TimeGrid, substeps: int, loads: Loads | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, (steps, 2n) shares of
     the excitation at each step of a period; loads (steps * substeps + 1, N) of the excitation on the bodies' grid.

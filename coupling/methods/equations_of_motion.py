@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.numerics.codes import COUNTERS
 from vanedamp.coupling.numerics.record import record
-from vanedamp.coupling.system.assembly import InitialMotion, Loads
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import Loads
 
 
 @record
@@ -49,7 +49,7 @@ class Motion(NamedTuple):
     listed: np.ndarray  # (r,) int: rows in the problem of a step
 
 
-def time_grid(system: System, steps: int, loads: Loads | None = None) -> TimeGrid:
+def time_grid(system: LineSystem, steps: int, loads: Loads | None = None) -> TimeGrid:
     """Return the grid of `steps` steps a period. loads: of an excitation that is no sum of the system's harmonics."""
     angle = 2 * np.pi * np.arange(steps + 1) / steps
     phases = system.phases(angle)
@@ -63,7 +63,7 @@ def time_grid(system: System, steps: int, loads: Loads | None = None) -> TimeGri
     )  # fmt: skip
 
 
-def start(system: System, initial: InitialMotion) -> Motion:
+def start(system: LineSystem, initial: InitialMotion) -> Motion:
     """Return the motion at time zero."""
     size, r, b = len(system.mass), len(system.J), system.bodies
     q = np.concatenate([initial.p, initial.displacement[:b] + system.floor @ initial.p])

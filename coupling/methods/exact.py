@@ -12,7 +12,6 @@ if TYPE_CHECKING:  # a scene takes the options without the engine
     from vanedamp.coupling.response.records import Records
     from vanedamp.coupling.response.restart_state import RestartState
     from vanedamp.coupling.scene.scene import Scene
-    from vanedamp.coupling.system.assembly import InitialMotion
     from vanedamp.coupling.system.system import System
 
 VARIANTS = (Variant("exact engine", "#1d4f91", "*", setting=None),)
@@ -27,18 +26,13 @@ class Options(PlanarOptions):
     """"exact": event by event, without time steps"""
 
 
-def begin(system: System, options: SolverOptions, initial: InitialMotion, records: Records, events: bool) -> Run:
-    """Return a run by the engine."""
-    from vanedamp.coupling.exact.event_driven import EngineRun  # its kernels are loaded when they are wanted
+def begin(scene: Scene, system: System, records: Records, events: bool, start: RestartState | None = None) -> Run:
+    """Return a run by the engine, of sliders or for bodies in the plane, whose kernels are loaded when wanted."""
+    if scene.planar:
+        from vanedamp.coupling.planar.planar_run import begin_run
 
-    return EngineRun(system, initial, records, events, options.max_events)
+        return begin_run(scene, system, records, events, scene.solver.max_events, start)
+    from vanedamp.coupling.exact.event_driven import EngineRun
+    from vanedamp.coupling.response.restart import line_start
 
-
-def begin_planar(
-    scene: Scene, system: System, options: SolverOptions, records: Records, events: bool,
-    start: RestartState | None = None,
-) -> Run:  # fmt: skip
-    """Return a run by the engine for bodies in the plane."""
-    from vanedamp.coupling.planar.planar_run import begin_run
-
-    return begin_run(scene, system, records, events, options.max_events, getattr(options, "linearisation", 0.01), start)
+    return EngineRun(system, *line_start(scene, system, start), records, events, scene.solver.max_events)

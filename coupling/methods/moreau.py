@@ -14,6 +14,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
 from vanedamp.coupling.methods.planar.start import planar_start
@@ -37,9 +38,8 @@ from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PlanarOptions, SteppingOptions
-from vanedamp.coupling.system.assembly import InitialMotion, Loads
+from vanedamp.coupling.system.assembly import Loads
 from vanedamp.coupling.system.restitution import restitution_at
-from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Real
 
 VARIANTS = (Variant("Moreau-Jean", "#c2410c", "o"),)
@@ -62,7 +62,7 @@ class Options(SteppingOptions, PlanarOptions):
 
 
 def begin(
-    system: System, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
+    system: LineSystem, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
 ) -> Run:
     """Return a run."""
     times, theta, problem = (
@@ -79,7 +79,7 @@ def begin(
     return SteppedRun(system, march, start(system, initial), records, events, options.smallest_steps)
 
 
-def begin_planar(scene: Scene, flat: System, options: Options, records: Records, events: bool) -> Run:
+def begin_planar(scene: Scene, flat: LineSystem, options: Options, records: Records, events: bool) -> Run:
     """Return a run of bodies with extent. flat: the scene's system with every body as a slider.
 
     Raises InputError for what bodies with extent do not allow.
@@ -99,7 +99,7 @@ def begin_planar(scene: Scene, flat: System, options: Options, records: Records,
     return SteppedRun(flat, march, motion, records, events, options.smallest_steps, plane)
 
 
-def moreau_matrices(system: System, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def moreau_matrices(system: LineSystem, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the inverse of the iteration matrix (N, N), its product with J^T (N, r), and the rows' mobility (r, r)."""
     h = times.step
     matrix = np.diag(system.mass + (h * theta) ** 2 * system.stiffness) + h * theta * system.damping

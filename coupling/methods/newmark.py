@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
@@ -28,11 +29,10 @@ from vanedamp.coupling.methods.step_records import (
 )
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.jit import entry, kernel
-from vanedamp.coupling.system.system import System
 
 
 def newmark_matrices(
-    system: System, times: TimeGrid, alpha: float
+    system: LineSystem, times: TimeGrid, alpha: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return alpha, beta, gamma; inverse iteration matrix, (1 + alpha) times its product with J^T, mobility."""
     h, beta, gamma = times.step, (1 - alpha) ** 2 / 4, 0.5 - alpha

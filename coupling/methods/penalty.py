@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.central_difference import central_difference_matrix, march_central_difference
 from vanedamp.coupling.methods.equations_of_motion import Motion, start, time_grid
@@ -20,8 +21,7 @@ from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PlanarOptions
-from vanedamp.coupling.system.assembly import InitialMotion, Loads
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import Loads
 from vanedamp.files.toml_input import InputError, Real
 
 VARIANTS = (
@@ -54,7 +54,7 @@ class Options(PenaltyOptions, PlanarOptions):
 
 
 def begin(
-    system: System, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
+    system: LineSystem, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
 ) -> Run:
     """Return a run. Raises InputError for a rigid contact of restitution 0."""
     times = time_grid(system, options.steps_per_period, loads)
@@ -78,7 +78,7 @@ def begin(
     return SteppedRun(soft, march, start(soft, initial), records, events, options.smallest_steps)
 
 
-def begin_planar(scene: Scene, flat: System, options: Options, records: Records, events: bool) -> Run:
+def begin_planar(scene: Scene, flat: LineSystem, options: Options, records: Records, events: bool) -> Run:
     """Return a run of bodies with extent. flat: the scene's system with every body as a slider.
 
     Raises InputError for implicit schemes, for a restitution of 0, and for what bodies with extent do not allow.

@@ -8,12 +8,12 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.step_records import damping_force, load_at, row_speed
 from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.solver_options import SteppingOptions
-from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError, NonNegative, Positive, Real
 
 
@@ -34,7 +34,7 @@ class PenaltyOptions(SteppingOptions):
         return self
 
 
-def with_penalty(system: System, times: TimeGrid, options: PenaltyOptions) -> tuple[System, np.ndarray]:
+def with_penalty(system: LineSystem, times: TimeGrid, options: PenaltyOptions) -> tuple[LineSystem, np.ndarray]:
     """Return rigid contacts as springs and dashpots, and the slip speed (friction rows,) of regularised friction.
 
     Raises InputError for a restitution of 0, and for one that depends on the speed.

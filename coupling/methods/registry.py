@@ -6,20 +6,17 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from vanedamp.coupling.methods import Method
 from vanedamp.coupling.response.evaluation import Run, evaluate, run_scene
-from vanedamp.coupling.response.records import Records, new_records
+from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Response
-from vanedamp.coupling.response.restart import at_speed_of, marked_with_speed, restart_from, restart_state
+from vanedamp.coupling.response.restart import at_speed_of, marked_with_speed
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.assembly import InitialMotion, assemble, initial_motion, loads_of, physical_scale
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.transient import most_periods
 from vanedamp.files.toml_input import InputError
 
@@ -41,8 +38,7 @@ def respond(
 
 def final_state(scene: Scene, run: Run) -> RestartState | None:
     """Return the state that a run of a scene has come to; None within a period, or if the method keeps none."""
-    last, system = run.final(), run.outcome().system
-    state = restart_state(system, physical_scale(scene, system), last) if isinstance(last, InitialMotion) else last
+    state = run.final()
     return None if state is None else marked_with_speed(scene, state)
 
 
@@ -56,57 +52,38 @@ def run_of(scene: Scene, events: bool = False, samples_per_period: int = 0, star
         raise InputError(f"continuation: {reason}")
     scene.solver.check_samples(samples_per_period)
     check_waveform(scene, scene.solver.method)
+    _check_bodies(scene, method)
     system = assemble(scene)
-    scale = physical_scale(scene, system)
-    start = None if start is None else at_speed_of(scene, start)
-    reduced, deflected = isinstance(scene.structure, Rom), is_deflected(scene, system)
-    records = new_records(system, most_periods(scene), samples_per_period, reduced, deflected)
-    if scene.planar:
-        return _begin_planar(scene, system, method, records, events, start)
-    initial = initial_motion(scene, system) if start is None else restart_from(system, scale, start)
-    signal = scene.excitation.signal
-    further = {} if signal is None else {"loads": loads_of(scene, signal)}
-    return method.begin(system, scene.solver, initial, records, events, **further)
+    records = new_records(
+        system, most_periods(scene), samples_per_period, isinstance(scene.structure, Rom), deflects(scene, system)
+    )
+    further = {} if start is None else {"start": at_speed_of(scene, start)}
+    return method.begin(scene, system, records, events, **further)
 
 
-def is_deflected(scene: Scene, system: System) -> bool:
-    """Return whether static loads of the bodies move the response of a scene; system: that of its sliders."""
-    functionals, loads = system.floor, system.of_bodies.weight
-    if scene.planar:
-        from vanedamp.coupling.planar.constraints import planar_system
-
-        n, plane = system.modes, planar_system(scene, system)
-        off_floor = plane.along[plane.tilt >= 0] + 1
-        pressed = np.zeros(system.bodies)
-        pressed[plane.tilt >= 0] = plane.weight[off_floor]
-        arm = np.array([scene.cavity[place].gap for place in plane.cavity])
-        functionals = np.vstack([functionals, plane.rise[:, :n], plane.turn[:, :n]])
-        loads = np.concatenate([loads, pressed, pressed * arm])
-    return deflects(system, functionals, loads)
-
-
-def _begin_planar(
-    scene: Scene, system: System, method: Method, records: Records, events: bool, start: RestartState | None
-) -> Run:
-    begin = getattr(method, "begin_planar", None)
-    if begin is None:
-        able = [name for name, part in METHODS.all().items() if hasattr(part, "begin_planar")]
+def _check_bodies(scene: Scene, method: Method) -> None:
+    """Raise InputError for bodies in the plane, or a contact law of theirs, that a method does not take."""
+    for number, damper in enumerate(scene.damper):
+        if damper.shape == "auto":
+            raise InputError(f'damper[{number}].shape: "auto" is still open; model_order.choices.choose settles it')
+    if not scene.planar:
+        return
+    laws = {name: getattr(part, "PLANAR_LAWS", None) for name, part in METHODS.all().items()}
+    law, name = scene.contact, scene.solver.method
+    if laws[name] is None:
+        able = [other for other, taken in laws.items() if taken is not None]
         raise InputError(
-            f"solver.method: {scene.solver.method} takes sliders only, and no impacts of two phases; bodies with "
-            f'extent, stiffness or dashpot and contact.law = "{scene.contact.law}" are for {" or ".join(able)}'
+            f"solver.method: {name} takes sliders only, and no impacts of two phases; bodies with "
+            f'extent, stiffness or dashpot and contact.law = "{law.law}" are for {" or ".join(able)}'
         )
-    law = scene.contact
     asked = {"yields": not law.rigid, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
-    wanted = {name for name, needs in asked.items() if needs}
-    if not wanted <= set(getattr(method, "PLANAR_LAWS", ())):
-        able = [name for name, part in METHODS.all().items() if wanted <= set(getattr(part, "PLANAR_LAWS", ()))]
+    wanted = {ability for ability, needs in asked.items() if needs}
+    if not wanted <= set(laws[name]):
+        able = [other for other, taken in laws.items() if taken is not None and wanted <= set(taken)]
         raise InputError(
             f'contact.law: "{law.law}" of bodies with extent, stiffness or dashpot, and of impacts in two phases, is '
-            f"for solver.method {' or '.join(able)}, not {scene.solver.method}"
+            f"for solver.method {' or '.join(able)}, not {name}"
         )
-    further = {} if start is None else {"start": start}
-    run: Run = begin(scene, system, scene.solver, records, events, **further)
-    return run
 
 
 def why_no_restart(scene: Scene) -> str | None:

@@ -8,7 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import DONE, IMPACTS, LOGGED, PERIOD, SOLVES, STEPS
-from vanedamp.coupling.response.evaluation import LOG_WIDTH, STATUS_OF, Outcome, Plane
+from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome, Plane
+from vanedamp.coupling.response.event_log import LINE_WIDTH, WIDTH, Rows
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.system import System
@@ -44,6 +45,7 @@ class SteppedRun:
     def __init__(
         self,
         system: System,
+        rows: Rows,
         march: March,
         motion: Stepped,
         records: Records,
@@ -51,11 +53,12 @@ class SteppedRun:
         steps: int,
         plane: Plane | None = None,
     ) -> None:
-        self.system, self.march, self.motion, self.records, self.plane = system, march, motion, records, plane
+        self.system, self.rows, self.march, self.plane = system, rows, march, plane
+        self.motion, self.records = motion, records
         self.steps = steps
         # a contact logs at most one impact per step
         self.slice = max(_SLICE // max(len(motion.active), 1), 1)
-        self.log = np.zeros((_SLICE if events else 0, 6 if plane is None else LOG_WIDTH))
+        self.log = np.zeros((_SLICE if events else 0, LINE_WIDTH if plane is None else WIDTH))
         self.chunks: list[np.ndarray] = []
 
     def advance_to(self, periods: int) -> Status:
@@ -78,7 +81,7 @@ class SteppedRun:
         }  # fmt: skip
         return Outcome(
             self.system, self.records, int(counters[PERIOD]), numbers["impacts"], _OPEN_LEDGER, numbers,
-            [chunk for chunk in self.chunks if len(chunk)], float(self.motion.deepest[0]), self.plane,
+            [chunk for chunk in self.chunks if len(chunk)], self.rows, float(self.motion.deepest[0]), self.plane,
         )  # fmt: skip
 
     def final(self) -> None:

@@ -6,9 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.numerics.codes import STICK
 from vanedamp.coupling.orbits.planar_names import UnitNames
-from vanedamp.coupling.planar.constraints import PlanarSystem, planar_system
 from vanedamp.coupling.planar.contact_flow import ContactFlows
 from vanedamp.coupling.planar.restart import planar_restart_state
 from vanedamp.coupling.response.restart_state import RestartState
@@ -137,7 +138,7 @@ class Frame:
         return image
 
 
-def image_of(system: PlanarSystem) -> np.ndarray | None:
+def image_of(system: System) -> np.ndarray | None:
     """Return the map (N, N) of coordinates to those of the mirror image; None where that is another scene."""
     size, u, bodies = len(system.mass), len(system.rest), len(system.along)
     image = np.zeros((size, size))

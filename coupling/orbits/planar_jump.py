@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.planar.constraints import PlanarSystem
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.restitution import restitutions_at
 
 #: singular values that count as none
@@ -53,7 +53,7 @@ class _Blow(NamedTuple):
 
 
 def impact(
-    system: PlanarSystem, v: np.ndarray, impulse: np.ndarray, compression: np.ndarray, plastic: np.ndarray, speed: float
+    system: System, v: np.ndarray, impulse: np.ndarray, compression: np.ndarray, plastic: np.ndarray, speed: float
 ) -> Jump:
     """Return the jump of speeds v (N,) by an impact in which contacts take part as impulses (2u,) of the engine say.
 
@@ -77,7 +77,7 @@ def impact(
 
 
 def _expand(
-    system: PlanarSystem,
+    system: System,
     pressed: Jump,
     roles: _Roles,
     given: np.ndarray,
@@ -102,7 +102,7 @@ def _expand(
 
 
 def _newton(
-    system: PlanarSystem, begun: Jump, impulse: np.ndarray, restitution: np.ndarray, change: np.ndarray, speed: float
+    system: System, begun: Jump, impulse: np.ndarray, restitution: np.ndarray, change: np.ndarray, speed: float
 ) -> Jump:
     """Return the jump by Newton's law with restitutions (u,), and their derivatives by the speeds of approach.
 
@@ -134,7 +134,7 @@ def _newton(
     return Jump(after, part.jump.derivative + np.multiply.outer(by_share, along))
 
 
-def _roles(system: PlanarSystem, v: np.ndarray, impulse: np.ndarray, speed: float) -> _Roles:
+def _roles(system: System, v: np.ndarray, impulse: np.ndarray, speed: float) -> _Roles:
     """Return who takes part in a blow of impulses (2u,) on speeds v (N,)."""
     u = len(system.rest)
     normal, tangential = impulse[:u], impulse[u:]
@@ -148,7 +148,7 @@ def _roles(system: PlanarSystem, v: np.ndarray, impulse: np.ndarray, speed: floa
     return _Roles(hit, sticks, np.where(slides, -np.sign(tangential) * system.friction, 0.0))
 
 
-def _blow(system: PlanarSystem, begun: Jump, roles: _Roles, target: np.ndarray, steep: np.ndarray) -> _Blow:
+def _blow(system: System, begun: Jump, roles: _Roles, target: np.ndarray, steep: np.ndarray) -> _Blow:
     """Return the blow that gives contacts that push normal speeds `target` (a,), with derivatives (a, N).
 
     Those that stick lose their slips. begun: the speeds so far.
@@ -165,7 +165,7 @@ def _blow(system: PlanarSystem, begun: Jump, roles: _Roles, target: np.ndarray, 
     return _Blow(jump, (solve @ wanted)[: len(hit)], (solve @ slope)[: len(hit)])
 
 
-def _restitution(system: PlanarSystem, approach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _restitution(system: System, approach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the restitutions (u,) at speeds of approach (u,), and their derivatives by these."""
     units = np.arange(len(approach))
     now = restitutions_at(system, units, approach)
@@ -176,7 +176,7 @@ def _restitution(system: PlanarSystem, approach: np.ndarray) -> tuple[np.ndarray
     return now, (ends[0] - ends[3] + 8.0 * (ends[2] - ends[1])) / (12.0 * step)
 
 
-def stopped(system: PlanarSystem, after: np.ndarray, shut: np.ndarray, speed: float) -> np.ndarray:
+def stopped(system: System, after: np.ndarray, shut: np.ndarray, speed: float) -> np.ndarray:
     """Return the projector (N, N), in the mass metric, of speeds onto those that a completed chatter has left (N,).
 
     shut: (u,) the closed contacts, whose rows at rest count; speed: the fastest, m/s.

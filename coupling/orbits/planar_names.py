@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.system.system import CASING, FLOOR, STOP, SURFACES, System
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
@@ -16,7 +17,6 @@ from vanedamp.coupling.numerics.codes import (
     STICK,
     STOPS,
 )
-from vanedamp.coupling.planar.constraints import CASING, FLOOR, STOP, SURFACES, PlanarSystem
 from vanedamp.coupling.scene.scene import Scene
 
 #: what could happen at a unit, for event functions that stay above zero
@@ -32,7 +32,7 @@ _COULD = {
 class UnitNames:
     """Names of the units of a scene, and of what happens at them."""
 
-    def __init__(self, scene: Scene, system: PlanarSystem) -> None:
+    def __init__(self, scene: Scene, system: System) -> None:
         self._rubs = (system.friction > 0.0) | (np.arange(len(system.rest)) >= system.contacts)
         self.names = []
         for r in range(len(system.rest)):

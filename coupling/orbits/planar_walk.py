@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
+from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.exact.event_functions import RESOLUTION
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.exact.impacts import COLLAPSE
@@ -36,7 +37,6 @@ from vanedamp.coupling.orbits.planar_frame import Frame
 from vanedamp.coupling.orbits.planar_jump import Jump, impact, stopped
 from vanedamp.coupling.orbits.planar_segment import Guard, Segment, acceleration_of
 from vanedamp.coupling.orbits.saltation import saltation
-from vanedamp.coupling.planar.constraints import PlanarMotion
 from vanedamp.coupling.planar.contact_flow import add_flow
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.planar.restart import planar_restart
@@ -79,7 +79,7 @@ class Walk:
         elongation, most = begun[len(begun) - len(frame.drawn) :], frame.longest
         self.given[:, len(begun) - len(frame.drawn) :][:, np.abs(elongation) > most] = 0.0
         elongation[:] = np.clip(elongation, -most, most)
-        motion = PlanarMotion(*np.split(frame.from_state @ begun, 2))
+        motion = Motion(*np.split(frame.from_state @ begun, 2))
         gap, speed = frame.gaps(motion.q), frame.system.J[: len(frame.system.rest)] @ motion.v
         yields = np.isfinite(self.system.spring)
         if np.any((gap < -_NOTHING * self.system.play)[~yields & (np.arange(len(gap)) < self.system.contacts)]):

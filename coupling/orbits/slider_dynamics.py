@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag
 
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.numerics.codes import (
     CLOSED,
     FORCE,
@@ -26,7 +27,6 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.orbits.saltation import LinearFlow, held
 from vanedamp.coupling.system.linear_response import glued_mass
-from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 
 
@@ -38,7 +38,7 @@ class SliderDynamics:
     between u and the state of the contract (orbits.passage); sizes: (k,) of that state in a typical motion.
     """
 
-    def __init__(self, system: System, scale: float, sizes: np.ndarray | None = None) -> None:
+    def __init__(self, system: LineSystem, scale: float, sizes: np.ndarray | None = None) -> None:
         self.system, self.scale = system, scale
         n, b, size = system.modes, system.bodies, system.modes + system.bodies
         friction = np.arange(len(system.J)) < system.friction_rows

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.numerics.codes import (
     CLOSED,
     HELD,
@@ -18,7 +19,6 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import System
 
 #: what the states of a row have in common: which of two rows carries a redundant force is no event
 _ALIKE = {int(HELD): int(STICK), int(TOUCHING): int(CLOSED)}
@@ -35,7 +35,7 @@ _CONTACT = {
 class RowNames:
     """Names of the rows of a scene, and of what happens at them."""
 
-    def __init__(self, scene: Scene, system: System) -> None:
+    def __init__(self, scene: Scene, system: LineSystem) -> None:
         self.friction_rows = system.friction_rows
         dampers = [f"casing.{i}" for i in range(system.friction_rows - system.bodies)]
         self.names = [*map(str, range(system.bodies)), *dampers]

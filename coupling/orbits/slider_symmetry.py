@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import block_diag
 
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.orbits.slider_dynamics import SliderDynamics
-from vanedamp.coupling.system.system import System
 
 
 def mirror_of(dynamics: SliderDynamics) -> np.ndarray | None:
@@ -40,7 +40,7 @@ def _partners(cavity: np.ndarray) -> np.ndarray:
     return partner
 
 
-def _rows_match(system: System, turn: np.ndarray) -> bool:
+def _rows_match(system: LineSystem, turn: np.ndarray) -> bool:
     """Whether each row has its like on the other side, with the same element, bound and free travel."""
     kinds = np.column_stack(
         [system.rest, system.limit, system.spring, system.dashpot, system.restitution, system.free_travel]

@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import eig, null_space, orth
 
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.exact.complex_modes import DEFECTIVE, LOST, IllConditioned
 from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
 from vanedamp.coupling.numerics.record import record
-from vanedamp.coupling.planar.constraints import PlanarSystem
 
 #: share of their size below which singular values are zero: rows that depend on each other
 _DEPENDENT = 1e-9
@@ -63,7 +63,7 @@ class ContactFlows(NamedTuple):
     fastest: np.ndarray  # (s,) largest |real| + |imaginary part| of an eigenvalue, 1/s
 
 
-def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
+def empty_flows(system: System, capacity: int = 8) -> ContactFlows:
     """Room for `capacity` flows."""
     size, u, e = len(system.mass), len(system.rest), len(system.frequency)
     springs = np.vstack([system.J[:u][np.isfinite(system.spring)], system.elongation])
@@ -80,7 +80,7 @@ def empty_flows(system: PlanarSystem, capacity: int = 8) -> ContactFlows:
     )  # fmt: skip
 
 
-def add_flow(flows: ContactFlows, system: PlanarSystem, state: np.ndarray) -> ContactFlows:
+def add_flow(flows: ContactFlows, system: System, state: np.ndarray) -> ContactFlows:
     """The stack with the flow of the states (u,) in its first free place.
 
     Raises IllConditioned for one that doubles cannot resolve, or whose friction forces have no solution.
@@ -101,7 +101,7 @@ def add_flow(flows: ContactFlows, system: PlanarSystem, state: np.ndarray) -> Co
 _ROOM = 2**28
 
 
-def _stretched(system: PlanarSystem, springs: np.ndarray) -> np.ndarray:
+def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
     """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, and those of springs (s, N)."""
     root = np.sqrt(system.mass)
     matrix = system.stiffness / root / root[:, None]
@@ -118,7 +118,7 @@ def _stretched(system: PlanarSystem, springs: np.ndarray) -> np.ndarray:
     return basis
 
 
-def _fill(flows: ContactFlows, system: PlanarSystem, s: int, state: np.ndarray) -> None:
+def _fill(flows: ContactFlows, system: System, s: int, state: np.ndarray) -> None:
     u, e, size = len(system.rest), len(system.frequency), len(system.mass)
     root = np.sqrt(system.mass)
     rows = system.J / root

@@ -18,17 +18,17 @@ from vanedamp.coupling.numerics.codes import (
     SEGMENTS,
 )  # fmt: skip
 from vanedamp.coupling.planar.automaton import advance, begin
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem, planar_motion, planar_system
 from vanedamp.coupling.planar.contact_flow import add_flow, empty_flows
 from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.planar.restart import planar_restart, planar_restart_state
 from vanedamp.coupling.planar.state import new_guards, new_scratch, new_state
-from vanedamp.coupling.response.evaluation import LOG_WIDTH, STATUS_OF, Outcome
+from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
+from vanedamp.coupling.response.event_log import WIDTH, rows_of_units
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import physical_scale
+from vanedamp.coupling.system.assembly import Motion, initial_motion
 from vanedamp.coupling.system.system import System
 
 #: imbalance of the ledger above which a response is not to be used
@@ -36,32 +36,26 @@ _OPEN_LEDGER = 1e-6
 
 
 def begin_run(
-    scene: Scene, flat: System, records: Records, events: bool, max_events: int, linearisation: float,
-    start: RestartState | None = None,
-) -> PlanarRun:  # fmt: skip
-    """Return a run of a scene at time zero, from its initial motion or the state of another run.
-
-    flat: its system with all bodies as sliders. Raises InputError.
-    """
-    system, scale = planar_system(scene, flat), physical_scale(scene, flat)
-    initial = planar_motion(scene, flat, system) if start is None else planar_restart(flat, system, scale, start)
-    return PlanarRun(flat, system, initial, records, events, max_events, linearisation, scale)
+    scene: Scene, system: System, records: Records, events: bool, max_events: int, start: RestartState | None = None
+) -> PlanarRun:
+    """Return a run of a scene at time zero, from its initial motion or the state of another run. Raises InputError."""
+    initial = initial_motion(scene, system) if start is None else planar_restart(system, start)
+    return PlanarRun(system, initial, records, events, max_events, getattr(scene.solver, "linearisation", 0.01))
 
 
 class PlanarRun:
     """The mutable state of one run, and the flows it has met."""
 
     def __init__(
-        self, flat: System, system: PlanarSystem, initial: PlanarMotion, records: Records, events: bool,
-        max_events: int, linearisation: float = 0.01, scale: float = 1.0,
+        self, system: System, initial: Motion, records: Records, events: bool, max_events: int,
+        linearisation: float = 0.01,
     ) -> None:  # fmt: skip
-        self.scale, self.ended = scale, False
-        self.flat, self.system, self.records, self.max_events, self.keep = flat, system, records, max_events, events
-        self.linearisation = linearisation
+        self.system, self.records, self.max_events, self.keep = system, records, max_events, events
+        self.linearisation, self.ended = linearisation, False
         self.flows = empty_flows(system)
         modes = self.flows.eigenvalue.shape[1]
         self.state, self.guards = new_state(system, modes, initial, records), new_guards(system, modes)
-        self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), LOG_WIDTH))
+        self.scratch, self.log = new_scratch(system, modes), np.zeros((4096 + 8 * len(system.rest), WIDTH))
         self.chunks: list[np.ndarray] = []
         self.begun = False
 
@@ -98,12 +92,12 @@ class PlanarRun:
         found = {name: int(counters[place]) for name, place in numbers.items()}
         found["subsystems"] = int(np.count_nonzero(self.flows.modes))
         return Outcome(
-            self.flat, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER, found, self.chunks,
-            plane=plane_of(self.system, self.state, self.linearisation),
+            self.system, self.records, int(counters[PERIOD]), int(counters[EVENTS]), _OPEN_LEDGER, found, self.chunks,
+            rows_of_units(self.system), plane=plane_of(self.system, self.state, self.linearisation),
         )  # fmt: skip
 
     def final(self) -> RestartState | None:
         """Return the state at the end of the periods done; None for a run that ended within one."""
         if self.ended:
             return None
-        return planar_restart_state(self.flat, self.system, self.scale, self.state.q, self.state.v)
+        return planar_restart_state(self.system, self.state.q, self.state.v)

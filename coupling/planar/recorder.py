@@ -7,10 +7,11 @@ from typing import Protocol
 
 import numpy as np
 
+from vanedamp.coupling.system.system import FLOOR, System
 from vanedamp.coupling.numerics.codes import PERIOD
 from vanedamp.coupling.numerics.jit import entry, inlined
-from vanedamp.coupling.planar.constraints import FLOOR, SURFACES, PlanarSystem
 from vanedamp.coupling.response.evaluation import Plane
+from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.records import STORED
 from vanedamp.coupling.response.response import PlanarSamples
 
@@ -35,19 +36,13 @@ class Kept(Protocol):
         """(n, u) whether contacts are closed."""
 
 
-def plane_of(system: PlanarSystem, kept: Kept, linearisation: float) -> Plane:
+def plane_of(system: System, kept: Kept, linearisation: float) -> Plane:
     """Return the results in the plane of a run."""
-    places = [
-        (int(body), SURFACES[surface], int(corner))
-        for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
-    ]
-    samples = partial(_samples, system, kept.sampled, kept.shut, places)
-    return Plane(kept.tilt, kept.lifted, system.neglected, linearisation, places, samples, system.spring)
+    samples = partial(_samples, system, kept.sampled, kept.shut)
+    return Plane(kept.tilt, kept.lifted, system.neglected, linearisation, samples)
 
 
-def _samples(
-    system: PlanarSystem, sampled: np.ndarray, shut: np.ndarray, places: list[tuple[int, str, int]], x: np.ndarray
-) -> PlanarSamples:
+def _samples(system: System, sampled: np.ndarray, shut: np.ndarray, x: np.ndarray) -> PlanarSamples:
     """Return the first samples in the plane, as many as there are of the response x (n,)."""
     q, contacts, extended = sampled[: len(x)], system.contacts, np.flatnonzero(system.tilt >= 0)
     base = x - q @ system.response if system.table.any() else np.zeros(len(x))
@@ -64,7 +59,7 @@ def _samples(
         body_lift=lift, body_tilt=tilt, floor_along=base[:, None] + q @ system.floor.T + rotation * system.height,
         floor_across=across,
         floor_rotation=rotation, contact_gap=gap, contact_closed=shut[: len(x), :contacts].astype(bool),
-        contacts=tuple(places[:contacts]),
+        contacts=tuple(rows_of_units(system).places[:contacts]),
     )  # fmt: skip
 
 

@@ -4,48 +4,45 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem, place_sliders
+from vanedamp.coupling.system.assembly import Motion, place_sliders
 from vanedamp.coupling.response.restart import before_stops, check_size
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.system import STOP, System
 from vanedamp.files.store import frozen
 
 #: share of the play by which a contact may overlap
 _ROUND_OFF = 1e-12
 
 
-def planar_restart_state(
-    flat: System, system: PlanarSystem, scale: float, q: np.ndarray, v: np.ndarray
-) -> RestartState:
-    """Return the restart state of coordinates (N,) and their rates.
-
-    flat: the system with all bodies as sliders; scale: displacement per modal coordinate of the structure.
-    """
-    n, friction = flat.modes, flat.friction_rows
+def planar_restart_state(system: System, q: np.ndarray, v: np.ndarray) -> RestartState:
+    """Return the restart state of coordinates (N,) and their rates."""
+    n, scale = system.modes, system.scale
     slip, lift, tilt = _in_cavities(system, q)
     speed, lift_velocity, tilt_rate = _in_cavities(system, v)
-    elongation = np.zeros(friction - flat.bodies)
+    elongation = np.zeros(system.dampers)
     elongation[_drawn(system)] = system.elongation @ q
     parts = (
-        scale * q[:n], scale * v[:n], slip, speed, elongation, flat.free_travel[friction:],
+        scale * q[:n], scale * v[:n], slip, speed, elongation, system.travels,
         lift, lift_velocity, tilt, tilt_rate,
     )  # fmt: skip
     return RestartState(*(frozen(part) for part in parts))
 
 
-def planar_restart(flat: System, system: PlanarSystem, scale: float, start: RestartState) -> PlanarMotion:
+def planar_restart(system: System, start: RestartState) -> Motion:
     """Return the motion at the start of a run of another scene, whose cavities may be smaller.
 
     There bodies, all of a cavity by the same share, go back to where they lie flat in the middle, as far as it takes.
     A structure beyond a stop is moved to it, and springs of friction dampers are unloaded to the limits of their
     sliders. Raises InputError for a scene of another size.
     """
-    check_size(flat, start, planar=True)
-    size, n = len(system.mass), flat.modes
+    check_size(system, start, planar=True)
+    size, n = len(system.mass), system.modes
     rest, v = np.zeros(size), np.zeros(size)
-    rest[:n], v[:n] = before_stops(flat, start.displacement / scale), start.velocity / scale
+    stops = np.flatnonzero((system.surface == STOP) & np.isinf(system.spring))
+    rest[:n] = before_stops(system.J[stops, :n], system.rest[stops], start.displacement / system.scale)
+    v[:n] = start.velocity / system.scale
     _from_cavities(system, v, v, start.slip_velocity, start.lift_velocity, start.tilt_rate)
-    moved, none = rest.copy(), np.zeros(flat.bodies)
+    moved, none = rest.copy(), np.zeros(system.bodies)
     _from_cavities(system, rest, rest, none, none, none)
     _from_cavities(system, moved, moved, start.slip, start.lift, start.tilt)
     u = system.contacts
@@ -62,15 +59,15 @@ def planar_restart(flat: System, system: PlanarSystem, scale: float, start: Rest
                 q[own] = rest[own] + max(share, 0.0) * (moved[own] - rest[own])
     most = system.limit[len(system.limit) - len(system.tangential) :] / system.tangential
     place_sliders(system, q, np.clip(start.elongation[_drawn(system)], -most, most))
-    return PlanarMotion(q, v)
+    return Motion(q, v)
 
 
-def _drawn(system: PlanarSystem) -> np.ndarray:
+def _drawn(system: System) -> np.ndarray:
     """Return the numbers (j,) of the friction dampers that are Jenkins elements."""
     return system.body[len(system.body) - len(system.tangential) :]
 
 
-def _in_cavities(system: PlanarSystem, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _in_cavities(system: System, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return coordinates of the bodies (b,) along and across their cavities and their tilts, relative to these."""
     extended = system.tilt >= 0
     slip = q[system.along] - system.floor @ q
@@ -80,7 +77,7 @@ def _in_cavities(system: PlanarSystem, q: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _from_cavities(
-    system: PlanarSystem, q: np.ndarray, structure: np.ndarray, slip: np.ndarray, lift: np.ndarray, tilt: np.ndarray
+    system: System, q: np.ndarray, structure: np.ndarray, slip: np.ndarray, lift: np.ndarray, tilt: np.ndarray
 ) -> None:
     """Set coordinates of the bodies in q (N,) from those relative to their cavities, which move with the structure."""
     floor, rise, turn = system.floor @ structure, system.rise @ structure, system.turn @ structure

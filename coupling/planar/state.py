@@ -1,4 +1,4 @@
-"""The state of a run of bodies with extent, and scratch space. Sizes as in constraints.PlanarSystem; m modes."""
+"""The state of a run of bodies with extent, and scratch space. Sizes as in constraints.System; m modes."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.exact.root_search import Expansion, new_expansion
 from vanedamp.coupling.numerics.codes import COUNTERS, OPEN
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
 from vanedamp.coupling.numerics.record import record
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
 from vanedamp.coupling.response.records import ENERGIES, Records
 
 
@@ -106,7 +107,7 @@ class Scratch(NamedTuple):
     wave: np.ndarray  # (m,) complex
 
 
-def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, records: Records) -> PlanarState:
+def new_state(system: System, modes: int, initial: Motion, records: Records) -> PlanarState:
     """Return the state at time zero."""
     u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
     samples = len(records.samples)
@@ -121,7 +122,7 @@ def new_state(system: PlanarSystem, modes: int, initial: PlanarMotion, records: 
     )  # fmt: skip
 
 
-def new_guards(system: PlanarSystem, modes: int) -> Guards:
+def new_guards(system: System, modes: int) -> Guards:
     """Return room for three event functions a unit."""
     k = 3 * len(system.rest)
     return Guards(
@@ -131,7 +132,7 @@ def new_guards(system: PlanarSystem, modes: int) -> Guards:
     )  # fmt: skip
 
 
-def new_scratch(system: PlanarSystem, modes: int) -> Scratch:
+def new_scratch(system: System, modes: int) -> Scratch:
     """Return scratch space for a scene."""
     u, size = len(system.rest), len(system.mass)
     integers = iter(np.zeros((10, u), np.int64))

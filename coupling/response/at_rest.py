@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, System
 
 #: gap to a wall, over the free travel, below which a body rests on it; changes of slips and speeds relative to their
 #: scales, and motions of floors relative to that of the response, that are none
@@ -25,15 +25,16 @@ def at_rest(scene: Scene, system: System, section: np.ndarray, scale: np.ndarray
     still = np.abs(speed).max(axis=0) <= _STILL * (scale[1] + scale[3 + b :])
     same = still & (np.ptp(slip, axis=0) <= _STILL * scale[3 : 3 + b])
     shapes = np.array([damper.shape for damper in scene.damper], object)
-    held = (system.limit[:b] > 0.0) & (shapes != "disc")
-    moves = np.abs(system.floor) > _ROUND_OFF * np.abs(system.of_structure.response).max(initial=0.0)
+    held = (system.holds > 0.0) & (shapes != "disc")
+    moves = np.abs(system.floor) > _ROUND_OFF * np.abs(system.response).max(initial=0.0)
     held |= same & ~moves.any(axis=1) & ~system.of_bodies.load.any(axis=0)
-    gaps = (system.rest + slip @ system.of_bodies.J.T).max(axis=0)
-    lying = (gaps <= _CLOSED * system.free_travel) & (np.arange(len(gaps)) >= system.friction_rows)
-    contacts = np.flatnonzero(lying & np.isinf(system.spring) & system.of_bodies.J.any(axis=1))
+    c = system.contacts
+    gaps = (system.rest[:c] + slip @ system.of_bodies.J[:c].T).max(axis=0)
+    along = np.isin(system.surface[:c], (LEFT, RIGHT, BODY)) & np.isinf(system.spring[:c])
+    contacts = np.flatnonzero(along & (gaps <= _CLOSED * system.play[:c]))
     for _ in range(b):  # from the walls inwards
-        for row in contacts:
-            pair = [body for body in (system.left_body[row], system.right_body[row]) if body >= 0]
+        for unit in contacts:
+            pair = [body for body in (system.body[unit], system.other[unit]) if body >= 0]
             for body in pair:
                 held[body] |= bool(same[body] and all(held[other] for other in pair if other != body))
     return bool(held.all())

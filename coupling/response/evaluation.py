@@ -14,14 +14,14 @@ import numpy as np
 
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.at_rest import at_rest
-from vanedamp.coupling.response.records import DETACHES, ENERGIES, EXCITATION, IMPACT, KINDS, STORED, VISCOUS, Records
-from vanedamp.coupling.response.response import Event, PlanarSamples, Response, Status, classify
+from vanedamp.coupling.response.event_log import Rows, events_of
+from vanedamp.coupling.response.records import ENERGIES, EXCITATION, STORED, VISCOUS, Records
+from vanedamp.coupling.response.response import PlanarSamples, Response, Status, classify
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.static_deflection import about_mean
 from vanedamp.coupling.response.steadiness import judge
 from vanedamp.coupling.response.steady_state import mean_confidence, transient_length
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import InitialMotion
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.transient import Transient
 
@@ -33,8 +33,6 @@ _HOPELESS = 3.0
 _CARRIED = 1e-3
 #: share of the largest order's load below which that of order 1 is none
 _NO_SHARE = 1e-9
-#: columns of the log of bodies in the plane
-LOG_WIDTH = 8
 #: statuses of runs that came to their end
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN)
 
@@ -59,11 +57,8 @@ class Run(Protocol):
     def outcome(self) -> Outcome:
         """Return the records of the run so far, and its figures."""
 
-    def final(self) -> InitialMotion | RestartState | None:
-        """Return the motion that another run can begin with; None if the run ended within a period, or keeps none.
-
-        Runs in the plane return the restart state itself.
-        """
+    def final(self) -> RestartState | None:
+        """Return the state that another run can begin with; None if the run ended within a period, or keeps none."""
 
 
 class Plane(NamedTuple):
@@ -71,22 +66,19 @@ class Plane(NamedTuple):
 
     tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
     shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status
-    ok; places: body, side and corner by the row in the log; samples: those in the plane, from those of the response;
-    spring: stiffness of the contact of each row, N/m, inf: rigid.
+    ok; samples: those in the plane, from those of the response.
     """
 
     tilt: np.ndarray
     lifted: np.ndarray
     neglected: np.ndarray
     bound: float
-    places: Sequence[tuple[int, str, int]]
     samples: Callable[[np.ndarray], PlanarSamples]
-    spring: np.ndarray
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a run: records of `periods` periods, counters, chunks of its log.
+    """The outcome of a run: records of `periods` periods, counters, chunks of its log and what their rows are.
 
     open_ledger: energy residual above which the method's figures are not to be used; penetration: relative to the
     free travel.
@@ -99,6 +91,7 @@ class Outcome:
     open_ledger: float
     counters: dict[str, int]
     log: Sequence[np.ndarray]
+    rows: Rows
     penetration: float = 0.0
     plane: Plane | None = None
 
@@ -232,7 +225,7 @@ def evaluate(
         section=section[:, :2].copy(),
         slip=section[:, 3 : 3 + b].copy(),
         slip_velocity=section[:, 3 + b :].copy(),
-        event_list=events_of(system, run.log) if run.plane is None else _events_in_plane(run.plane, run.log),
+        event_list=events_of(run.rows, run.log),
         time=np.arange(done * samples) * (system.period / max(samples, 1)),
         displacement=records.samples[: done * samples, 0].copy(),
         body_displacement=records.samples[: done * samples, 1:].copy(),
@@ -259,18 +252,6 @@ def _in_plane(plane: Plane, window: slice, span: float) -> tuple[dict[str, Any],
         for name, values in parts.items()
     }
     return figures, bool(np.any(neglected[~slider] > plane.bound))
-
-
-def _events_in_plane(plane: Plane, chunks: Sequence[np.ndarray]) -> list[Event]:
-    """Return the events of a log of bodies in the plane: as of events_of, tangential impulse and loss."""
-    found = []
-    entries = np.concatenate(chunks) if chunks else np.zeros((0, 8))
-    _complete(plane.spring, entries)
-    for moment, kind, row, before, after, *impulses, loss in entries.tolist():
-        body, side, corner = plane.places[int(row)]
-        normal, tangential = impulses
-        found.append(Event(moment, KINDS[int(kind)], body, side, before, after, normal, corner, tangential, loss))
-    return found
 
 
 def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> float:
@@ -330,46 +311,3 @@ def _attached(
     change = section[-1, 2] - section[first, 2]
     on_bodies = 2 / span * (change + 1j * system.omega * momentum) - system.of_bodies.load[0].sum()
     return float((-on_bodies / (system.omega**2 * harmonic)).real / system.of_bodies.mass.sum())
-
-
-def events_of(system: System, chunks: Sequence[np.ndarray]) -> list[Event]:
-    """Return the events of a compiled log: chunks of entries time, kind, row, velocity before and after, impulse."""
-    events = []
-    entries = np.concatenate(chunks) if chunks else np.zeros((0, 6))
-    _complete(system.spring, entries)
-    places = [_place(system, row) for row in range(len(system.J))] if len(entries) else []
-    for entry in entries:
-        body, side = places[int(entry[2])]
-        # speeds of the gap, turned into speeds of the body relative to the wall or body that it meets
-        sign = -1.0 if side in ("right", "body") else 1.0
-        before, after, impulse = sign * float(entry[3]) + 0.0, sign * float(entry[4]) + 0.0, float(entry[5])
-        events.append(Event(float(entry[0]), KINDS[int(entry[1])], body, side, before, after, impulse))
-    return events
-
-
-def _complete(spring: np.ndarray, entries: np.ndarray) -> None:
-    """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end brought."""
-    begun: dict[int, np.ndarray] = {}
-    for entry in entries:
-        kind, row = int(entry[1]), int(entry[2])
-        if not np.isfinite(spring[row]):
-            continue
-        if kind == IMPACT:
-            begun[row] = entry
-        elif kind == DETACHES and row in begun:
-            begun[row][4:] = entry[4:]
-
-
-def _place(system: System, row: int) -> tuple[int, str]:
-    """Return number and side of a row: of a body and where it acts; of a friction damper "casing", of a stop "stop"."""
-    if system.bodies <= row < system.friction_rows:
-        return row - system.bodies, "casing"
-    bodies = np.flatnonzero(system.of_bodies.J[row])
-    if row < system.friction_rows:
-        return int(bodies[0]), "floor"
-    if not len(bodies):
-        contacts = np.arange(system.friction_rows, len(system.J))
-        return row - int(contacts[~system.of_bodies.J[contacts].any(axis=1)][0]), "stop"
-    if len(bodies) == 2:
-        return int(bodies[0]), "body"
-    return int(bodies[0]), "left" if system.of_bodies.J[row, bodies[0]] > 0 else "right"

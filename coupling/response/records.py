@@ -57,6 +57,6 @@ def new_records(
         parts=np.zeros((periods + 1, 1 + b)), collided=np.zeros(periods + 1),
         samples=np.zeros((periods * samples, 1 + b)),
         coordinates=kept,
-        log=np.zeros((4096 + 4 * len(system.delassus), 6)),
+        log=np.zeros((4096 + 4 * (system.bodies + system.dampers + system.contacts), 6)),
         swing=np.tile([-np.inf, np.inf, 0.0], ((periods + 1) * deflected, 1)),
     )  # fmt: skip

@@ -6,30 +6,38 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem, initial_motion, line_system, row_motion
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.assembly import InitialMotion, row_motion
 from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.coupling.system.reduced_model_file import greatest_speed
-from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 
-def restart_state(system: System, scale: float, last: InitialMotion) -> RestartState:
-    """Return the restart state of a run from its last motion.
+def line_start(
+    scene: Scene, system: System, start: RestartState | None = None
+) -> tuple[LineSystem, InitialMotion]:
+    """Return the rows of a scene whose bodies only slide, and its motion at time zero: its own or that of a state.
 
-    scale: displacement per modal coordinate (system.assembly.physical_scale).
+    Raises InputError for a state of a scene of another size.
     """
-    b, friction, slip = system.bodies, system.friction_rows, last.displacement
+    line = line_system(system)
+    return line, initial_motion(scene, line) if start is None else restart_from(line, start)
+
+
+def restart_state(system: LineSystem, last: InitialMotion) -> RestartState:
+    """Return the restart state of a run from its last motion."""
+    b, friction, slip, scale = system.bodies, system.friction_rows, last.displacement, system.scale
     return RestartState(
         frozen(scale * last.p), frozen(scale * last.p_rate), frozen(slip[:b]), frozen(last.velocity[:b]),
         frozen(np.where(np.isfinite(system.spring), slip, 0.0)[b:friction]), frozen(system.free_travel[friction:]),
     )  # fmt: skip
 
 
-def restart_from(system: System, scale: float, start: RestartState) -> InitialMotion:
+def restart_from(system: LineSystem, start: RestartState) -> InitialMotion:
     """Return the motion at the start of a run of another scene.
 
     Bodies that would stand in a wall or in each other, because the gap is smaller now, are moved to where they touch,
@@ -38,10 +46,11 @@ def restart_from(system: System, scale: float, start: RestartState) -> InitialMo
     """
     b, friction = system.bodies, system.friction_rows
     check_size(system, start)
-    p, rate = (array / scale for array in (start.displacement, start.velocity))
+    p, rate = (array / system.scale for array in (start.displacement, start.velocity))
     limit, spring = system.limit[b:friction], system.spring[b:friction]
     elongation = np.where(np.isfinite(spring), np.clip(start.elongation, -limit / spring, limit / spring), 0.0)
-    p = before_stops(system, p)
+    stops = np.isinf(system.spring) & ~system.of_bodies.J.any(axis=1) & (np.arange(len(system.J)) >= friction)
+    p = before_stops(system.of_structure.J[stops], system.rest[stops], p)
     slip = _inside(system, start, p)
     return InitialMotion(p, rate, *row_motion(system, slip, start.slip_velocity, p, rate, elongation))
 
@@ -72,15 +81,15 @@ def at_speed_of(scene: Scene, start: RestartState) -> RestartState:
     )  # fmt: skip
 
 
-def check_size(system: System, start: RestartState, planar: bool = False) -> None:
+def check_size(system: LineSystem | System, start: RestartState, planar: bool = False) -> None:
     """Raise InputError for a state of a scene of another size; planar: whether its bodies move in the plane."""
-    b, friction = system.bodies, system.friction_rows
-    sizes = (system.modes, system.modes, b, b, friction - b, len(system.J) - friction, *4 * (b if planar else 0,))
+    n, b, dampers = system.modes, system.bodies, system.dampers
+    sizes = (n, n, b, b, dampers, len(system.travels), *4 * (b if planar else 0,))
     found = tuple(len(getattr(start, entry.name)) for entry in fields(start) if entry.name != "speed")
     if found[:6] != sizes[:6]:
         raise InputError(
             f"continuation: a state of {found[0]} modes, {found[2]} bodies and {found[4]} friction dampers does not "
-            f"fit a scene of {sizes[0]}, {sizes[2]} and {sizes[4]}"
+            f"fit a scene of {n}, {b} and {dampers}"
         )
     if found != sizes:
         raise InputError(
@@ -89,20 +98,18 @@ def check_size(system: System, start: RestartState, planar: bool = False) -> Non
         )
 
 
-def before_stops(system: System, p: np.ndarray) -> np.ndarray:
-    """Return modal coordinates (n,) outside of all rigid stops, moved out of each in turn, once for every stop."""
-    stops = [
-        r for r in range(system.friction_rows, len(system.J))
-        if not system.of_bodies.J[r].any() and np.isinf(system.spring[r])
-    ]  # fmt: skip
+def before_stops(stops: np.ndarray, gaps: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Return modal coordinates (n,) outside of all rigid stops, moved out of each in turn, once for every stop.
+
+    stops: their rows (k, n); gaps: (k,) at p = 0, m.
+    """
     for _ in stops:
-        for r in stops:
-            row = system.of_structure.J[r]
-            p = p - min(system.rest[r] + row @ p, 0.0) / (row @ row) * row
+        for row, gap in zip(stops, gaps, strict=True):
+            p = p - min(gap + row @ p, 0.0) / (row @ row) * row
     return p
 
 
-def _inside(system: System, start: RestartState, p: np.ndarray) -> np.ndarray:
+def _inside(system: LineSystem, start: RestartState, p: np.ndarray) -> np.ndarray:
     """Return slips (b,) of bodies inside their cavities: pushed in from the left walls, then from the right ones.
 
     A compliant wall stays pressed if its gap has not changed.

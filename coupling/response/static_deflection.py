@@ -5,18 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
 #: static deflections below this fraction of that under the excitation's amplitudes are round-off of directions
 _ROUND_OFF = 1e-9
 
 
-def deflects(system: System, functionals: np.ndarray, loads: np.ndarray) -> bool:
-    """Return whether static loads on the structure move the response.
-
-    functionals: (k, n) of the modal coordinates on which loads (k,) act, N, or N m for rotations.
-    """
-    modes = system.of_structure
+def deflects(scene: Scene, system: System) -> bool:
+    """Return whether static loads of the bodies move the response of a scene."""
+    n, modes = system.modes, system.of_structure
+    extended = np.flatnonzero(system.tilt >= 0)
+    pressed = np.zeros(system.bodies)
+    pressed[extended] = system.weight[system.along[extended] + 1]
+    arm = np.array([scene.cavity[place].gap for place in system.cavity])
+    functionals = np.vstack([system.floor[:, :n], system.rise[:, :n], system.turn[:, :n]])
+    loads = np.concatenate([system.of_bodies.weight, pressed, pressed * arm])
     yields = np.abs(modes.response) / np.where(modes.stiffness > 0.0, modes.stiffness, np.inf)
     static = yields @ (np.abs(functionals).T @ np.abs(loads))
     return bool(static > _ROUND_OFF * (yields @ np.abs(modes.load).sum(axis=0)))

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import initial_motion
 from vanedamp.coupling.system.body_loads import binding, body_loads
 from vanedamp.coupling.system.modal_basis import basis_of
 from vanedamp.coupling.system.system import System
@@ -63,7 +62,7 @@ def linear_modes(scene: Scene, system: System) -> list[LinearModes]:
     made = [_matrices(scene, system, sprung, np.zeros(len(sprung), bool))]
     # what pulls a body along its cavity presses it on a wall
     held = np.where(sprung, rough & ~rolls, rough | (system.of_bodies.weight != 0.0))
-    if held.any() or np.isfinite(_jenkins(system)[1]).any():
+    if held.any() or np.isfinite(system.casing_spring).any():
         made.append(_matrices(scene, system, sprung & ~held, held, True))
     return [_modes(matrices, system.frequency) for matrices in made]
 
@@ -84,34 +83,33 @@ def _matrices(scene: Scene, system: System, moving: np.ndarray, held: np.ndarray
     """
     n, b = system.modes, system.bodies
     basis = np.zeros((n + b, n + int(moving.sum())))
-    basis[:n, :n], basis[n:, :n] = np.eye(n), held[:, None] * system.floor
+    basis[:n, :n], basis[n:, :n] = np.eye(n), held[:, None] * system.floor[:, :n]
     basis[n + np.flatnonzero(moving), np.arange(n, basis.shape[1])] = 1.0
-    mass, stiffness, damping = np.diag(system.mass), np.diag(system.stiffness), system.damping.copy()
+    free = np.r_[np.arange(n), system.along]
+    mass, stiffness = np.diag(system.mass[free]), np.diag(np.r_[system.squares, np.zeros(b)])
+    damping = np.zeros((n + b, n + b))
+    damping[:n, :n] = system.viscous
+    floor = system.floor[:, :n]
     if moving.any():
         loads = body_loads(scene, basis_of(scene))
         springs, dashpots = binding(scene, loads)
-        slip = np.hstack([-system.floor, np.eye(b)])
+        slip = np.hstack([-floor, np.eye(b)])
         mass += slip.T @ (_turning(scene)[:, None] * slip)
         stiffness += slip.T @ (springs[:, None] * slip) - np.diag(np.r_[np.zeros(n), loads.gradient])
         damping += slip.T @ (dashpots[:, None] * slip)
     if stuck:
-        rows, springs = _jenkins(system)
-        drawn = np.isfinite(springs)
-        stiffness += rows[drawn].T @ (springs[drawn, None] * rows[drawn])
-    start = initial_motion(scene, system)
+        drawn = np.isfinite(system.casing_spring)
+        rows = system.casing[drawn][:, free]
+        stiffness += rows.T @ (system.casing_spring[drawn, None] * rows)
+    p, rate = scene.initial.displacement / system.scale, scene.initial.velocity / system.scale
     bodies = [damper for damper, moves in zip(scene.damper, moving, strict=True) if moves]
     position, speed = np.array([body.position for body in bodies]), np.array([body.velocity for body in bodies])
     return _Matrices(
-        basis.T @ mass @ basis, basis.T @ damping @ basis, basis.T @ stiffness @ basis, system.load @ basis,
-        system.weight @ basis, system.response @ basis, np.r_[start.p, system.floor[moving] @ start.p + position],
-        np.r_[start.p_rate, system.floor[moving] @ start.p_rate + speed],
+        basis.T @ mass @ basis, basis.T @ damping @ basis, basis.T @ stiffness @ basis, system.load[:, free] @ basis,
+        system.weight[free] @ basis, system.response[free] @ basis,
+        np.r_[np.full(n, p), floor[moving].sum(axis=1) * p + position],
+        np.r_[np.full(n, rate), floor[moving].sum(axis=1) * rate + speed],
     )  # fmt: skip
-
-
-def _jenkins(system: System) -> tuple[np.ndarray, np.ndarray]:
-    """Return the functionals (d, N) of the friction dampers and the stiffness (d,) of their springs, inf: none."""
-    rows = slice(system.bodies, system.friction_rows)
-    return system.J[rows], system.spring[rows]
 
 
 def _turning(scene: Scene) -> np.ndarray:

@@ -208,7 +208,7 @@ def linear_responses(scene: Scene) -> tuple[LinearResponse, LinearResponse]:
         raise InputError("excitation.waveform: linear curves are those of sums of sines; give harmonics")
     system = assemble(scene)
     modes, bodies = system.of_structure, system.of_bodies
-    glued_load = modes.load + bodies.load @ system.floor
+    glued_load = modes.load + bodies.load @ system.floor[:, : system.modes]
     order = system.order
     moves = np.flatnonzero(system.load.any(axis=1) | (system.table != 0) | (order == order[-1]))
     free, glued = (
@@ -222,7 +222,8 @@ def linear_responses(scene: Scene) -> tuple[LinearResponse, LinearResponse]:
 
 def glued_mass(system: System) -> np.ndarray:
     """Return the modal mass matrix (n, n) of the structure with every body glued to its floor."""
-    mass: np.ndarray = np.diag(system.of_structure.mass) + (system.floor.T * system.of_bodies.mass) @ system.floor
+    floor = system.floor[:, : system.modes]
+    mass: np.ndarray = np.diag(system.of_structure.mass) + (floor.T * system.of_bodies.mass) @ floor
     return mass
 
 

@@ -75,8 +75,8 @@ def onsets(scene: Scene) -> list[Onset | None]:
     wave = np.linalg.solve(np.diag(free.stiffness) + 1j * omega * free.damping - omega**2 * free.mass, free.load[0])
     response = abs(wave @ free.response + free.table[0])
     # a body that nothing holds stays where it is in space, which moves against the base
-    reach = np.abs(system.floor @ wave + bodies.load[0] / (bodies.mass * omega**2))
-    friction, pull = system.limit[:count] / bodies.mass, bodies.weight / bodies.mass
+    reach = np.abs(system.floor[:, : system.modes] @ wave + bodies.load[0] / (bodies.mass * omega**2))
+    friction, pull = system.holds / bodies.mass, bodies.weight / bodies.mass
     found: list[Onset | None] = []
     for index, damper in enumerate(scene.damper):
         row = [other for other, one in enumerate(scene.damper) if one.cavity == damper.cavity]

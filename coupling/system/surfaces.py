@@ -103,6 +103,20 @@ def surfaces_of(scene: Scene, basis: ModalBasis, index: int) -> tuple[Surface, .
     return tuple(surfaces)
 
 
+def walls_and_floor(scene: Scene, basis: ModalBasis, index: int) -> tuple[Surface, ...]:
+    """Return the surfaces of a cavity by their motion along it only, for bodies without a height."""
+    left, right, below = surface_labels(scene, index)
+    none = np.zeros(len(basis.stiffness))
+    rows = [
+        interface_row(basis, label, f"cavity[{index}].{side}")
+        for label, side in zip((left, right, below), SIDES, strict=False)
+    ]
+    labels = (left, right, below, below)
+    return tuple(
+        Surface(row, none, none, labels=(label, "", "")) for row, label in zip([*rows, rows[2]], labels, strict=True)
+    )
+
+
 def _places(basis: ModalBasis, labels: tuple[str, ...]) -> list[tuple[float, float]] | None:
     """Return the places (x, y) of a cavity's surfaces, m from the middle of the floor; None where these are unknown.
 

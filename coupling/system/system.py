@@ -1,10 +1,16 @@
 """The record of a scene as matrices, the same for every method: M q'' + C q' + K q = loads + J^T lambda.
 
-q = (p, x) are the real modal coordinates of the structure, mass-normalised, and the positions of the bodies. All motion
-is relative to the base: a prescribed motion is a structure without modes on a moving base. The excitation is a sum of e
-exponentials, its harmonics, and so are the loads: Re sum_h load_h exp(i frequency_h t). Those of an excitation that is
-no such sum are a function of the angle beside the system (system.assembly.loads_of), whose first harmonics these are.
-Everything unilateral or frictional is a row of J (system.constraints), whose displacement is J q + rest.
+q = (p, bodies, sliders): real modal coordinates of the structure, mass-normalised; of each body its position x along
+its cavity and, of one with extent, y across it and its tilt; and the sliders of Jenkins elements, coordinates without
+mass. All motion is relative to the base: a prescribed motion is a structure without modes on a moving base. x and y
+count from where the bodies of a cavity stand side by side on the floor, in the middle of the free travel. Tilts are
+small: a point (a, b) of a body, from its centre, moves by (x - tilt b, y + tilt a).
+
+The excitation is a sum of e exponentials, its harmonics, and so are the loads: Re sum_h load_h exp(i frequency_h t).
+Those of an excitation that is no such sum are a function of the angle (system.assembly.loads_of), whose first harmonics
+these are.
+
+Everything unilateral or frictional is a unit (system.units).
 """
 
 from __future__ import annotations
@@ -13,66 +19,116 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.record import record_with
+from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.system.surfaces import SIDES
+
+#: names of what a unit touches
+SURFACES = (*SIDES, "body", "stop", "casing")
+LEFT, RIGHT, FLOOR, CEILING, BODY, STOP, CASING = range(len(SURFACES))
 
 
 class Part(NamedTuple):
-    """The part of a system that belongs to k of its coordinates: as in System, and J (r, k) on them."""
+    """The part of a system that belongs to k of its coordinates."""
 
-    mass: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
-    load: np.ndarray
-    weight: np.ndarray
-    response: np.ndarray
-    J: np.ndarray
+    mass: np.ndarray  # (k,)
+    stiffness: np.ndarray  # (k,) of a structure, squared undamped angular frequencies; 0 for bodies
+    damping: np.ndarray  # (k, k), of a structure
+    load: np.ndarray  # (e, k)
+    weight: np.ndarray  # (k,)
+    response: np.ndarray  # (k,)
+    J: np.ndarray  # (rows, k)
 
 
-@record_with(sizes=("modes", "bodies", "friction_rows"))
+@record
 class System(NamedTuple):
-    """Matrices of a scene: n modes, b bodies, N = n + b coordinates, r rows (friction rows first, then contacts).
+    """Matrices of a scene: N coordinates, n of them modes, e harmonics, u units, b bodies, d friction dampers.
 
-    Compiled functions take it as it is.
+    A unit is a contact with its normal row and its slip, or, behind the contacts, a friction element with a constant
+    limit, which has only a slip. The last j units are Jenkins elements, whose slip is that of their slider; the sliders
+    are the last j coordinates. Rows (2u, N): normals first, then slips. Compiled functions take it as it is.
     """
 
     modes: int  # n
     bodies: int  # b
-    friction_rows: int
-    mass: np.ndarray  # (N,) 1 for a mode, kg for a body
-    stiffness: np.ndarray  # (N,) squared undamped angular frequencies; 0 for bodies
+    contacts: int
+    scale: float  # displacement per modal coordinate of a rigid structure, m; 1 for others
+    mass: np.ndarray  # (N,) 1 for a mode; kg; kg m^2; of a slider, which has none, a scale
+    stiffness: np.ndarray  # (N, N) without the springs of Jenkins elements
     damping: np.ndarray  # (N, N)
-    proportional: bool  # whether damping couples no two modes
+    squares: np.ndarray  # (n,) squared undamped angular frequencies of the structure without bodies
+    viscous: np.ndarray  # (n, n) damping of the structure without bodies
     load: np.ndarray  # (e, N) complex amplitudes of the loads of all harmonics, N
-    weight: np.ndarray  # (N,) gravity and centrifugal load along each body's cavity, N
+    weight: np.ndarray  # (N,) gravity and centrifugal load
     alike: bool  # whether the base accelerates all bodies alike: their cavities have one angle to its motion
     response: np.ndarray  # (N,) functional of the response
     table: np.ndarray  # (e,) complex displacements of a base whose motion is the response (prescribed), m
     frequency: np.ndarray  # (e,) angular frequencies of the harmonics, rad/s
     omega: float  # the first of them, rad/s
     period: float  # s
-    floor: np.ndarray  # (b, n) motion of the floor under each body
-    J: np.ndarray  # (r, N)
-    rest: np.ndarray  # (r,) displacement of a row at q = 0, m
-    delassus: np.ndarray  # (r, r) J M^-1 J^T, with no row closed
-    limit: np.ndarray  # (r,) friction force at slip, N; 0 for contacts
-    spring: np.ndarray  # (r,) stiffness of a row while it is closed, N/m; inf: rigid
-    dashpot: np.ndarray  # (r,) N s/m
-    restitution: np.ndarray  # (r,) of rigid contacts, or the coefficient from which their law takes it at a speed
-    restitution_at: int  # address of that law (numerics.function_address); 0: the coefficient at every speed
-    free_travel: np.ndarray  # (r,) of the contact's cavity, m: the scale of its gap; inf for friction rows
-    left_body: np.ndarray  # (r,) body to the left of a contact, -1: a wall
-    right_body: np.ndarray  # (r,) body to the right of a contact, -1: a wall
-    moves_with_floor: np.ndarray  # (r,) whether a contact's gap is a difference of slips
+    moment: float  # after which what an instant leaves open is looked at again, s
+    speed: float  # that the loads give the rows within a period, m/s: a scale for round-off
+    J: np.ndarray  # (2u, N)
+    rest: np.ndarray  # (u,) gap at q = 0, m
+    delassus: np.ndarray  # (2u, 2u) J M^-1 J^T
+    friction: np.ndarray  # (u,) coefficient of a contact
+    limit: np.ndarray  # (u,) constant limit of a friction element, N; 0 for contacts
+    restitution: np.ndarray  # (u,) or the coefficient from which the law takes it at a speed
+    restitution_at: int  # address of that law (system.restitution); 0: the coefficient at every speed
+    spring: np.ndarray  # (u,) stiffness of a contact that yields, N/m; inf: rigid, and friction elements
+    dashpot: np.ndarray  # (u,) N s/m
+    tangential: np.ndarray  # (j,) stiffness of the springs of Jenkins elements, N/m
+    elongation: np.ndarray  # (j, N) of these springs
+    two_phases: bool  # whether impacts have a phase of compression and one of expansion
+    play: np.ndarray  # (u,) m, the scale of a contact's gap
+    body: np.ndarray  # (u,) number of the unit's body, the left one of two; of a stop or a friction damper its own
+    other: np.ndarray  # (u,) number of the body to its right; -1: none
+    surface: np.ndarray  # (u,) int: place of its name in SURFACES
+    corner: np.ndarray  # (u,) int: 0 to 3, counterclockwise from the lower left one; -1: none
+    along: np.ndarray  # (b,) coordinate x of each body
+    tilt: np.ndarray  # (b,) coordinate of its tilt, -1: none
+    floor: np.ndarray  # (b, N) motion of the cavity along itself, at the height of the body's centre
+    turn: np.ndarray  # (b, N) rotation of the cavity
+    rise: np.ndarray  # (b, N) motion of the floor across the cavity, below the body's centre
+    height: np.ndarray  # (b,) of a body's centre above the floor, m; 0 where a slider has none
+    cavity: np.ndarray  # (b,) number of the body's cavity
+    holds: np.ndarray  # (b,) friction that holds a body on its floor under its weight, at most, N
+    neglected: (
+        np.ndarray
+    )  # (b,) shortening over the smallest play, per square of the tilt; nan for sliders, 0 for discs
+    casing: np.ndarray  # (d, N) motion of the structure at each friction damper
+    grip: np.ndarray  # (d,) friction force at slip of each friction damper, N; 0: none
+    casing_spring: np.ndarray  # (d,) stiffness before its slider, N/m; inf: rigid
 
     @property
     def of_structure(self) -> Part:
-        """The part of the modal coordinates."""
-        return self._part(slice(0, self.modes))
+        """The part of the modal coordinates, without bodies."""
+        at = slice(0, self.modes)
+        return Part(
+            self.mass[at], self.squares, self.viscous, self.load[:, at], self.weight[at], self.response[at],
+            self.J[:, at],
+        )  # fmt: skip
 
     @property
     def of_bodies(self) -> Part:
-        """The part of the bodies."""
-        return self._part(slice(self.modes, None))
+        """The part of the positions of the bodies along their cavities."""
+        at = self.along
+        return Part(
+            self.mass[at], np.zeros(len(at)), self.damping[np.ix_(at, at)], self.load[:, at], self.weight[at],
+            self.response[at], self.J[:, at],
+        )  # fmt: skip
+
+    @property
+    def dampers(self) -> int:
+        """Number of friction dampers."""
+        return len(self.casing)
+
+    @property
+    def travels(self) -> np.ndarray:
+        """Free travel (c,) of each gap along a cavity, from left to right, and of each stop, m."""
+        along = np.isin(self.surface[: self.contacts], (LEFT, RIGHT, BODY, STOP))
+        pairs = np.column_stack([self.surface[: self.contacts], self.body[: self.contacts]])[along]
+        first = np.sort(np.unique(pairs, axis=0, return_index=True)[1])
+        return np.asarray(self.play[: self.contacts][along][first])
 
     @property
     def order(self) -> np.ndarray:
@@ -84,8 +140,11 @@ class System(NamedTuple):
         phasors: np.ndarray = np.exp(1j * np.multiply.outer(angle, self.order))
         return phasors
 
-    def _part(self, at: slice) -> Part:
-        return Part(
-            self.mass[at], self.stiffness[at], self.damping[at, at], self.load[:, at], self.weight[at],
-            self.response[at], self.J[:, at],
-        )  # fmt: skip
+
+def on_structure(system: System) -> System:
+    """Return the system whose slips of Jenkins elements are those of what draws them, in place of their sliders'."""
+    if not len(system.tangential):
+        return system
+    J = system.J.copy()
+    J[-len(system.tangential) :] += system.elongation
+    return system._replace(J=J, delassus=(J / system.mass) @ J.T)

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from vanedamp.coupling.system.assembly import assemble, initial_motion
 from vanedamp.coupling.methods.registry import why_no_restart
-from vanedamp.coupling.planar.constraints import planar_motion, planar_system
 from vanedamp.coupling.planar.restart import planar_restart_state
 from vanedamp.coupling.response.restart import before_stops, restart_state
 from vanedamp.coupling.response.restart_state import RestartState

@@ -13,6 +13,8 @@ import mpmath as mp
 import numpy as np
 
 from tests.reference.multiprecision import exponential
+from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     BOUNDED,
@@ -30,7 +32,6 @@ from vanedamp.coupling.numerics.codes import (
     STICK,
     STOPS,
 )
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
@@ -53,10 +54,10 @@ class Step(NamedTuple):
     compression: np.ndarray | None = None
 
 
-def walk(flat: System, system: PlanarSystem, z: np.ndarray) -> list[Step]:
+def walk(flat: System, system: System, z: np.ndarray) -> list[Step]:
     """Return the steps of one period that begins with z = (q, q'), as the engine takes them."""
     u = len(system.rest)
-    run = PlanarRun(flat, system, PlanarMotion(*np.split(z, 2)), new_records(flat, 1, 0), True, 0)
+    run = PlanarRun(flat, system, Motion(*np.split(z, 2)), new_records(flat, 1, 0), True, 0)
     assert run.advance_to(1) is Status.EVENT_BUDGET
     steps, counters = [], run.state.counters
     while counters[PERIOD] == 0:
@@ -90,7 +91,7 @@ def walk(flat: System, system: PlanarSystem, z: np.ndarray) -> list[Step]:
 class PlanarSequence:
     """The motion of a scene through given steps."""
 
-    def __init__(self, system: PlanarSystem, steps: list[Step]) -> None:
+    def __init__(self, system: System, steps: list[Step]) -> None:
         self.system, self.steps = system, steps
         self.n, self.u, self.e = len(system.mass), len(system.rest), len(system.frequency)
         with mp.workdps(DIGITS):

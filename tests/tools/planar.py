@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.system.assembly import assemble, initial_motion
 from vanedamp.coupling.methods import moreau
-from vanedamp.coupling.planar.constraints import planar_motion, planar_system
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.evaluation import LOG_WIDTH
 from vanedamp.coupling.response.records import new_records

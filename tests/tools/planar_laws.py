@@ -18,6 +18,7 @@ import numpy as np
 from scipy.linalg import expm, null_space
 
 from tests.tools.planar import Run, open_run
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.exact.complex_modes import IllConditioned
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
@@ -39,7 +40,6 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
 )
 from vanedamp.coupling.planar.automaton import advance, begin
-from vanedamp.coupling.planar.constraints import PlanarSystem
 from vanedamp.coupling.planar.contact_flow import add_flow
 from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.scene.scene import Scene
@@ -354,7 +354,7 @@ def _held(rows: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 class Motion:
     """The equations of motion under some contact states:  z' = A z  of  z = (q, v, cos and sin of the harmonics, 1)."""
 
-    def __init__(self, system: PlanarSystem, state: np.ndarray) -> None:
+    def __init__(self, system: System, state: np.ndarray) -> None:
         n, u, e = len(system.mass), len(system.rest), len(system.frequency)
         units, contact = np.arange(u), np.arange(u) < system.contacts
         yields = np.isfinite(system.spring)
@@ -780,7 +780,7 @@ def _perturbed(data: dict):
     return other
 
 
-def _image_of(system: PlanarSystem, image: PlanarSystem) -> tuple[np.ndarray, np.ndarray]:
+def _image_of(system: System, image: System) -> tuple[np.ndarray, np.ndarray]:
     """Place in the mirror image of every coordinate, and its sign there: bodies are counted from the other end."""
     place, sign = np.arange(len(system.mass)), -np.ones(len(system.mass))
     for k, x in enumerate(system.along):

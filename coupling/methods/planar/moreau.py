@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from vanedamp.coupling.system.system import System
 from vanedamp.coupling.methods.planar.step_records import (
     account_step,
     drag_slider,
@@ -22,7 +23,6 @@ from vanedamp.coupling.methods.planar.step_records import (
 )
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
-from vanedamp.coupling.planar.constraints import PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
 from vanedamp.coupling.system.restitution import restitution_at
 
@@ -38,7 +38,7 @@ _HALVINGS, _GAIN = 40, 1e-10
 _ROUND_OFF = 1e-12
 
 
-def step_matrices(system: PlanarSystem, step: float, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def step_matrices(system: System, step: float, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the inverse of the iteration matrix (N, N), its product with J^T (N, 2u), and the mobility (2u, 2u).
 
     The mobility of a Jenkins element has its spring's part: the force is its mean over a step, as that of all springs.

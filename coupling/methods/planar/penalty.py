@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.system.system import STOP, System
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, contact_spring
 from vanedamp.coupling.methods.planar.step_records import (
     account_step,
@@ -21,7 +22,6 @@ from vanedamp.coupling.methods.planar.step_records import (
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD, STEPS
 from vanedamp.coupling.numerics.jit import entry, inlined
 from vanedamp.coupling.numerics.record import record
-from vanedamp.coupling.planar.constraints import STOP, PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
 from vanedamp.files.toml_input import InputError
 
@@ -40,7 +40,7 @@ class PenaltyForces(NamedTuple):
     old: np.ndarray  # (2u,) forces as the step begins
 
 
-def penalty_forces(system: PlanarSystem, step: float, options: PenaltyOptions) -> PenaltyForces:
+def penalty_forces(system: System, step: float, options: PenaltyOptions) -> PenaltyForces:
     """Return the laws that the options ask for. Raises InputError for a contact of restitution 0.
 
     A contact's spring and dashpot are those of a slider of the same mobility: where both corners of a face hit at once,
@@ -64,7 +64,7 @@ def penalty_forces(system: PlanarSystem, step: float, options: PenaltyOptions) -
     )  # fmt: skip
 
 
-def step_matrix(system: PlanarSystem, step: float) -> np.ndarray:
+def step_matrix(system: System, step: float) -> np.ndarray:
     """Return the inverse (N, N) of the mass with half a step of damping."""
     inverse: np.ndarray = np.linalg.inv(np.diag(system.mass) + 0.5 * step * system.damping)
     return inverse

@@ -4,33 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.system.system import System, on_structure
+from vanedamp.coupling.system.assembly import Motion, assemble, initial_motion
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid, time_grid
-from vanedamp.coupling.planar.constraints import (
-    PlanarMotion,
-    PlanarSystem,
-    on_structure,
-    planar_motion,
-    planar_system,
-)
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Loads, assemble, with_sine
 from vanedamp.coupling.system.system import System
 
 
-def planar_start(scene: Scene, flat: System, steps: int) -> tuple[PlanarSystem, PlanarMotion, TimeGrid]:
-    """Return system, motion at time zero and the steps of a period. flat: the scene with every body as a slider.
+def planar_start(scene: Scene, system: System, steps: int) -> tuple[System, Motion, TimeGrid]:
+    """Return system, motion at time zero and the steps of a period.
 
-    The slips of Jenkins elements are those of what draws their sliders. Raises InputError for what bodies with extent
-    do not allow.
+    The slips of Jenkins elements are those of what draws their sliders. Raises InputError for bodies that overlap.
     """
-    system, signal = on_structure(planar_system(scene, flat)), scene.excitation.signal
-    if signal is None:
-        return system, planar_motion(scene, flat, system), time_grid(flat, steps, _harmonics(flat, system))
-    sine = with_sine(scene)
-    level = -planar_system(sine, assemble(sine)).load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
-    times = time_grid(flat, steps, lambda angle: np.outer(signal.sampled(angle), level))
-    return system, planar_motion(scene, flat, system), times
-
-
-def _harmonics(flat: System, system: PlanarSystem) -> Loads:
-    return lambda angle: (flat.phases(angle) @ system.load).real
+    signal = scene.excitation.signal
+    loads = None if signal is None else loads_of(scene, signal)
+    return on_structure(system), initial_motion(scene, system), time_grid(system, steps, loads)

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.system import FLOOR, System
 from vanedamp.coupling.numerics.codes import (
     COUNTERS,
     DIVERGED,
@@ -18,7 +20,6 @@ from vanedamp.coupling.numerics.codes import (
 )
 from vanedamp.coupling.numerics.jit import inlined
 from vanedamp.coupling.numerics.record import record
-from vanedamp.coupling.planar.constraints import FLOOR, PlanarMotion, PlanarSystem
 from vanedamp.coupling.planar.contact_decisions import elongation, gap
 from vanedamp.coupling.planar.recorder import note_tilts, put_sample, record_section
 from vanedamp.coupling.response.recorder import note_step
@@ -39,7 +40,7 @@ _BOUND = 1e30
 
 @record
 class SteppedMotion(NamedTuple):
-    """The state of a run, advanced in place. Sizes as in constraints.PlanarSystem."""
+    """The state of a run, advanced in place. Sizes as in constraints.System."""
 
     # changes in every step
     q: np.ndarray  # (N,)
@@ -79,7 +80,7 @@ class SteppedMotion(NamedTuple):
 
 
 def start_steps(
-    system: PlanarSystem, initial: PlanarMotion, records: Records, spring: np.ndarray | None = None
+    system: System, initial: Motion, records: Records, spring: np.ndarray | None = None
 ) -> SteppedMotion:
     """Return the motion at time zero. spring: (u,) as in SteppedMotion, rigid contacts unless given."""
     u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))

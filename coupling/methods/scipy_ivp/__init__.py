@@ -6,8 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.coupling.system.system import on_structure
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.planar.constraints import on_structure, planar_motion, planar_system
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.scene.scene import Scene

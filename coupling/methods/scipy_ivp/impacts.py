@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.methods.scipy_ivp.motion import Unforced
 from vanedamp.coupling.numerics.codes import AT_LOW, DEPENDENT
 from vanedamp.coupling.numerics.complementarity import Problem, solve_box
 from vanedamp.coupling.system.restitution import restitutions_at
-from vanedamp.coupling.system.system import System
 
 #: a flight shorter than this share of a period, and all that follow it, are the end of a chatter
 CHATTER = 3e-7
@@ -73,7 +73,7 @@ def simultaneous_impacts(
     return Impact(touching, before, after, impulse, -0.5 * float(impulse @ (before + after)))
 
 
-def _solve(system: System, touching: np.ndarray, excess: np.ndarray, tied: np.ndarray, problem: Problem) -> bool:
+def _solve(system: LineSystem, touching: np.ndarray, excess: np.ndarray, tied: np.ndarray, problem: Problem) -> bool:
     k = len(touching)
     problem.matrix[:k, :k] = system.delassus[np.ix_(touching, touching)]
     problem.b[:k], problem.high[:k], problem.forced[:k] = excess, np.inf, 0

@@ -8,13 +8,13 @@ extended state.
 """
 
 from __future__ import annotations
+from vanedamp.coupling.system.line_system import LineSystem
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.system import System
 
 # states of a row: no force; at rest by an unknown force; at rest while other rows carry its force, which is constant;
 # sliding; a spring that holds or presses; a soft contact that has ended at zero force, before its gap is open
@@ -51,7 +51,7 @@ class Guards(NamedTuple):
 class Unforced:
     """The system without any force of rows: sizes, places in the state, and accelerations."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: LineSystem) -> None:
         n, r = system.modes, len(system.delassus)
         self.system, self.n, self.r, self.size = system, n, r, 2 * (n + r)
         self.p, self.d = slice(0, n), slice(n, n + r)

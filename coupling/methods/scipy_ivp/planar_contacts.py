@@ -8,6 +8,7 @@ complementarity). Impacts are the same question for velocities and impulses.
 """
 
 from __future__ import annotations
+from vanedamp.coupling.system.system import System
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations, islice, product
@@ -15,7 +16,6 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from vanedamp.coupling.planar.constraints import PlanarSystem
 
 #: states of a unit; a closed contact without friction slips to the right
 OPEN, STICK, LEFT, RIGHT = range(4)
@@ -53,7 +53,7 @@ class Unforced:
     (sprung (u,)), move. pull (j, extent): their forces on what draws them. The sliders' speeds in the state are zero.
     """
 
-    def __init__(self, system: PlanarSystem) -> None:
+    def __init__(self, system: System) -> None:
         n, e = len(system.mass), len(system.frequency)
         self.system, self.n, self.u, self.size, self.one = system, n, len(system.rest), 2 * n, 2 * n
         self.q, self.v, self.extent = slice(0, n), slice(n, 2 * n), 2 * n + 1 + 2 * e

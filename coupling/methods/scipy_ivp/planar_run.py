@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.event_loop import STANDING, EventLoop
@@ -25,7 +27,6 @@ from vanedamp.coupling.methods.scipy_ivp.planar_contacts import (
     impact,
 )
 from vanedamp.coupling.methods.scipy_ivp.planar_records import PlanarRecorder
-from vanedamp.coupling.planar.constraints import PlanarMotion, PlanarSystem
 from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.records import Records
@@ -50,7 +51,7 @@ class PlanarIvpRun(EventLoop):
     AT_ONCE = 1e-13
 
     def __init__(
-        self, flat: System, system: PlanarSystem, options: Options, initial: PlanarMotion, records: Records,
+        self, flat: System, system: System, options: Options, initial: Motion, records: Records,
         events: bool,
     ) -> None:  # fmt: skip
         self.system = system

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
@@ -31,8 +32,6 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
 )
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.response.records import Records
-from vanedamp.coupling.system.assembly import InitialMotion
-from vanedamp.coupling.system.system import System
 
 #: the shortest first step, as a share of a period
 _SHORTEST = 1e-26
@@ -46,7 +45,7 @@ class IvpRun(EventLoop):
     AT_ONCE = COLLAPSE
 
     def __init__(
-        self, system: System, options: Options, initial: InitialMotion, records: Records, events: bool
+        self, system: LineSystem, options: Options, initial: InitialMotion, records: Records, events: bool
     ) -> None:
         self.system = system
         self.unforced = u = Unforced(system)

@@ -1,0 +1,91 @@
+"""The log of a run: what its rows are, and the events that its entries tell.
+
+An entry has time, kind, row, relative speed before and after, impulse; of bodies in the plane also the impulse of
+friction and the energy taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.response.records import DETACHES, IMPACT, KINDS
+from vanedamp.coupling.response.response import Event
+from vanedamp.coupling.system.system import BODY, FLOOR, RIGHT, SURFACES, System
+
+#: columns of the log of bodies in the plane, and of that of sliders
+WIDTH, LINE_WIDTH = 8, 6
+
+
+class Rows(NamedTuple):
+    """What the rows (r,) of a log are.
+
+    places: number of the body, or of a stop or friction damper its own; side; corner (-1: none). other: (r,) number of
+    the body to the right, -1: none. sign: (r,) of the gap's speed in that of the body relative to what it meets.
+    spring: (r,) stiffness of a contact, N/m; inf: rigid.
+    """
+
+    places: Sequence[tuple[int, str, int]]
+    other: np.ndarray
+    sign: np.ndarray
+    spring: np.ndarray
+
+
+def rows_of_units(system: System) -> Rows:
+    """Return the rows of a log by units, whose speeds are those of gaps."""
+    places = [
+        (int(body), SURFACES[surface], int(corner))
+        for body, surface, corner in zip(system.body, system.surface, system.corner, strict=True)
+    ]
+    return Rows(places, system.other, np.ones(len(places)), system.spring)
+
+
+def rows_of_line(system: System) -> Rows:
+    """Return the rows of a log of sliders (system.line_system): floors, friction dampers, then the contacts."""
+    units, c = rows_of_units(system), system.contacts
+    floors = [(body, SURFACES[FLOOR], -1) for body in range(system.bodies)]
+    dampers = [(number, "casing", -1) for number in range(system.dampers)]
+    first = len(floors) + len(dampers)
+    sign = np.where(np.isin(system.surface[:c], (RIGHT, BODY)), -1.0, 1.0)
+    return Rows(
+        [*floors, *dampers, *units.places[:c]], np.r_[np.full(first, -1), system.other[:c]],
+        np.r_[np.ones(first), sign], np.r_[np.full(first, np.inf), system.spring[:c]],
+    )  # fmt: skip
+
+
+def events_of(rows: Rows, chunks: Sequence[np.ndarray]) -> list[Event]:
+    """Return the events of a log, from its chunks of entries (k, LINE_WIDTH or WIDTH)."""
+    found = []
+    entries = np.concatenate(chunks) if chunks else np.zeros((0, WIDTH))
+    _complete(rows.spring, entries)
+    for moment, kind, row, before, after, *impulses in entries.tolist():
+        (body, side, corner), sign = rows.places[int(row)], float(rows.sign[int(row)])
+        normal, *others = impulses
+        speeds = sign * before + 0.0, sign * after + 0.0
+        found.append(Event(moment, KINDS[int(kind)], body, side, *speeds, normal, corner, *others))
+    return found
+
+
+def named_bodies(rows: Rows, chunks: Sequence[np.ndarray], bodies: int) -> np.ndarray:
+    """Return whether an event after time zero names each body (bodies,): states at rest are logged as a run begins."""
+    named = np.zeros(bodies + 1, bool)
+    for row in {int(row) for chunk in chunks for row in chunk[chunk[:, 0] > 0.0, 2]}:
+        body, side, _ = rows.places[row]
+        if side not in ("stop", "casing"):
+            named[[body, rows.other[row]]] = True  # the last place is that of no body
+    return named[:bodies]
+
+
+def _complete(spring: np.ndarray, entries: np.ndarray) -> None:
+    """Give impacts on compliant contacts, logged as they begin, the speed and the impulse that their end brought."""
+    begun: dict[int, np.ndarray] = {}
+    for entry in entries:
+        kind, row = int(entry[1]), int(entry[2])
+        if not np.isfinite(spring[row]):
+            continue
+        if kind == IMPACT:
+            begun[row] = entry
+        elif kind == DETACHES and row in begun:
+            begun[row][4:] = entry[4:]

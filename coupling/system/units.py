@@ -1,0 +1,246 @@
+"""The units of a scene: contacts of bodies with their cavities and with each other, stops, friction elements.
+
+A contact is a normal row, its gap, and a slip row with a coefficient of friction; a friction element is a slip row with
+a constant limit: the floor under a body that only slides, or a friction damper between structure and casing. Contacts
+come first, cavity by cavity from left to right, then stops; of the friction elements, Jenkins elements come last.
+
+A body whose height is known lies in a cavity that turns by theta: a point at the height y above the floor meets walls
+that move by u - theta y where the floor moves by u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.scene.bodies import Cavity, Damper
+from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
+from vanedamp.coupling.system.shapes import Point, Slider, common_heights, shape_of
+from vanedamp.coupling.system.surfaces import Surface, flexibility
+from vanedamp.coupling.system.system import BODY, CASING, CEILING, FLOOR, LEFT, RIGHT, STOP, SURFACES
+from vanedamp.files.toml_input import InputError
+
+#: smaller coefficients of friction are treated as zero: their forces are lost in the round-off of others
+_SMOOTH = 1e-9
+#: mobility (1/kg) of a point that the first mode does not move
+_LIGHT = 1e-30
+#: of units that do not rebound
+_RIGID = Element(0.0)
+
+
+class Unit(NamedTuple):
+    """A unit, with the meaning of the fields of system.system.System; normal, slip: rows (N,)."""
+
+    normal: np.ndarray
+    slip: np.ndarray
+    rest: float = 0.0
+    friction: float = 0.0
+    element: Element = _RIGID
+    play: float = np.inf
+    body: int = -1
+    surface: int = CASING
+    corner: int = -1
+    limit: float = 0.0
+    other: int = -1
+
+
+class Body(NamedTuple):
+    """A body: its number, its coordinate x, half its length and the height of its centre above the floor, m.
+
+    centre: place of its middle along the cavity while the bodies stand side by side, m.
+    """
+
+    number: int
+    damper: Damper
+    x: int
+    a: float
+    b: float
+    centre: float
+
+    @property
+    def shape(self) -> Slider:
+        """Its shape."""
+        return shape_of(self.damper)
+
+    @property
+    def coordinates(self) -> slice:
+        """Its coordinates in q."""
+        return slice(self.x, self.x + (3 if self.shape.extended else 1))
+
+    def point(self, a: float, b: float, size: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the motion (N,) along and across of a point of the body."""
+        along, across = np.zeros(size), np.zeros(size)
+        along[self.x] = 1.0
+        if self.shape.extended:
+            along[self.x + 2], across[self.x + 1], across[self.x + 2] = -b, 1.0, a
+        return along, across
+
+
+class Law(NamedTuple):
+    """The contact law of a scene at the surfaces of its structure, with the masses (N,) of the coordinates."""
+
+    contact: ContactLaw
+    basis: ModalBasis
+    mass: np.ndarray
+
+    def element(self, normal: np.ndarray, restitution: float, yields: float) -> Element:
+        """Return the element of a contact from its normal row (N,) and the residual flexibility of its wall, m/N.
+
+        The structure's mass is that of its first mode, the same for every number of modes.
+        """
+        mobility = normal**2 / self.mass
+        mobility[1 : len(self.basis.stiffness)] = 0.0
+        return self.contact.element(restitution, 1 / max(float(mobility.sum()), _LIGHT), yields)
+
+
+def contacts_of(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], bodies: list[Body]) -> Iterator[Unit]:
+    """Yield the contacts in a cavity, from left to right: of each body with walls, floor and ceiling, and neighbours.
+
+    Raises InputError for neighbours that do not meet at a common height.
+    """
+    length = 2 * sum(body.a for body in bodies)
+    for body, right in zip(bodies, [*bodies[1:], None], strict=True):
+        if body is bodies[0]:
+            yield from _at_wall(law, cavity, surfaces, body, LEFT, -cavity.gap / 2 - length / 2)
+        if right is None:
+            yield from _at_wall(law, cavity, surfaces, body, RIGHT, cavity.gap / 2 + length / 2)
+        for surface in (FLOOR, CEILING):
+            yield from _at_floor(law, cavity, surfaces, body, surface)
+        if right is not None:
+            yield from _between(law, cavity, surfaces, body, right)
+
+
+def _at_wall(
+    law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], body: Body, surface: int, wall: float
+) -> Iterator[Unit]:
+    """Yield the contacts with the left or the right wall, at `wall` (m) along the cavity."""
+    sign, moving = 1.0 if surface == LEFT else -1.0, surfaces[surface]
+    for corner, a, b in body.shape.points(body.a, body.b, surface):
+        along, across = body.point(a, b, len(law.mass))
+        moved_along, moved_across = moving.motion(wall, body.b + b)
+        # a slider without a height meets the wall where the wall's motion is known
+        along[: len(moving.along)] -= moved_along if body.b > 0.0 else moving.along
+        across[: len(moving.along)] -= moved_across
+        lever = 0.0 if moving.y is None or not body.b else moving.y - body.b - b
+        yield _touching(
+            law, (sign * along, across), cavity.gap / 2, cavity.gap, body, surface, corner,
+            flexibility(law.basis, moving, True, lever),
+        )  # fmt: skip
+
+
+def _at_floor(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], body: Body, surface: int) -> Iterator[Unit]:
+    """Yield the contacts with floor or ceiling."""
+    below, play, moving = surface == FLOOR, cavity.play or 0.0, surfaces[surface]
+    sign = 1.0 if below else -1.0
+    for corner, a, b in body.shape.points(body.a, body.b, surface):
+        along, across = body.point(a, b, len(law.mass))
+        moved_along, moved_across = moving.motion(body.centre + a, 0.0 if below else 2 * body.b + play)
+        along[: len(moved_along)] -= moved_along
+        across[: len(moved_across)] -= moved_across
+        lever = 0.0 if moving.x is None else body.centre + a - moving.x
+        yield _touching(
+            law, (sign * across, along), 0.0 if below else play, play, body, surface, corner,
+            flexibility(law.basis, moving, False, lever),
+        )  # fmt: skip
+
+
+def _touching(
+    law: Law, rows: tuple[np.ndarray, np.ndarray], rest: float, play: float, body: Body, surface: int, corner: int,
+    yields: float,
+) -> Unit:  # fmt: skip
+    """Return the contact of a point of a body with a surface; rows: normal and slip, which sliders do not have."""
+    (normal, slip), extended = rows, body.shape.extended
+    return Unit(
+        normal, slip * extended, rest, body.damper.friction * extended,
+        law.element(normal, body.damper.restitution, yields), play, body.number, surface, corner,
+    )  # fmt: skip
+
+
+def _between(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], left: Body, right: Body) -> Iterator[Unit]:
+    """Yield the contacts of two neighbours at the ends of what their faces have in common."""
+    if left.shape.extended != right.shape.extended:
+        raise InputError(
+            f"damper[{right.number}].shape: a slider and a body with extent share cavity '{cavity.name}'; a slider has "
+            "no height at which they could touch: give it a shape"
+        )
+    heights, size = common_heights(left.damper, right.damper), len(law.mass)
+    if not heights:
+        spans = [" to ".join(f"{height:g}" for height in item.shape.face(item.a, item.b)) for item in (right, left)]
+        raise InputError(
+            f"damper[{right.number}].shape: touches a neighbour in cavity '{cavity.name}' from {spans[0]} m above the "
+            f"floor, and damper[{left.number}] from {spans[1]} m: neighbours must have a height in common"
+        )
+    coefficient = law.contact.pair_restitution(left.damper.restitution, right.damper.restitution)
+    friction = (left.damper.friction * right.damper.friction) ** 0.5 if left.shape.extended else 0.0
+    # the mean flexibility of the cavity's walls
+    yields = 0.5 * sum(flexibility(law.basis, surfaces[side], True) for side in (LEFT, RIGHT))
+    for height in heights:
+        right_along, right_across = right.point(-right.a, height - right.b, size)
+        left_along, left_across = left.point(left.a, height - left.b, size)
+        normal = right_along - left_along
+        yield Unit(
+            normal, (right_across - left_across) * (friction > 0.0), 0.0, friction,
+            law.element(normal, coefficient, yields), cavity.gap, left.number, BODY, other=right.number,
+        )  # fmt: skip
+
+
+def stops_of(scene: Scene, law: Law, reach: np.ndarray, start: float) -> Iterator[Unit]:
+    """Yield the contact of each stop, whose gap closes as the structure moves to that side.
+
+    A gap may be zero: its scale is at least how far the place moves. reach: (n,) static displacements of the modes
+    under the excitation; start: of the structure by its initial motion, m.
+    """
+    n, size = len(reach), len(law.mass)
+    for number, stop in enumerate(scene.stop):
+        ends = [(stop.at or "structure", "at", 1.0)] + ([(stop.to, "to", -1.0)] if stop.to else [])
+        towards = -1.0 if stop.side == "right" else 1.0
+        places = [(sign, interface_row(law.basis, label, f"stop[{number}].{key}")) for label, key, sign in ends]
+        normal = np.zeros(size)
+        normal[:n] = np.sum([towards * sign * row for sign, row in places], 0)
+        yields = sum(law.basis.flexibility({label: 1.0}) for label, _, _ in ends)
+        moved = float(np.abs(normal[:n]) @ reach) + start + np.finfo(float).tiny
+        yield Unit(
+            normal, np.zeros(size), stop.gap, element=law.element(normal, stop.restitution, yields), play=max(stop.gap, moved),
+            body=number, surface=STOP,
+        )  # fmt: skip
+
+
+def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
+    """Raise InputError for a friction with which a single contact may jam or have two motions (Painleve 1895)."""
+    for unit in contacts:
+        normal = (unit.normal**2 / mass).sum()
+        coupled = abs((unit.normal * unit.slip / mass).sum())
+        if unit.friction > 0.0 and unit.friction * coupled >= normal:
+            raise InputError(
+                f"damper[{unit.body}].friction: {unit.friction:g} lets the body jam at the {SURFACES[unit.surface]}; "
+                f"with its length, height and inertia a corner has a unique motion only below {normal / coupled:.4g}"
+            )
+
+
+def friction_elements(
+    scene: Scene, bodies: list[Body], floor: np.ndarray, holds: np.ndarray, casing: np.ndarray, grip: np.ndarray,
+    sliders: dict[int, np.ndarray],
+) -> Iterator[Unit]:  # fmt: skip
+    """Yield the friction elements: floors under bodies that only slide, rigid friction dampers, then Jenkins elements.
+
+    floor (b, N), holds (b,), casing (d, N), grip (d,): as in System; sliders: rows (N,) of the coordinates of the
+    Jenkins elements' sliders by the number of the friction damper. Elements without a limit are none.
+    """
+    none = np.zeros(floor.shape[1])
+    for body in bodies:
+        if holds[body.number] > 0.0 and not body.shape.extended:
+            slip = -floor[body.number]
+            slip[body.x] += 1.0
+            yield Unit(none, slip, body=body.number, surface=FLOOR, limit=float(holds[body.number]))
+    for number in sorted(range(len(scene.friction_damper)), key=sliders.__contains__):
+        if grip[number] > 0.0:
+            yield Unit(none, sliders.get(number, casing[number]), body=number, limit=float(grip[number]))
+
+
+def coefficient(friction: float) -> float:
+    """Return a coefficient of friction, zero where it is lost in the round-off of other forces."""
+    return friction if friction > _SMOOTH else 0.0
