@@ -6,8 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vanedamp.coupling.system.assembly import assemble, initial_motion
-from vanedamp.coupling.system.system import FLOOR
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods.registry import respond, run_of
 from vanedamp.coupling.model_order.body_choice import judge, judge_all, with_blocks, with_sliders
@@ -15,7 +13,8 @@ from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.sweep.sweep import sweep
-from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.coupling.system.system import FLOOR
 from vanedamp.files.store import frozen, load
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel

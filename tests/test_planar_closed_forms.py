@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.tools.planar import ledger, planar_run, still_table
-from vanedamp.coupling.system.system import CEILING, LEFT
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.response.records import DETACHES, FRICTION, IMPACT, IMPACT_LOSS, SLIPS, STICKS
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.system.system import CEILING, LEFT
 
 G = 9.81
 

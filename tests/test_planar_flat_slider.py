@@ -5,12 +5,11 @@ import pytest
 from scipy.linalg import eigh
 
 from tests.test_planar_surfaces import FOUR, HEIGHT, cavity_scene, rigid_cavity
-from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.system import BODY, FLOOR, LEFT, RIGHT
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import glued_mass, linear_responses
+from vanedamp.coupling.system.system import BODY, FLOOR, LEFT, RIGHT
 from vanedamp.files.toml_input import validate
 
 MASS, STIFFNESS, AMPLITUDE = 0.15696, 3.6046e7, 7e-5

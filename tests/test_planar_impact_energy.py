@@ -10,7 +10,6 @@ from tests.test_planar_methods import last, run_by
 from tests.test_planar_scenes import reference
 from tests.tools.planar import planar_scene, run_planar, still_table, witness
 from tests.tools.planar_laws import Stepper
-from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.response.records import IMPACT
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.assembly import assemble

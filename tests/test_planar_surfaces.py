@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from tests.tools.input_files import CLUSTER, changed
 from tests.tools.planar import run_planar
-from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.assembly import assemble as assemble_scene
 from vanedamp.coupling.system.modal_basis import modal_basis
 from vanedamp.files.toml_input import InputError, validate

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from tests.tools.planar import Run, ledger, open_run, planar_run, planar_scene, still_table
-from vanedamp.coupling.system.assembly import Motion
-from vanedamp.coupling.system.system import CEILING, FLOOR
 from vanedamp.coupling.numerics.codes import OPEN
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.system import CEILING, FLOOR
 
 #: half length and half height of a block, m; its play, m
 A, B, PLAY = 0.01, 0.04, 1e-4

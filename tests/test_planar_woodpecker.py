@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.tools.planar import Run, ledger, open_run, planar_scene, still_table
-from vanedamp.coupling.system.assembly import Motion
-from vanedamp.coupling.system.system import LEFT, RIGHT, System
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.system import LEFT, RIGHT, System
 
 SLEEVE, BIRD = (3e-4, 5e-9), (4.5e-3, 7e-7)  # mass, moment of inertia: kg, kg m^2
 L_M, L_G, L_S, R_M, R_0, H_M, H_S = 0.01, 0.015, 0.0201, 0.0031, 0.0025, 0.0058, 0.02  # m

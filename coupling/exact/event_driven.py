@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.exact import automaton
 from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes
 from vanedamp.coupling.exact.state import new_event_functions, new_scratch, new_state
@@ -32,6 +31,7 @@ from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import restart_state
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 
@@ -62,8 +62,8 @@ def is_common(system: LineSystem, modes: int) -> bool:
 class EngineRun:
     """The mutable state of one run and the subsystems it has met.
 
-    whole: the scene's system, whose rows are `system`; known: subsystems that earlier runs have met, of this system or of one that differs by its frequency only; new ones
-    are added.
+    whole: the scene's system; system: its rows; known: subsystems that earlier runs have met, of this system or of one
+    that differs by its frequency only; new ones are added.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Exact flow between two events: the linear subsystems that the sets of closed rows (system.constraints) name.
+"""Exact flow between two events: the linear subsystems that the sets of closed rows (system.line_system) name.
 
 Bodies held to the structure add their mass to it, bodies on closed springs (compliant contacts) their coordinate; the
 others move freely. The state of a subsystem is a vector of complex modal amplitudes c, and with c_0 to c_(e-1) the
@@ -23,11 +23,11 @@ from scipy.linalg import block_diag, null_space
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.exact.complex_modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
 from vanedamp.coupling.exact.peaks import GRIDS
 from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
 from vanedamp.coupling.numerics.record import record_with
+from vanedamp.coupling.system.line_system import LineSystem
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having
 SLOW = 1e-2
@@ -183,7 +183,9 @@ class Subsystem(NamedTuple):
     static: np.ndarray  # (n + b, n + b): z under constant loads on (p, x)
 
 
-def add_flow(flows: Flows, system: LineSystem, closed: np.ndarray, known: dict[bytes, Subsystem] | None = None) -> Flows:
+def add_flow(
+    flows: Flows, system: LineSystem, closed: np.ndarray, known: dict[bytes, Subsystem] | None = None
+) -> Flows:
     """Return the stack with the subsystem of the closed rows (r,) in its first free place.
 
     known: subsystems of this system by their closed rows, or of one that differs by its frequency only, to which new
@@ -334,7 +336,9 @@ def _check_rest(system: LineSystem, felt: np.ndarray, static: np.ndarray) -> Non
         raise IllConditioned("at rest under its weight the structure is too far away")
 
 
-def _fill_forces(flows: Flows, system: LineSystem, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray) -> None:
+def _fill_forces(
+    flows: Flows, system: LineSystem, s: int, full: np.ndarray, rigid: np.ndarray, sprung: np.ndarray
+) -> None:
     m = flows.modes[s]
     rate, load, e = flows.eigenvalue[s, :m], _growth(flows, s), len(system.frequency)
     spring, dashpot = system.spring[sprung, None], system.dashpot[sprung, None]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load, row_force
 from vanedamp.coupling.methods.step_records import (
@@ -25,6 +24,7 @@ from vanedamp.coupling.methods.step_records import (
 )
 from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.jit import entry
+from vanedamp.coupling.system.line_system import LineSystem
 
 
 def central_difference_matrix(system: LineSystem, times: TimeGrid) -> np.ndarray:

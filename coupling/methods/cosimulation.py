@@ -9,23 +9,27 @@ Gomes and others, Co-simulation: a survey (2018).
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 from scipy.linalg import expm
 
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, line_loads, start, time_grid
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_forces, net_load, row_force, with_penalty
 from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, STEPS
 from vanedamp.coupling.numerics.jit import entry, kernel
 from vanedamp.coupling.response.evaluation import Run
+from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.restart import line_start
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Loads
+from vanedamp.coupling.system.line_system import LineSystem
+from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Whole
 
 VARIANTS = (
@@ -53,12 +57,13 @@ class Options(PenaltyOptions):
         return self.steps_per_period * self.substeps
 
 
-def begin(
-    system: LineSystem, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
-) -> Run:
+def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
     """Return a run. Raises InputError for a rigid contact of restitution 0."""
-    times = time_grid(system, options.steps_per_period, loads)
-    soft, slow = with_penalty(system, times, options)
+    options: Any = scene.solver
+    line, initial = line_start(scene, system)
+    loads = line_loads(scene, line)
+    times = time_grid(line, options.steps_per_period, loads)
+    soft, slow = with_penalty(line, times, options)
     gauss_seidel, hold, substeps = options.exchange == "gauss_seidel", options.hold, options.substeps
     matrices = cosimulation_matrices(soft, times, substeps, loads)
     memory = np.zeros((3, 4 * soft.modes + len(soft.J)))
@@ -70,7 +75,8 @@ def begin(
             deepest,
         )  # fmt: skip
 
-    return SteppedRun(soft, march, start(soft, initial), records, events, options.smallest_steps)
+    rows = rows_of_line(system)
+    return SteppedRun(system, rows, march, start(soft, initial), records, events, options.smallest_steps)
 
 
 def cosimulation_matrices(

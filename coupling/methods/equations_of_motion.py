@@ -6,10 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.numerics.codes import COUNTERS
 from vanedamp.coupling.numerics.record import record
-from vanedamp.coupling.system.assembly import Loads
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.assembly import Loads, loads_of
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
+from vanedamp.coupling.system.system import System
 
 
 @record
@@ -49,7 +51,21 @@ class Motion(NamedTuple):
     listed: np.ndarray  # (r,) int: rows in the problem of a step
 
 
-def time_grid(system: LineSystem, steps: int, loads: Loads | None = None) -> TimeGrid:
+def line_loads(scene: Scene, line: LineSystem) -> Loads | None:
+    """Return the loads (k, N) of an excitation that is no sum of sines, on sliders; None for others."""
+    signal = scene.excitation.signal
+    if signal is None:
+        return None
+    loads, size = loads_of(scene, signal), len(line.mass)
+    return lambda angle: loads(angle)[:, :size]
+
+
+def line_grid(scene: Scene, line: LineSystem, steps: int) -> TimeGrid:
+    """Return the grid of `steps` steps per period of a scene of sliders."""
+    return time_grid(line, steps, line_loads(scene, line))
+
+
+def time_grid(system: LineSystem | System, steps: int, loads: Loads | None = None) -> TimeGrid:
     """Return the grid of `steps` steps a period. loads: of an excitation that is no sum of the system's harmonics."""
     angle = 2 * np.pi * np.arange(steps + 1) / steps
     phases = system.phases(angle)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.scene.solver_options import PlanarOptions, SolverOptions
+from vanedamp.coupling.scene.solver_options import PlanarOptions
 
 if TYPE_CHECKING:  # a scene takes the options without the engine
     from vanedamp.coupling.response.evaluation import Run

@@ -9,14 +9,13 @@ after theirs. Springs of compliant contacts and Jenkins elements enter the same 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, line_grid, start
 from vanedamp.coupling.methods.planar.start import planar_start
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
 from vanedamp.coupling.methods.step_records import (
@@ -35,11 +34,14 @@ from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Run
+from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
 from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.restart import line_start
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PlanarOptions, SteppingOptions
-from vanedamp.coupling.system.assembly import Loads
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.system.restitution import restitution_at
+from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import Real
 
 VARIANTS = (Variant("Moreau-Jean", "#c2410c", "o"),)
@@ -61,42 +63,38 @@ class Options(SteppingOptions, PlanarOptions):
     """weight of a step's end in the smooth forces; 0.5 is of second order, 1 damps [-]"""
 
 
-def begin(
-    system: LineSystem, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
-) -> Run:
-    """Return a run."""
-    times, theta, problem = (
-        time_grid(system, options.steps_per_period, loads),
-        options.theta,
-        new_problem(len(system.J)),
-    )
-    matrices = moreau_matrices(system, times, theta)
+def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
+    """Return a run. Raises InputError for bodies that overlap at the start."""
+    options = scene.solver
+    if scene.planar:
+        return _begin_planar(scene, system, options, records, events)
+    line, initial = line_start(scene, system)
+    times, theta, problem = line_grid(scene, line, options.steps_per_period), options.theta, new_problem(len(line.J))
+    matrices = moreau_matrices(line, times, theta)
     budget, deepest = options.max_events, options.penetration
 
     def march(motion: Motion, log: np.ndarray, until: int) -> int:
-        return march_moreau(system, times, motion, records, log, problem, *matrices, theta, until, budget, deepest)
+        return march_moreau(line, times, motion, records, log, problem, *matrices, theta, until, budget, deepest)
 
-    return SteppedRun(system, march, start(system, initial), records, events, options.smallest_steps)
+    rows = rows_of_line(system)
+    return SteppedRun(system, rows, march, start(line, initial), records, events, options.smallest_steps)
 
 
-def begin_planar(scene: Scene, flat: LineSystem, options: Options, records: Records, events: bool) -> Run:
-    """Return a run of bodies with extent. flat: the scene's system with every body as a slider.
-
-    Raises InputError for what bodies with extent do not allow.
-    """
+def _begin_planar(scene: Scene, whole: System, options: Any, records: Records, events: bool) -> Run:
+    """Return a run of bodies in the plane."""
     from vanedamp.coupling.methods.planar import moreau as planar  # its kernels are loaded when they are wanted
     from vanedamp.coupling.methods.planar.step_records import SteppedMotion, start_steps
 
-    system, initial, times = planar_start(scene, flat, options.steps_per_period)
+    system, initial, times = planar_start(scene, whole, options.steps_per_period)
     theta, budget, deepest = options.theta, options.max_events, options.penetration
     matrices = planar.step_matrices(system, times.step, theta)
 
     def march(motion: SteppedMotion, log: np.ndarray, until: int) -> int:
         return planar.march(system, times, motion, records, log, *matrices, theta, until, budget, deepest)
 
-    motion = start_steps(system, initial, records)
+    motion, steps = start_steps(system, initial, records), options.smallest_steps
     plane = plane_of(system, motion, options.linearisation)
-    return SteppedRun(flat, march, motion, records, events, options.smallest_steps, plane)
+    return SteppedRun(system, rows_of_units(system), march, motion, records, events, steps, plane)
 
 
 def moreau_matrices(system: LineSystem, times: TimeGrid, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

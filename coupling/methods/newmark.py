@@ -12,7 +12,6 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.penalty_forces import first_forces, net_load
 from vanedamp.coupling.methods.step_problem import list_row, solve_rows
@@ -29,6 +28,7 @@ from vanedamp.coupling.methods.step_records import (
 )
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
 from vanedamp.coupling.numerics.jit import entry, kernel
+from vanedamp.coupling.system.line_system import LineSystem
 
 
 def newmark_matrices(

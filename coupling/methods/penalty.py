@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.methods.central_difference import central_difference_matrix, march_central_difference
-from vanedamp.coupling.methods.equations_of_motion import Motion, start, time_grid
+from vanedamp.coupling.methods.equations_of_motion import Motion, line_grid, start
 from vanedamp.coupling.methods.newmark import march_newmark, newmark_matrices
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, with_penalty
 from vanedamp.coupling.methods.planar.start import planar_start
@@ -18,10 +17,12 @@ from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.complementarity import new_problem
 from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Run
+from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
 from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.restart import line_start
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PlanarOptions
-from vanedamp.coupling.system.assembly import Loads
+from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError, Real
 
 VARIANTS = (
@@ -53,12 +54,18 @@ class Options(PenaltyOptions, PlanarOptions):
         return self
 
 
-def begin(
-    system: LineSystem, options: Options, initial: InitialMotion, records: Records, events: bool, loads: Loads | None = None
-) -> Run:
-    """Return a run. Raises InputError for a rigid contact of restitution 0."""
-    times = time_grid(system, options.steps_per_period, loads)
-    soft, slow = with_penalty(system, times, options)
+def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
+    """Return a run.
+
+    Raises InputError for a rigid contact of restitution 0, and in the plane for implicit schemes and for bodies that
+    overlap at the start.
+    """
+    options = scene.solver
+    if scene.planar:
+        return _begin_planar(scene, system, options, records, events)
+    line, initial = line_start(scene, system)
+    times = line_grid(scene, line, options.steps_per_period)
+    soft, slow = with_penalty(line, times, options)
     budget, deepest = options.max_events, options.penetration
     if options.scheme == "central_difference":
         inverse = central_difference_matrix(soft, times)
@@ -75,14 +82,12 @@ def begin(
         def march(motion: Motion, log: np.ndarray, until: int) -> int:
             return march_newmark(soft, times, motion, records, log, problem, *matrices, slow, until, budget, deepest)
 
-    return SteppedRun(soft, march, start(soft, initial), records, events, options.smallest_steps)
+    rows = rows_of_line(system)
+    return SteppedRun(system, rows, march, start(soft, initial), records, events, options.smallest_steps)
 
 
-def begin_planar(scene: Scene, flat: LineSystem, options: Options, records: Records, events: bool) -> Run:
-    """Return a run of bodies with extent. flat: the scene's system with every body as a slider.
-
-    Raises InputError for implicit schemes, for a restitution of 0, and for what bodies with extent do not allow.
-    """
+def _begin_planar(scene: Scene, whole: System, options: Any, records: Records, events: bool) -> Run:
+    """Return a run of bodies in the plane."""
     from vanedamp.coupling.methods.planar import penalty as planar  # its kernels are loaded when they are wanted
     from vanedamp.coupling.methods.planar.step_records import SteppedMotion, start_steps
 
@@ -91,13 +96,13 @@ def begin_planar(scene: Scene, flat: LineSystem, options: Options, records: Reco
             f'solver.scheme: "{options.scheme}" takes sliders only; bodies with extent, stiffness or dashpot take '
             '"central_difference"'
         )
-    system, initial, times = planar_start(scene, flat, options.steps_per_period)
+    system, initial, times = planar_start(scene, whole, options.steps_per_period)
     forces, inverse = planar.penalty_forces(system, times.step, options), planar.step_matrix(system, times.step)
     budget, deepest = options.max_events, options.penetration
 
     def march(motion: SteppedMotion, log: np.ndarray, until: int) -> int:
         return planar.march(system, times, motion, records, log, forces, inverse, until, budget, deepest)
 
-    motion = start_steps(system, initial, records, forces.spring)
+    motion, steps = start_steps(system, initial, records, forces.spring), options.smallest_steps
     plane = plane_of(system, motion, options.linearisation)
-    return SteppedRun(flat, march, motion, records, events, options.smallest_steps, plane)
+    return SteppedRun(system, rows_of_units(system), march, motion, records, events, steps, plane)

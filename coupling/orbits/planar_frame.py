@@ -6,15 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
-from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.system import System
 from vanedamp.coupling.numerics.codes import STICK
 from vanedamp.coupling.orbits.planar_names import UnitNames
 from vanedamp.coupling.planar.contact_flow import ContactFlows
 from vanedamp.coupling.planar.restart import planar_restart_state
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble, physical_scale
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 
 
@@ -22,8 +21,7 @@ class Frame:
     """A scene's system, and its states (k,) in the order of RestartState against those of the engine, (q, q')."""
 
     def __init__(self, scene: Scene) -> None:
-        self.flat = assemble(scene)
-        self.system, self.scale = planar_system(scene, self.flat), physical_scale(scene, self.flat)
+        self.system = assemble(scene)
         self.names, self.scene = UnitNames(scene, self.system), scene
         self.flows: list[ContactFlows] = []  # that all passages share
         self.extended = np.flatnonzero(self.system.tilt >= 0)
@@ -45,7 +43,7 @@ class Frame:
 
     def restart_at(self, q: np.ndarray, v: np.ndarray) -> RestartState:
         """Return the restart state of coordinates (N,) and their rates."""
-        return planar_restart_state(self.flat, self.system, self.scale, q, v)
+        return planar_restart_state(self.system, q, v)
 
     def state_of(self, restart: RestartState) -> np.ndarray:
         """Return the state (k,) of a restart state."""
@@ -57,18 +55,18 @@ class Frame:
 
     def restart_of(self, state: np.ndarray) -> RestartState:
         """Return the restart state of a state (k,)."""
-        n, b, more, friction = self.flat.modes, self.flat.bodies, len(self.extended), self.flat.friction_rows
+        n, b, more = self.system.modes, self.system.bodies, len(self.extended)
         parts = np.split(np.asarray(state, float), np.cumsum([n, n, b, b, more, more, more, more]))
-        whole, elongation = np.zeros((4, b)), np.zeros(friction - b)
+        whole, elongation = np.zeros((4, b)), np.zeros(self.system.dampers)
         whole[:, self.extended], elongation[self.drawn] = parts[4:8], parts[8]
-        return RestartState(*map(frozen, (*parts[:4], elongation, self.flat.free_travel[friction:], *whole)))
+        return RestartState(*map(frozen, (*parts[:4], elongation, self.system.travels, *whole)))
 
     def glued(self) -> tuple[np.ndarray, np.ndarray]:
         """Return complex amplitudes (e, n) of the structure with all bodies at rest on their floors; its sag (n,).
 
         Amplitudes are inf at a resonance without damping.
         """
-        system, n = self.system, self.flat.modes
+        system, n = self.system, self.system.modes
         lying = np.eye(len(system.mass))[:, :n]
         for b, x in enumerate(system.along):
             lying[x] = system.floor[b, :n]
@@ -107,7 +105,7 @@ class Frame:
     def sizes(self) -> np.ndarray:
         """Return sizes (k,) of the coordinates: linear response, plays, tilts that take them, and these times omega."""
         system, omega = self.system, float(self.system.frequency[0])
-        reach = self.scale * np.abs(self.glued()[0]).sum(axis=0)
+        reach = system.scale * np.abs(self.glued()[0]).sum(axis=0)
         damper = self.scene.damper
         cavity = [self.scene.cavity[index] for index in system.cavity]
         gap = np.array([each.gap for each in cavity])
@@ -119,7 +117,7 @@ class Frame:
         largest = np.abs(reach).max(initial=0.0)
         largest = largest if 0.0 < largest < np.inf else float(gap.max(initial=0.0)) or 1.0
         reach = np.where(np.isfinite(reach), np.maximum(np.abs(reach), 1e-6 * largest), largest)
-        most = np.zeros(self.flat.friction_rows - len(gap))
+        most = np.zeros(system.dampers)
         most[self.drawn] = self.longest
         size = RestartState(
             *map(frozen, (reach, omega * reach, gap, omega * gap, most, (), lift, omega * lift, tilt, omega * tilt))

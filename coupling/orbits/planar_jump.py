@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.restitution import restitutions_at
+from vanedamp.coupling.system.system import System
 
 #: singular values that count as none
 _DEPENDENT = 1e-9

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.system.system import CASING, FLOOR, STOP, SURFACES, System
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
@@ -18,6 +17,7 @@ from vanedamp.coupling.numerics.codes import (
     STOPS,
 )
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.system import CASING, FLOOR, STOP, SURFACES, System
 
 #: what could happen at a unit, for event functions that stay above zero
 _COULD = {

@@ -36,7 +36,7 @@ class PlanarMap:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names (k,) of the coordinates."""
-        modes, bodies = range(self._frame.flat.modes), range(self._frame.flat.bodies)
+        modes, bodies = range(self._frame.system.modes), range(self._frame.system.bodies)
         groups = [("mode", modes, ""), ("body", bodies, " slip"), *(
             ("body", self._frame.extended.tolist(), name) for name in (" lift", " tilt")
         )]  # fmt: skip
@@ -76,9 +76,9 @@ class PlanarMap:
         amplitude, sag = frame.glued()
         if not np.all(np.isfinite(amplitude)):
             raise InputError("excitation.frequency: at a resonance without damping no motion repeats; change it")
-        p, rate = frame.scale * (amplitude.sum(axis=0).real + sag), frame.scale * frame.rates(amplitude)
-        slip, none = np.array([damper.position for damper in self.scene.damper]), np.zeros(frame.flat.bodies)
-        unloaded = np.zeros(frame.flat.friction_rows - frame.flat.bodies)
+        p, rate = frame.system.scale * (amplitude.sum(axis=0).real + sag), frame.system.scale * frame.rates(amplitude)
+        slip, none = np.array([damper.position for damper in self.scene.damper]), np.zeros(frame.system.bodies)
+        unloaded = np.zeros(frame.system.dampers)
         lying = RestartState(*map(frozen, (p, rate, slip, none, unloaded, (), none, none, none, none)))
         return frame.state_of(lying)
 

@@ -1,6 +1,6 @@
 """The motion in the plane between two events, and its derivatives, from the engine's own modes.
 
-States z = (q, q') (2N,): coordinates of planar.constraints and their rates.
+States z = (q, q') (2N,): coordinates of system.system and their rates.
 """
 
 from __future__ import annotations

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.exact.event_functions import RESOLUTION
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.exact.impacts import COLLAPSE
@@ -40,10 +39,11 @@ from vanedamp.coupling.orbits.saltation import saltation
 from vanedamp.coupling.planar.contact_flow import add_flow
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.planar.restart import planar_restart
-from vanedamp.coupling.response.evaluation import LOG_WIDTH
+from vanedamp.coupling.response.event_log import WIDTH
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.system.assembly import Motion
 
 #: events a period after which a passage gives up: each is a step of Python
 _EVENTS_A_PERIOD = 2000
@@ -84,8 +84,8 @@ class Walk:
         yields = np.isfinite(self.system.spring)
         if np.any((gap < -_NOTHING * self.system.play)[~yields & (np.arange(len(gap)) < self.system.contacts)]):
             self._worsen(PassageStatus.GRAZING)  # a body that would begin in a wall is put beside it
-            motion = planar_restart(frame.flat, frame.system, frame.scale, start)
-        self.run = PlanarRun(frame.flat, frame.system, motion, new_records(frame.flat, periods, 0), True, 0)
+            motion = planar_restart(frame.system, start)
+        self.run = PlanarRun(frame.system, motion, new_records(frame.system, periods, 0), True, 0)
         # a spring that is compressed pushes, or lags behind the body that leaves it
         inside = yields & (gap < -SIMULTANEOUS * self.system.play)
         stiffness = np.where(yields, self.system.spring, 0.0)
@@ -166,7 +166,7 @@ class Walk:
 
     def _taken(self) -> np.ndarray:
         """Return the new entries of the log."""
-        entries = np.concatenate(self.run.chunks) if self.run.chunks else np.zeros((0, LOG_WIDTH))
+        entries = np.concatenate(self.run.chunks) if self.run.chunks else np.zeros((0, WIDTH))
         self.run.chunks.clear()
         return entries
 

@@ -12,7 +12,6 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag
 
-from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.numerics.codes import (
     CLOSED,
     FORCE,
@@ -26,20 +25,24 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.orbits.saltation import LinearFlow, held
+from vanedamp.coupling.system.line_system import line_system
 from vanedamp.coupling.system.linear_response import glued_mass
+from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 
 
 class SliderDynamics:
     """Flows of a system by the states of its rows (numerics.codes), and its rows as functionals of u.
 
-    scale: displacement per modal coordinate (system.assembly.physical_scale). place, speed: (r, k) functionals of u,
-    displacement less rest and velocity of each row; springs: rows of Jenkins elements; to_state, from_state: (k, k)
+    whole: the scene's system; system: its rows; scale: displacement per modal coordinate. place, speed: (r, k)
+    functionals of u, displacement less rest and velocity of each row; springs: rows of Jenkins elements; to_state, from_state: (k, k)
     between u and the state of the contract (orbits.passage); sizes: (k,) of that state in a typical motion.
     """
 
-    def __init__(self, system: LineSystem, scale: float, sizes: np.ndarray | None = None) -> None:
-        self.system, self.scale = system, scale
+    def __init__(self, whole: System, sizes: np.ndarray | None = None) -> None:
+        self.whole, self.system = whole, line_system(whole)
+        system, scale = self.system, self.system.scale
+        self.scale = scale
         n, b, size = system.modes, system.bodies, system.modes + system.bodies
         friction = np.arange(len(system.J)) < system.friction_rows
         self.springs = np.flatnonzero(friction & np.isfinite(system.spring) & (system.limit > 0))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.numerics.codes import (
     CLOSED,
     HELD,
@@ -19,6 +18,7 @@ from vanedamp.coupling.numerics.codes import (
     VELOCITY,
 )
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.line_system import LineSystem
 
 #: what the states of a row have in common: which of two rows carries a redundant force is no event
 _ALIKE = {int(HELD): int(STICK), int(TOUCHING): int(CLOSED)}

@@ -16,7 +16,7 @@ from vanedamp.coupling.orbits.slider_symmetry import mirror_of
 from vanedamp.coupling.orbits.slider_walk import Walk
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble, physical_scale
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -45,8 +45,7 @@ class SliderMap:
 
     @cached_property
     def _dynamics(self) -> SliderDynamics:
-        system = assemble(self.scene)
-        return SliderDynamics(system, physical_scale(self.scene, system), self.scale)
+        return SliderDynamics(assemble(self.scene), self.scale)
 
     @cached_property
     def _names_of_rows(self) -> RowNames:
@@ -125,5 +124,4 @@ class SliderMap:
 def slider_map(scene: Scene, parameter: str, periods: int) -> SliderMap:
     """Return the period map of a scene of sliders. Raises InputError for one that the exact engine cannot run."""
     check_waveform(scene, "exact")
-    system = assemble(scene)
-    return SliderMap(scene, parameter, periods, SliderDynamics(system, physical_scale(scene, system)).sizes)
+    return SliderMap(scene, parameter, periods, SliderDynamics(assemble(scene)).sizes)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.system.line_system import InitialMotion
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
 from vanedamp.coupling.exact.state import State
 from vanedamp.coupling.numerics.codes import CLOSED, STICK, TOUCHING
 from vanedamp.coupling.orbits.slider_dynamics import SliderDynamics
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.system.line_system import InitialMotion
 
 #: a force this close to its bound, as a share of its terms, is at it
 _NEAR = 1e-9

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import block_diag
 
-from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.orbits.slider_dynamics import SliderDynamics
+from vanedamp.coupling.system.line_system import LineSystem
 
 
 def mirror_of(dynamics: SliderDynamics) -> np.ndarray | None:

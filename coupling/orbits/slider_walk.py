@@ -61,10 +61,10 @@ class Walk:
         self, dynamics: SliderDynamics, names: RowNames, start: RestartState, periods: int, flows: list[Flows]
     ) -> None:
         self._dynamics, self._names, self._periods, self._start = dynamics, names, periods, start
-        self._initial = restart_from(dynamics.system, dynamics.scale, start)
+        self._initial = restart_from(dynamics.system, start)
         self._budget = EVENTS_A_PERIOD * periods
-        records = new_records(dynamics.system, periods, 0)
-        self.run = EngineRun(dynamics.system, self._initial, records, True, self._budget)
+        records = new_records(dynamics.whole, periods, 0)
+        self.run = EngineRun(dynamics.whole, dynamics.system, self._initial, records, True, self._budget)
         if flows:
             self.run.flows = flows[0]
         self._crossings: list[Crossing] = []

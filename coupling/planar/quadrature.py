@@ -11,7 +11,6 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.system.system import FLOOR
 from vanedamp.coupling.numerics.codes import FLOW, LEAVING, OPEN, PERIOD, SLIP_LEFT, SLIP_RIGHT
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 from vanedamp.coupling.numerics.jit import inlined, kernel
@@ -20,6 +19,7 @@ from vanedamp.coupling.planar.exponential_integrals import integrate, response_a
 from vanedamp.coupling.planar.recorder import note_tilts
 from vanedamp.coupling.response.recorder import note_response
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, VISCOUS
+from vanedamp.coupling.system.system import FLOOR
 
 _TURN = 1.5
 #: modes from which on the integrals are taken in closed form, where none is slower than this share of the excitation:

@@ -7,13 +7,13 @@ from typing import Protocol
 
 import numpy as np
 
-from vanedamp.coupling.system.system import FLOOR, System
 from vanedamp.coupling.numerics.codes import PERIOD
 from vanedamp.coupling.numerics.jit import entry, inlined
 from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.records import STORED
 from vanedamp.coupling.response.response import PlanarSamples
+from vanedamp.coupling.system.system import FLOOR, System
 
 
 class Kept(Protocol):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.system.assembly import Motion, place_sliders
 from vanedamp.coupling.response.restart import before_stops, check_size
 from vanedamp.coupling.response.restart_state import RestartState
+from vanedamp.coupling.system.assembly import Motion, place_sliders
 from vanedamp.coupling.system.system import STOP, System
 from vanedamp.files.store import frozen
 

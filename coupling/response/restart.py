@@ -6,20 +6,18 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem, initial_motion, line_system, row_motion
-from vanedamp.coupling.system.system import System
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem, initial_motion, line_system, row_motion
 from vanedamp.coupling.system.modal_basis import modal_transfer
 from vanedamp.coupling.system.reduced_model_file import greatest_speed
+from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 
-def line_start(
-    scene: Scene, system: System, start: RestartState | None = None
-) -> tuple[LineSystem, InitialMotion]:
+def line_start(scene: Scene, system: System, start: RestartState | None = None) -> tuple[LineSystem, InitialMotion]:
     """Return the rows of a scene whose bodies only slide, and its motion at time zero: its own or that of a state.
 
     Raises InputError for a state of a scene of another size.

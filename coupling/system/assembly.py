@@ -94,7 +94,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     contacts = [unit for index, cavity in enumerate(scene.cavity) for unit in contacts_of(
         law, cavity, surfaces[index], [body for body in bodies if owner[body.number] == index]
     )]  # fmt: skip
-    start = abs(scene.initial.displacement) + abs(scene.initial.velocity) / np.sqrt(basis.stiffness[:1]).sum()
+    start = abs(scene.initial.displacement) + (abs(scene.initial.velocity) / np.sqrt(basis.stiffness[0]) if n else 0.0)
     contacts += stops_of(scene, law, np.abs(force).sum(axis=0) / basis.stiffness, start)
     check_friction(contacts, mass)
     holds = _holding(scene, loads)
@@ -117,26 +117,19 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     pulled = (elongation[:, :n] ** 2).sum(axis=1)
     mobility = (J[:, :massive] ** 2 / mass[:massive]).sum(axis=1)
     mass[massive:] = 1 / (np.r_[mobility, pulled].max(initial=0.0) or 1.0)
-    yields = np.isfinite(elements[:, 1])
-    springs = np.r_[elements[yields, 1] * mobility[:u][yields], spring[jenkins] * pulled]
-    fastest = np.sqrt(springs.max(initial=0.0))
-    period = 2 * np.pi / omega
-    frequency = omega * np.array(list(shares))
-    pushed = np.abs(weight) * period + (np.abs(load) / np.maximum(frequency, omega)[:, None]).sum(axis=0)
 
     def column(name: str, kind: type = float) -> np.ndarray:
         return np.array([getattr(unit, name) for unit in units], kind)
 
     response = np.zeros(size)
     response[:n] = forced
-    return System(
+    system = System(
         modes=n, bodies=len(bodies), contacts=len(contacts),
-        scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0, mass=mass, stiffness=stiffness, damping=damping,
-        squares=basis.stiffness, viscous=basis.damping, load=load, weight=weight,
-        alike=bool(np.all(accelerated == accelerated[:, :1])), response=response, table=table, frequency=frequency,
-        omega=omega, period=period,
-        moment=_MOMENT * (min(period, 2 * np.pi / fastest) if fastest > 0.0 else period),
-        speed=float((np.abs(J) @ (pushed / mass)).max(initial=0.0)), J=J, rest=column("rest"),
+        scale=float(forced[0]) if isinstance(scene.structure, Rigid) else 1.0, mass=mass,
+        stiffness=stiffness, damping=damping, squares=basis.stiffness, viscous=basis.damping, load=load, weight=weight,
+        alike=bool(np.all(accelerated == accelerated[:, :1])), response=response, table=table,
+        frequency=omega * np.array(list(shares)), omega=omega, period=2 * np.pi / omega, moment=0.0, speed=0.0, J=J,
+        rest=column("rest"),
         delassus=(J / mass) @ J.T, friction=column("friction"), limit=column("limit"), restitution=elements[:, 0],
         restitution_at=law_address(scene.contact, elements[: len(contacts), 0]), spring=elements[:, 1],
         dashpot=elements[:, 2], tangential=spring[jenkins], elongation=elongation,
@@ -148,6 +141,27 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         cavity=np.array(owner, np.int64), holds=holds, neglected=_neglected(scene, bodies, owner),
         casing=on_casing, grip=grip, casing_spring=spring,
     )  # fmt: skip
+    return _with_scales(system)
+
+
+def at_frequency(system: System, frequency: float) -> System:
+    """Return a system at another frequency of the excitation, Hz, which leaves the amplitudes of the loads."""
+    omega = 2 * np.pi * frequency
+    return _with_scales(system._replace(omega=omega, period=2 * np.pi / omega, frequency=omega * system.order))
+
+
+def _with_scales(system: System) -> System:
+    """Return a system with the moment and the speed that follow from the rest of it."""
+    yields = np.isfinite(system.spring)
+    mobility = (system.J[: len(yields)][yields] ** 2 / system.mass).sum(axis=1)
+    pulled = (system.elongation[:, : system.modes] ** 2).sum(axis=1)
+    springs = np.r_[system.spring[yields] * mobility, system.tangential * pulled]
+    fastest = np.sqrt(springs.max(initial=0.0))
+    shortest = min(system.period, 2 * np.pi / fastest) if fastest > 0.0 else system.period
+    pushed = np.abs(system.weight) * system.period
+    pushed += (np.abs(system.load) / np.maximum(system.frequency, system.omega)[:, None]).sum(axis=0)
+    speed = (np.abs(system.J) @ (pushed / system.mass)).max(initial=0.0)
+    return system._replace(moment=_MOMENT * shortest, speed=float(speed))
 
 
 def _holding(scene: Scene, loads: BodyLoads) -> np.ndarray:

@@ -118,6 +118,11 @@ class System(NamedTuple):
         )  # fmt: skip
 
     @property
+    def free_travel(self) -> np.ndarray:
+        """Free travel (u,) of each contact, m: the scale of its gap; inf for friction elements."""
+        return self.play
+
+    @property
     def dampers(self) -> int:
         """Number of friction dampers."""
         return len(self.casing)

@@ -19,7 +19,7 @@ from vanedamp.coupling.scene.bodies import Cavity, Damper
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw, Element
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.modal_basis import ModalBasis, interface_row
-from vanedamp.coupling.system.shapes import Point, Slider, common_heights, shape_of
+from vanedamp.coupling.system.shapes import Slider, common_heights, shape_of
 from vanedamp.coupling.system.surfaces import Surface, flexibility
 from vanedamp.coupling.system.system import BODY, CASING, CEILING, FLOOR, LEFT, RIGHT, STOP, SURFACES
 from vanedamp.files.toml_input import InputError
@@ -204,8 +204,8 @@ def stops_of(scene: Scene, law: Law, reach: np.ndarray, start: float) -> Iterato
         yields = sum(law.basis.flexibility({label: 1.0}) for label, _, _ in ends)
         moved = float(np.abs(normal[:n]) @ reach) + start + np.finfo(float).tiny
         yield Unit(
-            normal, np.zeros(size), stop.gap, element=law.element(normal, stop.restitution, yields), play=max(stop.gap, moved),
-            body=number, surface=STOP,
+            normal, np.zeros(size), stop.gap, element=law.element(normal, stop.restitution, yields),
+            play=max(stop.gap, moved), body=number, surface=STOP,
         )  # fmt: skip
 
 

@@ -17,19 +17,20 @@ import numpy as np
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.exact.event_driven import EngineRun
 from vanedamp.coupling.exact.subsystem_assembly import Subsystem
-from vanedamp.coupling.methods.registry import final_state, is_deflected
+from vanedamp.coupling.methods.registry import final_state
 from vanedamp.coupling.model_order.choices import NOTHING, choices_of, leaves_open, with_choices
 from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.response.evaluation import Outcome, Run, exchanged_energy, residual
+from vanedamp.coupling.response.event_log import named_bodies
 from vanedamp.coupling.response.records import EXCITATION, STORED, VISCOUS, new_records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.restart import at_speed_of, restart_from
+from vanedamp.coupling.response.restart import at_speed_of, line_start
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.response.static_deflection import about_mean
+from vanedamp.coupling.response.static_deflection import about_mean, deflects
 from vanedamp.coupling.scene.ramp import Ramp as Table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
+from vanedamp.coupling.system.assembly import assemble, at_frequency
 from vanedamp.coupling.system.engine_order import crossings
 from vanedamp.coupling.system.linear_response import (
     LinearPeak,
@@ -106,7 +107,10 @@ def seen_only(system: System) -> System:
     The engine lets such modes be: it carries no free motion of them from one period to the next. At rest they have no
     energy either, and the ledger is that of all that moves.
     """
-    rows = np.abs(np.vstack([system.of_structure.response, system.floor, system.of_structure.J]))
+    n = system.modes
+    rows = np.abs(np.vstack([
+        system.of_structure.response, system.floor[:, :n], system.casing[:, :n], system.of_structure.J
+    ]))  # fmt: skip
     felt = (rows / np.maximum(rows.max(axis=1, initial=0.0), np.finfo(float).tiny)[:, None]).max(axis=0, initial=0.0)
     own = system.of_structure.damping - np.diag(np.diag(system.of_structure.damping))
     unseen = np.flatnonzero((felt < _UNSEEN) & ~own.any(axis=0))
@@ -115,12 +119,6 @@ def seen_only(system: System) -> System:
     load = system.load.copy()
     load[:, unseen] = 0.0
     return system._replace(load=load)
-
-
-def at_frequency(system: System, frequency: float) -> System:
-    """Return a system at another frequency of the excitation, Hz, which leaves the amplitudes of the loads."""
-    omega = 2 * np.pi * frequency
-    return system._replace(omega=omega, period=2 * np.pi / omega, frequency=omega * system.order)
 
 
 class _Run(Iterator[int]):
@@ -136,7 +134,7 @@ class _Run(Iterator[int]):
         self.travel = np.array([travel[damper.cavity] for damper in scene.damper])
         self.amplitude, self.dynamic, self.impacts, self.collided = np.zeros((4, p))
         ends = [scene_at(scene, table, float(value)) for value in course.value[[0, -1]]]
-        self.deflected = any(is_deflected(end, assemble(end)) for end in ends)
+        self.deflected = any(deflects(end, assemble(end)) for end in ends)
         self.stuck = np.zeros((p, b), bool)
         self.section, self.parts = np.zeros((p + 1, 2)), np.zeros((p + 1, 1 + b))
         # the ledger without the work of the rotation, which is counted apart
@@ -174,12 +172,8 @@ class _Run(Iterator[int]):
         if scene.planar:
             from vanedamp.coupling.planar.planar_run import begin_run
 
-            return begin_run(scene, system, records, True, left, getattr(solver, "linearisation", 0.01), state)
-        if state is None:
-            motion = initial_motion(scene, system)
-        else:
-            motion = restart_from(system, physical_scale(scene, system), state)
-        return EngineRun(system, motion, records, True, left, self.known)
+            return begin_run(scene, system, records, True, left, state)
+        return EngineRun(system, *line_start(scene, system, state), records, True, left, self.known)
 
     def _record(self, k: int, outcome: Outcome) -> None:
         records, b = outcome.records, self.system.bodies
@@ -198,7 +192,7 @@ class _Run(Iterator[int]):
         self.dynamic[k] = about_mean(records, slice(0, 1), self.system.period)[1][0]
         slow = np.abs(section[:, 3 + b :]) <= _AT_REST * self.system.omega * self.travel
         same = np.abs(section[1, 3 : 3 + b] - section[0, 3 : 3 + b]) <= _AT_REST * self.travel
-        self.stuck[k] = slow.all(axis=0) & same & ~_named(outcome)
+        self.stuck[k] = slow.all(axis=0) & same & ~named_bodies(outcome.rows, outcome.log, b)
         self.events, self.open_ledger = self.events + outcome.events, outcome.open_ledger
         if outcome.plane is not None:
             neglected = outcome.plane.neglected * outcome.plane.tilt[0] ** 2  # nan for sliders
@@ -231,19 +225,8 @@ def _square(values: np.ndarray) -> float:
 
 def _alike(system: System, other: System) -> bool:
     """Whether two systems have the same subsystems (exact.subsystem_assembly.Subsystem)."""
-    names = ("stiffness", "damping", "mass", "floor", "J", "spring", "dashpot")
+    names = ("stiffness", "damping", "mass", "floor", "J", "casing", "casing_spring", "spring", "dashpot")
     return all(np.array_equal(getattr(system, name), getattr(other, name)) for name in names)
-
-
-def _named(outcome: Outcome) -> np.ndarray:
-    """Return whether an event names a body (b,); states at rest are logged as a run begins, at time zero."""
-    system, named = outcome.system, np.zeros(outcome.system.bodies, bool)
-    for row in {int(row) for chunk in outcome.log for row in chunk[chunk[:, 0] > 0.0, 2]}:
-        if outcome.plane is None:
-            named |= system.of_bodies.J[row] != 0.0
-        elif outcome.plane.places[row][1] not in ("stop", "casing"):
-            named[outcome.plane.places[row][0]] = True
-    return named
 
 
 def _stationary(scene: Scene, table: Table) -> tuple[dict[str, np.ndarray], dict[str, float]]:

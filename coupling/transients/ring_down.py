@@ -21,7 +21,7 @@ from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble, physical_scale
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import glued_mass
 from vanedamp.coupling.system.modal_basis import forced_label
 from vanedamp.coupling.system.system import System
@@ -98,7 +98,7 @@ def _followed(scene: Scene, system: System, table: RingDownTable, start: Restart
         raise InputError(f"ring_down.mode: expected 0 to {system.modes - 1}, not {table.mode}; modes count from 0")
     size = np.ones(system.modes)
     if start is not None:
-        size = np.hypot(start.displacement, start.velocity / omega) / physical_scale(scene, system)
+        size = np.hypot(start.displacement, start.velocity / omega) / system.scale
     moves = size > _STILL * size.max()
     if table.mode is not None:
         mode = table.mode

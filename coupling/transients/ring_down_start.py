@@ -7,18 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from vanedamp.coupling.system.assembly import assemble, initial_motion
 from vanedamp.coupling.methods.registry import why_no_restart
 from vanedamp.coupling.planar.restart import planar_restart_state
-from vanedamp.coupling.response.restart import before_stops, restart_state
+from vanedamp.coupling.response.restart import before_stops, line_start, restart_state
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.excitation import Excitation
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom
-from vanedamp.coupling.system.assembly import assemble, initial_motion, physical_scale
+from vanedamp.coupling.system.assembly import assemble, initial_motion
 from vanedamp.coupling.system.modal_basis import basis_of, forced_label, interface_row
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, STOP, System
 from vanedamp.coupling.transients.ramp_course import MOST_PERIODS
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -85,7 +84,7 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     with their bodies, and leaves the springs of friction dampers unloaded. Raises InputError.
     """
     system = assemble(scene)
-    state, scale = _initial(scene, system), physical_scale(scene, system)
+    state, scale = _initial(scene, system), system.scale
     if table.impulse is None and table.displacement is None:
         return state
     at = table.at or forced_label(scene)
@@ -95,19 +94,20 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     if table.displacement is not None:
         softness = row / system.of_structure.stiffness
         p = softness * (table.displacement / (row @ softness))
-        if np.any(before_stops(system, p) != p):
+        stops = (system.surface == STOP) & np.isinf(system.spring)
+        if np.any(before_stops(system.J[: len(stops)][stops, : system.modes], system.rest[stops], p) != p):
             raise InputError(
                 f"ring_down.displacement: {table.displacement:g} m would bring the structure beyond a stop; take less"
             )
         return replace(state, displacement=frozen(state.displacement + scale * p))
     rate = row * (table.impulse or 0.0)
-    slip = state.slip_velocity - system.floor @ rate
+    n = system.modes
+    slip = state.slip_velocity - system.floor[:, :n] @ rate
     moved = {"velocity": state.velocity + scale * rate, "slip_velocity": slip}
     if scene.planar:
-        plane, n = planar_system(scene, system), system.modes
-        extended = plane.tilt >= 0
-        moved["lift_velocity"] = state.lift_velocity - np.where(extended, plane.rise[:, :n] @ rate, 0.0)
-        moved["tilt_rate"] = state.tilt_rate - np.where(extended, plane.turn[:, :n] @ rate, 0.0)
+        extended = system.tilt >= 0
+        moved["lift_velocity"] = state.lift_velocity - np.where(extended, system.rise[:, :n] @ rate, 0.0)
+        moved["tilt_rate"] = state.tilt_rate - np.where(extended, system.turn[:, :n] @ rate, 0.0)
     return replace(state, **{name: frozen(values) for name, values in moved.items()})
 
 
@@ -117,14 +117,14 @@ def check_impacts(free: Scene, system: System, start: RestartState) -> None:
     A body that meets its walls at a speed u loses it as exp(-n log(1/e)) in n impacts at restitution e, each a free
     travel g apart: in a time T these are log(1 + (1 - e) u T / g) / log(1/e). Every period begins anew. InputError.
     """
-    rows = slice(system.friction_rows, None)
+    rows = np.flatnonzero(np.isin(system.surface, (LEFT, RIGHT, BODY, STOP)))
     rigid, bounce = np.isinf(system.spring[rows]), np.clip(system.restitution[rows], 0.01, 1.0 - 1e-12)
     if free.solver.method != "exact" or not rigid.any():
         return
     structure = system.of_structure
-    reach = np.hypot(np.sqrt(structure.stiffness) * start.displacement, start.velocity) / physical_scale(free, system)
+    reach = np.hypot(np.sqrt(structure.stiffness) * start.displacement, start.velocity) / system.scale
     speed = np.abs(structure.J[rows]) @ reach + np.abs(start.slip_velocity).max(initial=0.0)
-    travels = speed * system.period / system.free_travel[rows]
+    travels = speed * system.period / system.play[rows]
     impacts = free.time.simulated * np.sum((np.log1p((1.0 - bounce) * travels) / -np.log(bounce))[rigid])
     if impacts > _MOST_IMPACTS:
         raise InputError(
@@ -135,9 +135,7 @@ def check_impacts(free: Scene, system: System, start: RestartState) -> None:
 
 def _initial(scene: Scene, system: System) -> RestartState:
     """Return the state that the scene begins with."""
-    scale = physical_scale(scene, system)
     if not scene.planar:
-        return restart_state(system, scale, initial_motion(scene, system))
-    plane = planar_system(scene, system)
-    motion = planar_motion(scene, system, plane)
-    return planar_restart_state(system, plane, scale, motion.q, motion.v)
+        return restart_state(*line_start(scene, system))
+    motion = initial_motion(scene, system)
+    return planar_restart_state(system, motion.q, motion.v)

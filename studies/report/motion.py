@@ -296,7 +296,7 @@ def _turned(turn: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def _heights(body: BodyMotion, other: BodyMotion) -> list[float]:
-    """Return the heights at which neighbours touch, as planar.constraints has them: discs at one, faces at two."""
+    """Return the heights at which neighbours touch, as system.shapes has them: discs at one, faces at two."""
     discs = [each.half[1] for each in (body, other) if each.shape == "disc"]
     if discs or body.shape == "slider":
         return discs[:1] or [body.half[1]]

@@ -13,8 +13,6 @@ import mpmath as mp
 import numpy as np
 
 from tests.reference.multiprecision import exponential
-from vanedamp.coupling.system.system import System
-from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     BOUNDED,
@@ -35,6 +33,7 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.planar.planar_run import PlanarRun
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.system.system import System
 
 DIGITS, STEP = 40, mp.mpf(10) ** -16

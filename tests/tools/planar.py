@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.system.assembly import assemble, initial_motion
 from vanedamp.coupling.methods import moreau
 from vanedamp.coupling.planar.planar_run import PlanarRun
-from vanedamp.coupling.response.evaluation import LOG_WIDTH
+from vanedamp.coupling.response.event_log import WIDTH
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.assembly import assemble, initial_motion
 from vanedamp.files.toml_input import validate
 
 
@@ -20,8 +19,8 @@ class Run(PlanarRun):
     status = None
 
     def events(self, kind):
-        """Entries of the log of one kind (k, LOG_WIDTH)."""
-        log = np.concatenate(self.chunks) if self.chunks else np.zeros((0, LOG_WIDTH))
+        """Entries of the log of one kind (k, WIDTH)."""
+        log = np.concatenate(self.chunks) if self.chunks else np.zeros((0, WIDTH))
         return log[log[:, 1] == kind]
 
 
@@ -43,10 +42,8 @@ def planar_scene(data, *bodies, periods=1, gap=1.0, play=1.0):
 
 def open_run(scene, periods, events, samples=0):
     """A run of a scene that has not begun."""
-    flat = assemble(scene)
-    system = planar_system(scene, flat)
-    records = new_records(flat, periods, samples)
-    return Run(flat, system, planar_motion(scene, flat, system), records, True, events)
+    system = assemble(scene)
+    return Run(system, initial_motion(scene, system), new_records(system, periods, samples), True, events)
 
 
 def run_planar(scene, periods, events=10**7, samples=0):
@@ -58,10 +55,9 @@ def run_planar(scene, periods, events=10**7, samples=0):
 
 def witness(scene, periods, steps, samples=0, **options):
     """The run of a scene by time stepping, with its status."""
-    flat = assemble(scene)
-    records = new_records(flat, periods, samples)
-    taken = moreau.Options(steps_per_period=steps, **options)
-    run = moreau.begin_planar(scene, flat, taken, records, True)
+    system = assemble(scene)
+    taken = scene.replace({f"solver.{name}": value for name, value in {"method": "moreau", "steps_per_period": steps, **options}.items()})
+    run = moreau.begin(taken, system, new_records(system, periods, samples), True)
     return run, run.advance_to(periods)
 
 

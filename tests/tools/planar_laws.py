@@ -18,7 +18,6 @@ import numpy as np
 from scipy.linalg import expm, null_space
 
 from tests.tools.planar import Run, open_run
-from vanedamp.coupling.system.system import System
 from vanedamp.coupling.exact.complex_modes import IllConditioned
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS
@@ -43,6 +42,7 @@ from vanedamp.coupling.planar.automaton import advance, begin
 from vanedamp.coupling.planar.contact_flow import add_flow
 from vanedamp.coupling.response.records import FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
 

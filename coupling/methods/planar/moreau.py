@@ -13,7 +13,6 @@ import math
 
 import numpy as np
 
-from vanedamp.coupling.system.system import System
 from vanedamp.coupling.methods.planar.step_records import (
     account_step,
     drag_slider,
@@ -25,6 +24,7 @@ from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD
 from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
 from vanedamp.coupling.system.restitution import restitution_at
+from vanedamp.coupling.system.system import System
 
 #: problems that a step may take, the last with all contacts at once
 _TURNS = 20

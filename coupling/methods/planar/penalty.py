@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.system import STOP, System
 from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, contact_spring
 from vanedamp.coupling.methods.planar.step_records import (
     account_step,
@@ -23,6 +22,7 @@ from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD
 from vanedamp.coupling.numerics.jit import entry, inlined
 from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
+from vanedamp.coupling.system.system import STOP, System
 from vanedamp.files.toml_input import InputError
 
 

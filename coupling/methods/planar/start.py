@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from vanedamp.coupling.system.system import System, on_structure
-from vanedamp.coupling.system.assembly import Motion, assemble, initial_motion
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid, time_grid
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import Loads, assemble, with_sine
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import Motion, initial_motion, loads_of
+from vanedamp.coupling.system.system import System, on_structure
 
 
 def planar_start(scene: Scene, system: System, steps: int) -> tuple[System, Motion, TimeGrid]:

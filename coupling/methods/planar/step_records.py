@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.assembly import Motion
-from vanedamp.coupling.system.system import FLOOR, System
 from vanedamp.coupling.numerics.codes import (
     COUNTERS,
     DIVERGED,
@@ -33,6 +31,8 @@ from vanedamp.coupling.response.records import (
     VISCOUS,
     Records,
 )
+from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.system import FLOOR, System
 
 #: a motion above this, in m or m/s, has no physical meaning
 _BOUND = 1e30
@@ -79,9 +79,7 @@ class SteppedMotion(NamedTuple):
     listed: np.ndarray  # (u,) int: units of the problem
 
 
-def start_steps(
-    system: System, initial: Motion, records: Records, spring: np.ndarray | None = None
-) -> SteppedMotion:
+def start_steps(system: System, initial: Motion, records: Records, spring: np.ndarray | None = None) -> SteppedMotion:
     """Return the motion at time zero. spring: (u,) as in SteppedMotion, rigid contacts unless given."""
     u, size, of_bodies = len(system.rest), len(system.mass), (len(records.peak), len(system.along))
     samples = len(records.samples)

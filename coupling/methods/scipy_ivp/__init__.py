@@ -6,15 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from vanedamp.coupling.system.assembly import assemble, initial_motion
-from vanedamp.coupling.system.system import on_structure
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.response.restart import line_start
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import PERIOD_SECONDS, PlanarOptions, SteppingOptions
-from vanedamp.coupling.system.assembly import InitialMotion
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import initial_motion
+from vanedamp.coupling.system.system import System, on_structure
 from vanedamp.files.toml_input import Positive, Real, Whole
 
 VARIANTS = (Variant("solve_ivp, DOP853 with events", "#a16207", ">", setting="rtol", tolerance=True),)
@@ -41,19 +40,12 @@ class Options(SteppingOptions, PlanarOptions):
         return PERIOD_SECONDS + _STEP_SECONDS * self.steps_per_period
 
 
-def begin(system: System, options: Options, initial: InitialMotion, records: Records, events: bool) -> Run:
-    """Return a run."""
-    from vanedamp.coupling.methods.scipy_ivp.run import IvpRun  # its kernels are loaded when they are wanted
+def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
+    """Return a run. Raises InputError for bodies in the plane that overlap at the start."""
+    if scene.planar:  # kernels are loaded when they are wanted
+        from vanedamp.coupling.methods.scipy_ivp.planar_run import PlanarIvpRun
 
-    return IvpRun(system, options, initial, records, events)
+        return PlanarIvpRun(on_structure(system), scene.solver, initial_motion(scene, system), records, events)
+    from vanedamp.coupling.methods.scipy_ivp.run import IvpRun
 
-
-def begin_planar(scene: Scene, flat: System, options: Options, records: Records, events: bool) -> Run:
-    """Return a run of bodies with extent. flat: the scene's system with every body as a slider.
-
-    Raises InputError for what bodies with extent do not allow.
-    """
-    from vanedamp.coupling.methods.scipy_ivp.planar_run import PlanarIvpRun
-
-    system = on_structure(planar_system(scene, flat))
-    return PlanarIvpRun(flat, system, options, planar_motion(scene, flat, system), records, events)
+    return IvpRun(system, *line_start(scene, system), scene.solver, records, events)

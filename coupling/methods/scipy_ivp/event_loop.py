@@ -10,6 +10,7 @@ import numpy as np
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.arcs import Arc
 from vanedamp.coupling.response.evaluation import Outcome, Plane
+from vanedamp.coupling.response.event_log import Rows
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.system import System
 
@@ -28,10 +29,10 @@ class EventLoop(ABC):
 
     AT_ONCE: ClassVar[float]
 
-    def __init__(self, flat: System, options: Options, record: Any, y: np.ndarray) -> None:
-        self.flat, self.options, self.record, self.y = flat, options, record, y
+    def __init__(self, whole: System, rows: Rows, options: Options, record: Any, y: np.ndarray) -> None:
+        self.whole, self.rows, self.options, self.record, self.y = whole, rows, options, record, y
         self.steps = options.steps_per_period
-        self.time, self.step = 0.0, flat.period / self.steps
+        self.time, self.step = 0.0, whole.period / self.steps
         self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, 0.0
         self.begun = False
 
@@ -54,9 +55,9 @@ class EventLoop(ABC):
         """Return the results of the run."""
         record = self.record
         return Outcome(
-            self.flat, record.records, record.period, self.events, _OPEN_LEDGER * max(self.options.rtol, _LEAST),
+            self.whole, record.records, record.period, self.events, _OPEN_LEDGER * max(self.options.rtol, _LEAST),
             {"impacts": record.impacts, "evaluations": self.evaluations},
-            [np.array(record.log)] if record.log else [], max(record.deep, 0.0), self._plane(),
+            [np.array(record.log)] if record.log else [], self.rows, max(record.deep, 0.0), self._plane(),
         )  # fmt: skip
 
     def final(self) -> None:
@@ -82,7 +83,7 @@ class EventLoop(ABC):
             self._go_on()
             return self._end_period()
         self.events += 1
-        self.standing = self.standing + 1 if arc.duration < self.AT_ONCE * self.flat.period else 0
+        self.standing = self.standing + 1 if arc.duration < self.AT_ONCE * self.whole.period else 0
         if self.standing > STANDING:
             return Status.UNDECIDED
         return Status.OK if self._happen(arc.event) else Status.UNDECIDED

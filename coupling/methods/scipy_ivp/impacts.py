@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.methods.scipy_ivp.motion import Unforced
 from vanedamp.coupling.numerics.codes import AT_LOW, DEPENDENT
 from vanedamp.coupling.numerics.complementarity import Problem, solve_box
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.coupling.system.restitution import restitutions_at
 
 #: a flight shorter than this share of a period, and all that follow it, are the end of a chatter

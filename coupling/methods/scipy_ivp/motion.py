@@ -1,20 +1,20 @@
 """The motion between two events as a linear system, for an integrator: rates, forces of rows and event functions.
 
 The state z = (p, d, p', s) holds the structure's modal coordinates, the displacements of all rows (slips, elongations
-of springs before sliders, gaps; system.constraints), and both their rates. That gaps are differences of slips is a
+of springs before sliders, gaps; system.line_system), and both their rates. That gaps are differences of slips is a
 linear invariant, which Runge-Kutta methods keep to round-off; and a closed gap, or a slip that sticks, is zero to the
 last bit. With 1, cos and sin of the excitation's harmonics behind it, everything is a linear functional of this
 extended state.
 """
 
 from __future__ import annotations
-from vanedamp.coupling.system.line_system import LineSystem
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.system.line_system import LineSystem
 
 # states of a row: no force; at rest by an unknown force; at rest while other rows carry its force, which is constant;
 # sliding; a spring that holds or presses; a soft contact that has ended at zero force, before its gap is open

@@ -8,7 +8,6 @@ complementarity). Impacts are the same question for velocities and impulses.
 """
 
 from __future__ import annotations
-from vanedamp.coupling.system.system import System
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations, islice, product
@@ -16,6 +15,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from vanedamp.coupling.system.system import System
 
 #: states of a unit; a closed contact without friction slips to the right
 OPEN, STICK, LEFT, RIGHT = range(4)

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.system.system import FLOOR
 from vanedamp.coupling.methods.scipy_ivp.planar_contacts import OPEN, ROUND_OFF, Impact, Unforced
 from vanedamp.coupling.numerics.codes import COUNTERS, PERIOD
 from vanedamp.coupling.planar.recorder import record_section
 from vanedamp.coupling.response.recorder import cubic_extremum, note_step
 from vanedamp.coupling.response.records import ENERGIES, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS, Records
+from vanedamp.coupling.system.system import FLOOR
 
 #: the integrals
 _EXCITATION, _VISCOUS, _FRICTION, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN, _COUNT = range(9)

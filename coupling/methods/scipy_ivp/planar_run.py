@@ -1,6 +1,6 @@
 """Bodies with extent by scipy's DOP853, stopped at every event: an independent witness of the exact engine.
 
-It shares the rows of a scene with that engine (coupling.planar.constraints), but neither motion nor search nor
+It shares the rows of a scene with that engine (coupling.system.units), but neither motion nor search nor
 decisions nor impacts (methods.scipy_ivp.planar_contacts). Closed contacts are constraints on accelerations, impacts
 jumps between two integrations; events are searched on the solver's interpolant, where none can be missed
 (methods.scipy_ivp.root_search). Energies and harmonics are integrated along (methods.scipy_ivp.planar_records).
@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.system.system import System
-from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.event_loop import STANDING, EventLoop
@@ -29,8 +27,10 @@ from vanedamp.coupling.methods.scipy_ivp.planar_contacts import (
 from vanedamp.coupling.methods.scipy_ivp.planar_records import PlanarRecorder
 from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Plane
+from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.system.assembly import Motion as PlaneMotion
 from vanedamp.coupling.system.system import System
 
 #: the shortest first step, as a share of a period
@@ -43,22 +43,17 @@ _CHATTER = 1e-6
 
 
 class PlanarIvpRun(EventLoop):
-    """A run by solve_ivp: state y = (q, v, integrals) and the states of the units. Times count from the period's start.
-
-    flat: the scene's system with every body as a slider.
-    """
+    """A run by solve_ivp: state y = (q, v, integrals), states of the units. Times count from the period's start."""
 
     AT_ONCE = 1e-13
 
-    def __init__(
-        self, flat: System, system: System, options: Options, initial: Motion, records: Records,
-        events: bool,
-    ) -> None:  # fmt: skip
+    def __init__(self, system: System, options: Options, initial: PlaneMotion, records: Records, events: bool) -> None:
         self.system = system
         self.free = free = Unforced(system)
         record = PlanarRecorder(free, records, options.steps_per_period, events)
-        super().__init__(flat, options, record, np.concatenate([initial.q, initial.v, np.zeros(record.count)]))
-        self.sizes = self.record.sizes(float(flat.omega))
+        start = np.concatenate([initial.q, initial.v, np.zeros(record.count)])
+        super().__init__(system, rows_of_units(system), options, record, start)
+        self.sizes = self.record.sizes(float(system.omega))
         self.absolute = options.rtol * self.sizes
         self.state, self.struck = np.full(free.u, OPEN), np.full(free.u, -np.inf)  # times of the last impacts
         self.motion: Motion

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.arcs import Arc, first_step, integrate
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
@@ -31,7 +30,10 @@ from vanedamp.coupling.methods.scipy_ivp.motion import (
     Unforced,
 )
 from vanedamp.coupling.numerics.complementarity import new_problem
+from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records
+from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
+from vanedamp.coupling.system.system import System
 
 #: the shortest first step, as a share of a period
 _SHORTEST = 1e-26
@@ -45,12 +47,13 @@ class IvpRun(EventLoop):
     AT_ONCE = COLLAPSE
 
     def __init__(
-        self, system: LineSystem, options: Options, initial: InitialMotion, records: Records, events: bool
-    ) -> None:
+        self, whole: System, system: LineSystem, initial: InitialMotion, options: Options, records: Records,
+        events: bool,
+    ) -> None:  # fmt: skip
         self.system = system
         self.unforced = u = Unforced(system)
         record = Recorder(u, records, options.steps_per_period, events)
-        super().__init__(system, options, record, np.zeros(u.size + record.count))
+        super().__init__(whole, rows_of_line(whole), options, record, np.zeros(u.size + record.count))
         self.y[u.p], self.y[u.d] = initial.p, initial.displacement
         self.y[u.p_rate], self.y[u.s] = initial.p_rate, initial.velocity
         self.problem = new_problem(u.r)
