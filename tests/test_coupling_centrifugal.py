@@ -156,7 +156,7 @@ def test_an_inclined_cavity_pulls_the_body_to_its_left_wall():
 
 def test_a_normal_load_of_its_own_needs_no_radius():
     made = scene({"friction": 0.3, "normal_load": 7.0}, cavity={"radius": None})
-    assert assemble(made).limit[0] == pytest.approx(2.1, rel=1e-15)
+    assert assemble(made).holds[0] == pytest.approx(2.1, rel=1e-15)
 
 
 AXIS, POINT = np.array([0.6, 0.0, 0.8]), np.array([0.1, -0.2, 0.05])
@@ -203,7 +203,7 @@ def test_friction_and_pull_in_the_cavities_of_a_reduced_model(tmp_path):
         along, across, _ = by_hand(label)
         rest = np.linalg.norm(np.cross(SPEED * AXIS, np.cross(SPEED * AXIS, np.array(FLOORS[label][2]) - POINT)))
         assert system.weight[1 + i] == pytest.approx(MASS * along, rel=1e-12, abs=1e-12)
-        assert system.limit[i] == pytest.approx(0.25 * MASS * math.sqrt(rest**2 - along**2), rel=1e-12)
+        assert system.holds[i] == pytest.approx(0.25 * MASS * math.sqrt(rest**2 - along**2), rel=1e-12)
         if label != "a":  # whose load also has a part across the plane of motion: none
             assert abs(across) <= rest
     blocks = [body | {"shape": "block", "length": 0.02, "height": 0.01} for body in bodies]

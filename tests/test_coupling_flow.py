@@ -13,6 +13,7 @@ from scipy.linalg import expm, null_space
 from vanedamp.coupling.exact.subsystem_assembly import add_flow, empty_flows
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.line_system import line_system
 from vanedamp.coupling.system.modal_basis import ModalBasis
 from vanedamp.files.toml_input import validate
 
@@ -45,7 +46,8 @@ def random_system(seed, modes, bodies, labels, proportional=False):
     along = dict.fromkeys(rows, np.array([1.0, 0.0, 0.0]))
     unknown = dict.fromkeys(rows, np.zeros(3))
     stiffness = np.sort(rng.uniform(0.5, 25.0, modes))
-    system = assemble(scene, ModalBasis(stiffness, damping, np.zeros((modes, 3)), rows, along, unknown))
+    basis = ModalBasis(stiffness, damping, np.zeros((modes, 3)), rows, along, unknown)
+    system = line_system(assemble(scene, basis))
     # a base that moves at an angle of its own to each cavity
     shaken = 0.4j * system.of_bodies.mass * np.cos(np.maximum(np.arange(bodies) - 1, 0))
     return system._replace(load=np.r_[-1j * rng.uniform(-1.0, 1.0, modes), shaken][None], alike=False), rng

@@ -20,8 +20,10 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.response import records as recs
 from vanedamp.coupling.response.evaluation import Outcome
+from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.recorder import cubic_extremum, record_section
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import line_start
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import SteppingOptions
@@ -53,17 +55,18 @@ class Options(SteppingOptions):
         return 50e-6 * self.steps_per_period
 
 
-def begin(system, options, initial, records, events):
+def begin(scene, system, records, events):
     """Return a run. Raises InputError for friction dampers with springs."""
-    if np.isfinite(system.spring[: system.friction_rows]).any():
+    if np.isfinite(system.casing_spring).any():
         raise InputError("solver.method: leapfrog knows no springs of friction dampers; take another")
-    return Leapfrog(system, options, initial, records)
+    return Leapfrog(system, *line_start(scene, system), scene.solver, records)
 
 
 class Leapfrog:
     """A run."""
 
-    def __init__(self, system, options, initial, records):
+    def __init__(self, whole, system, initial, options, records):
+        self.whole, self.rows = whole, rows_of_line(whole)
         self.h, friction = system.period / options.steps_per_period, system.friction_rows
         spring, dashpot, reduced = system.spring.copy(), system.dashpot.copy(), 1 / np.diag(system.delassus)
         for r in np.flatnonzero(np.isinf(spring)):
@@ -162,7 +165,8 @@ class Leapfrog:
     def outcome(self):
         """What the run leaves behind."""
         impacts = int(self.records.impacts.sum())
-        return Outcome(self.system, self.records, self.period, impacts, 0.1, {"impacts": impacts}, [], self.deepest)
+        figures = {"impacts": impacts}
+        return Outcome(self.whole, self.records, self.period, impacts, 0.1, figures, [], self.rows, self.deepest)
 
     def final(self):
         """None: no run begins with the state of another."""

@@ -16,6 +16,7 @@ from vanedamp.coupling.exact.complex_modes import IllConditioned, complex_modes,
 from vanedamp.coupling.exact.subsystem_assembly import _about_centre, add_flow, empty_flows
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.line_system import line_system
 from vanedamp.coupling.system.modal_basis import ModalBasis
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.reduced import ReducedModel
@@ -50,7 +51,7 @@ def bar(modes, hanger, masses, restitution, damping, stiffness=1e7):
     basis = ModalBasis(
         omegas**2, matrix, np.zeros((modes, 3)), {"structure": shapes}, {"structure": np.array([1.0, 0.0, 0.0])}, {}
     )
-    return assemble(case.replace({"damper": bodies, "excitation.force": 1.0}), basis)
+    return line_system(assemble(case.replace({"damper": bodies, "excitation.force": 1.0}), basis))
 
 
 def error_of_flow(system, contacts, time):

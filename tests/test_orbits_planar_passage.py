@@ -50,11 +50,10 @@ def shaken(frequency, force, gravity, law, body):
 
 
 def frame_of(scene):
-    """The period map of a scene, its system with and without extent, and (q, q') at the start."""
+    """The period map of a scene, its system, and (q, q') at the start."""
     found = period_map(scene)
-    flat, system = found._frame.flat, found._frame.system
-    motion = planar_motion(scene, flat, system)
-    return found, flat, system, np.r_[motion.q, motion.v]
+    motion = initial_motion(scene, found._frame.system)
+    return found, found._frame.system, np.r_[motion.q, motion.v]
 
 
 def start_of(found, z):
@@ -100,12 +99,12 @@ CASES = {
 def test_matches_a_fixed_sequence_in_40_digits(case):
     """An error of a speed by round-off shifts an event by that over its rate."""
     scene, expected = CASES[case]
-    found, flat, system, z = frame_of(scene)
+    found, system, z = frame_of(scene)
     passage = found(start_of(found, z))
     assert passage.status is PassageStatus.OK
     names = {part for name in passage.sequence for part in name.split(", ")}
     assert set(expected) <= names
-    end, derivative = PlanarSequence(system, walk(flat, system, z)).passage(z)
+    end, derivative = PlanarSequence(system, walk(system, z)).passage(z)
     slowest = min(abs(crossing.speed) for crossing in passage.crossings)
     to_state, from_state = found._frame.to_state, found._frame.from_state
     size = np.abs(passage.derivative).max()
@@ -122,7 +121,7 @@ def directions(found, x):
     """Directions (k, m), in units of the scale, in which a state may move without breaking closed contacts."""
     frame = found._frame
     motion = Motion(*np.split(frame.from_state @ x, 2))
-    run = PlanarRun(frame.flat, frame.system, motion, new_records(frame.flat, 1, 0), True, 0)
+    run = PlanarRun(frame.system, motion, new_records(frame.system, 1, 0), True, 0)
     run.advance_to(1)
     held = frame.to_state @ Segment(run).begun() @ frame.from_state
     left, sizes, _ = np.linalg.svd(held / found.scale[:, None] * found.scale)
@@ -291,7 +290,7 @@ def flat_block(law):
 def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
     """Of springs and dashpots the order in which two corners meet a wall is no matter, to first order."""
     scene = flat_block(SPRING)
-    found, flat, system, z = frame_of(scene)
+    found, system, z = frame_of(scene)
     x, periods = start_of(found, z), 4
     passage = found.over(periods)(x)
     assert passage.status is PassageStatus.OK
@@ -302,7 +301,7 @@ def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
         tilted = x.copy()
         tilted[tilt] += way * 1e-8
         start = Motion(*np.split(found._frame.from_state @ tilted, 2))
-        run = PlanarRun(flat, system, start, new_records(flat, periods, 0), False, 10**6)
+        run = PlanarRun(system, start, new_records(system, periods, 0), False, 10**6)
         assert run.advance_to(periods) is Status.OK
         ends.append(found._frame.to_state @ np.r_[run.state.q, run.state.v])
     grown = (ends[0] - ends[1]) / 2e-8

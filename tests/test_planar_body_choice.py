@@ -81,9 +81,8 @@ def test_lift_is_counted_from_the_floor_that_moves():
         "damper.0.shape": "block", "cavity.c1.normal_motion": 0.5, "cavity.c1.rotation": 3.0,
         "initial.displacement": 1e-5, "initial.velocity": 0.2,
     })  # fmt: skip
-    flat = assemble(made)
-    system = planar_system(made, flat)
-    motion = planar_motion(made, flat, system)
+    system = assemble(made)
+    motion = initial_motion(made, system)
     on_floor = np.flatnonzero(system.surface == FLOOR)
     assert system.rest[on_floor] + system.J[on_floor] @ motion.q == pytest.approx(1e-5, rel=1e-9)
     assert (system.J[on_floor] @ motion.v) == pytest.approx(0.0, abs=1e-12)

@@ -8,6 +8,7 @@ from tests.test_planar_surfaces import FOUR, HEIGHT, cavity_scene, rigid_cavity
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.line_system import line_system
 from vanedamp.coupling.system.linear_response import glued_mass, linear_responses
 from vanedamp.coupling.system.system import BODY, FLOOR, LEFT, RIGHT
 from vanedamp.files.toml_input import validate
@@ -68,37 +69,47 @@ def test_rows_of_a_flat_block_are_those_of_the_slider(tmp_path, kind):
     """Gaps of all its corners at a wall, slips of both lower ones; mass but for its rotation and motion across."""
     surfaces = {"floor": "all"} if kind == "one label" else FOUR
     scene = two_blocks() if kind == "two on one mode" else rigid_blocks(tmp_path, surfaces)
-    slider = assemble(scene)  # every body as the slider that it is while it lies flat
-    if len(scene.damper) == 1:
-        np.testing.assert_array_equal(slider.J, assemble(as_sliders(scene)).J)
-    plane, n, b = planar_system(scene, slider), slider.modes, slider.bodies
+    plane = assemble(scene)
+    n, b = plane.modes, plane.bodies
+    height = [damper.height for damper in scene.damper]
+    # every body as the slider that it is while it lies flat, with neighbours of its own height
+    sliders = [
+        line_system(assemble(as_sliders(scene).replace({f"damper.{k}.height": own for k in range(b)})))
+        for own in height
+    ]
     lying = flat_motions(plane, n)
     rows, units = plane.J @ lying, len(plane.J) // 2
-    gaps = {LEFT: b, BODY: b + 1, RIGHT: len(slider.J) - 1}
+    gaps = {LEFT: b, RIGHT: len(sliders[0].J) - 1}
     for unit, surface in enumerate(plane.surface):
+        body = plane.body[unit]
         if surface == FLOOR:
-            np.testing.assert_allclose(rows[units + unit], slider.J[plane.body[unit]], atol=1e-12)
+            np.testing.assert_allclose(rows[units + unit], sliders[body].J[body], atol=1e-12)
             np.testing.assert_allclose(rows[unit] * (kind != "four patches"), 0.0, atol=1e-12)
         elif surface in gaps:
-            np.testing.assert_allclose(rows[unit], slider.J[gaps[surface]], atol=1e-12)
-    np.testing.assert_allclose(plane.floor[:, :n], slider.floor, atol=1e-14)
-    mass = lying.T @ (plane.mass[:, None] * lying) - np.diag(slider.mass)
+            np.testing.assert_allclose(rows[unit], sliders[body].J[gaps[surface]], atol=1e-12)
+        elif surface == BODY:
+            apart = np.r_[0.5 * (height[body + 1] - height[body]) * plane.turn[body, :n], -np.eye(b)[body]]
+            apart[n + body + 1] = 1.0
+            np.testing.assert_allclose(rows[unit], apart, atol=1e-12)
+    floor = np.array([sliders[k].floor[k] for k in range(b)])
+    np.testing.assert_allclose(plane.floor[:, :n], floor, atol=1e-14)
+    mass = lying.T @ (plane.mass[:, None] * lying) - np.diag(sliders[0].mass)
     inertia, weight = plane.mass[plane.tilt], plane.mass[plane.along]
     own = (plane.turn.T * inertia) @ plane.turn + (plane.rise.T * weight) @ plane.rise
     np.testing.assert_allclose(mass[:n, :n], own[:n, :n], atol=1e-12 * np.abs(mass).max())
     np.testing.assert_allclose(mass[n:], 0.0, atol=1e-15)
-    arm = 0.5 * np.array([damper.height for damper in scene.damper])[:, None]
+    arm = 0.5 * np.array(height)[:, None]
     without = assemble(as_sliders(scene).replace({f"damper.{k}.height": None for k in range(b)}))
-    np.testing.assert_allclose(without.floor - slider.floor, arm * plane.turn[:, :n], atol=1e-13)
-    assert np.abs(arm * plane.turn[:, :n]).max() > 0.01 * np.abs(slider.floor).max()
+    np.testing.assert_allclose(without.floor[:, :n] - floor, arm * plane.turn[:, :n], atol=1e-13)
+    assert np.abs(arm * plane.turn[:, :n]).max() > 0.01 * np.abs(floor).max()
 
 
 @pytest.mark.parametrize("height", [None, HEIGHT])
 def test_a_sprung_slider_has_the_arm_too(tmp_path, height):
     slider = {"cavity": "c1", "mass": 0.05, "stiffness": 10.0, "height": height, "friction": 0.2}
     scene = cavity_scene(rigid_cavity(tmp_path / "rom.h5"), FOUR, damper=[slider, slider])
-    flat = assemble(scene)
-    system = planar_system(scene, flat)
+    system = assemble(scene)
+    flat = line_system(assemble(scene.replace({f"damper.{k}.stiffness": None for k in range(2)})))
     in_order = [flat.friction_rows, flat.friction_rows + 1, flat.friction_rows + 2]
     found = {surface: system.J[unit] for unit, surface in enumerate(system.surface[: system.contacts])}
     for surface, row in zip((LEFT, BODY, RIGHT), in_order, strict=True):
@@ -149,7 +160,7 @@ def test_sliders_of_one_cavity_share_a_height():
         body(position=-4e-6, mass=1e-3), body(height=6e-3, position=4e-6, mass=3e-3), gravity=2e3, periods=100
     )
     system = assemble(scene)
-    np.testing.assert_allclose(system.floor * np.sqrt(MASS), 1.0 - TURNS * (3.5e-3 + 3 * 6e-3) / 8, rtol=1e-12)
+    np.testing.assert_allclose(system.floor[:, 0] * np.sqrt(MASS), 1.0 - TURNS * (3.5e-3 + 3 * 6e-3) / 8, rtol=1e-12)
     response = simulate(scene)
     assert response.status in ("ok", "not_steady") and abs(response.energy_residual) < 1e-10
     assert response.impacts_per_period > 0.5

@@ -233,8 +233,8 @@ def test_a_smaller_bound_unloads_the_spring():
     final = simulate(thrown(2)).final
     weak = [element | {"friction": 1e-3 * element["friction"]} for element in HELD["friction_damper"]]
     case = thrown(1, friction_damper=weak)
-    flat = assemble(case)
-    run = begin_run(case, flat, new_records(flat, 1, 0), True, 10**6, 0.1, final)
+    system = assemble(case)
+    run = begin_run(case, system, new_records(system, 1, 0), True, 10**6, final)
     found = run.system.elongation @ run.state.q
     np.testing.assert_allclose(np.abs(found), run.system.limit[-2:] / run.system.tangential, rtol=1e-9)
     assert run.advance_to(1) is Status.OK

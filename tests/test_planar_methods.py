@@ -35,9 +35,8 @@ SOLVERS = [
 def run_by(scene, samples=0, **solver):
     """The run of a scene's one period by a method, and its status."""
     method = METHODS[solver["method"]]
-    flat = assemble(scene)
-    records = new_records(flat, 1, samples)
-    run = method.begin_planar(scene, flat, method.Options(**solver), records, True)
+    system = assemble(scene)
+    run = method.begin(scene.replace({"solver": solver}), system, new_records(system, 1, samples), True)
     status = run.advance_to(1)
     return run, status
 

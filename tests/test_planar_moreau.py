@@ -13,7 +13,7 @@ from vanedamp.coupling.response.records import EXCITATION, FRICTION, IMPACT_LOSS
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.waveform import Waveform, register
-from vanedamp.coupling.system.assembly import assemble, initial_motion, loads_of
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import STRICT, InputError, validate
 
 BLOCK = {"shape": "block", "length": 0.02, "height": 0.01, "mass": 1.3}
@@ -113,11 +113,10 @@ def test_a_slider_moves_as_in_the_scheme_of_sliders(excitation):
     scene, _ = vane("slider", 20, **excitation)
     run, status = witness(scene, 20, 400, samples=4)
     assert status is Status.OK
-    flat = assemble(scene)
-    records = new_records(flat, 20, 4)
-    further = {"loads": loads_of(scene, scene.excitation.signal)} if scene.excitation.signal else {}
-    options = moreau.Options(steps_per_period=400)
-    other = moreau.begin(flat, options, initial_motion(scene, flat), records, True, **further)
+    stepped = scene.replace({"solver": {"method": "moreau", "steps_per_period": 400}})
+    system = assemble(scene)
+    records = new_records(system, 20, 4)
+    other = moreau.begin(stepped, system, records, True)
     assert other.advance_to(20) is Status.OK
     assert records.impacts.sum() > 20
     for name in ("peak", "section", "samples", "harmonic", "momentum", "square", "parts", "impacts", "collided"):

@@ -105,7 +105,7 @@ def test_unequal_restitution_brings_no_energy():
         coefficients = np.where(np.arange(u) == floor[0], *rng.permutation([0.1, 0.9]))
         system = opened.system._replace(restitution=coefficients)
         v = opened.state.v.copy()
-        run = Run(opened.flat, system, Motion(opened.state.q, v), new_records(opened.flat, 1, 0), True, 1)
+        run = Run(system, Motion(opened.state.q, v), new_records(system, 1, 0), True, 1)
         before = system.J @ v
         run.advance_to(1)
         hits = [hit for hit in run.events(IMPACT) if hit[0] == 0.0]

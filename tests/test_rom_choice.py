@@ -53,7 +53,7 @@ def scene(file, **changes):
 def springs(made):
     """(contacts,) stiffness of a scene's contacts, N/m."""
     system = assemble(made)
-    return system.spring[system.friction_rows :]
+    return system.spring[: system.contacts]
 
 
 def test_each_wall_yields_by_its_own_flexibility(tmp_path):

@@ -35,8 +35,9 @@ class SliderDynamics:
     """Flows of a system by the states of its rows (numerics.codes), and its rows as functionals of u.
 
     whole: the scene's system; system: its rows; scale: displacement per modal coordinate. place, speed: (r, k)
-    functionals of u, displacement less rest and velocity of each row; springs: rows of Jenkins elements; to_state, from_state: (k, k)
-    between u and the state of the contract (orbits.passage); sizes: (k,) of that state in a typical motion.
+    functionals of u, displacement less rest and velocity of each row; springs: rows of Jenkins elements; to_state,
+    from_state: (k, k) between u and the state of the contract (orbits.passage); sizes: (k,) of that state in a typical
+    motion.
     """
 
     def __init__(self, whole: System, sizes: np.ndarray | None = None) -> None:

@@ -45,4 +45,4 @@ def _floor_shares(scene: Scene) -> np.ndarray:
         return np.ones(system.bodies)
     nearest = int(np.argmin(np.abs(np.sqrt(system.of_structure.stiffness) - system.omega)))
     at = system.of_structure.response[nearest]
-    return system.floor[:, nearest] / at if at else np.zeros(system.bodies)
+    return np.asarray(system.floor[:, nearest]) / at if at else np.zeros(system.bodies)

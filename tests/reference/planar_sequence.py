@@ -53,10 +53,10 @@ class Step(NamedTuple):
     compression: np.ndarray | None = None
 
 
-def walk(flat: System, system: System, z: np.ndarray) -> list[Step]:
+def walk(system: System, z: np.ndarray) -> list[Step]:
     """Return the steps of one period that begins with z = (q, q'), as the engine takes them."""
     u = len(system.rest)
-    run = PlanarRun(flat, system, Motion(*np.split(z, 2)), new_records(flat, 1, 0), True, 0)
+    run = PlanarRun(system, Motion(*np.split(z, 2)), new_records(system, 1, 0), True, 0)
     assert run.advance_to(1) is Status.EVENT_BUDGET
     steps, counters = [], run.state.counters
     while counters[PERIOD] == 0:

@@ -15,7 +15,7 @@ import numpy as np
 from tests.tools.scene_strategies import scene_of
 from tests.tools.segment_stepper import Segment, Stepper
 from vanedamp.coupling.numerics.codes import DONE, OPEN, PERIOD
-from vanedamp.coupling.response.evaluation import events_of
+from vanedamp.coupling.response.event_log import events_of, rows_of_line
 from vanedamp.coupling.system.system import System
 
 #: perturbation of the runs that measure chaos, as a share of lengths and masses
@@ -56,7 +56,7 @@ def record(data: dict, change=None) -> Record:
     code = run.advance(stepper.periods, stepper.budget) if code == DONE else code
     hits: dict = defaultdict(list)
     before, together = (-np.inf, (-1, "")), np.inf
-    for event in events_of(run.system, run.log.chunks):
+    for event in events_of(rows_of_line(run.whole), run.log.chunks):
         if event.kind == "impact":
             time, contact = event.time / run.system.period, (event.damper, event.side)
             hits[contact].append((time, event.relative_velocity_before))

@@ -43,7 +43,7 @@ class Chain:
             time={"periods": 1, "transient": 0},
         )
         system = assemble(data)
-        rows = np.array([system.floor[0], system.of_structure.response])
+        rows = np.array([system.floor[0, :2], system.of_structure.response])
         modal = np.linalg.solve(rows, state.reshape(2, 2).T)
         slip, speed = np.array([GAP - _HALF_GAP - state[0]]), np.array([-state[2]])
         start = RestartState(modal[:, 0], modal[:, 1], slip, speed, np.zeros(0), np.full(2, 2 * _HALF_GAP))

@@ -68,7 +68,7 @@ def explicit_run(
     steps = math.ceil(2 * math.pi / omega * highest / (2 * share))
     h, load, half = 2 * math.pi / omega / steps, excitation_force(scene), scene.cavity[0].gap / 2
     start, peak = np.array([scene.damper[0].position, scene.damper[0].velocity]), np.zeros(periods)
-    contact = np.array([half, system.spring[-1], system.dashpot[-1], scene.damper[0].mass])
+    contact = np.array([half, system.spring[0], system.dashpot[0], scene.damper[0].mass])
     arrays = (stiffness.indptr, stiffness.indices, stiffness.data, mass, *_sparse(response), *_sparse(wall))
     angle = 2 * np.pi * np.arange(steps) / steps
     phase = load * sum((share * np.exp(1j * order * angle)).imag for order, share in scene.excitation.shares.items())

@@ -14,8 +14,9 @@ import numpy as np
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.run import Arc, IvpRun
 from vanedamp.coupling.response.records import new_records
+from vanedamp.coupling.response.restart import line_start
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble, initial_motion
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.studies.bench.methods.peers import PeerRun
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
     options = Options(rtol=setting, steps_per_period=_STEPS)
     options.check_samples(samples)
     records = new_records(system, periods, samples)
-    job = CvodeRun(system, options, initial_motion(scene, system), records, False)
+    job = CvodeRun(system, *line_start(scene, system), options, records, False)
     started = time.thread_time()
     status = job.advance_to(periods)
     seconds = time.thread_time() - started

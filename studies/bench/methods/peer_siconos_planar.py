@@ -16,7 +16,7 @@ from vanedamp.coupling.methods.equations_of_motion import time_grid
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid
-from vanedamp.coupling.system.assembly import assemble, physical_scale
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.bench.methods.peers import DEEPEST, PeerRun
@@ -28,20 +28,20 @@ _TOLERANCE, _SWEEPS = 1e-12, 100_000
 def run_block(scene: Scene, periods: int, steps: int, samples: int) -> PeerRun:
     """Run a scene of one block with `steps` steps a period. Raises InputError for any other scene."""
     _check(scene)
-    flat = assemble(scene)
-    times, n, body, cavity = time_grid(flat, steps), flat.modes, scene.damper[0], scene.cavity[0]
+    whole = assemble(scene)
+    times, n, body, cavity = time_grid(whole, steps), whole.modes, scene.damper[0], scene.cavity[0]
     a, b = body.half_extent
     q, v = np.zeros(n + 3), np.zeros(n + 3)
-    scale = physical_scale(scene, flat)
+    scale = whole.scale
     q[:n], v[:n] = scene.initial.displacement / scale, scene.initial.velocity / scale
-    floor = flat.floor[0]
+    floor = whole.floor[0, :n]
     q[n:] = body.position + floor @ q[:n], body.lift + a * abs(body.tilt), body.tilt
     v[n:] = body.velocity + floor @ v[:n], body.lift_velocity, body.tilt_rate
     gaps = _gaps(floor, a, b, cavity.gap, cavity.play or 0.0)
-    simulation, system, kept = _model(scene, flat, q, v, gaps, periods, times.step)
-    phases = flat.phases(flat.omega * times.step * (np.arange(steps) + 0.5))
+    simulation, system, kept = _model(scene, whole, q, v, gaps, periods, times.step)
+    phases = whole.phases(whole.omega * times.step * (np.arange(steps) + 0.5))
     loads = np.zeros((steps, n + 3))
-    loads[:, : n + 1] = (phases @ flat.load).real + flat.weight
+    loads[:, : n + 1] = (phases @ whole.load[:, : n + 1]).real + whole.weight[: n + 1]
     # across the cavity the body's weight presses it to the floor
     loads[:, n + 1] = -body.mass * scene.gravity.acceleration * np.cos(np.radians(scene.gravity.orientation_deg))
     force, place = system.fExt(), system.q()
@@ -55,7 +55,7 @@ def run_block(scene: Scene, periods: int, steps: int, samples: int) -> PeerRun:
         path[k + 1] = place
     seconds = time.thread_time() - started
     del kept
-    x = path[:-1, :n] @ flat.response[:n] + np.tile(times.table[:-1, 0], periods)
+    x = path[:-1, :n] @ whole.response[:n] + np.tile(times.table[:-1, 0], periods)
     every = np.arange(0, periods * steps, steps // samples) if samples else np.zeros(0, int)
     slip = path[every, n] - path[every, :n] @ floor
     deep = max(float((-(rest + path @ normal)).max() / play) for normal, _, rest, play in gaps)
@@ -94,21 +94,21 @@ def _gaps(
 
 
 def _model(
-    scene: Scene, flat: System, q: np.ndarray, v: np.ndarray, gaps: list[tuple[np.ndarray, np.ndarray, float, float]],
+    scene: Scene, whole: System, q: np.ndarray, v: np.ndarray, gaps: list[tuple[np.ndarray, np.ndarray, float, float]],
     periods: int, step: float,
 ) -> tuple[Any, Any, list[Any]]:  # fmt: skip
     """Return simulation, dynamical system, and the objects that must live as long as they do."""
     import siconos.kernel as kernel
 
-    n, body = flat.modes, scene.damper[0]
+    n, body = whole.modes, scene.damper[0]
     mass, stiffness, damping = (
         np.diag(np.r_[np.ones(n), body.mass, body.mass, body.moment_of_inertia]),
         *np.zeros((2, n + 3, n + 3)),
     )
-    stiffness[:n, :n], damping[:n, :n] = np.diag(flat.stiffness[:n]), flat.damping[:n, :n]
+    stiffness[:n, :n], damping[:n, :n] = np.diag(whole.squares), whole.viscous
     system = kernel.LagrangianLinearTIDS(q.copy(), v.copy(), mass, stiffness, damping)
     system.setFExtPtr(np.zeros(n + 3))
-    world = kernel.NonSmoothDynamicalSystem(0.0, (periods + 1) * flat.period)
+    world = kernel.NonSmoothDynamicalSystem(0.0, (periods + 1) * whole.period)
     world.insertDynamicalSystem(system)
     kept: list[Any] = [world]
     for normal, slip, rest, _ in gaps:

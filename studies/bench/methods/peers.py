@@ -15,9 +15,10 @@ import numpy as np
 
 from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart import line_start
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import assemble, initial_motion
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.assembly import assemble
+from vanedamp.coupling.system.line_system import LineSystem
 from vanedamp.files.toml_input import InputError
 
 #: share of the free travel by which a body may overlap a wall, as for our methods
@@ -91,7 +92,7 @@ def run_peer(name: str, scene: Scene, periods: int, setting: float, samples: int
 class Coupled(NamedTuple):
     """A scene as M q'' + C q' + K q = loads + J^T lambda, the steps of a period, and its state at time zero."""
 
-    system: System
+    system: LineSystem
     times: TimeGrid
     motion: Motion
 
@@ -108,8 +109,8 @@ def one_restitution(name: str, scene: Scene) -> None:
 
 def coupled(scene: Scene, steps: int) -> Coupled:
     """Return the matrices of our own stepping methods, with the given number of steps a period."""
-    system = assemble(scene)
-    return Coupled(system, time_grid(system, steps), start(system, initial_motion(scene, system)))
+    system, initial = line_start(scene, assemble(scene))
+    return Coupled(system, time_grid(system, steps), start(system, initial))
 
 
 def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:
