@@ -65,7 +65,7 @@ class Options(SteppingOptions, PlanarOptions):
 
 def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
     """Return a run. Raises InputError for bodies that overlap at the start."""
-    options = scene.solver
+    options: Any = scene.solver
     if scene.planar:
         return _begin_planar(scene, system, options, records, events)
     line, initial = line_start(scene, system)

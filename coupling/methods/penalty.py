@@ -31,6 +31,7 @@ VARIANTS = (
     Variant("penalty, HHT", "#0e7490", "^", {"scheme": "hht"}),
 )
 WAVEFORMS = True
+PLANAR_LAWS: tuple[str, ...] = ()
 RUBBING_WARNING = (
     "impacts of bodies with extent on springs that rub leave other speeds than Newton's law, with any number of steps; "
     'take "exact" or "moreau" for amplitudes'
@@ -60,7 +61,7 @@ def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
     Raises InputError for a rigid contact of restitution 0, and in the plane for implicit schemes and for bodies that
     overlap at the start.
     """
-    options = scene.solver
+    options: Any = scene.solver
     if scene.planar:
         return _begin_planar(scene, system, options, records, events)
     line, initial = line_start(scene, system)

@@ -70,16 +70,17 @@ def _check_bodies(scene: Scene, method: Method) -> None:
         return
     laws = {name: getattr(part, "PLANAR_LAWS", None) for name, part in METHODS.all().items()}
     law, name = scene.contact, scene.solver.method
-    if laws[name] is None:
-        able = [other for other, taken in laws.items() if taken is not None]
+    taken = laws[name]
+    if taken is None:
+        able = [other for other, known in laws.items() if known is not None]
         raise InputError(
             f"solver.method: {name} takes sliders only, and no impacts of two phases; bodies with "
             f'extent, stiffness or dashpot and contact.law = "{law.law}" are for {" or ".join(able)}'
         )
     asked = {"yields": not law.rigid, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
     wanted = {ability for ability, needs in asked.items() if needs}
-    if not wanted <= set(laws[name]):
-        able = [other for other, taken in laws.items() if taken is not None and wanted <= set(taken)]
+    if not wanted <= set(taken):
+        able = [other for other, known in laws.items() if known is not None and wanted <= set(known)]
         raise InputError(
             f'contact.law: "{law.law}" of bodies with extent, stiffness or dashpot, and of impacts in two phases, is '
             f"for solver.method {' or '.join(able)}, not {name}"

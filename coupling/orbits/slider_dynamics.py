@@ -74,7 +74,7 @@ class SliderDynamics:
         modes, bodies = system.of_structure, system.of_bodies
         load = modes.load + bodies.load @ system.floor
         omega = system.frequency[:, None, None]
-        dynamic = np.diag(modes.stiffness) + 1j * omega * modes.damping - omega**2 * glued_mass(system)
+        dynamic = np.diag(modes.stiffness) + 1j * omega * modes.damping - omega**2 * glued_mass(self.whole)
         try:
             amplitude: np.ndarray = np.linalg.solve(dynamic, load[:, :, None])[:, :, 0]
         except np.linalg.LinAlgError:

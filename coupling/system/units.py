@@ -205,7 +205,7 @@ def stops_of(scene: Scene, law: Law, reach: np.ndarray, start: float) -> Iterato
         moved = float(np.abs(normal[:n]) @ reach) + start + np.finfo(float).tiny
         yield Unit(
             normal, np.zeros(size), stop.gap, element=law.element(normal, stop.restitution, yields),
-            play=max(stop.gap, moved), body=number, surface=STOP,
+            play=max(float(stop.gap), moved), body=number, surface=STOP,
         )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -16,6 +16,7 @@ from vanedamp.coupling.system.assembly import initial_motion
 from vanedamp.coupling.system.system import System, on_structure
 from vanedamp.files.toml_input import Positive, Real, Whole
 
+PLANAR_LAWS: tuple[str, ...] = ()
 VARIANTS = (Variant("solve_ivp, DOP853 with events", "#a16207", ">", setting="rtol", tolerance=True),)
 #: processor time of a step, s
 _STEP_SECONDS = 1e-3
@@ -42,10 +43,11 @@ class Options(SteppingOptions, PlanarOptions):
 
 def begin(scene: Scene, system: System, records: Records, events: bool) -> Run:
     """Return a run. Raises InputError for bodies in the plane that overlap at the start."""
+    options: Any = scene.solver
     if scene.planar:  # kernels are loaded when they are wanted
         from vanedamp.coupling.methods.scipy_ivp.planar_run import PlanarIvpRun
 
-        return PlanarIvpRun(on_structure(system), scene.solver, initial_motion(scene, system), records, events)
+        return PlanarIvpRun(on_structure(system), options, initial_motion(scene, system), records, events)
     from vanedamp.coupling.methods.scipy_ivp.run import IvpRun
 
-    return IvpRun(system, *line_start(scene, system), scene.solver, records, events)
+    return IvpRun(system, *line_start(scene, system), options, records, events)
