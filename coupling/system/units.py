@@ -202,10 +202,10 @@ def stops_of(scene: Scene, law: Law, reach: np.ndarray, start: float) -> Iterato
         normal = np.zeros(size)
         normal[:n] = np.sum([towards * sign * row for sign, row in places], 0)
         yields = sum(law.basis.flexibility({label: 1.0}) for label, _, _ in ends)
-        moved = float(np.abs(normal[:n]) @ reach) + start + np.finfo(float).tiny
+        moved = float(np.abs(normal[:n]) @ reach + start + np.finfo(float).tiny)
         yield Unit(
             normal, np.zeros(size), stop.gap, element=law.element(normal, stop.restitution, yields),
-            play=max(float(stop.gap), moved), body=number, surface=STOP,
+            play=max(stop.gap, moved), body=number, surface=STOP,
         )  # fmt: skip
 
 
