@@ -175,7 +175,7 @@ def random_start(seed, law):
         scene = scene_of(table)
         if not scene.planar:
             return None
-        found, _, _, z = frame_of(scene)
+        found, _, z = frame_of(scene)
     except InputError:
         return None
     return found, start_of(found, z)
@@ -250,7 +250,7 @@ def beside_elements(law, body, **excitation):
 )
 def test_jenkins_elements_beside_bodies(law, body):
     """Their elongations are states; one that slides forgets its own, as differences of the engine say."""
-    found, _, _, z = frame_of(beside_elements({"law": law}, body))
+    found, _, z = frame_of(beside_elements({"law": law}, body))
     assert found.names[-2:] == ("friction damper 0 elongation", "friction damper 2 elongation")
     x = found(start_of(found, z)).state
     assert np.all(np.abs(x[-2:]) > 1e-3)
@@ -313,7 +313,7 @@ def test_tilt_of_an_aligned_block_grows_as_the_derivative_says():
 
 def test_an_aligned_block_that_hits_rigid_walls_has_no_derivative_of_its_tilt():
     """However small its tilt is, it leaves the wall with a rate of tilt that is not."""
-    found, _, _, z = frame_of(flat_block({"law": "newton"}))
+    found, _, z = frame_of(flat_block({"law": "newton"}))
     x = start_of(found, z)
     passage = found(x)
     assert passage.status is PassageStatus.COINCIDENT
@@ -336,7 +336,7 @@ def test_an_orbit_without_derivative_is_not_called_stable():
         "contact": {"law": "newton"},
     }  # fmt: skip
     body = BLOCK | {"friction": 0.0, "restitution": 0.6, "lift": 0.2, "velocity": 0.3}
-    found, _, _, z = frame_of(planar_scene(table, body, gap=3.0, play=0.5))
+    found, _, z = frame_of(planar_scene(table, body, gap=3.0, play=0.5))
     state = start_of(found, z)
     for _ in range(250):
         state = found(state).state
@@ -385,14 +385,14 @@ def test_a_block_that_sticks_to_its_floor_is_an_orbit():
 
 
 def test_state_and_restart_are_inverse():
-    found, _, _, z = frame_of(CASES["disc on springs"][0])
+    found, _, z = frame_of(CASES["disc on springs"][0])
     x = start_of(found, z)
     np.testing.assert_array_equal(found.state_of(found.restart_of(x)), x)
 
 
 def test_two_periods_are_one_after_the_other():
     """Springs that are compressed as a period ends go on in the next one."""
-    found, _, _, z = frame_of(CASES["disc that a spring pushes again"][0])
+    found, _, z = frame_of(CASES["disc that a spring pushes again"][0])
     x = start_of(found, z)
     for _ in range(3):
         one = found(x)
@@ -406,7 +406,7 @@ def test_two_periods_are_one_after_the_other():
 
 def test_mirror_image():
     """The image of a motion half a period later is a motion: twice it is a period."""
-    found, _, _, z = frame_of(CASES["block that rocks and hits"][0])
+    found, _, z = frame_of(CASES["block that rocks and hits"][0])
     x = start_of(found, z)
     image = found.mirrored(x)
     passage = found(x)
@@ -416,7 +416,7 @@ def test_mirror_image():
 
 def test_no_mirror_image_where_gravity_pulls_along():
     scene = CASES["block that rocks and hits"][0].replace({"gravity.orientation_deg": 30.0})
-    found, _, _, z = frame_of(scene)
+    found, _, z = frame_of(scene)
     assert found.mirrored(start_of(found, z)) is None
 
 
@@ -431,14 +431,14 @@ def grazed(share: float) -> Scene:
 
 
 def test_a_tangential_impact_is_grazing():
-    found, _, _, z = frame_of(grazed(-1e-13))
+    found, _, z = frame_of(grazed(-1e-13))
     passage = found(start_of(found, z))
     assert passage.status is PassageStatus.GRAZING
 
 
 @pytest.mark.parametrize("share", [1e-2, 1e-6])
 def test_clearance_of_an_impact_that_nearly_happens(share):
-    found, _, _, z = frame_of(grazed(share))
+    found, _, z = frame_of(grazed(share))
     passage = found(start_of(found, z))
     assert passage.status is PassageStatus.OK
     distance, name = passage.clearance
@@ -453,7 +453,7 @@ def test_a_passage_that_begins_as_a_body_begins_to_slip_is_grazing():
 
 
 def test_a_state_that_is_no_number_stops():
-    found, _, _, z = frame_of(CASES["disc on springs"][0])
+    found, _, z = frame_of(CASES["disc on springs"][0])
     assert found(np.full(len(z), np.nan)).status is PassageStatus.STOPPED
 
 
