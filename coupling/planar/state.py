@@ -84,7 +84,7 @@ class Scratch(NamedTuple):
     before: np.ndarray  # (u,) int: states before the event
     listed: np.ndarray  # (u,) int: units of a problem
     way: np.ndarray  # (u,) int: direction in which a listed unit slips, 0: none yet
-    slips: np.ndarray  # (u,) int: direction in which a listed unit slips that might stop
+    slips: np.ndarray  # (u,) int: direction in which a listed unit slips that might stop; what it does in a short step
     place: np.ndarray  # (u,) int: where its unknowns begin
     verdict: np.ndarray  # (u,) int
     doubtful: np.ndarray  # (u,) int: whether the normal force (1) or the slip (2) was not decided
