@@ -332,14 +332,15 @@ def _polish(
     Beside stiff contacts the linear problem leaves slow modes with round-off relative to the quick ones. Equal modes,
     whose steps are not small, stay as they are.
     """
-    values, shapes, eye = values.copy(), shapes / np.linalg.norm(shapes, axis=0), np.eye(len(stiffness))
+    values, eye = values.copy(), np.eye(len(stiffness))
+    shapes = (shapes / np.linalg.norm(shapes, axis=0)).astype(complex)
     for n, value in enumerate(values):
         shape = shapes[:, n]
         for _ in range(2):
             force = value**2 * eye + value * damping + stiffness
             slope = (2 * value * eye + damping) @ shape
             system = np.block([[force, slope[:, None]], [shape.conj()[None], np.zeros((1, 1))]])
-            size = np.abs(system).max(axis=1)
+            size = np.maximum(np.abs(system).max(axis=1), np.finfo(float).tiny)
             try:
                 change = np.linalg.solve(system / size[:, None], np.r_[-(force @ shape), 0.0] / size)
             except np.linalg.LinAlgError:
