@@ -10,6 +10,7 @@ that move by u - theta y where the floor moves by u.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -103,7 +104,7 @@ def contacts_of(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], bodies:
     Raises InputError for neighbours that do not meet at a common height.
     """
     length = 2 * sum(body.a for body in bodies)
-    for body, right in zip(bodies, [*bodies[1:], None], strict=True):
+    for body, right in itertools.pairwise([*bodies, None]):
         if body is bodies[0]:
             yield from _at_wall(law, cavity, surfaces, body, LEFT, -cavity.gap / 2 - length / 2)
         if right is None:
