@@ -10,7 +10,6 @@ that move by u - theta y where the floor moves by u.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -104,8 +103,9 @@ def contacts_of(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], bodies:
     Raises InputError for neighbours that do not meet at a common height.
     """
     length = 2 * sum(body.a for body in bodies)
-    for body, right in itertools.pairwise([*bodies, None]):
-        if body is bodies[0]:
+    for place, body in enumerate(bodies):
+        right = bodies[place + 1] if place + 1 < len(bodies) else None
+        if place == 0:
             yield from _at_wall(law, cavity, surfaces, body, LEFT, -cavity.gap / 2 - length / 2)
         if right is None:
             yield from _at_wall(law, cavity, surfaces, body, RIGHT, cavity.gap / 2 + length / 2)
