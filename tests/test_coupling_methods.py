@@ -15,6 +15,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from benchmarks.methods import charts, figures
+from benchmarks.methods.scenes import charted
+from benchmarks.rows import Rows
 from tests.test_studies_extension import ROOT, install
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.methods import Variant
@@ -28,9 +31,6 @@ from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.toml_input import InputError, Positive, validate
-from vanedamp.studies.bench.methods import charts, figures
-from vanedamp.studies.bench.methods.scenes import charted
-from vanedamp.studies.bench.rows import Rows
 from vanedamp.studies.commands.support.budget import check_run
 
 # -- the method

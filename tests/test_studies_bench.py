@@ -6,17 +6,17 @@ import json
 import numpy as np
 import pytest
 
-from vanedamp.coupling.engine import simulate
-from vanedamp.studies.bench.engine import scenes as bench_scenes
-from vanedamp.studies.bench.engine.hand_written_loop import (
+from benchmarks.engine import scenes as bench_scenes
+from benchmarks.engine.hand_written_loop import (
     ACCOUNT,
     ImpactOscillator,
     complete_loop,
     lean_loop,
     plain_loop,
 )
-from vanedamp.studies.bench.engine.measure import Effort, print_summary, run_bench
-from vanedamp.studies.bench.engine.reference_solutions import solve_with_events, truth
+from benchmarks.engine.measure import Effort, print_summary, run_bench
+from benchmarks.engine.reference_solutions import solve_with_events, truth
+from vanedamp.coupling.engine import simulate
 from vanedamp.studies.cli import BAD_INPUT, main
 
 PERIODS = 20

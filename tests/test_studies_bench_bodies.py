@@ -5,8 +5,8 @@ import json
 
 from PIL import Image
 
-from vanedamp.studies.bench.bodies import methods
-from vanedamp.studies.bench.bodies.measure import Effort, print_summary, run_bodies
+from benchmarks.bodies import methods
+from benchmarks.bodies.measure import Effort, print_summary, run_bodies
 
 
 def test_benchmark_leaves_its_results(tmp_path, capsys):

@@ -7,9 +7,9 @@ import math
 import pytest
 from PIL import Image
 
+from benchmarks.doubling import measure
+from benchmarks.doubling.measure import Effort, print_summary, run_doubling
 from tests.reference.orbit_upright_body import UprightBody
-from vanedamp.studies.bench.doubling import measure
-from vanedamp.studies.bench.doubling.measure import Effort, print_summary, run_doubling
 
 
 def test_the_doubling_is_that_of_forty_digits():

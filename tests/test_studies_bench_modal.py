@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from vanedamp.studies.bench.modes import measure as bench_modal
-from vanedamp.studies.bench.modes.measure import Effort, print_summary, run_bench
+from benchmarks.modes import measure as bench_modal
+from benchmarks.modes.measure import Effort, print_summary, run_bench
 
 TINY = Effort(sizes=(0.008,), rounds=1, limit=120.0)
 

@@ -5,8 +5,8 @@ import json
 
 import pytest
 
-from vanedamp.studies.bench.reduction import measure as bench
-from vanedamp.studies.bench.reduction.measure import Effort, print_summary, run_bench
+from benchmarks.reduction import measure as bench
+from benchmarks.reduction.measure import Effort, print_summary, run_bench
 
 
 @pytest.fixture(scope="module")

@@ -7,18 +7,18 @@ import sys
 
 import pytest
 
+from benchmarks import rows as bench_rows
+from benchmarks.rows import Contest, Rows
+from benchmarks.tables import seconds_text, table
 from tests.tools.processes import environment
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.bench import rows as bench_rows
-from vanedamp.studies.bench.rows import Contest, Rows
-from vanedamp.studies.bench.tables import seconds_text, table
 from vanedamp.studies.terminal import duration
 
 BENCHMARK = """
 import os, signal, sys
 from pathlib import Path
 from vanedamp.files.store import write_json
-from vanedamp.studies.bench.rows import Rows
+from benchmarks.rows import Rows
 from vanedamp.studies.figures import save, subplots
 
 folder, order = Path(sys.argv[1]), Path(sys.argv[2])

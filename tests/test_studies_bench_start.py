@@ -8,8 +8,8 @@ import sys
 import pytest
 from PIL import Image
 
-from vanedamp.studies.bench.start import measure
-from vanedamp.studies.bench.start.measure import Effort, imports_of, print_summary, run_start, small_scene
+from benchmarks.start import measure
+from benchmarks.start.measure import Effort, imports_of, print_summary, run_start, small_scene
 
 
 @pytest.mark.parametrize(

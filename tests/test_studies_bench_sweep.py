@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks.sweep.measure import Effort, _efficiency, print_summary, run_bench
+from benchmarks.sweep.simulation import Costs, simulated
+from benchmarks.sweep.worker import Job, measure, scene
 from vanedamp.coupling.sweep.grid import grid
-from vanedamp.studies.bench.sweep.measure import Effort, _efficiency, print_summary, run_bench
-from vanedamp.studies.bench.sweep.simulation import Costs, simulated
-from vanedamp.studies.bench.sweep.worker import Job, measure, scene
 
 TINY = Effort((8, 20), 1, ((4, 5),), (6, 5), 4, 3, (1, 2, 50), 20)
 FREE = Costs(0.0, 0.0, 0.0, 0.0)

@@ -8,15 +8,15 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from benchmarks.methods import measure as work_precision
+from benchmarks.methods import scenes as method_scenes
+from benchmarks.methods.charts import status_after
+from benchmarks.methods.peers import PEERS
+from benchmarks.stability import limits as stability
+from benchmarks.stability.macro_step import macro_step
+from benchmarks.stability.maps import CO_SIMULATIONS, MAPS, MapEffort
+from benchmarks.stability.scenes import DAMPING
 from vanedamp.coupling.engine import simulate
-from vanedamp.studies.bench.methods import measure as work_precision
-from vanedamp.studies.bench.methods import scenes as method_scenes
-from vanedamp.studies.bench.methods.charts import status_after
-from vanedamp.studies.bench.methods.peers import PEERS
-from vanedamp.studies.bench.stability import limits as stability
-from vanedamp.studies.bench.stability.macro_step import macro_step
-from vanedamp.studies.bench.stability.maps import CO_SIMULATIONS, MAPS, MapEffort
-from vanedamp.studies.bench.stability.scenes import DAMPING
 from vanedamp.studies.cli import main
 
 SMALL = stability.Effort(points=2, runs=3, modes=(0, 1, 2, 5, 10, 20))
