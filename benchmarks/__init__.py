@@ -13,6 +13,11 @@ from after a stop. What several benchmarks need is in the files of this folder.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from vanedamp.files.extensions import ExtensionPoint
+
+#: the case of the shipped mesh
+CLUSTER_CASE = Path(__file__).with_name("cluster_case.toml")
 
 BENCHMARKS = ExtensionPoint("benchmark", "benchmarks", "vanedamp.benchmarks", ("SUMMARY", "run"), folders=True)

@@ -9,11 +9,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-import vanedamp
 from vanedamp.files.toml_input import InputError
 
 #: folder that holds the package vanedamp: the top of the repository, or a folder of installed packages
-_ROOT = Path(str(vanedamp.__file__)).parents[1]
+_ROOT = Path(__file__).parents[2]
 
 
 class CheckoutCommand(NamedTuple):
@@ -38,6 +37,6 @@ class CheckoutCommand(NamedTuple):
                 f"this command needs the folder {self.package}/ of the project's repository, which is not installed "
                 "with the package; run it in a checkout (there: pip install -e .)"
             )
-        if str(_ROOT) not in sys.path:  # first: other packages may have the same name
+        if sys.path[0] != str(_ROOT):  # other packages may have the same name
             sys.path.insert(0, str(_ROOT))
         return import_module(f"{self.package}.command")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from benchmarks import CLUSTER_CASE
 from benchmarks.engine import scenes as bench_scenes
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.scene.scene import Scene
@@ -110,7 +111,6 @@ class Cluster:
         if not case.is_file():
             from vanedamp.meshes.parameters import VaneCluster
             from vanedamp.meshes.vane_cluster import SHIPPED, build
-            from vanedamp.studies.case.tables import DEMO_CASE
 
             self.folder.mkdir(parents=True, exist_ok=True)
             mesh = self.folder / "vane_cluster.msh"
@@ -118,7 +118,7 @@ class Cluster:
                 shutil.copy(SHIPPED, mesh)
             else:
                 build(VaneCluster(element_size=self.size), mesh)
-            text = DEMO_CASE.read_text(encoding="utf-8")
+            text = CLUSTER_CASE.read_text(encoding="utf-8")
             case.write_text(text.replace("degree = 2", "degree = 1"), encoding="utf-8")
         return case
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from benchmarks import CLUSTER_CASE
 from vanedamp.files.toml_input import read_toml, validate
 from vanedamp.rom.reduced import ReducedModel
 
@@ -14,11 +15,11 @@ def cluster_model(degree: int, modes: int) -> ReducedModel:
     """Return the shipped cluster with the given number of fixed-interface modes."""
     from vanedamp.meshes.vane_cluster import SHIPPED
     from vanedamp.studies.case.stages import assemble, reduction
-    from vanedamp.studies.case.tables import DEMO_CASE, Case
+    from vanedamp.studies.case.tables import Case
 
-    data = read_toml(DEMO_CASE)
+    data = read_toml(CLUSTER_CASE)
     data["mesh"] = {"file": str(SHIPPED), "degree": degree}
-    return reduction(assemble(validate(Case, data, "demo_case.toml")), modes)
+    return reduction(assemble(validate(Case, data, CLUSTER_CASE.name)), modes)
 
 
 _ROD_MODES, _BEAM_ELEMENTS, _CLUSTER_MODES = 40, 8, 12

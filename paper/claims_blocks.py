@@ -10,10 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from vanedamp.studies.paper import claims_reduced, claims_rigid
-from vanedamp.studies.paper.claims_rigid import Curves, claim, verdict
-from vanedamp.studies.paper.curve import Curve, means_of
-from vanedamp.studies.paper.figure_file import Bar
+from paper import claims_rigid
+from vanedamp.studies.demo import claims as shown
+from vanedamp.studies.demo.claims import Curves, claim, verdict
+from vanedamp.studies.demo.curve import Curve, means_of
+from vanedamp.studies.demo.figure_file import Bar
 from vanedamp.studies.report.claims import Claim
 
 _BARS = ("light", "nominal", "heavy", "light_same_gap", "nominal_same_gap", "heavy_same_gap")
@@ -53,7 +54,7 @@ def _gaps(curves: Curves, sliders: Curves) -> list[Claim]:
         "Its means scatter less: a block passes from corner to corner, so that no two of its impacts are alike, but "
         "many of them make an average.",
     )
-    both = zip(claims_rigid.fig9({"": curves["gap"]}), claims_rigid.fig9(sliders), why, strict=True)
+    both = zip(shown.fig9({"": curves["gap"]}), shown.fig9(sliders), why, strict=True)
     return [_beside(*parts) for parts in both]
 
 
@@ -61,20 +62,20 @@ def _drop(curves: Curves, slider: Curve) -> list[Claim]:
     block = curves["gap"][1]
     return [
         _beside(
-            claims_reduced.onset(curves["flat"][0]),
-            claims_reduced.onset(slider),
+            shown.onset(curves["flat"][0]),
+            shown.onset(slider),
             "This block begins flat and at rest, but its cavity turns with the structure, as the shipped cluster's "
             "does: the floor throws it up, and it hits the walls at all frequencies. In a cavity that does not turn it "
             "lies flat and has the slider's onset.",
         ),
         _beside(
-            claims_reduced.drop(block),
-            claims_reduced.drop(slider),
+            shown.drop(block),
+            shown.drop(slider),
             "The block comes nearer to the curve of the fixed body, but goes through it as well: it takes energy.",
         ),
         _beside(
-            claims_reduced.resonance_shift(block),
-            claims_reduced.resonance_shift(slider),
+            shown.resonance_shift(block),
+            shown.resonance_shift(slider),
             "At the peak the impacts attach more than the body's mass, as those of the slider do.",
         ),
     ]

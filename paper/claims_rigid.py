@@ -7,99 +7,13 @@ model has or lacks. Amplitudes are relative to the undamped maximum.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
-from vanedamp.studies.paper.curve import Curve
-from vanedamp.studies.paper.figure_file import Bar
+from vanedamp.studies.demo.claims import Curves, claim, verdict
+from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.figure_file import Bar
 from vanedamp.studies.report.claims import Claim
-
-Curves = Mapping[str, list[Curve]]
-#: reductions that differ by less are the same
-_SLACK = 0.02
-SHOWN, PARTLY, NOT_SHOWN = "shown", "partly", "not shown"
-
-
-def claim(said: str, ours: str, word: str, why: str = "", figures: Mapping[str, float | None] | None = None) -> Claim:
-    """Return a claim of the paper, the finding here, and plain figures."""
-    plain = {name: None if value is None else float(value) for name, value in (figures or {}).items()}
-    if word != SHOWN and not why:
-        why = "The figures lie outside of what counts as shown here."
-    return Claim(said, ours, word, why, dict(plain))
-
-
-def verdict(shown: bool | np.bool_, partly: bool | np.bool_ = False) -> str:
-    """Return the word for a claim that holds, holds in part or does not."""
-    return SHOWN if shown else PARTLY if partly else NOT_SHOWN
-
-
-def fig9(curves: Curves) -> list[Claim]:
-    """Judge gaps: reference, reference/2, reference/10."""
-    gaps = dict(zip(("reference", "reference/2", "reference/10"), curves[""], strict=True))
-    peaks = {name: curve.peak() for name, curve in gaps.items()}
-    tops = {name: float(curve.largest.max()) for name, curve in gaps.items()}
-    half = gaps["reference/2"]
-    smooth = float(half.smooth.max())
-    touched = half.impacts > 0
-    irregular = float(np.mean(~half.periodic[touched]))
-    heights = [peak.height for peak in peaks.values()]
-    return [
-        claim(
-            "At reference/2 the bodies take about half of the amplitude away, averaged.",
-            f"highest mean {peaks['reference/2']}, smoothed {smooth:.3f}: a reduction of {1 - smooth:.0%}",
-            verdict(0.4 <= 1 - smooth <= 0.6, 0.3 <= 1 - smooth <= 0.7),
-            figures={"peak_mean": peaks["reference/2"].height, "peak_smoothed": smooth, "peak_max": tops["reference/2"],
-                     "reduction": 1 - smooth, "confidence": peaks["reference/2"].confidence},
-        ),
-        claim(
-            "The gap decides how much is gained.",
-            "highest means (maxima): "
-            + ", ".join(f"{name} {peaks[name].height:.3f} ({tops[name]:.3f})" for name in gaps),
-            verdict(max(heights) - min(heights) > 0.2),
-            "The widest gap leaves the least: its body is not touched below half an amplitude, and above it the "
-            "impacts keep the response far below the resonance. A tenth of it comes close to the curve of the fixed "
-            "body.",
-            {f"peak_{name}": peak.height for name, peak in peaks.items()},
-        ),
-        claim(
-            "Damped curves scatter from point to point, since responses with impacts need not be periodic.",
-            f"reference/2: {irregular:.0%} of the {touched.sum()} points with impacts are not periodic; rms scatter "
-            f"of the maxima {half.scatter['largest']:.4f}, of the means {half.scatter['mean']:.4f}",
-            verdict(irregular > 0.5, irregular > 0.1),
-            figures={"non_periodic": irregular}
-            | {f"scatter_{name}": value for name, value in half.scatter.items()},
-        ),
-    ]  # fmt: skip
-
-
-def fig10(curves: Curves) -> list[Claim]:
-    """Judge one body against two."""
-    kinds = ("single", "separate", "shared")
-    reductions = {name: 1 - float(curves[name][0].smooth.max()) for name in kinds}
-    peaks = {name: curves[name][0].peak() for name in kinds}
-    figures = {f"reduction_{name}": value for name, value in reductions.items()}
-    figures |= {f"peak_{name}": peak.height for name, peak in peaks.items()}
-    text = ", ".join(f"{name} {value:.1%}" for name, value in reductions.items())
-    like_single = reductions["separate"] >= reductions["single"] - _SLACK
-    return [
-        claim(
-            "Two halves in cavities of their own damp no worse than the single body of the same mass.",
-            f"reductions of the smoothed means: {text}",
-            verdict(like_single),
-            "On one mode, halves with equal gaps see the same wall motion and do what the whole body does.",
-            figures,
-        ),
-        claim(
-            "Two bodies in cavities of their own damp no worse than in one cavity together.",
-            f"reductions: {text}; highest means: separate {peaks['separate']}, shared {peaks['shared']}",
-            verdict(reductions["separate"] >= reductions["shared"] - _SLACK, like_single),
-            "In one cavity the halves have two steady states near their peak: they move together and damp like the "
-            "single body, or lose energy to each other as well and damp better (fig14).",
-            figures,
-        ),
-    ]
-
 
 #: mean amplitude above which a row near its peak moves together like one body: between its two steady states
 TOGETHER = 0.3

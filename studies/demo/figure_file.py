@@ -1,4 +1,4 @@
-"""A figure of the paper as a file: scenes in the units of the structure that they are made for.
+"""A figure as a file: scenes in the units of the structure that they are made for.
 
 The file has a `title`, a `[frequencies]` table (start, stop and number of points), the `[scene]` that all curves share,
 and a `[curve.<name>]` for each curve that differs from it, with the tables that it replaces; a figure of one curve has
@@ -125,7 +125,7 @@ class Effort:
 
 
 @dataclass(frozen=True)
-class PaperFigure:
+class FigureScenes:
     """A figure: its title and its scenes by the names of their curves, each with its [sweep]."""
 
     name: str
@@ -133,17 +133,16 @@ class PaperFigure:
     scenes: dict[str, Scene]
 
     @classmethod
-    def load(cls, name: str, structure: Structure, effort: Effort | None = None) -> PaperFigure:
-        """Read the figure of that name, on a structure. Raises InputError, naming the file."""
-        file = FOLDER / f"{name}.toml"
+    def load(cls, file: Path, structure: Structure, effort: Effort | None = None) -> FigureScenes:
+        """Read a figure, on a structure. Raises InputError, naming the file."""
         data = read_toml(file)
         try:
-            return cls._made(name, _scaled(data, structure), structure, effort)
+            return cls._made(file.stem, _scaled(data, structure), structure, effort)
         except InputError as error:
             raise InputError(f"{file}: {error}") from error
 
     @classmethod
-    def _made(cls, name: str, data: dict[str, Any], structure: Structure, effort: Effort | None) -> PaperFigure:
+    def _made(cls, name: str, data: dict[str, Any], structure: Structure, effort: Effort | None) -> FigureScenes:
         bar = validate(Bar, data["bar"], "bar") if "bar" in data else None
         scenes = {}
         for curve, changes in data.get("curve", {"": {}}).items():

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import simpson
 
+from paper.scene_files import FOLDER
 from vanedamp.modal.campbell import Campbell, campbell
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.participation import effective_masses
-from vanedamp.studies.paper.figure_file import FOLDER
 
 TITLE = "Campbell diagram of a blade on a hub"
 #: engine orders of the diagram, and modes that are followed

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vanedamp.studies.paper.claims_rigid import Curves, claim, verdict
-from vanedamp.studies.paper.curve import Curve
+from vanedamp.studies.demo.claims import Curves, claim, verdict
+from vanedamp.studies.demo.curve import Curve
 from vanedamp.studies.report.claims import Claim
 
 #: shares of the load at which friction carries the body along, of the file's normal loads

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from paper.blade import Blade, southwell
+from paper.claims_rotation import Scenes, friction_only, load_ratio, values
+from paper.claims_systems import top
+from vanedamp.studies.demo.claims import Curves
+from vanedamp.studies.demo.curve import Curve
 from vanedamp.studies.figures import draw_grid, save, subplots
-from vanedamp.studies.paper.blade import Blade, southwell
-from vanedamp.studies.paper.claims_rigid import Curves
-from vanedamp.studies.paper.claims_rotation import Scenes, friction_only, load_ratio, values
-from vanedamp.studies.paper.claims_systems import top
-from vanedamp.studies.paper.curve import Curve
 from vanedamp.studies.report.charts import COLOURS
 
 _GREY, _DARK, _BLACK = "#94a3b8", "#475569", "#0f172a"

@@ -12,11 +12,11 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.optimize import brentq
 
+from paper.blade import Blade, beam_southwell, southwell
+from paper.claims_systems import top
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rigid
-from vanedamp.studies.paper.blade import Blade, beam_southwell, southwell
-from vanedamp.studies.paper.claims_rigid import Curves, claim, verdict
-from vanedamp.studies.paper.claims_systems import top
+from vanedamp.studies.demo.claims import Curves, claim, verdict
 from vanedamp.studies.report.claims import Claim
 
 Scenes = Mapping[str, Scene]

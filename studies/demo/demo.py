@@ -11,16 +11,28 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.store import load
 from vanedamp.files.toml_output import write_commented
+from vanedamp.studies.demo import claims
+from vanedamp.studies.demo.figure_file import FOLDER, Effort, Structure
+from vanedamp.studies.demo.figure_study import MODES, FigureStudy, Read, Session, prepare, print_claims, study
+from vanedamp.studies.demo.pictures import responses_picture
 from vanedamp.studies.file_kinds import KINDS
-from vanedamp.studies.paper.figure_file import Effort, Structure
-from vanedamp.studies.paper.runner import MODES, Session, prepare, print_claims, study
 from vanedamp.studies.report.claims import CLAIMS
 from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.report.pictures import mode_picture, summary_picture
 from vanedamp.studies.workers import WorkerPool, available_cores
 
+
+def _draw_gaps(read: Read, path: Path) -> None:
+    names = ("reference", "reference/2", "reference/10")
+    responses_picture(dict(zip(names, read.curves[""], strict=True)), read.figure.title, path)
+
+
 #: figures of the paper, with fewer frequencies and periods than `vanedamp paper` takes
-FIGURES = ("fig9", "fig10", "fig12")
+FIGURES = {
+    "fig9": FigureStudy(FOLDER / "fig9.toml", lambda read: claims.fig9(read.curves), _draw_gaps),
+    "fig10": FigureStudy(FOLDER / "fig10.toml", lambda read: claims.fig10(read.curves)),
+    "fig12": FigureStudy(FOLDER / "fig12.toml", lambda read: claims.fig12(read.curves)),
+}
 #: those that need no reduced model
 RIGID_FIGURES = ("fig9", "fig10")
 #: the file that makes the sweeps again
@@ -73,7 +85,7 @@ def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> P
         session = Session(structure, folder, pool, EFFORT)
         for name in RIGID_FIGURES if rigid else FIGURES:
             begun = time.perf_counter()
-            figure = study(name, session)
+            figure = study(FIGURES[name], session)
             print_claims(figure, time.perf_counter() - begun)
             sources += figure.sources
             results += [*(folder / source for source in figure.sources), folder / f"{name}{CLAIMS}"]

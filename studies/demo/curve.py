@@ -1,4 +1,4 @@
-"""A damped curve over frequencies as the paper's claims read it: smoothed means, maxima, scatter, onset."""
+"""A damped curve over frequencies as claims read it: smoothed means, maxima, scatter, onset."""
 
 from __future__ import annotations
 

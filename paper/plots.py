@@ -10,35 +10,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from paper.claims_blocks import ROWS
+from paper.claims_rigid import MOST_THETA, attached_closed_form, regime
+from paper.claims_systems import FORCES, LOADS, NAMES, top
 from vanedamp.coupling.response.response import Response
+from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.pictures import DARK, GREY, draw_damped, draw_linear, finish
 from vanedamp.studies.figures import draw_grid, save, subplots
-from vanedamp.studies.paper.claims_blocks import ROWS
-from vanedamp.studies.paper.claims_rigid import MOST_THETA, attached_closed_form, regime
-from vanedamp.studies.paper.claims_systems import FORCES, LOADS, NAMES, top
-from vanedamp.studies.paper.curve import Curve
 from vanedamp.studies.report.charts import COLOURS
-
-_GREY, _DARK = "#94a3b8", "#475569"
-
-
-def responses_picture(curves: Mapping[str, Curve], title: str, path: Path, linear: str | None = None) -> None:
-    """Draw forced responses by their labels, with the undamped and fixed curves of one (default: the first)."""
-    figure, axes = subplots(size=(9.5, 5.2))
-    _linear(axes, curves[linear or next(iter(curves))])
-    for (label, curve), colour in zip(curves.items(), COLOURS, strict=False):
-        _damped(axes, curve, label, colour)
-    _finish(axes, title)
-    save(figure, path, dpi=110)
 
 
 def panels_picture(panels: Mapping[str, Mapping[str, Curve]], title: str, path: Path) -> None:
     """Draw forced responses in panels side by side, by their titles."""
     figure, row = subplots(1, len(panels), size=(5.6 * len(panels), 5.2), sharey=True)
     for axes, (name, curves) in zip(row, panels.items(), strict=True):
-        _linear(axes, next(iter(curves.values())))
+        draw_linear(axes, next(iter(curves.values())))
         for (label, curve), colour in zip(curves.items(), COLOURS, strict=False):
-            _damped(axes, curve, label, colour)
-        _finish(axes, name, ylabel=axes is row[0])
+            draw_damped(axes, curve, label, colour)
+        finish(axes, name, ylabel=axes is row[0])
     figure.suptitle(title)
     save(figure, path, dpi=110)
 
@@ -50,11 +39,11 @@ def orientations_picture(
     curves = {label: of for label, of in curves.items() if "starts" not in label}
     figure, (first, second, third) = subplots(1, 3, size=(16, 5.2))
     for axes, index, name in ((first, 0, "horizontal"), (second, -1, "vertical")):
-        _linear(axes, curves["single"][index])
+        draw_linear(axes, curves["single"][index])
         for (label, of), colour in zip(curves.items(), COLOURS, strict=False):
             style = "--" if "aside" in label else "-"  # they lie on the single one
             axes.plot(of[index].frequency, 100 * of[index].smooth, style, color=colour, label=label)
-        _finish(axes, f"{name}: smoothed means")
+        finish(axes, f"{name}: smoothed means")
     for (label, of), colour in zip(curves.items(), COLOURS, strict=False):
         tops = [100 * float(curve.smooth.max()) for curve in of]
         spread = [100 * curve.peak().confidence for curve in of]
@@ -77,8 +66,8 @@ def blocks_picture(
     """Draw blocks beside sliders (dashed): the drop to the fixed curve, gaps, rows, bars."""
     figure, panels = subplots(2, 2, size=(14, 10.5))
     drop, gaps, rows, bars = panels.ravel()
-    _linear(drop, blocks["gap"][1])
-    _damped(drop, blocks["gap"][1], "block", COLOURS[0])
+    draw_linear(drop, blocks["gap"][1])
+    draw_damped(drop, blocks["gap"][1], "block", COLOURS[0])
     flat = blocks["flat"][0]
     drop.plot(
         flat.frequency, 100 * flat.mean, "+", color=COLOURS[2], markersize=6, label="block, flat and at rest first"
@@ -92,14 +81,14 @@ def blocks_picture(
         _besides(axes, {name: blocks[name][0] for name in names}, others)
     texts = ("reference/2: drop to the fixed curve", "gaps", "bodies in a row", "mass and gap by the bar's length")
     for axes, text in zip(panels.ravel(), texts, strict=True):
-        _finish(axes, text)
+        finish(axes, text)
     figure.suptitle(f"{title} (dashed)")
     save(figure, path, dpi=110)
 
 
 def _besides(axes: Axes, blocks: Mapping[str, Curve], sliders: Mapping[str, Curve]) -> None:
     """Draw means of blocks and, dashed, smoothed means of sliders, by their names."""
-    _linear(axes, next(iter(blocks.values())))
+    draw_linear(axes, next(iter(blocks.values())))
     for (name, block), colour in zip(blocks.items(), COLOURS, strict=False):
         axes.plot(block.frequency, 100 * block.mean, color=colour, linewidth=2, label=name)
         if name in sliders:
@@ -155,7 +144,7 @@ def history_picture(response: Response, reference: float, title: str, path: Path
         linewidth=0.6,
         label="peak of a period",
     )
-    left.axvline(response.transient, color=_GREY, linestyle="--", label="end of the transient")
+    left.axvline(response.transient, color=GREY, linestyle="--", label="end of the transient")
     left.set_xlabel("period")
     left.set_ylabel("peak / undamped maximum")
     left.set_ylim(bottom=0)
@@ -193,7 +182,7 @@ def mistuning_picture(
     stable = theta < MOST_THETA
     axes.plot(amplitude[stable], attached[stable], color="#0f172a", label="closed form, symmetric 1:1 regime")
     axes.plot(amplitude[~stable], attached[~stable], ":", color="#0f172a", label="where it is not stable")
-    axes.plot([], [], "x", color=_DARK, label="other responses with impacts")
+    axes.plot([], [], "x", color=DARK, label="other responses with impacts")
     axes.set_xlim(0.1, 1.1)
     axes.set_ylim(0, 4)
     axes.set_xlabel("amplitude / half gap")
@@ -207,7 +196,7 @@ def mistuning_picture(
 def systems_picture(curves: Mapping[str, Sequence[Curve]], title: str, path: Path) -> None:
     """Draw the best of each system, and its tops."""
     figure, (left, right) = subplots(1, 2, size=(14.5, 5.6), width_ratios=[1.5, 1])
-    _linear(left, curves["single_body"][0])
+    draw_linear(left, curves["single_body"][0])
     labels, tops, means, colours = [], [], [], []
     numbers: dict[str, Sequence[Any]] = {"friction_damper": FORCES, "rotating": LOADS}
     for (name, of), colour in zip(curves.items(), COLOURS, strict=False):
@@ -232,31 +221,6 @@ def systems_picture(curves: Mapping[str, Sequence[Curve]], title: str, path: Pat
     right.set_title(
         "tops of the curves; forces in exciting forces,\nloads in shares of the one that sticks", fontsize=11
     )
-    _finish(left, "means (points) and smoothed means; of several loads the best")
+    finish(left, "means (points) and smoothed means; of several loads the best")
     figure.suptitle(title)
     save(figure, path, dpi=110)
-
-
-def _linear(axes: Axes, curve: Curve) -> None:
-    axes.plot(curve.frequency, 100 * curve.undamped, ":", color=_DARK, linewidth=1.4, label="undamped")
-    axes.plot(curve.frequency, 100 * curve.fixed, "--", color=_GREY, linewidth=1.4, label="bodies fixed")
-
-
-def _damped(axes: Axes, curve: Curve, label: str, colour: str) -> None:
-    axes.plot(
-        curve.frequency, 100 * curve.largest, ".", color=colour, markersize=3.5, alpha=0.7, label=f"{label}, maximum"
-    )
-    low, high = curve.mean - curve.confidence, curve.mean + curve.confidence
-    axes.fill_between(curve.frequency, 100 * low, 100 * high, color=colour, alpha=0.25, linewidth=0)
-    axes.plot(curve.frequency, 100 * curve.smooth, color=colour, linewidth=2, label=f"{label}, smoothed mean")
-
-
-def _finish(axes: Axes, title: str, ylabel: bool = True) -> None:
-    axes.set_xlabel("excitation frequency, Hz")
-    if ylabel:
-        axes.set_ylabel("amplitude / undamped maximum, %")
-    axes.set_ylim(0, 105)
-    axes.margins(x=0)
-    axes.set_title(title)
-    draw_grid(axes)
-    axes.legend(fontsize=8)
