@@ -7,12 +7,14 @@ A benchmark is a package (or any module) with
     NAME                if it is not the folder's
     ORDER               place in --help
 
-Import what is heavy inside `run`. Measure in `rows.Rows`: they are announced, printed as they come, and gone on
-from after a stop. What several benchmarks need is in the files of this folder.
+Ours derive from `benchmark.Benchmark` in a module of the folder, which `running` imports when it runs; the module has
+two of them, FULL and QUICK. What several benchmarks need is in the files of this folder.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 from vanedamp.files.extensions import ExtensionPoint
@@ -21,3 +23,14 @@ from vanedamp.files.extensions import ExtensionPoint
 CLUSTER_CASE = Path(__file__).with_name("cluster_case.toml")
 
 BENCHMARKS = ExtensionPoint("benchmark", "benchmarks", "vanedamp.benchmarks", ("SUMMARY", "run"), folders=True)
+
+
+def running(*modules: str) -> Callable[[Path, bool], None]:
+    """Return the `run` of benchmarks in modules: all are announced before the first begins."""
+
+    def run(folder: Path, quick: bool) -> None:
+        chosen = [getattr(import_module(module), "QUICK" if quick else "FULL") for module in modules]
+        for benchmark, rows in [(benchmark, benchmark.announced(folder)) for benchmark in chosen]:
+            benchmark.print_summary(benchmark.run(folder, rows))
+
+    return run

@@ -58,7 +58,7 @@ class Rows:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"--output {folder}: cannot be made ({error.strerror})") from error
-        self.file, self._name, self._inputs = folder / f"bench_{name}.partial", name, inputs
+        self.folder, self.file, self._inputs = folder, folder / f"bench_{name}.partial", inputs
         self._expected, self._left = dict(expected), dict(expected)
         self._taken: list[dict[str, Any]] = []
         #: what the rows took by the clock, those of before included

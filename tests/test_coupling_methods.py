@@ -298,7 +298,7 @@ def test_what_it_cannot_do_is_refused():
 
 def test_appears_in_the_chart(tmp_path, monkeypatch):
     """Measured like ours, and drawn: in the legend with its own marks, beside all that did not fail."""
-    effort = charts.Effort(1, (100, 200), (1e-4,), 1, 60, 200, 2, 1e5, 200, None, ())
+    effort = charts.Settings(1, (100, 200), (1e-4,), 1, 60, 200, 2, 1e5, 200, None, ())
     measured = charts.Chart("one body", scene, True, effort)
     chart = measured.measure(Rows(tmp_path, "work-precision", {}, measured.rows()), 0)
     ours = {(point["method"], point["setting"]): point for point in chart["points"]}

@@ -8,7 +8,7 @@ corners hit almost together parts at once for steps that cannot tell them apart.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -16,16 +16,15 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.benchmark import Benchmark, Result
 from benchmarks.bodies.measure import SHAPES, body_scene
 from benchmarks.engine.inside import time_of_a_period
 from benchmarks.methods.peers import PEERS, run_peer, version
 from benchmarks.methods.scenes import by, charted
 from benchmarks.rows import Rows
-from benchmarks.timing import machine
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import write_csv, write_json
 from vanedamp.files.toml_input import InputError
 
 #: periods and samples by which motions are compared, and the coefficients of friction
@@ -33,11 +32,10 @@ PERIODS, SAMPLES, FRICTION = 2, 10, (0.4, 0.0)
 #: tolerance of the reference that checks the exact engine
 _TIGHT = 1e-12
 _PRICE = "price of a block"
-_COLUMNS = ("friction", "method", "setting", "status", "error", "low", "high", "seconds_per_period")
 
 
 @dataclass(frozen=True)
-class Effort:
+class BlockMethods(Benchmark):
     """Starts that errors are medians of, steps a period, those of peers, tolerances; periods and rounds of timing."""
 
     starts: int
@@ -47,64 +45,67 @@ class Effort:
     timed: int
     rounds: int
 
+    NAME = "bodies_methods"
+    COLUMNS = ("friction", "method", "setting", "status", "error", "low", "high", "seconds_per_period")
 
-FULL = Effort(15, (200, 1000, 5000, 20_000, 100_000), (200, 1000, 5000, 20_000), (1e-4, 1e-6, 1e-8, 1e-10), 30, 4)
-QUICK = Effort(3, (200, 5000), (200,), (1e-6,), 10, 2)
+    def expected(self, folder: Path) -> dict[str, float]:
+        names = [_row(friction, label, solver) for friction in FRICTION for label, solver in _variants(self)]
+        return dict.fromkeys(names, 0.2 * self.starts) | {_PRICE: 10.0}
+
+    def measure(self, rows: Rows) -> Result:
+        points: list[dict[str, Any]] = []
+        absent: dict[str, str] = {}
+
+        @cache
+        def exact(friction: float) -> list[np.ndarray]:
+            return [simulate_block(block_scene(start, friction))[1] for start in range(self.starts)]
+
+        def measured(friction: float, label: str, solver: dict[str, Any]) -> dict[str, Any]:
+            try:
+                return _point(label, solver, friction, exact(friction), self)
+            except InputError as refused:
+                return {"absent": str(refused)}
+
+        for friction, (label, solver) in itertools.product(FRICTION, _variants(self)):
+            row = _row(friction, label, solver)
+            if label in absent:
+                rows.leave_out(row, absent[label])
+                continue
+            inputs = asdict(self) | ({"version": version(label)} if label in PEERS else {})
+            point = rows.take(row, partial(measured, friction, label, solver), inputs=inputs, tell=_text)
+            if "absent" in point:
+                absent[label] = point["absent"]
+            else:
+                points.append({"friction": friction} | point)
+        return {"points": points, "absent": absent, "price": rows.take(_PRICE, partial(_price, self))}
+
+    def draw(self, result: Mapping[str, Any], folder: Path) -> None:
+        from benchmarks.bodies.figures import methods_figure
+
+        methods_figure(result, folder / "bench_bodies_methods.png")
+
+    def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
+        """Yield the table of the points, who is absent, and what a block costs beside a slider."""
+        yield f"{'friction':>8} {'method':<28} {'setting':>9} {'error':>9} {'us a period':>12}"
+        for row in result["points"]:
+            figures = f"{row['status']:>9}"
+            if row["error"] is not None:
+                figures = f"{row['error']:9.2g} {1e6 * row['seconds_per_period']:12.4g}"
+            yield f"{row['friction']:8g} {row['method']:<28} {row['setting']:9g} {figures}"
+        yield from (f"without {label}: {reason}" for label, reason in result["absent"].items())
+        for name, price in result["price"].items():
+            scale, unit = (1.0, "impacts") if name == "impacts" else (1e6, "us")
+            block, slider = scale * price["block"], scale * price["slider"]
+            yield f"{name}: block {block:.4g}, slider {slider:.4g} {unit} a period, ratio {block / slider:.3g}"
+
+
+FULL = BlockMethods(15, (200, 1000, 5000, 20_000, 100_000), (200, 1000, 5000, 20_000), (1e-4, 1e-6, 1e-8, 1e-10), 30, 4)
+QUICK = BlockMethods(3, (200, 5000), (200,), (1e-6,), 10, 2)
 
 
 def block_scene(start: int, friction: float, periods: int = PERIODS) -> Scene:
     """Return the scene at resonance: the block begins above the floor, tilted more from start to start."""
     return body_scene(1.0, "block", periods, 0, lift=8e-5, tilt=2e-3 * (1 + 0.05 * start), friction=friction)
-
-
-def announced(folder: Path, effort: Effort = FULL) -> Rows:
-    """Announce the rows, one a method, setting and coefficient of friction, and the price of a block."""
-    names = [_row(friction, label, solver) for friction in FRICTION for label, solver in _variants(effort)]
-    return Rows(folder, "bodies_methods", asdict(effort), dict.fromkeys(names, 0.2 * effort.starts) | {_PRICE: 10.0})
-
-
-def run_methods(folder: Path, effort: Effort = FULL, rows: Rows | None = None) -> dict[str, Any]:
-    """Measure, write bench_bodies_methods.json, .csv and .png into a folder, and return the content of the JSON.
-
-    rows: where they were announced before.
-    """
-    from benchmarks.bodies.figures import methods_figure
-
-    rows = rows or announced(folder, effort)
-    points: list[dict[str, Any]] = []
-    absent: dict[str, str] = {}
-
-    @cache
-    def exact(friction: float) -> list[np.ndarray]:
-        return [simulate_block(block_scene(start, friction))[1] for start in range(effort.starts)]
-
-    def measured(friction: float, label: str, solver: dict[str, Any]) -> dict[str, Any]:
-        try:
-            return _point(label, solver, friction, exact(friction), effort)
-        except InputError as refused:
-            return {"absent": str(refused)}
-
-    for friction, (label, solver) in itertools.product(FRICTION, _variants(effort)):
-        row = _row(friction, label, solver)
-        if label in absent:
-            rows.leave_out(row, absent[label])
-            continue
-        inputs = asdict(effort) | ({"version": version(label)} if label in PEERS else {})
-        point = rows.take(row, partial(measured, friction, label, solver), inputs=inputs, tell=_text)
-        if "absent" in point:
-            absent[label] = point["absent"]
-        else:
-            points.append({"friction": friction} | point)
-    result = {
-        "machine": machine(), "effort": asdict(effort), "points": points, "absent": absent,
-        "price": rows.take(_PRICE, partial(_price, effort)), "wall_time_s": rows.seconds,
-    }  # fmt: skip
-    write_json(folder / "bench_bodies_methods.json", result)
-    table = [["" if row[name] is None else row[name] for name in _COLUMNS] for row in points]
-    write_csv(folder / "bench_bodies_methods.csv", _COLUMNS, table)
-    methods_figure(result, folder / "bench_bodies_methods.png")
-    rows.finish()
-    return result
 
 
 def _row(friction: float, label: str, solver: Mapping[str, Any]) -> str:
@@ -127,7 +128,7 @@ def simulate_block(scene: Scene) -> tuple[str, np.ndarray]:
     return response.status.value, np.column_stack([response.displacement, response.body_displacement])
 
 
-def _variants(effort: Effort) -> list[tuple[str, dict[str, Any]]]:
+def _variants(effort: BlockMethods) -> list[tuple[str, dict[str, Any]]]:
     """Return labels and what they are run with: a [solver] table, or the setting of a peer."""
     found: list[tuple[str, dict[str, Any]]] = []
     for label, (method, variant) in charted().items():
@@ -148,7 +149,7 @@ def _variants(effort: Effort) -> list[tuple[str, dict[str, Any]]]:
 
 
 def _point(
-    label: str, solver: dict[str, Any], friction: float, exact: list[np.ndarray], effort: Effort
+    label: str, solver: dict[str, Any], friction: float, exact: list[np.ndarray], effort: BlockMethods
 ) -> dict[str, Any]:
     """Return status, error and cost. Raises InputError where a method or a peer does not take the scene."""
     setting = _setting(solver)
@@ -174,13 +175,13 @@ def _point(
     return point | {"error": middle, "low": low, "high": high, "seconds_per_period": seconds}
 
 
-def _seconds(scene: Scene, effort: Effort) -> float:
+def _seconds(scene: Scene, effort: BlockMethods) -> float:
     """Return the processor time of a period after the first, which loads compiled functions, s: the least of rounds."""
     last = 3 if scene.solver.method == "solve_ivp" else max(effort.timed, 3)
     return min(time_of_a_period(scene, (1, last)) for _ in range(effort.rounds))
 
 
-def _price(effort: Effort) -> dict[str, dict[str, float]]:
+def _price(effort: BlockMethods) -> dict[str, dict[str, float]]:
     """Return the processor time of a period (s) of slider and block by each method, and the impacts of both there."""
     tables: dict[str, dict[str, Any]] = {
         "exact": {}, "moreau": {"steps_per_period": effort.steps[1]}, "penalty": {"steps_per_period": effort.steps[1]},
@@ -194,19 +195,3 @@ def _price(effort: Effort) -> dict[str, dict[str, float]]:
         for method, options in tables.items():
             price[method][shape] = _seconds(by(scene, method=method, **options), effort)
     return price
-
-
-def print_methods(result: Mapping[str, Any]) -> None:
-    """Print the table of the points, who is absent, and what a block costs beside a slider."""
-    print(f"{'friction':>8} {'method':<28} {'setting':>9} {'error':>9} {'us a period':>12}")
-    for row in result["points"]:
-        figures = f"{row['status']:>9}"
-        if row["error"] is not None:
-            figures = f"{row['error']:9.2g} {1e6 * row['seconds_per_period']:12.4g}"
-        print(f"{row['friction']:8g} {row['method']:<28} {row['setting']:9g} {figures}")
-    for label, reason in result["absent"].items():
-        print(f"without {label}: {reason}")
-    for name, price in result["price"].items():
-        scale, unit = (1.0, "impacts") if name == "impacts" else (1e6, "us")
-        block, slider = scale * price["block"], scale * price["slider"]
-        print(f"{name}: block {block:.4g}, slider {slider:.4g} {unit} a period, ratio {block / slider:.3g}")

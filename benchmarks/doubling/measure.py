@@ -9,9 +9,8 @@ exact engine's runs, judged by the same rule, are what they are compared with.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,16 +18,17 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from benchmarks.benchmark import Benchmark, Result
 from benchmarks.methods.scenes import charted
 from benchmarks.rows import Rows
-from benchmarks.timing import machine
+from benchmarks.timing import seconds
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.orbits.newton import find_orbit
 from vanedamp.coupling.orbits.passage import PeriodMap
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import finite, write_csv, write_json
+from vanedamp.files.store import finite
 from vanedamp.files.toml_input import validate
 
 #: kg, N/m, N of the rigid model and its force; m/s^2
@@ -51,14 +51,13 @@ DRAWN = 2336.0, 2344.0
 STEADY = 2335.0
 #: passages with their derivative of which one is timed
 _PASSAGES = 100
-_COLUMNS = ("method", "steps", "doubling", "error", "unsteady", "seconds_per_period")
 #: about what a method's doubling takes at the coarsest steps, s
 _COST = 2.0
 METHODS = ("Moreau-Jean", "penalty, central differences")
 
 
 @dataclass(frozen=True)
-class Effort:
+class Doubling(Benchmark):
     """Steps a period of each method, periods of a run, bisections; frequencies of the diagram and its steps."""
 
     steps: tuple[int, ...]
@@ -67,9 +66,64 @@ class Effort:
     frequencies: int
     coarse: tuple[int, int]
 
+    NAME = "doubling"
+    COLUMNS = ("method", "steps", "doubling", "error", "unsteady", "seconds_per_period")
 
-FULL = Effort((50, 100, 200, 500, 1000, 2000, 5000, 20_000), 1500, 16, 101, (100, 1000))
-QUICK = Effort((100, 1000), 600, 8, 11, (100, 200))
+    def jobs(self) -> dict[str, tuple[str, dict[str, Any]]]:
+        """Return label and [solver] table of the rows whose doubling is measured."""
+        return {
+            f"{label}, {steps} steps": (label, options | {"steps_per_period": steps})
+            for label, options in _variants().items() for steps in self.steps
+        }  # fmt: skip
+
+    def drawn(self) -> dict[str, dict[str, Any]]:
+        """Return the [solver] tables whose settled heights are drawn: the exact engine's and of coarse steps."""
+        return {"exact engine": {}} | {
+            f"{label}, {steps} steps": options | {"steps_per_period": steps}
+            for (label, options), steps in zip(_variants().items(), self.coarse, strict=True)
+        }
+
+    def expected(self, folder: Path) -> dict[str, float]:
+        costs = {row: _COST * (1 + solver["steps_per_period"] / 200) for row, (_, solver) in self.jobs().items()}
+        return {"exact engine": 20.0} | costs | {f"diagram: {name}": 10.0 for name in self.drawn()}
+
+    def measure(self, rows: Rows) -> Result:
+        branch = Branch()
+        engine = rows.take("exact engine", partial(_engine, branch, self), tell=_hertz)
+        points = [
+            rows.take(row, partial(_point, branch, self, engine["exact_by_runs"], label, solver), tell=_hertz)
+            for row, (label, solver) in self.jobs().items()
+        ]
+        diagram = [
+            rows.take(f"diagram: {name}", partial(_settled, branch, self, name, solver))
+            for name, solver in self.drawn().items()
+        ]
+        return dict(finite({
+            "reference": DOUBLING, **engine, "exact_tolerance": CLOSE / DOUBLING, "points": points, "diagram": diagram,
+        }))  # fmt: skip
+
+    def draw(self, result: Mapping[str, Any], folder: Path) -> None:
+        from benchmarks.doubling.figures import doubling_figure
+
+        doubling_figure(result, folder / "bench_doubling.png")
+
+    def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
+        """Yield the doubling by each method."""
+        yield (
+            f"the period doubles at {result['exact']:.9f} Hz: multiplier -1 by the exact engine, "
+            f"{result['exact_error']:.1e} from 40 digits; its runs alternate from {result['exact_by_runs']:.3f} Hz on"
+        )
+        for point in result["points"]:
+            error = "" if point["error"] is None else f"error {point['error']:.1e}, "
+            yield (
+                f"{point['method']:30} {point['steps']:6} steps: {_hertz(point)}, {error}"
+                f"{1e6 * point['seconds_per_period']:.3g} us a period; "
+                f"{100 * point['unsteady']:.2g} % alternation where there is none"
+            )
+
+
+FULL = Doubling((50, 100, 200, 500, 1000, 2000, 5000, 20_000), 1500, 16, 101, (100, 1000))
+QUICK = Doubling((100, 1000), 600, 8, 11, (100, 200))
 
 
 def upright(frequency: float, periods: int = 1, **solver: Any) -> Scene:
@@ -144,7 +198,7 @@ class Branch:
         return float(np.abs(np.diff(response.slip[-LAST - 1 :, 0])).mean() / HEIGHT)
 
 
-def doubling(branch: Branch, effort: Effort, **solver: Any) -> float | None:
+def doubling(branch: Branch, effort: Doubling, **solver: Any) -> float | None:
     """Return the frequency (Hz) where runs begin to alternate, by bisection; None if all between LOW and HIGH do."""
     low, high = LOW, HIGH
     if not branch.alternation(low, effort.periods, **solver) < ALTERNATING:
@@ -156,52 +210,15 @@ def doubling(branch: Branch, effort: Effort, **solver: Any) -> float | None:
     return 0.5 * (low + high)
 
 
-def run_doubling(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure, write bench_doubling.json, .csv and .png into a folder, and return the content of the JSON."""
-    from benchmarks.doubling.figures import doubling_figure
-
-    variants = {
-        label: {"method": name, **variant.options} for label, (name, variant) in charted().items() if label in METHODS
-    }
-    jobs = {
-        f"{label}, {steps} steps": (label, options | {"steps_per_period": steps})
-        for label, options in variants.items() for steps in effort.steps
-    }  # fmt: skip
-    solvers = _coarse(effort, variants)
-    expected = {"exact engine": 20.0} | {
-        row: _COST * (1 + solver["steps_per_period"] / 200) for row, (_, solver) in jobs.items()
-    }
-    rows = Rows(folder, "doubling", asdict(effort), expected | {f"diagram: {name}": 10.0 for name in solvers})
-    branch = Branch()
-    engine = rows.take("exact engine", partial(_engine, branch, effort), tell=_hertz)
-    points = [
-        rows.take(row, partial(_point, branch, effort, engine["exact_by_runs"], label, solver), tell=_hertz)
-        for row, (label, solver) in jobs.items()
-    ]
-    diagram = [
-        rows.take(f"diagram: {name}", partial(_settled, branch, effort, name, solver))
-        for name, solver in solvers.items()
-    ]
-    result = finite({
-        "machine": machine(), "effort": asdict(effort), "reference": DOUBLING, **engine,
-        "exact_tolerance": CLOSE / DOUBLING, "points": points, "diagram": diagram, "wall_time_s": rows.seconds,
-    })  # fmt: skip
-    write_json(folder / "bench_doubling.json", result)
-    write_csv(folder / "bench_doubling.csv", _COLUMNS, ([point[name] for name in _COLUMNS] for point in points))
-    doubling_figure(result, folder / "bench_doubling.png")
-    rows.finish()
-    return result
-
-
-def _engine(branch: Branch, effort: Effort) -> dict[str, Any]:
+def _engine(branch: Branch, effort: Doubling) -> dict[str, Any]:
     """Return the doubling by the exact engine's derivative and by its runs, and what both cost."""
     by_runs = doubling(branch, effort)
     assert by_runs is not None
     exact = exact_doubling(branch.map, branch.state(STEADY))
     return {
         "exact": exact, "exact_by_runs": by_runs, "exact_error": abs(exact - DOUBLING) / DOUBLING,
-        "exact_seconds_per_period": _seconds(partial(branch.settle, STEADY, effort.periods), effort.periods),
-        "seconds_per_passage": _seconds(partial(_pass, branch.map, branch.state(STEADY)), _PASSAGES),
+        "exact_seconds_per_period": seconds(branch.settle, STEADY, effort.periods) / effort.periods,
+        "seconds_per_passage": seconds(_pass, branch.map, branch.state(STEADY)) / _PASSAGES,
         "unsteady": branch.alternation(STEADY, effort.periods),
     }  # fmt: skip
 
@@ -211,14 +228,14 @@ def _hertz(row: Mapping[str, Any]) -> str:
     return "at every frequency" if found is None else f"{found:.3f} Hz"
 
 
-def _point(branch: Branch, effort: Effort, exact: float, label: str, solver: Mapping[str, Any]) -> dict[str, Any]:
+def _point(branch: Branch, effort: Doubling, exact: float, label: str, solver: Mapping[str, Any]) -> dict[str, Any]:
     """Return the doubling by a method, how its motion alternates before, and what a period costs."""
     found = doubling(branch, effort, **solver)
     return {
         "method": label, "steps": solver["steps_per_period"], "doubling": found,
         "error": None if found is None else abs(found - exact) / exact,
         "unsteady": branch.alternation(STEADY, effort.periods, **solver),
-        "seconds_per_period": _seconds(partial(branch.settle, STEADY, effort.periods, **solver), effort.periods),
+        "seconds_per_period": seconds(partial(branch.settle, STEADY, effort.periods, **solver)) / effort.periods,
     }  # fmt: skip
 
 
@@ -227,22 +244,14 @@ def _pass(walked: PeriodMap, state: np.ndarray) -> None:
         walked(state)
 
 
-def _seconds(run: Callable[[], object], periods: int) -> float:
-    """Return the CPU time of one of the periods that a call takes, s."""
-    begun = time.thread_time()
-    run()
-    return (time.thread_time() - begun) / periods
-
-
-def _coarse(effort: Effort, variants: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the [solver] tables whose settled heights are drawn, by name: the exact engine's and of coarse steps."""
-    return {"exact engine": {}} | {
-        f"{label}, {steps} steps": dict(options) | {"steps_per_period": steps}
-        for (label, options), steps in zip(variants.items(), effort.coarse, strict=True)
+def _variants() -> dict[str, dict[str, Any]]:
+    """Return the [solver] table of each method by its label, but for the steps."""
+    return {
+        label: {"method": name, **variant.options} for label, (name, variant) in charted().items() if label in METHODS
     }
 
 
-def _settled(branch: Branch, effort: Effort, name: str, solver: Mapping[str, Any]) -> dict[str, Any]:
+def _settled(branch: Branch, effort: Doubling, name: str, solver: Mapping[str, Any]) -> dict[str, Any]:
     """Return the heights (m) of the last 32 periods over the frequency."""
     frequencies = np.linspace(*DRAWN, effort.frequencies).tolist()
     return {
@@ -252,19 +261,3 @@ def _settled(branch: Branch, effort: Effort, name: str, solver: Mapping[str, Any
             for frequency in frequencies
         ],
     }  # fmt: skip
-
-
-def print_summary(result: Mapping[str, Any]) -> None:
-    """Print the doubling by each method."""
-    print(
-        f"the period doubles at {result['exact']:.9f} Hz: multiplier -1 by the exact engine, "
-        f"{result['exact_error']:.1e} from 40 digits; its runs alternate from {result['exact_by_runs']:.3f} Hz on"
-    )
-    for point in result["points"]:
-        found = "at every frequency" if point["doubling"] is None else f"{point['doubling']:.3f} Hz"
-        error = "" if point["error"] is None else f"error {point['error']:.1e}, "
-        print(
-            f"{point['method']:30} {point['steps']:6} steps: {found}, {error}"
-            f"{1e6 * point['seconds_per_period']:.3g} us a period; "
-            f"{100 * point['unsteady']:.2g} % alternation where there is none"
-        )

@@ -8,8 +8,8 @@ are medians over the rounds.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,15 +17,14 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
+from benchmarks.benchmark import Benchmark, Result, Row
 from benchmarks.engine import scenes
 from benchmarks.engine.hand_written_loop import ImpactOscillator, complete_loop, lean_loop, plain_loop
 from benchmarks.engine.inside import awake_modes, time_of_a_period, time_of_parts
 from benchmarks.engine.reference_solutions import solve_with_events, truth
-from benchmarks.rows import Rows
-from benchmarks.timing import Clock, format_spread, in_turns, machine, seconds, spread
+from benchmarks.timing import Clock, format_spread, in_turns, seconds, spread
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import write_csv, write_json
 
 _SEED = 20_260_101
 _TOLERANCES = (1e-5, 1e-7, 1e-9, 1e-11)
@@ -37,11 +36,15 @@ _HARD = "two impacts a period"
 _ROW = 1.5
 #: frequencies and gaps, relative to those of the one-mode scene, that have few and many impacts and evaluations
 _VARIED = [(1.0, 200.0), *((f, g) for g in (0.5, 1.0) for f in (0.974, 0.984, 0.992, 1.0, 1.01))]
+_SPREAD = ("median", "low", "high")
 
 
 @dataclass(frozen=True)
-class Effort:
-    """Rounds of every comparison and how long its runs are, in periods (pairs: the two lengths of a run)."""
+class Engine(Benchmark):
+    """Rounds of every comparison and how long its runs are, in periods (pairs: the two lengths of a run).
+
+    Needs mpmath: raises InputError without.
+    """
 
     rounds: int
     settle: int
@@ -53,43 +56,58 @@ class Effort:
     calm: tuple[int, int]
     hard: tuple[int, int]
 
+    NAME = "engine"
+    COLUMNS = ("part", "case", "quantity", "unit", *_SPREAD)
 
-FULL = Effort(11, 3000, 200, (2000, 12_000), 20_000, 60, (1, 2, 5, 10, 20, 40, 60), (2000, 10_000), (100, 300))
-QUICK = Effort(3, 2000, 20, (200, 1200), 2000, 10, (1, 60), (2000, 6000), (60, 160))
+    def rows(self, folder: Path) -> dict[str, Row]:
+        tasks: dict[str, Callable[[np.random.Generator], dict[str, Any]]] = {
+            "one mode": partial(_one_mode, self),
+            **{f"modes, {use}": partial(_use, self, use) for use in scenes.USES},
+            "bodies": partial(_bodies, self), "costs": partial(_costs, self),
+        }  # fmt: skip
+        return {
+            name: Row(_ROW * self.rounds, partial(task, np.random.default_rng([_SEED, number])), _told)
+            for number, (name, task) in enumerate(tasks.items())
+        }
+
+    def result(self, values: Mapping[str, Any]) -> Result:
+        modes = _modes(self, {use: values[f"modes, {use}"] for use in scenes.USES})
+        return {"seed": _SEED, "one_mode": values["one mode"], "modes": modes} | {
+            name: values[name] for name in ("bodies", "costs")
+        }
+
+    def lines(self, result: Mapping[str, Any]) -> Iterator[Sequence[Any]]:
+        """Yield a line a number: part, case, quantity, unit, median and quartiles."""
+        for *names, values in _numbers(result):
+            yield *names, *(values.get(key, "") for key in _SPREAD)
+
+    def draw(self, result: Mapping[str, Any], folder: Path) -> None:
+        from benchmarks.engine.figures import one_mode_figure, scaling_figure
+
+        one_mode_figure(result, folder / "bench_one_mode.png")
+        scaling_figure(result, folder / "bench_scaling.png")
+
+    def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
+        """Yield the ratios."""
+        one, modes, bodies, costs = (result[part] for part in ("one_mode", "modes", "bodies", "costs"))
+        yield f"one mode, one body, two impacts a period: {1e6 * one['time']['engine']['median']:.2f} us a period"
+        yield from (f"  {name:38} {format_spread(ratio)}" for name, ratio in one["ratio"].items())
+        yield "  largest error: " + ", ".join(f"{name} {error:.1e}" for name, error in one["error"].items())
+        yield f"{modes['counts'][-1]} modes / 1 mode"
+        for use, entry in modes["uses"].items():
+            yield f"  {use:38} {format_spread(entry['ratio'])}, {entry['awake'][-1]:.1f} modes awake on average"
+        yield "time of n bodies / (n x time of one)"
+        for count, ratio in zip(bodies["counts"], bodies["per_body"], strict=True):
+            yield f"  {count:<38} {format_spread(ratio)}"
+        yield "a period of one mode and one body, us"
+        for name, part in costs["counted"].items():
+            yield f"  {name:38} {part['number']:8.3g} x {1e6 * part['cost']:.3f}"
+        yield from (f"  {name:38} {1e6 * part:8.3g}" for name, part in costs["timed"].items())
+        yield f"  one more awake mode {'':18} {1e6 * modes['per_mode_and_impact']:8.3g} an impact"
 
 
-def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure, write bench_engine.json, .csv and two figures into a folder, and return what the JSON holds.
-
-    Raises InputError without mpmath.
-    """
-    tasks: dict[str, Callable[[np.random.Generator], dict[str, Any]]] = {
-        "one mode": partial(_one_mode, effort),
-        **{_use_row(use): partial(_use, effort, use) for use in scenes.USES},
-        "bodies": partial(_bodies, effort), "costs": partial(_costs, effort),
-    }  # fmt: skip
-    rows = Rows(folder, "engine", asdict(effort), dict.fromkeys(tasks, _ROW * effort.rounds))
-    done = {
-        name: rows.take(name, partial(task, np.random.default_rng([_SEED, number])), tell=_told)
-        for number, (name, task) in enumerate(tasks.items())
-    }
-    result: dict[str, Any] = {
-        "machine": machine(), "seed": _SEED, "effort": asdict(effort), "one_mode": done["one mode"],
-        "modes": _modes(effort, {use: done[_use_row(use)] for use in scenes.USES}),
-        "bodies": done["bodies"], "costs": done["costs"], "wall_time_s": rows.seconds,
-    }  # fmt: skip
-    from benchmarks.engine.figures import one_mode_figure, scaling_figure
-
-    write_json(folder / "bench_engine.json", result)
-    _write_csv(result, folder / "bench_engine.csv")
-    one_mode_figure(result, folder / "bench_one_mode.png")
-    scaling_figure(result, folder / "bench_scaling.png")
-    rows.finish()
-    return result
-
-
-def _use_row(use: str) -> str:
-    return f"modes, {use}"
+FULL = Engine(11, 3000, 200, (2000, 12_000), 20_000, 60, (1, 2, 5, 10, 20, 40, 60), (2000, 10_000), (100, 300))
+QUICK = Engine(3, 2000, 20, (200, 1200), 2000, 10, (1, 60), (2000, 6000), (60, 160))
 
 
 def _told(row: Mapping[str, Any]) -> str:
@@ -100,29 +118,7 @@ def _told(row: Mapping[str, Any]) -> str:
     return " to ".join(dict.fromkeys(f"{1e6 * times[end]['median']:.3g}" for end in (0, -1))) + " us a period"
 
 
-def print_summary(result: Mapping[str, Any]) -> None:
-    """Print the ratios."""
-    one, modes, bodies = result["one_mode"], result["modes"], result["bodies"]
-    print(f"one mode, one body, two impacts a period: {1e6 * one['time']['engine']['median']:.2f} us a period")
-    for name, ratio in one["ratio"].items():
-        print(f"  {name:38} {format_spread(ratio)}")
-    print("  largest error: " + ", ".join(f"{name} {error:.1e}" for name, error in one["error"].items()))
-    print(f"{modes['counts'][-1]} modes / 1 mode")
-    for use, entry in modes["uses"].items():
-        print(f"  {use:38} {format_spread(entry['ratio'])}, {entry['awake'][-1]:.1f} modes awake on average")
-    print("time of n bodies / (n x time of one)")
-    for count, ratio in zip(bodies["counts"], bodies["per_body"], strict=True):
-        print(f"  {count:<38} {format_spread(ratio)}")
-    costs = result["costs"]
-    print("a period of one mode and one body, us")
-    for name, part in costs["counted"].items():
-        print(f"  {name:38} {part['number']:8.3g} x {1e6 * part['cost']:.3f}")
-    for name, part in costs["timed"].items():
-        print(f"  {name:38} {1e6 * part:8.3g}")
-    print(f"  one more awake mode {'':18} {1e6 * modes['per_mode_and_impact']:8.3g} an impact")
-
-
-def _one_mode(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
+def _one_mode(effort: Engine, rng: np.random.Generator) -> dict[str, Any]:
     """Measure the engine, the loops and solve_ivp on two impacts a period: times, ratios, errors of the state."""
     scene = scenes.settled(scenes.one_mode(), effort.settle)
     case = ImpactOscillator.of(scene)
@@ -152,7 +148,7 @@ def _one_mode(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _use(effort: Effort, use: str, rng: np.random.Generator) -> dict[str, Any]:
+def _use(effort: Engine, use: str, rng: np.random.Generator) -> dict[str, Any]:
     """Measure time against the number of modes, for a body that does not, seldom or often wakes them."""
     lengths = effort.hard if use == _HARD else effort.calm
     with tempfile.TemporaryDirectory() as folder:
@@ -176,7 +172,7 @@ def _use(effort: Effort, use: str, rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _modes(effort: Effort, uses: Mapping[str, Any]) -> dict[str, Any]:
+def _modes(effort: Engine, uses: Mapping[str, Any]) -> dict[str, Any]:
     """Return times against the number of modes, and what one more costs an impact."""
     hard = uses[_HARD]
     change = hard["time"][-1]["median"] - hard["time"][0]["median"]
@@ -184,7 +180,7 @@ def _modes(effort: Effort, uses: Mapping[str, Any]) -> dict[str, Any]:
     return {"counts": list(effort.modes), "uses": dict(uses), "per_mode_and_impact": per_mode}
 
 
-def _bodies(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
+def _bodies(effort: Engine, rng: np.random.Generator) -> dict[str, Any]:
     """Measure time against the number of bodies in cavities of their own."""
     varied = {str(count): scenes.bodies(count) for count in _COUNTS}
     lengths = (effort.engine[0], sum(effort.engine) // 2)
@@ -205,7 +201,7 @@ def _bodies(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _costs(effort: Effort, rng: np.random.Generator) -> dict[str, Any]:
+def _costs(effort: Engine, rng: np.random.Generator) -> dict[str, Any]:
     """Return what a period of the one-mode scene consists of.
 
     counted: periods' ends, events and evaluations of the search with what one of each costs, fitted to scenes that
@@ -248,8 +244,8 @@ def _error(states: np.ndarray, exact: np.ndarray) -> float:
     return float((np.abs(states - exact) / np.abs(exact).max(axis=0)).max())
 
 
-def _write_csv(result: Mapping[str, Any], path: Path) -> None:
-    """Write one line a number: part, case, quantity, unit, median and quartiles."""
+def _numbers(result: Mapping[str, Any]) -> list[tuple[Any, ...]]:
+    """Return part, case, quantity, unit and values of every number of a result."""
     one, modes, bodies = result["one_mode"], result["modes"], result["bodies"]
     lines = [("one mode", name, "time per period", "s", times) for name, times in one["time"].items()]
     lines += [("one mode", name, "ratio of times", "1", ratio) for name, ratio in one["ratio"].items()]
@@ -265,6 +261,4 @@ def _write_csv(result: Mapping[str, Any], path: Path) -> None:
     costs = result["costs"]
     lines += [("costs", name, "time of one", "s", {"median": part["cost"]}) for name, part in costs["counted"].items()]
     lines += [("costs", name, "time per period", "s", {"median": part}) for name, part in costs["timed"].items()]
-    spreads = ("median", "low", "high")
-    rows = ((*names, *(values.get(key, "") for key in spreads)) for *names, values in lines)
-    write_csv(path, ("part", "case", "quantity", "unit", *spreads), rows)
+    return lines

@@ -10,17 +10,16 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from benchmarks.benchmark import Benchmark, Result, Row
 from benchmarks.limits.worker import LIMITS
-from benchmarks.rows import Rows
 from benchmarks.tables import seconds_text, table
-from benchmarks.timing import machine
-from vanedamp.files.store import replacing, write_csv, write_json
+from vanedamp.files.store import replacing
 from vanedamp.studies.workers import run_module
 
 #: what is started, and what it brings
@@ -40,53 +39,51 @@ _WORDS = {
 
 
 @dataclass(frozen=True)
-class Effort:
+class Limits(Benchmark):
     """Operations of each kind (matrix: its rows; byte: doubles of a vector), bytes of a file, repeated starts."""
 
     sizes: Mapping[str, int]
     file: int
     starts: int
 
+    NAME = "limits"
+    CLOCK = "CPU time of the process, one thread; files and starts by the clock"
+    COLUMNS = ("operation", "seconds")
 
-FULL = Effort(
+    def rows(self, folder: Path) -> dict[str, Row]:
+        tasks: dict[str, Callable[[], float]] = {
+            _WORDS[name]: partial(_process, name, self.sizes[name]) for name in LIMITS
+        }
+        tasks[_FILE] = partial(_byte_of_file, folder, self.file)
+        tasks |= {_START.format(name): partial(_start, code, self.starts) for name, code in STARTS.items()}
+        return {name: Row(4.0, task, seconds_text) for name, task in tasks.items()}
+
+    def result(self, values: Mapping[str, Any]) -> Result:
+        return {"seconds": dict(values)}
+
+    def lines(self, result: Mapping[str, Any]) -> Iterable[Sequence[Any]]:
+        return result["seconds"].items()
+
+    def summary(self, result: Mapping[str, Any]) -> list[str]:
+        """Return the limits as rates, too."""
+        seconds = result["seconds"]
+        rates = {
+            _WORDS["multiply_add"]: f"{2e-9 / seconds[_WORDS['multiply_add']]:.3g} Gflop/s",
+            _WORDS["byte"]: f"{1e-9 / seconds[_WORDS['byte']]:.3g} GB/s",
+            _FILE: f"{1e-9 / seconds[_FILE]:.3g} GB/s",
+        }
+        rows = ((name, seconds_text(value), rates.get(name, "")) for name, value in seconds.items())
+        return [table(("operation", "time", "rate"), rows)]
+
+
+FULL = Limits(
     {"exponential": 3_000_000, "product": 30_000_000, "division": 10_000_000, "multiply_add": 1500,
      "byte": 25_000_000}, 100_000_000, 11,
 )  # fmt: skip
-QUICK = Effort(
+QUICK = Limits(
     {"exponential": 100_000, "product": 1_000_000, "division": 1_000_000, "multiply_add": 300, "byte": 1_000_000},
     1_000_000, 2,
 )  # fmt: skip
-
-
-def run_limits(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure, write bench_limits.json and .csv into a folder, and return the content of the JSON."""
-    tasks: dict[str, Callable[[], float]] = {
-        _WORDS[name]: partial(_process, name, effort.sizes[name]) for name in LIMITS
-    }
-    tasks[_FILE] = partial(_byte_of_file, folder, effort.file)
-    tasks |= {_START.format(name): partial(_start, code, effort.starts) for name, code in STARTS.items()}
-    rows = Rows(folder, "limits", asdict(effort), dict.fromkeys(tasks, 4.0))
-    seconds = {name: rows.take(name, task, tell=seconds_text) for name, task in tasks.items()}
-    result = {
-        "machine": machine() | {"clock": "CPU time of the process, one thread; files and starts by the clock"},
-        "effort": asdict(effort), "seconds": seconds, "wall_time_s": rows.seconds,
-    }  # fmt: skip
-    write_json(folder / "bench_limits.json", result)
-    write_csv(folder / "bench_limits.csv", ("operation", "seconds"), seconds.items())
-    rows.finish()
-    return result
-
-
-def print_summary(result: Mapping[str, Any]) -> None:
-    """Print the limits as rates, too."""
-    seconds = result["seconds"]
-    rates = {
-        _WORDS["multiply_add"]: f"{2e-9 / seconds[_WORDS['multiply_add']]:.3g} Gflop/s",
-        _WORDS["byte"]: f"{1e-9 / seconds[_WORDS['byte']]:.3g} GB/s",
-        _FILE: f"{1e-9 / seconds[_FILE]:.3g} GB/s",
-    }
-    rows = ((name, seconds_text(value), rates.get(name, "")) for name, value in seconds.items())
-    print(table(("operation", "time", "rate"), rows))
 
 
 def _process(name: str, size: int) -> float:

@@ -47,7 +47,7 @@ Key = tuple[str, float]
 
 
 @dataclass(frozen=True)
-class Effort:
+class Settings:
     """Rounds of timing, steps per period, tolerances of solve_ivp, periods of comparison, of means, of the reference.
 
     ivp: periods of solve_ivp's means; dearest: steps that a mean may cost; timed: steps of a timed run; modes:
@@ -73,11 +73,6 @@ class Effort:
     longest: float = 300.0
 
 
-FULL = Effort(3, (100, 300, 1000, 3000, 10_000), (1e-4, 1e-6, 1e-8, 1e-10), 10, 2000, 30_000, 400, 1e7, 100_000, 10,
-              (0, 1, 2, 4, 7, 10, 15, 20), (300, 1000), 500, CurveEffort())  # fmt: skip
-QUICK = Effort(2, (100, 1000), (1e-4, 1e-8), 3, 200, 600, 40, 1e6, 50_000, None, (), (300,), 100)
-
-
 @dataclass(frozen=True)
 class Chart:
     """A scene by every method, made when it is first needed. repeats: whether its response does."""
@@ -85,7 +80,7 @@ class Chart:
     name: str
     make: Callable[[], Scene]
     repeats: bool
-    effort: Effort
+    effort: Settings
 
     def rows(self) -> dict[str, float]:
         """Return the rows in their order, and about what each takes, s."""
@@ -243,7 +238,7 @@ def status_after(scene: Scene, periods: int) -> str:
     return simulate(scene.replace({"time.periods": periods, "time.transient": 0})).status.value
 
 
-def _settings(effort: Effort) -> list[Key]:
+def _settings(effort: Settings) -> list[Key]:
     """Return every method's label with each of its settings; the exact engine is the first."""
     return [
         (label, float(setting))
@@ -252,7 +247,7 @@ def _settings(effort: Effort) -> list[Key]:
     ]
 
 
-def _peer_settings(effort: Effort) -> list[Key]:
+def _peer_settings(effort: Settings) -> list[Key]:
     return [
         (name, float(setting))
         for name, peer in PEERS.items()
@@ -321,7 +316,7 @@ def _mean_error(mean: float, confidence: float | None, reference: Response) -> d
     return {"error": error, "interval": interval, "floor": float(np.hypot(interval, theirs))}
 
 
-def _lengths(key: Key, effort: Effort) -> tuple[int, int]:
+def _lengths(key: Key, effort: Settings) -> tuple[int, int]:
     """Return two lengths of a run in periods, so that the longer takes some tenths of a second."""
     if _by_tolerance(key[0]):
         return 1, 3

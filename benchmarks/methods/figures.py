@@ -8,14 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.ticker import NullFormatter
 
 from benchmarks.methods.peers import PEERS
 from benchmarks.methods.scenes import charted
-from vanedamp.studies.figures import GREY, draw_grid, save, subplots
-
-#: of curves that are no methods
-_COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#65a30d", "#0e7490", "#7e22ce", "#be185d", "#a16207")
+from vanedamp.studies.figures import BLUE, GREY, RED, draw_grid, save, subplots
 
 
 def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
@@ -78,11 +74,11 @@ def _chart(axes: Axes, name: str, chart: Mapping[str, Any], styles: Mapping[str,
 
 def _ladder(axes: Axes, ladder: Mapping[str, Any]) -> None:
     times, errors = [1e6 * time["median"] for time in ladder["time"]][:-1], ladder["error"][:-1]
-    axes.loglog(times, errors, "o", color=_COLOURS[0])
+    axes.loglog(times, errors, "o", color=BLUE)
     for count, time, error in zip(ladder["modes"], times, errors, strict=False):
         axes.annotate(str(count), (time, error), (5, 5), textcoords="offset points", fontsize=9)
     full = ladder["full"]
-    axes.loglog([1e6 * full["time"]], [full["error"]], "s", color=_COLOURS[1])
+    axes.loglog([1e6 * full["time"]], [full["error"]], "s", color=RED)
     axes.annotate(
         f"whole mesh, {full['free_dofs']} DOFs\none curve, extrapolated: {full['curve_days']:.2g} days",
         (1e6 * full["time"], full["error"]), (-8, 12), textcoords="offset points", ha="right", fontsize=9,
@@ -105,13 +101,13 @@ def wrap(reason: str) -> str:
 
 def _curve(axes: Axes, curve: Mapping[str, Any]) -> None:
     """Draw mean amplitudes around the peak of the damped curve, with fixed frequency and onset."""
-    axes.plot(curve["at_hz"], [1e6 * value for value in curve["amplitude"]], "o-", color=_COLOURS[0], markersize=4,
+    axes.plot(curve["at_hz"], [1e6 * value for value in curve["amplitude"]], "o-", color=BLUE, markersize=4,
               label=f"exact engine, {curve['modes']} modes")  # fmt: skip
-    axes.plot(curve["peak_hz"], [1e6 * value for value in curve["mesh_peak"]], "s", color=_COLOURS[1],
+    axes.plot(curve["peak_hz"], [1e6 * value for value in curve["mesh_peak"]], "s", color=RED,
               label=f"whole mesh, {curve['free_dofs']} DOFs")  # fmt: skip
     for value, style, colour, label in (
-        (curve["fixed_hz"][0], "-", _COLOURS[0], "fixed, reduced"),
-        (curve["fixed_hz"][1], "--", _COLOURS[1], "fixed, whole mesh"),
+        (curve["fixed_hz"][0], "-", BLUE, "fixed, reduced"),
+        (curve["fixed_hz"][1], "--", RED, "fixed, whole mesh"),
         (curve["onset_hz"], ":", GREY, "onset"),
     ):
         axes.axvline(value, linestyle=style, color=colour, label=label)
@@ -123,26 +119,3 @@ def _curve(axes: Axes, curve: Mapping[str, Any]) -> None:
     axes.set_ylabel("mean amplitude, µm")
     draw_grid(axes)
     axes.legend(fontsize=8)
-
-
-def stability_figure(result: Mapping[str, Any], path: Path) -> None:
-    """Draw a panel a part: measured edges of failure as points, analytic limits as lines."""
-    figure, axes = subplots(2, 4, size=(19, 9))
-    for panel, (name, part) in zip(axes.flat, result["parts"].items(), strict=True):
-        for (curve, values), colour in zip(part["curves"].items(), _COLOURS, strict=False):
-            line = curve in ("limit", "1 - duration / step")
-            panel.plot(
-                part["x"], values, "--" if line else "o", color=GREY if line else colour,
-                label="analytic limit" if curve == "limit" else curve,
-            )  # fmt: skip
-        if part["log"]:
-            panel.set_xscale("log")
-            panel.set_yscale("log")
-            panel.xaxis.set_minor_formatter(NullFormatter())
-            panel.yaxis.set_minor_formatter(NullFormatter())
-        panel.set_title(name)
-        panel.set_xlabel(part["x_label"])
-        panel.set_ylabel(part["y_label"])
-        draw_grid(panel)
-        panel.legend(fontsize=9)
-    save(figure, path)

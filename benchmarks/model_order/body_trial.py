@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -218,22 +218,22 @@ def summary(verdicts: Sequence[Verdict]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def print_body_trial(result: Mapping[str, Any]) -> None:
-    """Print the verdicts."""
-    print(
+def body_trial_text(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the verdicts as lines."""
+    yield (
         "slider or block: scene, tolerance, choice, tilts that persist, estimated and true error of the slider (95 %), "
         "cost of the choice over that of the block's run"
     )
     for row in result["verdicts"]:
         estimate = "      ?" if row["estimate"] is None else f"{row['estimate']:+7.3f}"
-        print(
+        yield (
             f"  {row['scene']:>3} {row['tolerance']:5}  {row['shape']:6}  {row['persisting']}/{row['tilts']}  "
             f"{estimate}  {row['error']:+7.3f} ({row['confidence']:.3f})  {row['cost']:.2f}"
             + ("" if row["status"] == "ok" else f"  {row['status']}")
             + ("" if row["kept"] else "  MISSED" if row["missed"] else "  beyond, within its confidence")
         )
     for row in result["tolerances"]:
-        print(
+        yield (
             f"  tolerance {row['tolerance']:g}: {row['kept']} of {row['number']} within, {row['missed']} surely not; "
             f"{row['sliders']} sliders chosen, {row['saved']} of {row['sliders_enough']} that are enough; cost of the "
             f"choice {row['cost']:.2f}, of the slider {row['slider_cost']:.2f} of the block's run (medians)"

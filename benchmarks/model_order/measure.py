@@ -10,29 +10,29 @@ Newton's law has no limit, and a massless boundary without loss is another conta
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.benchmark import Benchmark, Result
 from benchmarks.engine.inside import time_of_a_period
 from benchmarks.model_order.bar_on_wall import LAWS as BAR_LAWS
 from benchmarks.model_order.bar_on_wall import bounce
 from benchmarks.model_order.body_trial import SEED as BODY_SEED
-from benchmarks.model_order.body_trial import body_rows, print_body_trial, run_body_trial
+from benchmarks.model_order.body_trial import body_rows, body_trial_text, run_body_trial
 from benchmarks.model_order.body_trial import summary as body_summary
 from benchmarks.model_order.scenes import SEED
 from benchmarks.model_order.structures import cluster_model
-from benchmarks.model_order.trial import print_trial, run_trial, summary, trial_rows
+from benchmarks.model_order.trial import run_trial, summary, trial_rows, trial_text
 from benchmarks.rows import Rows, Take, at_once
-from benchmarks.timing import Clock, in_turns, machine
+from benchmarks.timing import Clock, in_turns
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import warm_up
-from vanedamp.files.store import finite, write_json
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.truncation import massless
@@ -58,7 +58,7 @@ _BAR, _TIMES = "bar on a wall", "cluster: times"
 
 
 @dataclass(frozen=True)
-class Effort:
+class Ladder(Benchmark):
     """Sizes of models, numbers of runs and lengths of them."""
 
     degree: int
@@ -71,42 +71,53 @@ class Effort:
     body_trials: int
     body_periods: int
 
+    NAME = FILES = "ladder"
 
-FULL = Effort(
+    def expected(self, folder: Path) -> dict[str, float]:
+        runs = self.frequencies * len(_STARTS) * self.periods
+        expected = {_BAR: 0.3 * len(self.bar_modes)}
+        expected |= {_row(law, modes): 1e-5 * runs * (1 + 0.2 * modes) for law in LAWS for modes in self.modes}
+        expected |= {_TIMES: 5.0} | dict.fromkeys(trial_rows(self.trials), 0.03 * self.trial_periods)
+        return expected | dict.fromkeys(body_rows(self.body_trials), 0.01 * self.body_periods)
+
+    def measure(self, rows: Rows) -> Result:
+        file = rows.folder / "ladder_rom.h5"
+        cluster_model(self.degree, max(self.modes)).save(file)
+        result: Result = {"bar": rows.take(_BAR, partial(bar_errors, self.bar_modes))}
+        result["cluster"] = cluster_curves(file, self, rows.take)
+        result["auto"] = summary(run_trial(rows.folder, SEED, self.trials, self.trial_periods, rows.take))
+        verdicts = run_body_trial(rows.folder, BODY_SEED, self.body_trials, self.body_periods, rows.take)
+        return result | {"bodies": body_summary(verdicts) | {"periods": self.body_periods}}
+
+    def draw(self, result: Mapping[str, Any], folder: Path) -> None:
+        from benchmarks.model_order import figures
+
+        figures.bar_figure(result["bar"], folder / "ladder_bar.png")
+        figures.cluster_figure(result["cluster"], folder / "ladder_cluster.png")
+        figures.auto_figure(result["auto"], folder / "ladder_auto.png")
+        figures.bodies_figure(result["bodies"], folder / "ladder_bodies.png")
+
+    def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
+        """Yield the errors and verdicts."""
+        bar, cluster = result["bar"], result["cluster"]
+        yield "bar on a wall, error of the second apex's time, by modes " + ", ".join(map(str, bar["modes"]))
+        for law, errors in bar["time"].items():
+            yield f"  {law:10} " + "  ".join(f"{error:.1e}" for error in errors)
+        finest = f"{cluster['reference']['law']}, {cluster['reference']['modes']} modes"
+        yield f"cluster, error of the mean amplitude against {finest}, by modes " + ", ".join(
+            map(str, cluster["modes"])
+        )
+        for law, entry in cluster["laws"].items():
+            yield f"  {law:22} " + "  ".join(f"{error:.1e}" for error in entry["error"])
+        yield from trial_text(result["auto"])
+        yield from body_trial_text(result["bodies"])
+
+
+FULL = Ladder(
     2, (1, 2, 3, 6, 12, 25, 60), 9, 1500, (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30),
     {"cluster": 4, "rod": 3, "beam": 3}, 2000, 40, 2000,
 )  # fmt: skip
-QUICK = Effort(1, (1, 2, 3, 6, 12), 3, 1200, (1, 2, 4, 8), {"cluster": 1, "beam": 1}, 200, 3, 900)
-
-
-def run_ladder(folder: Path, effort: Effort) -> dict[str, Any]:
-    """Measure, and write ladder.json with its figures to the folder, made if need be."""
-    rows = Rows(folder, "ladder", asdict(effort), _expected(effort))
-    file = folder / "ladder_rom.h5"
-    cluster_model(effort.degree, max(effort.modes)).save(file)
-    result: dict[str, Any] = {"machine": machine(), "bar": rows.take(_BAR, partial(bar_errors, effort.bar_modes))}
-    result["cluster"] = cluster_curves(file, effort, rows.take)
-    result["auto"] = summary(run_trial(folder, SEED, effort.trials, effort.trial_periods, rows.take))
-    verdicts = run_body_trial(folder, BODY_SEED, effort.body_trials, effort.body_periods, rows.take)
-    result["bodies"] = body_summary(verdicts) | {"periods": effort.body_periods}
-    write_json(folder / "ladder.json", finite(result))
-    from benchmarks.model_order.figures import auto_figure, bar_figure, bodies_figure, cluster_figure
-
-    bar_figure(result["bar"], folder / "ladder_bar.png")
-    cluster_figure(result["cluster"], folder / "ladder_cluster.png")
-    auto_figure(result["auto"], folder / "ladder_auto.png")
-    bodies_figure(result["bodies"], folder / "ladder_bodies.png")
-    rows.finish()
-    return result
-
-
-def _expected(effort: Effort) -> dict[str, float]:
-    """Return the rows in their order, and about what each takes, s."""
-    runs = effort.frequencies * len(_STARTS) * effort.periods
-    expected = {_BAR: 0.3 * len(effort.bar_modes)}
-    expected |= {_row(law, modes): 1e-5 * runs * (1 + 0.2 * modes) for law in LAWS for modes in effort.modes}
-    expected |= {_TIMES: 5.0} | dict.fromkeys(trial_rows(effort.trials), 0.03 * effort.trial_periods)
-    return expected | dict.fromkeys(body_rows(effort.body_trials), 0.01 * effort.body_periods)
+QUICK = Ladder(1, (1, 2, 3, 6, 12), 3, 1200, (1, 2, 4, 8), {"cluster": 1, "beam": 1}, 200, 3, 900)
 
 
 def _row(law: str, modes: int) -> str:
@@ -124,7 +135,7 @@ def bar_errors(counts: tuple[int, ...]) -> dict[str, Any]:
     }
 
 
-def cluster_curves(file: Path, effort: Effort, take: Take = at_once) -> dict[str, Any]:
+def cluster_curves(file: Path, effort: Ladder, take: Take = at_once) -> dict[str, Any]:
     """Measure mean amplitudes over the frequencies, their error and cost, for each law and number of natural modes."""
     model = ReducedModel.load(file)
     first = float(model.natural_frequencies_hz[0])
@@ -185,7 +196,7 @@ def _from(scene: Scene, start: float) -> Scene:
     return scene.replace({"damper.0.position": start * scene.cavity[0].gap})
 
 
-def _scene(file: Path, modes: int, contact: Mapping[str, Any], mass: float, frequency: float, effort: Effort) -> Scene:
+def _scene(file: Path, modes: int, contact: Mapping[str, Any], mass: float, frequency: float, effort: Ladder) -> Scene:
     damper = {"cavity": "c1", "mass": _BODY * mass, "friction": 0.4}
     if contact["law"] != "massless":
         damper["restitution"] = _RESTITUTION
@@ -198,17 +209,3 @@ def _scene(file: Path, modes: int, contact: Mapping[str, Any], mass: float, freq
         "time": {"periods": effort.periods, "transient": effort.periods // 3},
     }
     return validate(Scene, data, "scene")
-
-
-def print_summary(result: Mapping[str, Any]) -> None:
-    """Print the errors."""
-    bar, cluster = result["bar"], result["cluster"]
-    print("bar on a wall, error of the second apex's time, by modes " + ", ".join(map(str, bar["modes"])))
-    for law, errors in bar["time"].items():
-        print(f"  {law:10} " + "  ".join(f"{error:.1e}" for error in errors))
-    finest = f"{cluster['reference']['law']}, {cluster['reference']['modes']} modes"
-    print(f"cluster, error of the mean amplitude against {finest}, by modes " + ", ".join(map(str, cluster["modes"])))
-    for law, entry in cluster["laws"].items():
-        print(f"  {law:22} " + "  ".join(f"{error:.1e}" for error in entry["error"]))
-    print_trial(result["auto"])
-    print_body_trial(result["bodies"])

@@ -7,7 +7,7 @@ per period, within runs and in turns.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -186,16 +186,16 @@ def summary(verdicts: Sequence[Verdict]) -> dict[str, Any]:
     }
 
 
-def print_trial(result: dict[str, Any]) -> None:
-    """Print the verdicts."""
-    print("automatic choice: scene, tolerance, modes, estimated and true error (95 %), cost, cheapest model, ratio")
+def trial_text(result: dict[str, Any]) -> Iterator[str]:
+    """Yield the verdicts as lines."""
+    yield ("automatic choice: scene, tolerance, modes, estimated and true error (95 %), cost, cheapest model, ratio")
     for row in result["verdicts"]:
-        print(
+        yield (
             f"  {row['scene']:11} {row['tolerance']:5}  {row['modes']:>3}  {row['estimate']:.4f}  {row['error']:.4f} "
             f"({row['confidence']:.4f})  {1e6 * row['cost']:6.1f} us  {row['cheapest_modes']:>3}  {row['ratio']:.2f}"
             + ("" if row["kept"] else "  MISSED")
         )
-    print(
+    yield (
         f"  {result['kept']} of {result['number']} within their tolerance, {result['within_twice']} within twice the "
         f"cheapest cost (largest ratio {result['largest_ratio']:.2f})"
     )

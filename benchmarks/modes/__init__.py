@@ -1,16 +1,8 @@
 """Eigensolvers."""
 
-from __future__ import annotations
-
-from pathlib import Path
+from benchmarks import running
 
 NAME = "modal"
 ORDER = 20
 SUMMARY = "time and memory of ten modes beside scipy's solvers"
-
-
-def run(folder: Path, quick: bool) -> None:
-    """Measure, write results and figures, print a summary."""
-    from benchmarks.modes.measure import FULL, QUICK, print_summary, run_bench
-
-    print_summary(run_bench(folder, QUICK if quick else FULL))
+run = running("benchmarks.modes.measure")

@@ -9,26 +9,24 @@ from __future__ import annotations
 import importlib.metadata
 import importlib.util
 import itertools
-import json
-import subprocess
 import tempfile
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.apart import apart
+from benchmarks.benchmark import Benchmark, Result
 from benchmarks.modes.solvers import COUNT, NAMES, OURS
 from benchmarks.rows import Contest, Rows
 from benchmarks.tables import table
-from benchmarks.timing import machine
-from vanedamp.files.store import write_csv, write_json
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.vane_cluster import build
-from vanedamp.studies.workers import run_module
 
+_WORKER = "benchmarks.modes.worker"
 # frequencies that differ by more than this between two solvers are another answer
 _AGREE = 1e-7
 #: a solver that takes this many times the best's time has lost
@@ -46,39 +44,80 @@ _COARSE, _GROWTH, _DEAR = 0.0042, 3.5, {"superlu": 1.7, "superlu_default": 4.0}
 
 
 @dataclass(frozen=True)
-class Effort:
-    """Element sizes of the cluster, m, rounds of every measurement (the median counts), and the limit of one, s."""
+class Modal(Benchmark):
+    """Element sizes of the cluster, m, rounds of every measurement (the median counts), and the limit of one, s.
+
+    Solvers take turns in every round; one that has lost by far at a size is left out from there on.
+    """
 
     sizes: tuple[float, ...]
     rounds: int
     limit: float
 
+    NAME = "modal"
+    CLOCK = "CPU time of the process, one thread"
+    COLUMNS = ("dofs", "solver", "status", "factorisation_cpu_s", "modes_cpu_s", "modes_wall_s", "peak_bytes")
+
+    def inputs(self) -> dict[str, Any]:
+        return {}
+
+    def expected(self, folder: Path) -> dict[str, float]:
+        expected = {}
+        for size in self.sizes:
+            expected[_row(size)] = 8.0 + 4.0 * (_COARSE / size) ** 2.4
+            for turn, name in itertools.product(range(self.rounds), _solvers()[0]):
+                expected[_row(size, turn, name)] = 3.0 + _DEAR.get(name, 1.2) * (_COARSE / size) ** _GROWTH
+        return expected
+
+    def measure(self, rows: Rows) -> Result:
+        solvers, absent = _solvers()
+        contest = Contest(OURS, _LOST, self.limit)
+        result: Result = {"modes": COUNT, "absent": absent, "dropped": contest.dropped, "sizes": []}
+        for size, growth in zip(self.sizes, _growths(self.sizes), strict=True):
+            with tempfile.TemporaryDirectory() as home:
+                result["sizes"].append(_size(rows, contest, solvers, _Matrices(Path(home), size, self), growth))
+            result["ahead"] = _ahead(result["sizes"])
+            self.write(
+                self.begun() | result | {"wall_time_s": rows.seconds}, rows.folder
+            )  # a larger size may be killed
+        return result
+
+    def lines(self, result: Mapping[str, Any]) -> Iterator[Sequence[Any]]:
+        """Yield a line a size and solver."""
+        for entry in result["sizes"]:
+            assembly = entry["assembly"]
+            dofs, times = assembly.get("dofs"), assembly.get("assembly", {})
+            clocks = (times.get("cpu_s"), times.get("wall_s"), assembly.get("peak_bytes"))
+            yield dofs, "assembly", assembly["status"], "", *clocks
+            for name, run in entry["solvers"].items():
+                factor, modes = run.get("factorisation", {}), run.get("modes", {})
+                clocks = (modes.get("cpu_s"), modes.get("wall_s"), run.get("peak_bytes"))
+                yield dofs, NAMES[name], run["status"], factor.get("cpu_s"), *clocks
+
+    def draw(self, result: Mapping[str, Any], folder: Path) -> None:
+        from benchmarks.modes.figures import modal_figure
+
+        modal_figure(result, folder / "bench_modal.png")
+
+    def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
+        """Yield times, memory and ratios."""
+        lines = []
+        for entry in result["sizes"]:
+            dofs, ratios = f"{entry['assembly'].get('dofs', 0):,}", entry["ratio"]
+            lines.append((dofs, "assembly", _assembly_text(entry["assembly"]), ""))
+            lines += [
+                (dofs, NAMES[name], _solver_text(run), f"{ratios[name]['modes']:.2f}" if name in ratios else "")
+                for name, run in entry["solvers"].items()
+            ]
+        yield table(("degrees of freedom", "solver", "processor time and peak memory", "ours / this"), lines)
+        yield from (f"not measured: {NAMES[name]} ({reason})" for name, reason in result["absent"].items())
+        behind = [f"{name} at {dofs}" for name, dofs in result["ahead"]["behind"]]
+        yield "at or ahead of each at every size" if not behind else "behind " + ", ".join(behind)
+
 
 #: about 30 000, 100 000 and 350 000 degrees of freedom
-FULL = Effort((0.0042, 0.00225, 0.00134), 3, 900.0)
-QUICK = Effort((0.006, 0.0042), 1, 120.0)
-
-
-def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure, write bench_modal.json, .csv and .png into a folder, and return what the JSON holds.
-
-    Solvers take turns in every round; one that has lost by far at a size is left out from there on.
-    """
-    solvers, absent = _solvers()
-    rows = Rows(folder, "modal", {}, _expected(solvers, effort))
-    contest = Contest(OURS, _LOST, effort.limit)
-    result: dict[str, Any] = {
-        "machine": machine() | {"clock": "CPU time of the process, one thread"}, "effort": asdict(effort),
-        "modes": COUNT, "absent": absent, "dropped": contest.dropped, "sizes": [],
-    }  # fmt: skip
-    for size, growth in zip(effort.sizes, _growths(effort.sizes), strict=True):
-        with tempfile.TemporaryDirectory() as home:
-            result["sizes"].append(_size(rows, contest, solvers, _Matrices(Path(home), size, effort), growth))
-        result["ahead"] = _ahead(result["sizes"])
-        result["wall_time_s"] = rows.seconds
-        _write(result, folder)  # a large size may end in a kill: what is measured stays
-    rows.finish()
-    return result
+FULL = Modal((0.0042, 0.00225, 0.00134), 3, 900.0)
+QUICK = Modal((0.006, 0.0042), 1, 120.0)
 
 
 @dataclass(frozen=True)
@@ -87,7 +126,7 @@ class _Matrices:
 
     home: Path
     size: float
-    effort: Effort
+    effort: Modal
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -99,14 +138,14 @@ class _Matrices:
         mesh = self.home / "cluster.msh"
         if not mesh.is_file():
             build(VaneCluster(element_size=self.size), mesh)
-        return _process(self.effort.limit, "assemble", str(mesh), str(self.home / "matrices.npz"))
+        return apart(_WORKER, "assemble", str(mesh), str(self.home / "matrices.npz"), limit=self.effort.limit)
 
     def solve(self, name: str) -> dict[str, Any]:
         """Solve in a process of its own."""
         file = self.home / "matrices.npz"
         if not file.is_file():
             self.assemble()  # that of a run that was stopped is lost
-        return _process(self.effort.limit, name, str(file), str(COUNT))
+        return apart(_WORKER, name, str(file), str(COUNT), limit=self.effort.limit)
 
 
 def _size(rows: Rows, contest: Contest, solvers: list[str], matrices: _Matrices, growth: float) -> dict[str, Any]:
@@ -143,16 +182,6 @@ def _row(size: float, turn: int = 0, name: str | None = None) -> str:
     return f"{size:g} m, " + ("assembly" if name is None else f"{NAMES[name]}, round {turn + 1}")
 
 
-def _expected(solvers: list[str], effort: Effort) -> dict[str, float]:
-    """Return the rows in their order, and about what each takes, s."""
-    expected = {}
-    for size in effort.sizes:
-        expected[_row(size)] = 8.0 + 4.0 * (_COARSE / size) ** 2.4
-        for turn, name in itertools.product(range(effort.rounds), solvers):
-            expected[_row(size, turn, name)] = 3.0 + _DEAR.get(name, 1.2) * (_COARSE / size) ** _GROWTH
-    return expected
-
-
 def _growths(sizes: tuple[float, ...]) -> list[float]:
     """Return by how much a solver's time grows from each size to the next, about."""
     return [(one / other) ** _GROWTH for one, other in itertools.pairwise(sizes)] + [1.0]
@@ -179,32 +208,6 @@ def _timed(row: Mapping[str, Any]) -> dict[str, Any]:
 
 def _time(runs: list[dict[str, Any]]) -> float:
     return float(np.median([run["modes"]["cpu_s"] for run in runs]))
-
-
-def _write(result: Mapping[str, Any], folder: Path) -> None:
-    from benchmarks.modes.figures import modal_figure
-
-    folder.mkdir(parents=True, exist_ok=True)
-    write_json(folder / "bench_modal.json", result)
-    _write_csv(result, folder / "bench_modal.csv")
-    modal_figure(result, folder / "bench_modal.png")
-
-
-def print_summary(result: Mapping[str, Any]) -> None:
-    """Print times, memory and ratios."""
-    lines = []
-    for entry in result["sizes"]:
-        dofs, ratios = f"{entry['assembly'].get('dofs', 0):,}", entry["ratio"]
-        lines.append((dofs, "assembly", _assembly_text(entry["assembly"]), ""))
-        lines += [
-            (dofs, NAMES[name], _solver_text(run), f"{ratios[name]['modes']:.2f}" if name in ratios else "")
-            for name, run in entry["solvers"].items()
-        ]
-    print(table(("degrees of freedom", "solver", "processor time and peak memory", "ours / this"), lines))
-    for name, reason in result["absent"].items():
-        print(f"not measured: {NAMES[name]} ({reason})")
-    behind = [f"{name} at {dofs}" for name, dofs in result["ahead"]["behind"]]
-    print("at or ahead of each at every size" if not behind else "behind " + ", ".join(behind))
 
 
 def _solvers() -> tuple[list[str], dict[str, str]]:
@@ -235,19 +238,6 @@ def _middle(runs: list[dict[str, Any]]) -> dict[str, Any]:
     return runs[0] | middle | peaks | {"rounds": len(runs)}
 
 
-def _process(limit: float, *arguments: str) -> dict[str, Any]:
-    """Measure once in a process of its own, on one thread; trouble is a status."""
-    try:
-        done = run_module("benchmarks.modes.worker", *arguments, threads=1, timeout=limit)
-    except subprocess.TimeoutExpired:
-        return {"status": f"more than {limit:g} s"}
-    if done.returncode != 0:
-        lines = done.stderr.strip().splitlines()
-        return {"status": lines[-1] if lines else f"ended by signal {-done.returncode} (out of memory?)"}
-    result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return result | {"status": "ok"}
-
-
 def _agree(solvers: Mapping[str, Any]) -> bool:
     """Say whether all solvers give the same frequencies."""
     values = [np.array(s["eigenvalues"]) for s in solvers.values() if s["status"] == "ok"]
@@ -274,23 +264,3 @@ def _ahead(sizes: list[dict[str, Any]]) -> dict[str, Any]:
         if ratio["modes"] > 1.05
     ]
     return {"everywhere": not behind, "behind": behind}
-
-
-def _write_csv(result: Mapping[str, Any], path: Path) -> None:
-    """Write one line a size and solver."""
-    rows: list[tuple[Any, ...]] = []
-    for entry in result["sizes"]:
-        assembly = entry["assembly"]
-        dofs, times = assembly.get("dofs"), assembly.get("assembly", {})
-        rows.append(
-            (dofs, "assembly", assembly["status"], "", times.get("cpu_s"), times.get("wall_s"),
-             assembly.get("peak_bytes"))
-        )  # fmt: skip
-        for name, run in entry["solvers"].items():
-            factor, modes = run.get("factorisation", {}), run.get("modes", {})
-            rows.append(
-                (dofs, NAMES[name], run["status"], factor.get("cpu_s"), modes.get("cpu_s"), modes.get("wall_s"),
-                 run.get("peak_bytes"))
-            )  # fmt: skip
-    header = ("dofs", "solver", "status", "factorisation_cpu_s", "modes_cpu_s", "modes_wall_s", "peak_bytes")
-    write_csv(path, header, rows)

@@ -5,23 +5,19 @@ Tasks take turns in a process of their own for each size, on one thread; process
 
 from __future__ import annotations
 
-import json
-import subprocess
 import tempfile
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.rows import Rows
-from benchmarks.timing import machine
-from vanedamp.files.store import write_csv, write_json
+from benchmarks.apart import apart
+from benchmarks.benchmark import Benchmark, Result, Row
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.vane_cluster import build
-from vanedamp.studies.workers import run_module
 
 #: of the reduction, over the ten modes
 TARGET = 1.2
@@ -38,68 +34,69 @@ _COARSE, _SECONDS, _GROWTH = 0.0042, 15.0, 3.2
 
 
 @dataclass(frozen=True)
-class Effort:
+class Reduction(Benchmark):
     """Element sizes of the cluster, m, rounds, and the limit of one size, s."""
 
     sizes: tuple[float, ...]
     rounds: int
     limit: float
 
+    NAME = "reduction"
+    CLOCK = "CPU time of the process, one thread"
+    COLUMNS = ("dofs", "task", "cpu_s", "wall_s", "ratio", "factorisations", "solves")
+
+    def inputs(self) -> dict[str, Any]:
+        return {"rounds": self.rounds, "limit": self.limit}
+
+    def rows(self, folder: Path) -> dict[str, Row]:
+        return {
+            f"{size:g} m": Row(
+                (self.rounds + 0.5) * _SECONDS * (_COARSE / size) ** _GROWTH, partial(_size, size, self), _text
+            )
+            for size in self.sizes
+        }
+
+    def result(self, values: Mapping[str, Any]) -> Result:
+        pairs = zip(self.sizes, values.values(), strict=True)
+        sizes = [{"element_size": size} | row | {"ratio": _ratios(row)} for size, row in pairs]
+        return {"target": TARGET, "sizes": sizes}
+
+    def lines(self, result: Mapping[str, Any]) -> Iterable[Sequence[Any]]:
+        """Return a line a size and task."""
+        return (
+            (entry["dofs"], name, task["cpu_s"], task["wall_s"], entry["ratio"].get(name), task["factorisations"],
+             task["solves"])
+            for entry in result["sizes"] if entry["status"] == "ok" for name, task in entry["tasks"].items()
+        )  # fmt: skip
+
+    def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
+        """Yield seconds, ratios, factorisations and solves."""
+        for entry in result["sizes"]:
+            if entry["status"] != "ok":
+                yield f"element size {entry['element_size']} m: {entry['status']}"
+                continue
+            yield f"{entry['dofs']:,} degrees of freedom, {entry['peak_bytes'] / 1e9:.2f} GB"
+            for name, task in entry["tasks"].items():
+                ratio = "" if name == "modes" else f", {entry['ratio'][name]:.2f} of the modes"
+                yield (
+                    f"  {NAMES[name]:46} {task['cpu_s']:8.2f} s{ratio}; "
+                    f"{task['factorisations']} factorisations, {task['solves']} solves"
+                )
+
 
 #: about 30 000 and 100 000 degrees of freedom
-FULL = Effort((0.0042, 0.00225), 3, 3600.0)
-QUICK = Effort((0.006,), 1, 600.0)
+FULL = Reduction((0.0042, 0.00225), 3, 3600.0)
+QUICK = Reduction((0.006,), 1, 600.0)
 
 
-def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure, write bench_reduction.json and .csv into a folder, and return what the JSON holds."""
-    expected = {f"{size:g} m": (effort.rounds + 0.5) * _SECONDS * (_COARSE / size) ** _GROWTH for size in effort.sizes}
-    rows = Rows(folder, "reduction", {"rounds": effort.rounds, "limit": effort.limit}, expected)
-    sizes = []
-    for size in effort.sizes:
-        row = rows.take(f"{size:g} m", partial(_size, size, effort), tell=_row_text)
-        sizes.append({"element_size": size} | row | {"ratio": _ratios(row)})
-    result = {
-        "machine": machine() | {"clock": "CPU time of the process, one thread"}, "effort": asdict(effort),
-        "target": TARGET, "sizes": sizes, "wall_time_s": rows.seconds,
-    }  # fmt: skip
-    write_json(folder / "bench_reduction.json", result)
-    _write_csv(sizes, folder / "bench_reduction.csv")
-    rows.finish()
-    return result
-
-
-def print_summary(result: Mapping[str, Any]) -> None:
-    """Print seconds, ratios, factorisations and solves."""
-    for entry in result["sizes"]:
-        if entry["status"] != "ok":
-            print(f"element size {entry['element_size']} m: {entry['status']}")
-            continue
-        print(f"{entry['dofs']:,} degrees of freedom, {entry['peak_bytes'] / 1e9:.2f} GB")
-        for name, task in entry["tasks"].items():
-            ratio = "" if name == "modes" else f", {entry['ratio'][name]:.2f} of the modes"
-            print(
-                f"  {NAMES[name]:46} {task['cpu_s']:8.2f} s{ratio}; "
-                f"{task['factorisations']} factorisations, {task['solves']} solves"
-            )
-
-
-def _size(size: float, effort: Effort) -> dict[str, Any]:
+def _size(size: float, effort: Reduction) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as home:
         mesh = Path(home) / "cluster.msh"
         build(VaneCluster(element_size=size), mesh)
-        try:
-            done = run_module(
-                "benchmarks.reduction.worker", str(mesh), str(effort.rounds), threads=1,
-                timeout=effort.limit,
-            )  # fmt: skip
-        except subprocess.TimeoutExpired:
-            return {"status": f"more than {effort.limit:g} s"}
-    if done.returncode != 0:
-        return {"status": (done.stderr.strip().splitlines() or ["killed (out of memory?)"])[-1]}
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    tasks = {name: _middle(rounds) for name, rounds in found["tasks"].items()}
-    return found | {"status": "ok", "tasks": tasks, "rounds": found["tasks"]}
+        found = apart("benchmarks.reduction.worker", str(mesh), str(effort.rounds), limit=effort.limit)
+    if found["status"] != "ok":
+        return found
+    return found | {"tasks": {name: _middle(of) for name, of in found["tasks"].items()}, "rounds": found["tasks"]}
 
 
 def _middle(rounds: list[dict[str, Any]]) -> dict[str, Any]:
@@ -120,21 +117,8 @@ def _ratios(row: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def _row_text(row: Mapping[str, Any]) -> str:
+def _text(row: Mapping[str, Any]) -> str:
     if row["status"] != "ok":
         return str(row["status"])
     ratio = _ratios(row)["reduction"]
     return f"{row['dofs']:,} degrees of freedom, reduction over modes {ratio:.2f} (target {TARGET})"
-
-
-def _write_csv(sizes: list[dict[str, Any]], path: Path) -> None:
-    """Write one line a size and task."""
-    header = ("dofs", "task", "cpu_s", "wall_s", "ratio", "factorisations", "solves")
-    lines = [
-        (entry["dofs"], name, task["cpu_s"], task["wall_s"], entry["ratio"].get(name), task["factorisations"],
-         task["solves"])
-        for entry in sizes
-        if entry["status"] == "ok"
-        for name, task in entry["tasks"].items()
-    ]  # fmt: skip
-    write_csv(path, header, lines)

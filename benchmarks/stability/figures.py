@@ -1,4 +1,4 @@
-"""Figure of the maps of failure."""
+"""Figures of failure: edges beside their limits, and maps."""
 
 from __future__ import annotations
 
@@ -10,9 +10,33 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.ticker import NullFormatter
 
-from vanedamp.studies.figures import save, subplots
+from vanedamp.studies.figures import GREY, draw_grid, save, subplots
+from vanedamp.studies.report.charts import COLOURS
 
 _SHADES = LinearSegmentedColormap.from_list("failure", ["#f8fafc", "#fca5a5"])
+
+
+def stability_figure(result: Mapping[str, Any], path: Path) -> None:
+    """Draw a panel a part: measured edges of failure as points, analytic limits as lines."""
+    figure, axes = subplots(2, 4, size=(19, 9))
+    for panel, (name, part) in zip(axes.flat, result["parts"].items(), strict=True):
+        for (curve, values), colour in zip(part["curves"].items(), COLOURS, strict=False):
+            line = curve in ("limit", "1 - duration / step")
+            panel.plot(
+                part["x"], values, "--" if line else "o", color=GREY if line else colour,
+                label="analytic limit" if curve == "limit" else curve,
+            )  # fmt: skip
+        if part["log"]:
+            panel.set_xscale("log")
+            panel.set_yscale("log")
+            panel.xaxis.set_minor_formatter(NullFormatter())
+            panel.yaxis.set_minor_formatter(NullFormatter())
+        panel.set_title(name)
+        panel.set_xlabel(part["x_label"])
+        panel.set_ylabel(part["y_label"])
+        draw_grid(panel)
+        panel.legend(fontsize=9)
+    save(figure, path)
 
 
 def maps_figure(maps: Mapping[str, Any], path: Path) -> None:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigvalsh
 
-from benchmarks.rows import Rows
+from benchmarks.benchmark import Benchmark, Result, Row
 from benchmarks.stability.macro_step import largest_stable
 from benchmarks.stability.maps import MAPS, MapEffort
 from benchmarks.stability.scenes import (
@@ -33,15 +33,17 @@ from benchmarks.stability.scenes import (
     touching,
     unsteady,
 )
-from benchmarks.timing import machine
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.files.store import finite, write_csv, write_json
+from vanedamp.files.store import finite, write_csv
+
+#: about what a part takes for each of its points, and a map, s
+_PART, _MAP = 1.0, 60.0
 
 
 @dataclass(frozen=True)
-class Effort:
+class Stability(Benchmark):
     """Points of a curve, runs behind a point, modes of the rod; maps over two numbers, if any."""
 
     points: int
@@ -49,77 +51,66 @@ class Effort:
     modes: tuple[int, ...]
     maps: MapEffort | None = None
 
+    NAME = FILES = "stability"
+    COLUMNS = ("part", "curve", "x", "y")
 
-#: about what a part takes for each of its points, and a map, s
-_PART, _MAP = 1.0, 60.0
+    def rows(self, folder: Path) -> dict[str, Row]:
+        found = {name: Row(_PART * self.points, partial(part, self), _edge) for name, part in _parts().items()}
+        if self.maps is not None:
+            found |= {_map_row(name): Row(_MAP, partial(make, self.maps)) for name, make in MAPS.items()}
+        return found
 
-FULL = Effort(9, 40, (0, 1, 2, 5, 10, 20, 50), MapEffort())
-QUICK = Effort(2, 4, (0, 1, 2))
+    def result(self, values: Mapping[str, Any]) -> Result:
+        result: Result = {"parts": {name: values[name] for name in _parts()}}
+        if self.maps is not None:
+            result["maps"] = {name: values[_map_row(name)] for name in MAPS}
+        return dict(finite(result))
+
+    def lines(self, result: Mapping[str, Any]) -> Iterator[Sequence[Any]]:
+        """Yield a line a point of a curve."""
+        for name, part in result["parts"].items():
+            for curve, values in part["curves"].items():
+                yield from ((name, curve, x, y) for x, y in zip(part["x"], values, strict=True))
+
+    def draw(self, result: Mapping[str, Any], folder: Path) -> None:
+        """Draw the curves; draw the maps and write their points."""
+        from benchmarks.stability.figures import maps_figure, stability_figure
+
+        stability_figure(result, folder / "stability.png")
+        if "maps" in result:
+            write_csv(folder / "stability_maps.csv", ("map", "x", "y", "value"), _points(result["maps"]))
+            maps_figure(result["maps"], folder / "stability_maps.png")
+
+    def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
+        """Yield how far each measured edge lies from its limit."""
+        yield from (f"{name:16} {_edge(part)}" for name, part in result["parts"].items())
+        for name, mapped in result.get("maps", {}).items():
+            ratio = np.array(mapped["edge"], float) / np.array(mapped["limit"], float)
+            known = ratio[np.isfinite(ratio)]
+            yield f"map of {name}: edge / analytic limit {known.min():.3f} to {known.max():.3f}, {len(known)} columns"
 
 
-def run_stability(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure; write stability.json, .csv and figures into a folder. Returns what the JSON holds."""
-    parts: dict[str, Callable[[Effort], dict[str, Any]]] = {
-        "explicit": explicit_limit,
-        "contact pair": contact_limit,
-        "friction": friction_limit,
-        "co-simulation": cosimulation_limit,
-        "contact energy": contact_energy,
-        "missed impacts": missed_impacts,
-        "restitution": restitution_and_modes,
-        "chatter": chatter_end,
-    }
-    maps = MAPS if effort.maps is not None else {}
-    expected = dict.fromkeys(parts, _PART * effort.points) | {_map_row(name): _MAP for name in maps}
-    rows = Rows(folder, "stability", asdict(effort), expected)
-    result: dict[str, Any] = {"machine": machine(), "effort": asdict(effort)}
-    result["parts"] = {name: rows.take(name, partial(part, effort), tell=_edge) for name, part in parts.items()}
-    if effort.maps is not None:
-        result["maps"] = {name: rows.take(_map_row(name), partial(make, effort.maps)) for name, make in maps.items()}
-    result = finite(result | {"wall_time_s": rows.seconds})
-    write_json(folder / "stability.json", result)
-    points = (
-        (name, curve, x, y)
-        for name, part in result["parts"].items()
-        for curve, values in part["curves"].items()
-        for x, y in zip(part["x"], values, strict=True)
-    )
-    write_csv(folder / "stability.csv", ("part", "curve", "x", "y"), points)
-    _write_maps(result.get("maps", {}), folder / "stability_maps.csv")
-    from benchmarks.methods.figures import stability_figure
-    from benchmarks.stability.figures import maps_figure
+FULL = Stability(9, 40, (0, 1, 2, 5, 10, 20, 50), MapEffort())
+QUICK = Stability(2, 4, (0, 1, 2))
 
-    stability_figure(result, folder / "stability.png")
-    if "maps" in result:
-        maps_figure(result["maps"], folder / "stability_maps.png")
-    rows.finish()
-    return result
+
+def _parts() -> dict[str, Callable[[Stability], dict[str, Any]]]:
+    return {
+        "explicit": explicit_limit, "contact pair": contact_limit, "friction": friction_limit,
+        "co-simulation": cosimulation_limit, "contact energy": contact_energy, "missed impacts": missed_impacts,
+        "restitution": restitution_and_modes, "chatter": chatter_end,
+    }  # fmt: skip
 
 
 def _map_row(name: str) -> str:
     return f"map of {name}"
 
 
-def _write_maps(maps: Mapping[str, Any], path: Path) -> None:
-    """Write one line a point of a map."""
-    rows = (
-        (name, x, y, value)
-        for name, mapped in maps.items()
-        for y, row in zip(mapped["y"], mapped["value"], strict=True)
-        for x, value in zip(mapped["x"], row, strict=True)
-    )
-    if maps:
-        write_csv(path, ("map", "x", "y", "value"), rows)
-
-
-def print_summary(result: Mapping[str, Any]) -> None:
-    """Print how far each measured edge lies from its limit."""
-    for name, part in result["parts"].items():
-        print(f"{name:16} {_edge(part)}")
-    for name, mapped in result.get("maps", {}).items():
-        ratio = np.array(mapped["edge"], float) / np.array(mapped["limit"], float)
-        known = ratio[np.isfinite(ratio)]
-        print(f"map of {name}: edge / analytic limit {known.min():.3f} to {known.max():.3f}, {len(known)} columns")
+def _points(maps: Mapping[str, Any]) -> Iterator[Sequence[Any]]:
+    """Yield a line a point of a map."""
+    for name, mapped in maps.items():
+        for y, row in zip(mapped["y"], mapped["value"], strict=True):
+            yield from ((name, x, y, value) for x, value in zip(mapped["x"], row, strict=True))
 
 
 def _edge(part: Mapping[str, Any]) -> str:
@@ -130,7 +121,7 @@ def _edge(part: Mapping[str, Any]) -> str:
     return f"measured / analytic limit {ratio.min():.3f} to {ratio.max():.3f}"
 
 
-def explicit_limit(effort: Effort) -> dict[str, Any]:
+def explicit_limit(effort: Stability) -> dict[str, Any]:
     """Measure central differences: largest stable step against the structure's frequency; limit 2 / omega."""
     ratios = np.geomspace(15, 120, effort.points)
     measured = []
@@ -142,7 +133,7 @@ def explicit_limit(effort: Effort) -> dict[str, Any]:
     )
 
 
-def contact_limit(effort: Effort) -> dict[str, Any]:
+def contact_limit(effort: Stability) -> dict[str, Any]:
     """Measure central differences, a body pressed on a soft wall: limit 2 / omega_max of the pair on its spring."""
     masses, measured, limits = np.geomspace(0.01, 3, effort.points), [], []
     for mass in masses:
@@ -156,7 +147,7 @@ def contact_limit(effort: Effort) -> dict[str, Any]:
     return _part("mass of the body / mass of the structure", "step, periods", masses, measured, limits, log=True)
 
 
-def friction_limit(effort: Effort) -> dict[str, Any]:
+def friction_limit(effort: Stability) -> dict[str, Any]:
     """Measure regularised friction: least slip speed at which a body comes to rest; limit mu N dt / (2 m*)."""
     masses, measured, limits = np.geomspace(0.01, 3, effort.points), [], []
     for mass in masses:
@@ -170,7 +161,7 @@ def friction_limit(effort: Effort) -> dict[str, Any]:
     return _part("mass of the body / mass of the structure", "slip speed, m/s", masses, measured, limits, log=True)
 
 
-def cosimulation_limit(effort: Effort) -> dict[str, Any]:
+def cosimulation_limit(effort: Stability) -> dict[str, Any]:
     """Measure Jacobi co-simulation, forces and speeds held: largest stable macro-step against the ratio of masses.
 
     The limit is where the spectral radius of the linear macro-step (a body on its spring and dashpot, a structure under
@@ -185,7 +176,7 @@ def cosimulation_limit(effort: Effort) -> dict[str, Any]:
     return _part("mass of the body / mass of the structure", "macro-step, periods", masses, measured, limits, log=True)
 
 
-def contact_energy(effort: Effort) -> dict[str, Any]:
+def contact_energy(effort: Stability) -> dict[str, Any]:
     """Measure the rebound of an elastic collision (restitution 1) by penalty methods, against steps in the contact.
 
     Largest over where in a step the contact begins; above one, contact makes energy.
@@ -225,7 +216,7 @@ def _rebound(options: Mapping[str, Any], shift: float) -> float:
     return float(abs(way[390] - way[380]) / (10 * speed / steps))
 
 
-def missed_impacts(effort: Effort) -> dict[str, Any]:
+def missed_impacts(effort: Stability) -> dict[str, Any]:
     """Measure the share of short contacts that solve_ivp steps over, by their duration in steps; none beyond one."""
     ratios = np.linspace(0.1, 1.3, max(2 * effort.points - 1, 3))
     missed, exact = [], []
@@ -248,7 +239,7 @@ def missed_impacts(effort: Effort) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def restitution_and_modes(effort: Effort) -> dict[str, Any]:
+def restitution_and_modes(effort: Stability) -> dict[str, Any]:
     """Measure contact mass and speed after one impact of a body on the tip of a clamped rod, by the number of modes."""
     from benchmarks.methods.scenes import rod
 
@@ -274,7 +265,7 @@ def restitution_and_modes(effort: Effort) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def chatter_end(effort: Effort) -> dict[str, Any]:
+def chatter_end(effort: Stability) -> dict[str, Any]:
     """Measure the end of the chatter of a ball dropped on a plate, by restitution; limit t0 (1 + k) / (1 - k)."""
     restitutions = np.linspace(0.2, 0.9, effort.points)
     measured, limits, events = [], [], []

@@ -11,18 +11,18 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.benchmark import Benchmark, Result
 from benchmarks.rows import Rows
-from benchmarks.timing import format_spread, machine, spread
+from benchmarks.timing import format_spread, spread
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.store import write_csv, write_json
 from vanedamp.files.toml_input import validate
 
 UNIT = "import numpy, numba"
@@ -36,20 +36,10 @@ COMMANDS = {
 }
 #: packages whose imports are told apart; the others are one
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "vanedamp")
+#: of the results
+_GROUPS = ("ratio", "parts", "imports")
 _WORKER = ["-m", "benchmarks.start.worker", "scene.toml", "response.h5"]
 _ROOT = Path(__file__).parents[2]
-
-
-@dataclass(frozen=True)
-class Effort:
-    """Rounds of all processes; whether functions are compiled once in an empty cache."""
-
-    rounds: int
-    compile: bool = True
-
-
-FULL = Effort(11)
-QUICK = Effort(3)
 
 
 def small_scene() -> Scene:
@@ -68,36 +58,61 @@ def small_scene() -> Scene:
     )
 
 
-def run_start(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure, write bench_start.json, .csv and .png into a folder, and return the content of the JSON."""
-    from benchmarks.start.figures import start_figure
+@dataclass(frozen=True)
+class Start(Benchmark):
+    """Rounds of all processes; whether functions are compiled once in an empty cache."""
 
-    expected = ({COMPILATION: 30.0} if effort.compile else {}) | {_row(turn): 4.0 for turn in range(effort.rounds)}
-    rows = Rows(folder, "start", {}, expected)
-    with tempfile.TemporaryDirectory() as home:
-        place = Path(home)
-        small_scene().save(place / "scene.toml")
-        first = rows.take(COMPILATION, partial(_compilation, place), tell=_compilation_text) if effort.compile else None
-        _seconds(COMMANDS["vanedamp run"], place)  # compiles what is not compiled yet
-        rounds = [
-            rows.take(_row(turn), partial(_round, place, turn), tell=_round_text) for turn in range(effort.rounds)
-        ]
-    result: dict[str, Any] = {
-        "machine": machine() | {"clock": "processor time of processes"}, "effort": asdict(effort), "unit": UNIT,
-        "compilation": first, "seconds": _spreads([taken["seconds"] for taken in rounds]),
-        "ratio": _spreads([_over(taken["seconds"], taken["seconds"][UNIT]) for taken in rounds]),
-        "parts": _spreads([_over(taken["parts"], taken["seconds"][UNIT]) for taken in rounds]),
-        "imports": _spreads([_over(taken["imports"], taken["seconds"][UNIT]) for taken in rounds]),
-        "wall_time_s": rows.seconds,
-    }  # fmt: skip
-    write_json(folder / "bench_start.json", result)
-    write_csv(
-        folder / "bench_start.csv", ("what", "median", "low", "high"),
-        ([name, *values.values()] for group in ("ratio", "parts", "imports") for name, values in result[group].items()),
-    )  # fmt: skip
-    start_figure(result, folder / "bench_start.png")
-    rows.finish()
-    return result
+    rounds: int
+    compile: bool = True
+
+    NAME = "start"
+    CLOCK = "processor time of processes"
+    COLUMNS = ("what", "median", "low", "high")
+
+    def inputs(self) -> dict[str, Any]:
+        return {}
+
+    def expected(self, folder: Path) -> dict[str, float]:
+        return ({COMPILATION: 30.0} if self.compile else {}) | {_row(turn): 4.0 for turn in range(self.rounds)}
+
+    def measure(self, rows: Rows) -> Result:
+        with tempfile.TemporaryDirectory() as home:
+            place = Path(home)
+            small_scene().save(place / "scene.toml")
+            first = None
+            if self.compile:
+                first = rows.take(COMPILATION, partial(_compilation, place), tell=_compilation_text)
+            _seconds(COMMANDS["vanedamp run"], place)  # compiles what is not compiled yet
+            rounds = [
+                rows.take(_row(turn), partial(_round, place, turn), tell=_round_text) for turn in range(self.rounds)
+            ]
+        return {
+            "unit": UNIT, "compilation": first, "seconds": _spreads([taken["seconds"] for taken in rounds]),
+            "ratio": _spreads([_over(taken["seconds"], taken["seconds"][UNIT]) for taken in rounds]),
+            "parts": _spreads([_over(taken["parts"], taken["seconds"][UNIT]) for taken in rounds]),
+            "imports": _spreads([_over(taken["imports"], taken["seconds"][UNIT]) for taken in rounds]),
+        }  # fmt: skip
+
+    def lines(self, result: Mapping[str, Any]) -> Iterable[Sequence[Any]]:
+        return ([name, *values.values()] for group in _GROUPS for name, values in result[group].items())
+
+    def draw(self, result: Mapping[str, Any], folder: Path) -> None:
+        from benchmarks.start.figures import start_figure
+
+        start_figure(result, folder / "bench_start.png")
+
+    def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
+        """Yield the ratios of commands, and of the parts of a run."""
+        yield f"unit: python -c '{UNIT}', {result['seconds'][UNIT]['median']:.3g} s; median and quartiles"
+        if result["compilation"] is not None:
+            yield f"{COMPILATION:30} {result['compilation']['ratio']:8.3g}"
+        for group in _GROUPS:
+            yield f"{group}:"
+            yield from (f"  {name:28} {format_spread(values)}" for name, values in result[group].items())
+
+
+FULL = Start(11)
+QUICK = Start(3)
 
 
 def _row(turn: int) -> str:
@@ -171,15 +186,3 @@ def _compilation_text(row: Mapping[str, float]) -> str:
 def _round_text(row: Mapping[str, Any]) -> str:
     ratios = _over(row["seconds"], row["seconds"][UNIT])
     return ", ".join(f"{name} {ratio:.3g}" for name, ratio in ratios.items() if name != UNIT)
-
-
-def print_summary(result: Mapping[str, Any]) -> None:
-    """Print the ratios of commands, and of the parts of a run."""
-    unit = result["seconds"][UNIT]
-    print(f"unit: python -c '{UNIT}', {unit['median']:.3g} s; median and quartiles")
-    if result["compilation"] is not None:
-        print(f"{COMPILATION:30} {result['compilation']['ratio']:8.3g}")
-    for group in ("ratio", "parts", "imports"):
-        print(f"{group}:")
-        for name, values in result[group].items():
-            print(f"  {name:28} {format_spread(values)}")

@@ -12,7 +12,7 @@ import json
 import shutil
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.util import find_spec
@@ -21,13 +21,14 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.benchmark import Benchmark, Result
 from benchmarks.rows import Rows
 from benchmarks.sweep.simulation import Costs, simulated
 from benchmarks.sweep.worker import Job, scene
-from benchmarks.timing import format_spread, machine, spread
+from benchmarks.timing import format_spread, spread
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.coupling.sweep.worker import COLUMNS
-from vanedamp.files.store import write_csv, write_json
+from vanedamp.files.store import write_json
 from vanedamp.studies.workers import available_cores, run_module
 
 TARGET, MOST_MB = 0.95, 120
@@ -53,7 +54,7 @@ _SEED = 20_260_101
 
 
 @dataclass(frozen=True)
-class Effort:
+class SweepScaling(Benchmark):
     """Scenes of a sweep and their periods.
 
     compared: those that one process and all cores run in turns, `rounds` times; sizes: further sweeps on all cores;
@@ -70,92 +71,97 @@ class Effort:
     simulated: tuple[int, ...]
     each: int
 
+    NAME = "sweep"
+    CLOCK = "CPU time of the processes"
+    COLUMNS = (*_COLUMNS, "scenes_per_second")
 
-FULL = Effort(
+    @property
+    def cores(self) -> int:
+        """Workers of a sweep on all cores."""
+        return max(2, available_cores())
+
+    def expected(self, folder: Path) -> dict[str, float]:
+        found = {
+            f"{_name(job)}, round {turn + 1}": _seconds(job)
+            for turn in range(self.rounds) for job in self.pair(turn)
+        } | {_name(job): _seconds(job) for job in self.sizes_on(folder)}  # fmt: skip
+        for executor, title in _EXECUTORS.items():
+            found |= {_name(job): _seconds(job) for job in self.on(executor)} | {f"{title}, handing out": 10.0}
+        return found | {"checkpoint": 3.0, "single scenes": 8.0} | {f"{n}, simulated": 5.0 for n in _EXECUTORS.values()}
+
+    def pair(self, turn: int) -> list[Job]:
+        """Return the same sweep in one process and on all cores, in the order of a round."""
+        jobs = [Job("sweep", *self.compared, count, "") for count in (1, self.cores)]
+        return jobs if turn % 2 == 0 else jobs[::-1]
+
+    def sizes_on(self, folder: Path) -> list[Job]:
+        """Return the further sweeps on all cores. Each keeps what is done beside the rows, and resumes from there."""
+        return [
+            Job("sweep", points, periods, self.cores, str(folder / f"bench_sweep_{points}.files"))
+            for points, periods in self.sizes
+        ]
+
+    def on(self, executor: str) -> list[Job]:
+        """Return the sweeps with an executor, on one and two workers."""
+        return [Job("sweep", *self.others, count, "", executor) for count in (1, 2)]
+
+    def measure(self, rows: Rows) -> Result:
+        result: Result = {
+            "periods": self.compared[1], "workers": self.cores, "target": TARGET,
+            "pairs": [_pair(rows, self.pair(turn), turn) for turn in range(self.rounds)], "sizes": [],
+        }  # fmt: skip
+        for job in self.sizes_on(rows.folder):
+            result["sizes"].append(rows.take(_name(job), partial(_run, job), tell=_tell_sweep))
+            shutil.rmtree(job.folder, ignore_errors=True)
+        result["executors"] = _executors(rows, self)
+        result["checkpoint"] = rows.take("checkpoint", _checkpoint, tell=_tell_checkpoint)
+        timed = Job("points", self.timed, self.compared[1], 1, "")
+        result["point_s"] = rows.take("single scenes", lambda: _run(timed)["seconds"], tell=_tell_points)
+        result["simulated"] = _simulations(rows, self, result)
+        result["checks"] = _checks(result)
+        result["efficiency"] = {
+            name: spread(np.array([pair["efficiency"][name] for pair in result["pairs"]])) for name in EFFICIENCIES
+        }
+        return result | {"overhead": spread(np.array([_overhead(entry) for entry in result["sizes"]]))}
+
+    def lines(self, result: Mapping[str, Any]) -> Iterator[Sequence[Any]]:
+        """Yield a line a sweep."""
+        entries = [entry for pair in result["pairs"] for entry in (pair["one"], pair["all"])] + result["sizes"]
+        for entry in entries + [entry for found in result["executors"].values() for entry in found["sweeps"]]:
+            yield *(_flat(entry[name]) for name in _COLUMNS), _speed(entry)
+
+    def draw(self, result: Mapping[str, Any], folder: Path) -> None:
+        from benchmarks.sweep.figures import sweep_figure
+
+        sweep_figure(result, folder / "bench_sweep.png")
+
+    def summary(self, result: Mapping[str, Any]) -> Iterator[str]:
+        """Yield efficiency, memory and limits against their targets."""
+        pairs = result["pairs"]
+        points, workers = pairs[0]["all"]["points"], result["workers"]
+        yield f"{points} scenes of {result['periods']} periods, {workers} workers and one process in turns:"
+        for name, values in result["efficiency"].items():
+            yield f"  {EFFICIENCIES[name]:38} {format_spread(values)}  target {result['target']}"
+        most = max(pair["all"]["worker_peak_bytes"] for pair in pairs)
+        yield f"  memory of a worker with its part of the server {most / 1e6:.0f} MB  target {MOST_MB} MB"
+        yield f"  share of the main process in the processors' time {format_spread(result['overhead'])}"
+        for check in result["checks"]:
+            yield (
+                f"  {_EXECUTORS[check['executor']]}, {check['workers']} workers, {check['points']} scenes: time with a "
+                f"task {check['measured']:.3f} measured, {check['simulated']:.3f} simulated"
+            )
+        for name, runs in result["simulated"].items():
+            least = next((run["workers"] for run in runs if run["efficiency"] < TARGET), None)
+            text = f"up to {runs[-1]['workers']} workers" if least is None else f"below {least} workers"
+            yield f"  {_EXECUTORS[name]}, simulated: {TARGET} of ideal {text}"
+        yield f"load of the machine at the beginning: {result['machine']['load']:.1f}"
+
+
+FULL = SweepScaling(
     (10_000, 1500), 3, ((1_000, 200), (100_000, 200), (1_000_000, 5)), (4000, 1500), 400, 300,
     (1, 2, 8, 64, 256, 1000, 4000), 1000,
 )  # fmt: skip
-QUICK = Effort((200, 300), 1, ((400, 20),), (100, 300), 40, 20, (1, 2, 1000), 200)
-
-
-def run_bench(folder: Path, effort: Effort = FULL) -> dict[str, Any]:
-    """Measure, write bench_sweep.json, .csv and .png into a folder, and return what the JSON holds."""
-    from benchmarks.sweep.figures import sweep_figure
-
-    cores = max(2, available_cores())
-    rows = Rows(folder, "sweep", asdict(effort), _expected(effort, cores))
-    result: dict[str, Any] = {
-        "machine": machine() | {"clock": "CPU time of the processes"}, "effort": asdict(effort),
-        "periods": effort.compared[1], "workers": cores, "target": TARGET,
-        "pairs": [_pair(rows, effort, cores, turn) for turn in range(effort.rounds)], "sizes": [],
-    }  # fmt: skip
-    for points, periods in effort.sizes:
-        # the sweep of this row keeps what is done beside the rows, and goes on from there
-        kept = folder / f"bench_sweep_{points}.files"
-        job = Job("sweep", points, periods, cores, str(kept))
-        result["sizes"].append(rows.take(_name(job), partial(_run, job), tell=_tell_sweep))
-        shutil.rmtree(kept, ignore_errors=True)
-    result["executors"] = _executors(rows, effort)
-    result["checkpoint"] = rows.take("checkpoint", _checkpoint, tell=_tell_checkpoint)
-    timed = Job("points", effort.timed, effort.compared[1], 1, "")
-    result["point_s"] = rows.take("single scenes", lambda: _run(timed)["seconds"], tell=_tell_points)
-    result["simulated"] = _simulations(rows, effort, result)
-    result["checks"] = _checks(result)
-    result["efficiency"] = {
-        name: spread(np.array([pair["efficiency"][name] for pair in result["pairs"]])) for name in EFFICIENCIES
-    }
-    result["overhead"] = spread(np.array([_overhead(entry) for entry in result["sizes"]]))
-    write_json(folder / "bench_sweep.json", result | {"wall_time_s": rows.seconds})
-    entries = [entry for pair in result["pairs"] for entry in (pair["one"], pair["all"])] + result["sizes"]
-    entries += [entry for found in result["executors"].values() for entry in found["sweeps"]]
-    write_csv(
-        folder / "bench_sweep.csv",
-        (*_COLUMNS, "scenes_per_second"),
-        [(*(_flat(entry[name]) for name in _COLUMNS), _speed(entry)) for entry in entries],
-    )
-    sweep_figure(result, folder / "bench_sweep.png")
-    rows.finish()
-    return result
-
-
-def print_summary(result: Mapping[str, Any]) -> None:
-    """Print efficiency, memory and limits against their targets."""
-    pairs = result["pairs"]
-    points, workers = pairs[0]["all"]["points"], result["workers"]
-    print(f"{points} scenes of {result['periods']} periods, {workers} workers and one process in turns:")
-    for name, values in result["efficiency"].items():
-        print(f"  {EFFICIENCIES[name]:38} {format_spread(values)}  target {result['target']}")
-    most = max(pair["all"]["worker_peak_bytes"] for pair in pairs)
-    print(f"  memory of a worker with its part of the server {most / 1e6:.0f} MB  target {MOST_MB} MB")
-    print(f"  share of the main process in the processors' time {format_spread(result['overhead'])}")
-    for check in result["checks"]:
-        print(
-            f"  {_EXECUTORS[check['executor']]}, {check['workers']} workers, {check['points']} scenes: time with a task"
-            f" {check['measured']:.3f} measured, {check['simulated']:.3f} simulated"
-        )
-    for name, runs in result["simulated"].items():
-        least = next((run["workers"] for run in runs if run["efficiency"] < TARGET), None)
-        text = f"up to {runs[-1]['workers']} workers" if least is None else f"below {least} workers"
-        print(f"  {_EXECUTORS[name]}, simulated: {TARGET} of ideal {text}")
-    print(f"load of the machine at the beginning: {result['machine']['load']:.1f}")
-
-
-def _expected(effort: Effort, cores: int) -> dict[str, float]:
-    """Return the rows in their order, and about what each takes, s."""
-    found: dict[str, float] = {}
-    for turn in range(effort.rounds):
-        for count in (1, cores) if turn % 2 == 0 else (cores, 1):
-            job = Job("sweep", *effort.compared, count, "")
-            found[f"{_name(job)}, round {turn + 1}"] = _seconds(job)
-    for points, periods in effort.sizes:
-        job = Job("sweep", points, periods, cores, "")
-        found[_name(job)] = _seconds(job)
-    for executor in _EXECUTORS:
-        for count in (1, 2):
-            job = Job("sweep", *effort.others, count, "", executor)
-            found[_name(job)] = _seconds(job)
-        found[f"{_EXECUTORS[executor]}, handing out"] = 10.0
-    return found | {"checkpoint": 3.0, "single scenes": 8.0} | {f"{n}, simulated": 5.0 for n in _EXECUTORS.values()}
+QUICK = SweepScaling((200, 300), 1, ((400, 20),), (100, 300), 40, 20, (1, 2, 1000), 200)
 
 
 def _seconds(job: Job) -> float:
@@ -168,20 +174,20 @@ def _name(job: Job) -> str:
     return f"{job.points} scenes of {job.periods} periods, {by}"
 
 
-def _pair(rows: Rows, effort: Effort, cores: int, turn: int) -> dict[str, Any]:
+def _pair(rows: Rows, jobs: Sequence[Job], turn: int) -> dict[str, Any]:
     """Run the same sweep in one process and on all cores."""
-    runs = {}
-    for count in (1, cores) if turn % 2 == 0 else (cores, 1):
-        job = Job("sweep", *effort.compared, count, "")
-        runs[count] = rows.take(f"{_name(job)}, round {turn + 1}", partial(_run, job), tell=_tell_sweep)
-    return {"one": runs[1], "all": runs[cores], "efficiency": _efficiency(runs[1], runs[cores])}
+    runs = {
+        job.workers: rows.take(f"{_name(job)}, round {turn + 1}", partial(_run, job), tell=_tell_sweep) for job in jobs
+    }
+    one, many = runs[1], runs[max(runs)]
+    return {"one": one, "all": many, "efficiency": _efficiency(one, many)}
 
 
-def _executors(rows: Rows, effort: Effort) -> dict[str, dict[str, Any]]:
+def _executors(rows: Rows, effort: SweepScaling) -> dict[str, dict[str, Any]]:
     """Measure every executor that is there: sweeps on one and two workers, and what handing out costs."""
     found: dict[str, dict[str, Any]] = {}
     for executor, title in _EXECUTORS.items():
-        jobs = [Job("sweep", *effort.others, count, "", executor) for count in (1, 2)]
+        jobs = effort.on(executor)
         if (reason := _missing(executor)) is not None:
             for name in (*map(_name, jobs), f"{title}, handing out", f"{title}, simulated"):
                 rows.leave_out(name, reason)
@@ -231,7 +237,7 @@ def _checkpoint() -> dict[str, float]:
     return {"write": max(times[0] - sizes[0] * point, 0.0), "write_point": max(point, 0.0), "bytes_point": of_file}
 
 
-def _simulations(rows: Rows, effort: Effort, result: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
+def _simulations(rows: Rows, effort: SweepScaling, result: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
     """Simulate each executor that was measured, for growing numbers of workers."""
     found = {}
     for executor, measured in result["executors"].items():
@@ -263,7 +269,7 @@ def _checks(result: Mapping[str, Any]) -> list[dict[str, Any]]:
     return found
 
 
-def _growing(effort: Effort, seconds: Sequence[float], costs: Costs) -> list[dict[str, Any]]:
+def _growing(effort: SweepScaling, seconds: Sequence[float], costs: Costs) -> list[dict[str, Any]]:
     found = []
     for workers in effort.simulated:
         rng = np.random.default_rng([_SEED, workers])
