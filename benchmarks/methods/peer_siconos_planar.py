@@ -6,15 +6,15 @@ and the ceiling that it may meet, solved by its projected Gauss-Seidel for two d
 
 from __future__ import annotations
 
-import time
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from benchmarks.methods.peers import DEEPEST, PeerRun
+from benchmarks.methods.siconos_steps import march
 from vanedamp.coupling.methods.equations_of_motion import time_grid
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.scene.bodies import Damper
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.system.assembly import assemble, physical_scale
@@ -28,6 +28,8 @@ _TOLERANCE, _SWEEPS = 1e-12, 100_000
 def run_block(scene: Scene, periods: int, steps: int, samples: int) -> PeerRun:
     """Run a scene of one block with `steps` steps a period. Raises InputError for any other scene."""
     _check(scene)
+    import siconos.kernel as kernel
+
     flat = assemble(scene)
     times, n, body, cavity = time_grid(flat, steps), flat.modes, scene.damper[0], scene.cavity[0]
     a, b = body.half_extent
@@ -38,23 +40,20 @@ def run_block(scene: Scene, periods: int, steps: int, samples: int) -> PeerRun:
     q[n:] = body.position + floor @ q[:n], body.lift + a * abs(body.tilt), body.tilt
     v[n:] = body.velocity + floor @ v[:n], body.lift_velocity, body.tilt_rate
     gaps = _gaps(floor, a, b, cavity.gap, cavity.play or 0.0)
-    simulation, system, kept = _model(scene, flat, q, v, gaps, periods, times.step)
     phases = flat.phases(flat.omega * times.step * (np.arange(steps) + 0.5))
     loads = np.zeros((steps, n + 3))
     loads[:, : n + 1] = (phases @ flat.load).real + flat.weight
     # across the cavity the body's weight presses it to the floor
     loads[:, n + 1] = -body.mass * scene.gravity.acceleration * np.cos(np.radians(scene.gravity.orientation_deg))
-    force, place = system.fExt(), system.q()
-    path = np.zeros((periods * steps + 1, n + 3))
-    path[0] = q
-    started = time.thread_time()
-    for k in range(periods * steps):
-        force[:] = loads[k % steps]
-        simulation.computeOneStep()
-        simulation.nextStep()
-        path[k + 1] = place
-    seconds = time.thread_time() - started
-    del kept
+    problem = kernel.FrictionContact(2)
+    problem.numericsSolverOptions().iparam[0] = _SWEEPS
+    problem.numericsSolverOptions().dparam[0] = _TOLERANCE
+    contacts = [
+        (kernel.NewtonImpactFrictionNSL(body.restitution, 0.0, body.friction, 2), np.vstack([normal, slip]),
+         np.array([rest, 0.0]))
+        for normal, slip, rest, _ in gaps
+    ]  # fmt: skip
+    path, seconds = march((q, v), _matrices(flat, body), contacts, problem, loads, periods, times.step)
     x = path[:-1, :n] @ flat.response[:n] + np.tile(times.table[:-1, 0], periods)
     every = np.arange(0, periods * steps, steps // samples) if samples else np.zeros(0, int)
     slip = path[every, n] - path[every, :n] @ floor
@@ -93,32 +92,9 @@ def _gaps(
     return found
 
 
-def _model(
-    scene: Scene, flat: System, q: np.ndarray, v: np.ndarray, gaps: list[tuple[np.ndarray, np.ndarray, float, float]],
-    periods: int, step: float,
-) -> tuple[Any, Any, list[Any]]:  # fmt: skip
-    """Return simulation, dynamical system, and the objects that must live as long as they do."""
-    import siconos.kernel as kernel
-
-    n, body = flat.modes, scene.damper[0]
-    mass, stiffness, damping = (
-        np.diag(np.r_[np.ones(n), body.mass, body.mass, body.moment_of_inertia]),
-        *np.zeros((2, n + 3, n + 3)),
-    )
+def _matrices(flat: System, body: Damper) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return mass, stiffness and damping (n + 3, n + 3) of the structure's modes and the body."""
+    n = flat.modes
+    stiffness, damping = np.zeros((2, n + 3, n + 3))
     stiffness[:n, :n], damping[:n, :n] = np.diag(flat.stiffness[:n]), flat.damping[:n, :n]
-    system = kernel.LagrangianLinearTIDS(q.copy(), v.copy(), mass, stiffness, damping)
-    system.setFExtPtr(np.zeros(n + 3))
-    world = kernel.NonSmoothDynamicalSystem(0.0, (periods + 1) * flat.period)
-    world.insertDynamicalSystem(system)
-    kept: list[Any] = [world]
-    for normal, slip, rest, _ in gaps:
-        law = kernel.NewtonImpactFrictionNSL(body.restitution, 0.0, body.friction, 2)
-        relation = kernel.LagrangianLinearTIR(np.vstack([normal, slip]), np.array([rest, 0.0]))
-        interaction = kernel.Interaction(law, relation)
-        world.link(interaction, system)
-        kept += [law, relation, interaction]
-    problem = kernel.FrictionContact(2)
-    problem.numericsSolverOptions().iparam[0] = _SWEEPS
-    problem.numericsSolverOptions().dparam[0] = _TOLERANCE
-    scheme, clock = kernel.MoreauJeanOSI(0.5), kernel.TimeDiscretisation(0.0, step)
-    return kernel.TimeStepping(world, clock, scheme, problem), system, [*kept, problem, scheme, clock]
+    return np.diag(np.r_[np.ones(n), body.mass, body.mass, body.moment_of_inertia]), stiffness, damping
