@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.methods.peers import PEERS
-from benchmarks.methods.scenes import charted
+from benchmarks.methods.peers import styles
 from vanedamp.studies.figures import BLUE, GREY, RED, draw_grid, save, subplots
 
 
@@ -53,10 +52,8 @@ def methods_figure(result: Mapping[str, Any], path: Path) -> None:
     """Draw the error of every method over its cost, a panel a coefficient of friction."""
     cases = sorted({row["friction"] for row in result["points"]}, reverse=True)
     figure, panels = subplots(1, len(cases), size=(6.5 * len(cases), 5.2), sharey=True, squeeze=False)
-    styles = {label: (variant.colour, variant.marker) for label, (_, variant) in charted().items()}
-    styles |= {name: (peer.colour, peer.marker) for name, peer in PEERS.items()}
     for axes, friction in zip(panels[0], cases, strict=True):
-        for label, (colour, marker) in styles.items():
+        for label, (colour, marker) in styles().items():
             mine = [
                 row for row in result["points"]
                 if row["method"] == label and row["friction"] == friction and row["error"] is not None

@@ -19,9 +19,10 @@ import numpy as np
 from benchmarks.benchmark import Benchmark, Result
 from benchmarks.bodies.measure import SHAPES, body_scene
 from benchmarks.engine.inside import time_of_a_period
-from benchmarks.methods.peers import PEERS, run_peer, version
-from benchmarks.methods.scenes import by, charted
+from benchmarks.methods.peers import PEERS, run_peer, settings_of_peers, version
+from benchmarks.methods.scenes import Key, by, charted, settings, solved
 from benchmarks.rows import Rows
+from benchmarks.timing import spread
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
@@ -49,7 +50,7 @@ class BlockMethods(Benchmark):
     COLUMNS = ("friction", "method", "setting", "status", "error", "low", "high", "seconds_per_period")
 
     def expected(self, folder: Path) -> dict[str, float]:
-        names = [_row(friction, label, solver) for friction in FRICTION for label, solver in _variants(self)]
+        names = [_row(friction, key) for friction in FRICTION for key in _keys(self)]
         return dict.fromkeys(names, 0.2 * self.starts) | {_PRICE: 10.0}
 
     def measure(self, rows: Rows) -> Result:
@@ -60,19 +61,19 @@ class BlockMethods(Benchmark):
         def exact(friction: float) -> list[np.ndarray]:
             return [simulate_block(block_scene(start, friction))[1] for start in range(self.starts)]
 
-        def measured(friction: float, label: str, solver: dict[str, Any]) -> dict[str, Any]:
+        def measured(friction: float, key: Key) -> dict[str, Any]:
             try:
-                return _point(label, solver, friction, exact(friction), self)
+                return _point(key, friction, exact(friction), self)
             except InputError as refused:
                 return {"absent": str(refused)}
 
-        for friction, (label, solver) in itertools.product(FRICTION, _variants(self)):
-            row = _row(friction, label, solver)
+        for friction, key in itertools.product(FRICTION, _keys(self)):
+            row, label = _row(friction, key), key[0]
             if label in absent:
                 rows.leave_out(row, absent[label])
                 continue
             inputs = asdict(self) | ({"version": version(label)} if label in PEERS else {})
-            point = rows.take(row, partial(measured, friction, label, solver), inputs=inputs, tell=_text)
+            point = rows.take(row, partial(measured, friction, key), inputs=inputs, tell=_text)
             if "absent" in point:
                 absent[label] = point["absent"]
             else:
@@ -108,14 +109,8 @@ def block_scene(start: int, friction: float, periods: int = PERIODS) -> Scene:
     return body_scene(1.0, "block", periods, 0, lift=8e-5, tilt=2e-3 * (1 + 0.05 * start), friction=friction)
 
 
-def _row(friction: float, label: str, solver: Mapping[str, Any]) -> str:
-    return f"friction {friction:g}: {label}, {_setting(solver):g}"
-
-
-def _setting(solver: Mapping[str, Any]) -> float:
-    """Return the setting of a method's table, or a peer's."""
-    setting: float = solver.get("setting", solver.get("rtol", solver.get("steps_per_period", 0)))
-    return setting
+def _row(friction: float, key: Key) -> str:
+    return f"friction {friction:g}: {key[0]}, {key[1]:g}"
 
 
 def _text(point: Mapping[str, Any]) -> str:
@@ -128,41 +123,24 @@ def simulate_block(scene: Scene) -> tuple[str, np.ndarray]:
     return response.status.value, np.column_stack([response.displacement, response.body_displacement])
 
 
-def _variants(effort: BlockMethods) -> list[tuple[str, dict[str, Any]]]:
-    """Return labels and what they are run with: a [solver] table, or the setting of a peer."""
-    found: list[tuple[str, dict[str, Any]]] = []
-    for label, (method, variant) in charted().items():
-        settings: tuple[float, ...] = effort.tolerances if variant.tolerance else effort.steps
-        if method == "exact":
-            settings = (_TIGHT,)
-        for setting in settings:
-            table = {"method": method, **variant.options}
-            if variant.setting is not None:
-                table[variant.setting] = setting
-            if variant.tolerance:
-                table["steps_per_period"] = SAMPLES
-            found.append((label, table))
-    found += [
-        (name, {"setting": steps}) for name, peer in PEERS.items() if not peer.tolerance for steps in effort.peers
-    ]
-    return found
+def _keys(effort: BlockMethods) -> list[Key]:
+    """Return methods and peers with each of their settings; of peers those that take steps."""
+    return [*settings(effort.steps, effort.tolerances), *settings_of_peers(effort.peers, ())]
 
 
-def _point(
-    label: str, solver: dict[str, Any], friction: float, exact: list[np.ndarray], effort: BlockMethods
-) -> dict[str, Any]:
+def _point(key: Key, friction: float, exact: list[np.ndarray], effort: BlockMethods) -> dict[str, Any]:
     """Return status, error and cost. Raises InputError where a method or a peer does not take the scene."""
-    setting = _setting(solver)
+    label, setting = key
     errors, seconds, status = [], 0.0, Status.OK.value
     for start, reference in enumerate(exact):
         scene = block_scene(start, friction)
         if label in PEERS:
             run = run_peer(label, scene, PERIODS, setting, SAMPLES)
             status, samples, seconds = run.status, run.samples, seconds + run.seconds / PERIODS / len(exact)
-        elif solver["method"] == "exact":  # judged by another method
+        elif charted()[label][0] == "exact":  # judged by another method
             status, samples = simulate_block(by(scene, method="solve_ivp", rtol=_TIGHT, steps_per_period=SAMPLES))
         else:
-            status, samples = simulate_block(by(scene, **solver))
+            status, samples = simulate_block(solved(scene, key, SAMPLES))
         if status != Status.OK.value:
             break
         errors.append(float((np.abs(samples - reference) / np.ptp(reference, axis=0)).max()))
@@ -170,9 +148,9 @@ def _point(
     if status != Status.OK.value:
         return point | dict.fromkeys(("error", "low", "high", "seconds_per_period"))
     if label not in PEERS:
-        seconds = _seconds(by(block_scene(0, friction), **solver), effort)
-    low, middle, high = (float(value) for value in np.quantile(errors, (0.25, 0.5, 0.75)))
-    return point | {"error": middle, "low": low, "high": high, "seconds_per_period": seconds}
+        seconds = _seconds(solved(block_scene(0, friction), key, SAMPLES), effort)
+    found = spread(np.array(errors))
+    return point | {"error": found["median"], "low": found["low"], "high": found["high"], "seconds_per_period": seconds}
 
 
 def _seconds(scene: Scene, effort: BlockMethods) -> float:

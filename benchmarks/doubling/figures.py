@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.methods.scenes import charted
+from benchmarks.methods.peers import styles
 from vanedamp.studies.figures import BLUE, GREY, draw_grid, save, subplots
 
 
 def doubling_figure(result: Mapping[str, Any], path: Path) -> None:
     """Draw the settled heights over the frequency, errors over cost, and alternation where there is none over cost."""
     figure, (left, middle, right) = subplots(1, 3, size=(18, 5.4))
-    styles = {label: (variant.colour, variant.marker) for label, (_, variant) in charted().items()}
+    looks = styles()
     for number, entry in enumerate(reversed(result["diagram"])):
-        colour = next(of for label, (of, _) in styles.items() if entry["method"].startswith(label))
+        colour = next(of for label, (of, _) in looks.items() if entry["method"].startswith(label))
         repeated = np.repeat(entry["frequency"], [len(heights) for heights in entry["height"]])
         heights = 1e9 * np.concatenate(entry["height"])
         left.plot(repeated, heights, ".", ms=2.5 - 0.5 * number, color=colour, label=entry["method"])
@@ -26,7 +26,7 @@ def doubling_figure(result: Mapping[str, Any], path: Path) -> None:
     left.set_ylabel("height of the body once a period, nm")
     left.set_title("where a body's bounce doubles its period")
     left.legend(fontsize=8, markerscale=4, loc="upper left")
-    for label, (colour, marker) in styles.items():
+    for label, (colour, marker) in looks.items():
         mine = [point for point in result["points"] if point["method"] == label]
         for axes, key in ((middle, "error"), (right, "unsteady")):
             drawn = [(1e6 * point["seconds_per_period"], point[key]) for point in mine if point[key]]

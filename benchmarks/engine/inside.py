@@ -1,15 +1,17 @@
 """Measurements inside the engine: modes that are awake, time of a period and of its parts.
 
-The one file of `studies` that reaches behind `coupling.engine.simulate`.
+The one file of the benchmarks that reaches behind `coupling.engine.simulate`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import seconds
+from benchmarks.timing import Clock, in_turns, seconds
 from vanedamp.coupling.exact.automaton import amplitude_changes
 from vanedamp.coupling.exact.energy_balance import account
 from vanedamp.coupling.exact.event_driven import EngineRun, is_common
@@ -38,6 +40,14 @@ def time_of_a_period(scene: Scene, lengths: tuple[int, int]) -> float:
     run = run_of(scene.replace({"time.periods": last, "time.transient": 0}))
     run.advance_to(first)
     return seconds(run.advance_to, last) / (last - first)
+
+
+def times_in_turns(
+    scenes: Mapping[str, Scene], lengths: tuple[int, int], rounds: int, rng: np.random.Generator
+) -> dict[str, np.ndarray]:
+    """Return the seconds of a period (rounds,) of every scene."""
+    clocks: dict[str, Clock] = {name: partial(time_of_a_period, scene, lengths) for name, scene in scenes.items()}
+    return in_turns(clocks, rounds, rng)
 
 
 def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:

@@ -20,7 +20,7 @@ from scipy.optimize import nnls
 from benchmarks.benchmark import Benchmark, Result, Row
 from benchmarks.engine import scenes
 from benchmarks.engine.hand_written_loop import ImpactOscillator, complete_loop, lean_loop, plain_loop
-from benchmarks.engine.inside import awake_modes, time_of_a_period, time_of_parts
+from benchmarks.engine.inside import awake_modes, time_of_a_period, time_of_parts, times_in_turns
 from benchmarks.engine.reference_solutions import solve_with_events, truth
 from benchmarks.timing import Clock, format_spread, in_turns, seconds, spread
 from vanedamp.coupling.engine import simulate
@@ -152,12 +152,8 @@ def _use(effort: Engine, use: str, rng: np.random.Generator) -> dict[str, Any]:
     """Measure time against the number of modes, for a body that does not, seldom or often wakes them."""
     lengths = effort.hard if use == _HARD else effort.calm
     with tempfile.TemporaryDirectory() as folder:
-        reduced = [scenes.reduced(Path(folder), count, use) for count in effort.modes]
-        clocks: dict[str, Clock] = {
-            str(count): partial(time_of_a_period, scene, lengths)
-            for count, scene in zip(effort.modes, reduced, strict=True)
-        }
-        times = in_turns(clocks, effort.rounds, rng)
+        varied = {str(count): scenes.reduced(Path(folder), count, use) for count in effort.modes}
+        times, reduced = times_in_turns(varied, lengths, effort.rounds, rng), varied.values()
         windows = [
             simulate(scene.replace({"time.periods": lengths[1], "time.transient": lengths[0]})) for scene in reduced
         ]
@@ -184,9 +180,7 @@ def _bodies(effort: Engine, rng: np.random.Generator) -> dict[str, Any]:
     """Measure time against the number of bodies in cavities of their own."""
     varied = {str(count): scenes.bodies(count) for count in _COUNTS}
     lengths = (effort.engine[0], sum(effort.engine) // 2)
-    times = in_turns(
-        {name: partial(time_of_a_period, scene, lengths) for name, scene in varied.items()}, effort.rounds, rng
-    )
+    times = times_in_turns(varied, lengths, effort.rounds, rng)
     responses = [simulate(scene.replace({"time.periods": lengths[1]})) for scene in varied.values()]
     return {
         "counts": list(_COUNTS),
@@ -208,10 +202,8 @@ def _costs(effort: Engine, rng: np.random.Generator) -> dict[str, Any]:
     differ in their numbers; timed: seconds a period of the engine's search and account, and what is left of it.
     """
     varied = [scenes.one_mode(*factors) for factors in _VARIED]
-    clocks: dict[str, Clock] = {
-        str(i): partial(time_of_a_period, scene, effort.engine) for i, scene in enumerate(varied)
-    }
-    times = np.array([np.median(values) for values in in_turns(clocks, effort.rounds, rng).values()])
+    turns = times_in_turns({str(i): scene for i, scene in enumerate(varied)}, effort.engine, effort.rounds, rng)
+    times = np.array([np.median(values) for values in turns.values()])
     counts = np.array([_counts(scene, effort.engine) for scene in varied])
     # relative errors count, so that the cheap scenes have their say
     costs, _ = nnls(counts / times[:, None], np.ones(len(times)))

@@ -21,14 +21,15 @@ from benchmarks.engine.inside import time_of_a_period
 from benchmarks.engine.reference_solutions import truth
 from benchmarks.methods import scenes
 from benchmarks.methods.full_mesh_comparison import CurveEffort
-from benchmarks.methods.peers import PEERS, PeerRun, run_peer, version
+from benchmarks.methods.peers import PEERS, PeerRun, run_peer, settings_of_peers, version
+from benchmarks.methods.scenes import Key
 from benchmarks.rows import Contest, Rows
 from benchmarks.timing import Clock, in_turns, spread
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.solver_options import METHODS, SteppingOptions
+from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.scene.structures import Rigid
 from vanedamp.files.toml_input import InputError
 
@@ -43,7 +44,6 @@ DEAR, ONE = "too dear for a mean", 1e-4
 DROPPED = "dropped: "
 #: about what a row takes, s: a run of a scene that repeats, of another; of that by tolerance; the times
 _RUN, _MEAN, _DEAR_MEAN, _TIMES = 0.1, 0.8, 10.0, 6.0
-Key = tuple[str, float]
 
 
 @dataclass(frozen=True)
@@ -163,14 +163,7 @@ class Chart:
 
     def _variant(self, key: Key) -> Scene:
         """Return the scene by a method with a setting."""
-        label, setting = key
-        method, variant = scenes.charted()[label]
-        options = dict(variant.options) | ({variant.setting: setting} if variant.setting else {})
-        if variant.setting and not variant.tolerance:
-            options[variant.setting] = int(setting)
-        if variant.tolerance and issubclass(METHODS.part(method).Options, SteppingOptions):
-            options["steps_per_period"] = _SAMPLES if self.repeats else _LEAST
-        return scenes.by(self.scene, method=method, **options)
+        return scenes.solved(self.scene, key, _SAMPLES if self.repeats else _LEAST)
 
     def _run(self, scene: Scene, periods: int) -> Response:
         return simulate(
@@ -239,20 +232,11 @@ def status_after(scene: Scene, periods: int) -> str:
 
 
 def _settings(effort: Settings) -> list[Key]:
-    """Return every method's label with each of its settings; the exact engine is the first."""
-    return [
-        (label, float(setting))
-        for label, (_, variant) in scenes.charted().items()
-        for setting in ((effort.tolerances if variant.tolerance else effort.steps) if variant.setting else (0,))
-    ]
+    return scenes.settings(effort.steps, effort.tolerances)
 
 
 def _peer_settings(effort: Settings) -> list[Key]:
-    return [
-        (name, float(setting))
-        for name, peer in PEERS.items()
-        for setting in (effort.tolerances if peer.tolerance else effort.peers)
-    ]
+    return settings_of_peers(effort.peers, effort.tolerances)
 
 
 def _growth(setting: float, steps: tuple[int, ...]) -> float:

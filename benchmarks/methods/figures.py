@@ -9,18 +9,17 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
-from benchmarks.methods.peers import PEERS
-from benchmarks.methods.scenes import charted
+from benchmarks.methods.peers import styles
 from vanedamp.studies.figures import BLUE, GREY, RED, draw_grid, save, subplots
 
 
 def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
     """Draw a panel a scene: error against CPU time per period, and the model ladder if there is one."""
-    charts, drawn, styles = result["charts"], [], _styles()
+    charts, drawn, looks = result["charts"], [], styles()
     figure, axes = subplots(2, 4, size=(21, 10))
     panels = list(axes.flat)
     for panel, (name, chart) in zip(panels, charts.items(), strict=False):
-        _chart(panel, name, chart, styles)
+        _chart(panel, name, chart, looks)
         drawn.append(panel)
     for part, draw in (("ladder", _ladder), ("curve", _curve)):
         if part in result:
@@ -32,19 +31,13 @@ def work_precision_figure(result: Mapping[str, Any], path: Path) -> None:
     for panel in drawn[: len(charts)]:
         handles, labels = panel.get_legend_handles_labels()
         legend = dict(zip(labels, handles, strict=True)) | legend
-    names = [name for name in styles if name in legend]
+    names = [name for name in looks if name in legend]
     figure.legend([legend[name] for name in names], names, loc="outside lower center", ncols=6)
     save(figure, path)
 
 
-def _styles() -> dict[str, tuple[str, str]]:
-    """Return the colour and marker of every method and peer, by its label: the same in all panels."""
-    ours = {label: (variant.colour, variant.marker) for label, (_, variant) in charted().items()}
-    return ours | {name: (peer.colour, peer.marker) for name, peer in PEERS.items()}
-
-
-def _chart(axes: Axes, name: str, chart: Mapping[str, Any], styles: Mapping[str, tuple[str, str]]) -> None:
-    for method, (colour, marker) in styles.items():
+def _chart(axes: Axes, name: str, chart: Mapping[str, Any], looks: Mapping[str, tuple[str, str]]) -> None:
+    for method, (colour, marker) in looks.items():
         points = [point for point in chart["points"] if point["method"] == method and point["time"]]
         times = [1e6 * point["time"]["median"] for point in points]
         errors = [max(point["error"], 1e-14) for point in points]

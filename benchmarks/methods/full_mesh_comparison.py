@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.engine.inside import time_of_a_period
+from benchmarks.engine.inside import times_in_turns
 from benchmarks.methods.full_mesh_run import explicit_run, glued_frequencies_hz
 from benchmarks.methods.scenes import Cluster
 from benchmarks.rows import Take, at_once
-from benchmarks.timing import Clock, in_turns, spread
+from benchmarks.timing import spread
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.linear_response import receptance
@@ -83,9 +83,8 @@ def ladder(folder: Path, counts: tuple[int, ...], rounds: int, seed: int, take: 
 
 def _reduced_models(finest: Scene, counts: tuple[int, ...], rounds: int, seed: int) -> dict[str, Any]:
     """Return time a period and error of the models with these numbers of modes, and the finest's peaks, m."""
-    variants = {count: finest.replace({"structure.modes": count}) for count in counts}
-    clocks: dict[str, Clock] = {str(n): partial(time_of_a_period, scene, (500, 2000)) for n, scene in variants.items()}
-    times = in_turns(clocks, rounds, np.random.default_rng(seed))
+    variants = {str(count): finest.replace({"structure.modes": count}) for count in counts}
+    times = times_in_turns(variants, (500, 2000), rounds, np.random.default_rng(seed))
     first = {"time.periods": _FIRST, "time.transient": 0}
     peaks = [simulate(scene.replace(first)).peak for scene in variants.values()]
     return {

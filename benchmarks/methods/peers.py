@@ -6,13 +6,14 @@ express, or that it is not installed, it says by an InputError, which charts and
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.methods.scenes import charted
 from vanedamp.coupling.methods.equations_of_motion import Motion, TimeGrid, start, time_grid
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
@@ -64,12 +65,25 @@ PEERS = {
 }
 
 
+def styles() -> dict[str, tuple[str, str]]:
+    """Return the colour and marker of every method and peer, by its label: the same in all charts."""
+    ours = {label: (variant.colour, variant.marker) for label, (_, variant) in charted().items()}
+    return ours | {name: (peer.colour, peer.marker) for name, peer in PEERS.items()}
+
+
 def version(name: str) -> str | None:
     """Return the version of a peer, None where it is not installed."""
     try:
         return str(getattr(import_module(PEERS[name].needs), "__version__", "unknown"))
     except ImportError:
         return None
+
+
+def settings_of_peers(steps: Sequence[float], tolerances: Sequence[float]) -> list[tuple[str, float]]:
+    """Return every peer with each of its settings."""
+    return [
+        (name, float(setting)) for name, peer in PEERS.items() for setting in (tolerances if peer.tolerance else steps)
+    ]
 
 
 def run_peer(name: str, scene: Scene, periods: int, setting: float, samples: int = 0) -> PeerRun:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +13,16 @@ from benchmarks import CLUSTER_CASE
 from benchmarks.engine import scenes as bench_scenes
 from vanedamp.coupling.methods import Variant
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.solver_options import METHODS
+from vanedamp.coupling.scene.solver_options import METHODS, SteppingOptions
 from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.toml_input import validate
 
 if TYPE_CHECKING:
     from vanedamp.modal.matrices import SystemMatrices
     from vanedamp.rom.interface import Interface
+
+#: a method's label in charts, or a peer's name, and its setting: steps per period or a tolerance
+Key = tuple[str, float]
 
 
 def charted() -> dict[str, tuple[str, Variant]]:
@@ -30,6 +34,27 @@ def charted() -> dict[str, tuple[str, Variant]]:
                 raise ExtensionError(f"method {name}: another is '{variant.label}' in charts, too; name it otherwise")
             found[variant.label] = (name, variant)
     return found
+
+
+def settings(steps: Sequence[float], tolerances: Sequence[float]) -> list[Key]:
+    """Return every method's label with each of its settings, 0 for one that has none; the exact engine is the first."""
+    return [
+        (label, float(setting))
+        for label, (_, variant) in charted().items()
+        for setting in ((tolerances if variant.tolerance else steps) if variant.setting else (0,))
+    ]
+
+
+def solved(scene: Scene, key: Key, least: int) -> Scene:
+    """Return the scene by a method with a setting. least: steps per period where the setting is a tolerance."""
+    label, setting = key
+    method, variant = charted()[label]
+    options = dict(variant.options)
+    if variant.setting:
+        options[variant.setting] = setting if variant.tolerance else int(setting)
+    if variant.tolerance and issubclass(METHODS.part(method).Options, SteppingOptions):
+        options["steps_per_period"] = least
+    return by(scene, method=method, **options)
 
 
 def by(scene: Scene, **solver: Any) -> Scene:

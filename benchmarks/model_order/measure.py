@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.benchmark import Benchmark, Result
-from benchmarks.engine.inside import time_of_a_period
+from benchmarks.engine.inside import times_in_turns
 from benchmarks.model_order.bar_on_wall import LAWS as BAR_LAWS
 from benchmarks.model_order.bar_on_wall import bounce
 from benchmarks.model_order.body_trial import SEED as BODY_SEED
@@ -29,7 +29,6 @@ from benchmarks.model_order.scenes import SEED
 from benchmarks.model_order.structures import cluster_model
 from benchmarks.model_order.trial import run_trial, summary, trial_rows, trial_text
 from benchmarks.rows import Rows, Take, at_once
-from benchmarks.timing import Clock, in_turns
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.sweep import warm_up
@@ -184,11 +183,7 @@ def _point(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 def _times(scenes: Mapping[str, Scene]) -> dict[str, float]:
     """Return the seconds a period of scenes, medians over the rounds."""
-    clocks: dict[str, Clock] = {}
-    for name, scene in scenes.items():
-        long = scene.replace({"time.periods": _LENGTHS[1], "time.transient": 0})
-        clocks[name] = partial(time_of_a_period, long, _LENGTHS)
-    times = in_turns(clocks, _ROUNDS, np.random.default_rng(0))
+    times = times_in_turns(scenes, _LENGTHS, _ROUNDS, np.random.default_rng(0))
     return {name: float(np.median(values)) for name, values in times.items()}
 
 

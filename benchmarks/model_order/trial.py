@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.engine.inside import time_of_a_period
+from benchmarks.engine.inside import times_in_turns
 from benchmarks.model_order.scenes import Trial, trials
 from benchmarks.rows import Take, at_once
-from benchmarks.timing import in_turns
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.model_order.selection import select_model_orders
 from vanedamp.coupling.scene.scene import Scene
@@ -157,12 +156,9 @@ def errors(
 
 def _costs(scene: Scene, kinds: Sequence[Kind]) -> np.ndarray:
     """Return the seconds per period (kinds,), medians over the rounds."""
-    clocks = {
-        format_model(kind): partial(time_of_a_period, _fixed(scene, kind, _LENGTHS[1], _STARTS[0]), _LENGTHS)
-        for kind in kinds
-    }
-    times = in_turns(clocks, _ROUNDS, np.random.default_rng(0))
-    return np.array([np.median(times[format_model(kind)]) for kind in kinds])
+    models = {format_model(kind): _fixed(scene, kind, _LENGTHS[1], _STARTS[0]) for kind in kinds}
+    times = times_in_turns(models, _LENGTHS, _ROUNDS, np.random.default_rng(0))
+    return np.array([np.median(values) for values in times.values()])
 
 
 def _fixed(scene: Scene, kind: Kind, periods: int, start: float) -> Scene:
