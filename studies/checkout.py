@@ -28,7 +28,9 @@ class CheckoutCommand(NamedTuple):
         self._module().add_arguments(parser)
 
     def run(self, arguments: Namespace) -> None:
-        """Run it."""
+        """Run it. Raises InputError for an output folder that is the package's."""
+        if Path(arguments.output).resolve() == (_ROOT / self.package).resolve():
+            raise InputError(f"--output {arguments.output}: holds the source of this command; name another folder")
         self._module().run(arguments)
 
     def _module(self) -> ModuleType:

@@ -38,6 +38,15 @@ def test_in_a_checkout_they_run_from_anywhere(command, tmp_path):
     assert f"vanedamp {command} [-h]" in done.stdout
 
 
+@pytest.mark.parametrize(("command", "folder"), [(["bench", "limits", "--quick"], "benchmarks"), (["paper"], "paper")])
+def test_results_do_not_go_among_the_sources(command, folder, monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    assert main([*command, "-o", folder]) == BAD_INPUT
+    assert capsys.readouterr().err == (
+        f"vanedamp: --output {folder}: holds the source of this command; name another folder\n"
+    )
+
+
 def test_help_lists_them_without_a_checkout(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(checkout, "_ROOT", tmp_path)
     with pytest.raises(SystemExit) as stopped:
