@@ -32,7 +32,7 @@ from vanedamp.studies.demo.figure_file import (
     linear_peaks,
     with_length,
 )
-from vanedamp.studies.demo.figure_study import Session
+from vanedamp.studies.demo.figure_study import Read, Session
 from vanedamp.studies.report.results import collect
 
 FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
@@ -256,6 +256,25 @@ def test_claims_of_blocks_stand_beside_those_of_sliders(tmp_path):
     assert [claim.verdict for claim in claims[7:8]] == ["not shown"]  # several bodies are one
     blocks_picture(mine, others, "Blocks", tmp_path / "blocks.png")
     assert (tmp_path / "blocks.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("name", ["fig10", "fig14", "fig19", "mistuning", "systems", "blocks", "fit"])
+def test_every_study_judges_and_draws_the_curves_of_its_scenes(name, tmp_path):
+    """With one curve in the place of all others, in the numbers that its sweeps have."""
+    (curve,) = damped("fig9", "", [0.96, 0.98, 0.9875, 1.0, 1.01], 600, 390, **{"cavity.c1.gap": [0.5 * AMPLITUDE]})
+    of = STUDIES[name].args[0]
+
+    def alike(file):
+        figure = FigureScenes.load(file, STRUCTURE)
+        axes = {name: list(scene.sweep_points()[0].values())[:-1] for name, scene in figure.scenes.items()}
+        return figure, {name: [curve] * math.prod(map(len, values)) for name, values in axes.items()}
+
+    figure, mine = alike(of.file)
+    read = Read(figure, mine, {file.stem: alike(file)[1] for file in of.others})
+    claims = of.claims(read)
+    assert claims and all(claim.verdict == "shown" or claim.why for claim in claims)
+    of.picture(read, tmp_path / "study.png")
+    assert (tmp_path / "study.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_map_of_fit_and_friction(tmp_path):
