@@ -9,11 +9,11 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.methods.scenes import double
 from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.studies.bench.methods.scenes import double
 
 METHODS = {
     "moreau": {"method": "moreau"},

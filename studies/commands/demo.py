@@ -21,7 +21,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> None:
     """Run the demonstration."""
     from vanedamp.studies.commands.support.outputs import output_folder
-    from vanedamp.studies.demo import PIPELINE, run_demo
+    from vanedamp.studies.demo.demo import PIPELINE, run_demo
     from vanedamp.studies.pipeline.pipeline import adopt
 
     folder = output_folder(arguments)
