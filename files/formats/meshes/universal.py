@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.modal.labelled_mesh import LabelledMesh, text_lines
-from vanedamp.modal.msh import MeshError
+from vanedamp.files.formats.meshes.labelled_mesh import LabelledMesh, MeshError, text_lines
 
 _NODES, _ELEMENTS, _SYSTEMS = (2411, 781, 15), (2412, 780), (2420,)
 # numbers that each member of a group has

@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.modal.frames import Frame, through
-from vanedamp.modal.labelled_mesh import LINES, SHELLS, SOLIDS, LabelledMesh, text_lines
-from vanedamp.modal.msh import MeshError
+from vanedamp.files.formats.meshes.frames import Frame, through
+from vanedamp.files.formats.meshes.labelled_mesh import LINES, SHELLS, SOLIDS, LabelledMesh, MeshError, text_lines
 
 _KINDS = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
 # number of corners, and of all nodes where those between the corners are given

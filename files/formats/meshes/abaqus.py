@@ -16,9 +16,16 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from vanedamp.modal.frames import Frame, rotation, through
-from vanedamp.modal.labelled_mesh import KINDS, LINES, SHELLS, SOLIDS, LabelledMesh, text_lines
-from vanedamp.modal.msh import MeshError
+from vanedamp.files.formats.meshes.frames import Frame, rotation, through
+from vanedamp.files.formats.meshes.labelled_mesh import (
+    KINDS,
+    LINES,
+    SHELLS,
+    SOLIDS,
+    LabelledMesh,
+    MeshError,
+    text_lines,
+)
 
 _ELEMENTS = (
     (re.compile(r"C3D(\d+)[A-Z]*"), SOLIDS),

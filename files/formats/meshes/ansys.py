@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.modal.labelled_mesh import SHELLS, SOLIDS, LabelledMesh, text_lines
-from vanedamp.modal.msh import MeshError
+from vanedamp.files.formats.meshes.labelled_mesh import SHELLS, SOLIDS, LabelledMesh, MeshError, text_lines
 
 _SOLIDS = (
     5,
