@@ -3,6 +3,9 @@
 Every keyword that gives or moves nodes and elements is followed or refused. Others say nothing about the mesh: their
 meaning for the structure (materials and their *ORIENTATION, supports and the *TRANSFORM of their axes, loads, steps)
 is said in the case, in global axes.
+
+Why not meshlane: version 5.5.0 skips six- and eight-node shells (CPS6, CPS8), so that the sets of facets that they
+cover are empty.
 """
 
 from __future__ import annotations
