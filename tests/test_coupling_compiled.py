@@ -8,8 +8,8 @@ from importlib.metadata import version
 import pytest
 
 from tests.tools.processes import environment
-from vanedamp.coupling.numerics import jit
-from vanedamp.coupling.numerics.jit import _sources
+from vanedamp.coupling.numerics.compiler import jit
+from vanedamp.coupling.numerics.compiler.jit import _sources
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_a_caller_does_not_date_its_callee(digest):
 
 _KEPT = """
 import numpy as np
-from vanedamp.coupling.numerics.jit import entry
+from vanedamp.coupling.numerics.compiler.jit import entry
 
 def add(values, one):
     for place in range(len(values)):
@@ -89,7 +89,9 @@ _DAMAGE = {
     "cut": lambda content: content[: len(content) // 2],
     "noise": lambda content: bytes(range(256)) * 8,
     "zeros within": lambda content: content[: len(content) // 2] + bytes(512) + content[len(content) // 2 + 512 :],
-    "another version's": lambda content: pickle.dumps(version("numba")) + b"cvanedamp.coupling.numerics.jit\nNo\n.",
+    "another version's": lambda content: (
+        pickle.dumps(version("numba")) + b"cvanedamp.coupling.numerics.compiler.jit\nNo\n."
+    ),
     "another object": lambda content: pickle.dumps(version("numba")) + pickle.dumps((None, 7)),
 }
 
@@ -134,7 +136,7 @@ from numba import njit
 from vanedamp.coupling.exact.event_functions import step_or_stop
 from vanedamp.coupling.exact.root_search import expand, new_expansion
 from vanedamp.coupling.numerics.codes import POSITION
-from vanedamp.coupling.numerics.jit import entry, kernel
+from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 
 
 @kernel

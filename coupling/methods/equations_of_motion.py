@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import COUNTERS
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.system.assembly import InitialMotion, Loads
 from vanedamp.coupling.system.system import System
 

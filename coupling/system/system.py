@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.record import record_with
+from vanedamp.coupling.numerics.compiler.record import record_with
 
 
 class Part(NamedTuple):
@@ -58,7 +58,7 @@ class System(NamedTuple):
     spring: np.ndarray  # (r,) stiffness of a row while it is closed, N/m; inf: rigid
     dashpot: np.ndarray  # (r,) N s/m
     restitution: np.ndarray  # (r,) of rigid contacts, or the coefficient from which their law takes it at a speed
-    restitution_at: int  # address of that law (numerics.function_address); 0: the coefficient at every speed
+    restitution_at: int  # address of that law (numerics.compiler.function_address); 0: the coefficient at every speed
     free_travel: np.ndarray  # (r,) of the contact's cavity, m: the scale of its gap; inf for friction rows
     left_body: np.ndarray  # (r,) body to the left of a contact, -1: a wall
     right_body: np.ndarray  # (r,) body to the right of a contact, -1: a wall
