@@ -88,7 +88,9 @@ _DAMAGE = {
     "empty": lambda content: b"",
     "cut": lambda content: content[: len(content) // 2],
     "noise": lambda content: bytes(range(256)) * 8,
-    "zeros within": lambda content: content[: len(content) // 2] + bytes(512) + content[len(content) // 2 + 512 :],
+    "zeros within": lambda content: (
+        content[: len(content) // 2] + bytes(len(content) // 4) + content[3 * len(content) // 4 :]
+    ),
     "another version's": lambda content: (
         pickle.dumps(version("numba")) + b"cvanedamp.coupling.numerics.compiler.jit\nNo\n."
     ),
@@ -102,7 +104,7 @@ def test_damaged_code_is_compiled_again_and_replaced(which, damage, kept):
     """After a loss of power; zeros within machine code would crash, or compute anything."""
     run, files = kept
     content = files[which].read_bytes()
-    assert len(content) > 1024
+    assert len(content) > 512  # a generic processor's name is short
     files[which].write_bytes(_DAMAGE[damage](content))
     assert run() == (6.0, False)
     assert run() == (6.0, True)
