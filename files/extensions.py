@@ -34,7 +34,7 @@ class ExtensionPoint(NamedTuple):
     A part is a module, or any object with the attributes.
 
     kind        in words, for messages
-    package     each module of which is a part; folders: each package of which is one
+    package     each module of which is a part; folders: each package of which is one; or a module with PARTS by name
     group       of entry points, whose names are those of the parts
     attributes  that a part must have; it may have a NAME other than its file's, and an ORDER among the others
     """
@@ -47,6 +47,9 @@ class ExtensionPoint(NamedTuple):
 
     def own(self) -> dict[str, Any]:
         """Return the parts of our own folder by name, in their order."""
+        listed = getattr(import_module(self.package), "PARTS", None)
+        if listed is not None:
+            return _in_order(listed)
         parts = {}
         for _, name, is_folder in pkgutil.iter_modules(import_module(self.package).__path__):
             if is_folder is self.folders:

@@ -1,4 +1,8 @@
-"""Input files written for people: TOML with what its keys mean, and their units, as comments."""
+"""Input files written for people: TOML with what its keys mean, and their units, as comments.
+
+tomlkit writes them. What is here are comments, lines and digits: tomlkit 0.15.2 alone writes a list of 200 frequencies
+as one line of 3,884 characters; here the longest has 99.
+"""
 
 from __future__ import annotations
 

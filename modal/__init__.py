@@ -1,9 +1,9 @@
 """Finite elements, from a mesh to modes and the rigid model. Begin with `elasticity.Solid` and `eigen.solve_modes`.
 
-In the order of the pipeline: `mesh_import` (on `abaqus`, `nastran`, `ansys`, `universal_file` and `other_formats`,
-which give a `labelled_mesh`, and on `frames`) and `msh` read meshes; `elasticity` (on `fenicsx`) assembles
-`matrices`, which `matrix_files` exchanges; `eigen` (on `petsc`, `parallel`, `lanczos`, `algebra`) solves; `rotating`,
-`gyroscopic` and `campbell` (on `speed_range`, `mode_tracking`) are for structures that turn; `multiple`,
-`participation` and `stress` describe modes, `units` checks them; `measurements`, `frf` (on `rational_fit`) and
-`correlation` are for tests, `model_updating` fits the model to them; `rigid_model` and `base_excitation` come last.
+In the order of the pipeline: `mesh_import` (on `files.formats.meshes`) and `msh` read meshes; `elasticity` (on
+`fenicsx`) assembles `matrices`, which `matrix_files` exchanges; `eigen` (on `petsc`, `parallel`, `lanczos`, `algebra`)
+solves; `rotating`, `gyroscopic` and `campbell` (on `speed_range`, `mode_tracking`) are for structures that turn;
+`multiple`, `participation` and `stress` describe modes, `units` checks them; `measurements`, `frf` (on `rational_fit`)
+and `correlation` are for tests, `model_updating` fits the model to them; `rigid_model` and `base_excitation` come
+last.
 """

@@ -34,10 +34,10 @@ from mpi4py import MPI
 from scipy import sparse
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.files.store import digest
 from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
-from vanedamp.modal.msh import MeshError
 
 try:
     gmshio: Any = importlib.import_module("dolfinx.io.gmsh")

@@ -4,6 +4,9 @@ A triangular solve waits for memory, not for arithmetic: four right-hand sides c
 find several copies of a multiple eigenvalue. Grimes, Lewis and Simon (1994), SIAM J. Matrix Anal. Appl. 15(1); here all
 directions are kept and orthogonalised against, and a full space restarts with its best vectors (Wu and Simon 2000, SIAM
 J. Matrix Anal. Appl. 22(2)).
+
+Why not SLEPc's Krylov-Schur (3.18), which has no blocks: with the same factors of 73,122 freedoms it takes as long
+for 6 modes (1.1 s and 1.2 s), 2.2 s for 20 (here 1.8 s) and 7.0 s for 60 (here 4.6 s). Ranks of MPI share it (`petsc`).
 """
 
 from __future__ import annotations

@@ -9,20 +9,31 @@ optional dependency.
 from __future__ import annotations
 
 import csv
-import importlib
 import os
 import re
-import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vanedamp.files.csv_input import content_lines
-from vanedamp.files.errors import VanedampError
 from vanedamp.files.foreign import existing, reading
-from vanedamp.files.store import replacing, write_csv
+from vanedamp.files.formats.universal_datasets import (
+    COMPLEX_MODE,
+    FORCE,
+    FREQUENCY,
+    FRF,
+    NORMAL_MODE,
+    MeasurementError,
+    curve_dataset,
+    damping_ratio,
+    datasets,
+    mode_dataset,
+    pyuff,
+    write_universal,
+)
+from vanedamp.files.store import write_csv
 from vanedamp.modal.correlation import MeasuredShapes
 from vanedamp.modal.frf import Frf, FrfError
 from vanedamp.modal.temperature import Temperature, TemperatureError
@@ -34,19 +45,6 @@ COLUMNS = ("real-imaginary", "magnitude-degrees", "magnitude-radians")
 _PLACE = ("x", "y", "z", "dx", "dy", "dz")
 # specific data types of UFF 58, record 9
 _QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
-_NORMAL_MODE, _COMPLEX_MODE = 2, 3
-#: types of the functions of dataset 58
-GENERAL, HISTORY, FRF = 0, 1, 4
-#: specific data types of its axes, and their names and units
-UNKNOWN, DISPLACEMENT, FORCE, TIME, FREQUENCY = 0, 8, 13, 17, 18
-_AXES = {
-    UNKNOWN: ("NONE", "NONE"), DISPLACEMENT: ("displacement", "m"), 11: ("velocity", "m/s"),
-    12: ("acceleration", "m/s^2"), FORCE: ("force", "N"), TIME: ("time", "s"), FREQUENCY: ("frequency", "Hz"),
-}  # fmt: skip
-
-
-class MeasurementError(VanedampError):
-    """A file of shapes or responses that cannot be read or written; the message names the file and the remedy."""
 
 
 def read_shapes(path: str | os.PathLike[str]) -> MeasuredShapes:
@@ -243,28 +241,14 @@ def _measured(file: Path, **values: Any) -> MeasuredShapes:
         raise MeasurementError(f"{file}: {error}") from error
 
 
-def _pyuff() -> Any:
-    try:
-        return importlib.import_module("pyuff")
-    except ImportError as error:
-        raise MeasurementError("universal files need pyuff: pip install pyuff; CSV files need nothing") from error
-
-
-def _datasets(file: Path) -> list[dict[str, Any]]:
-    universal = _pyuff().UFF(str(file))
-    kinds = universal.get_set_types()
-    wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58, 2411)))
-    return [universal.read_sets(int(index)) for index in wanted]
-
-
 def _shapes_of_universal(file: Path) -> MeasuredShapes:
-    datasets = _datasets(file)
+    found = datasets(file)
     nodes: dict[int, np.ndarray] = {}
-    for dataset in datasets:
+    for dataset in found:
         if dataset["type"] in (15, 2411):
             points = np.column_stack([dataset["x"], dataset["y"], dataset["z"]])
             nodes |= dict(zip(np.asarray(dataset["node_nums"], dtype=int).tolist(), points, strict=True))
-    modes = [d for d in datasets if d["type"] == 55 and d["analysis_type"] in (_NORMAL_MODE, _COMPLEX_MODE)]
+    modes = [d for d in found if d["type"] == 55 and d["analysis_type"] in (NORMAL_MODE, COMPLEX_MODE)]
     if not nodes or not modes:
         raise MeasurementError(f"{file}: holds no nodes (dataset 15 or 2411) or no mode shapes (dataset 55)")
     numbers = np.asarray(modes[0]["node_nums"], dtype=int)
@@ -284,7 +268,7 @@ def _shapes_of_universal(file: Path) -> MeasuredShapes:
         directions=np.tile(np.eye(3), (len(numbers), 1))[seen],
         shapes=shapes[:, seen],
         frequencies_hz=frequencies,
-        damping_ratios=[_damping_ratio(mode) for mode in modes],
+        damping_ratios=[damping_ratio(mode) for mode in modes],
     )
 
 
@@ -300,7 +284,7 @@ def _shapes_to_universal(shapes: MeasuredShapes, target: Path) -> None:
     if len(np.unique(3 * number + axes)) < len(axes):
         raise MeasurementError(f"{target}: two values for one point and axis; a universal file holds one")
     labels = np.arange(1, len(points) + 1)
-    prepare = _pyuff()
+    prepare = pyuff()
     zero = np.zeros(len(points), dtype=int)
     sets = [
         prepare.prepare_15(
@@ -315,37 +299,8 @@ def _shapes_to_universal(shapes: MeasuredShapes, target: Path) -> None:
     write_universal(sets, target)
 
 
-def mode_dataset(
-    number: int, frequency: float, ratio: float, nodes: np.ndarray, shape: np.ndarray, *, title: str = "mode",
-    quantity: str = "displacement", mass: float = 0.0,
-) -> dict[str, Any]:  # fmt: skip
-    """Return dataset 55 of a mode, for `write_universal`: a normal one, or of a complex shape one with an eigenvalue.
-
-    number: from 1; frequency: Hz; ratio: of damping; nodes: labels (n,); shape: (n, 3); mass: modal, of a normal mode.
-    """
-    data: dict[str, Any] = {
-        "type": 55, "id1": f"{title} {number}: {frequency:.6g} Hz", "id2": quantity, "id3": "NONE", "id4": "NONE",
-        "id5": "NONE", "model_type": 1, "data_ch": 2, "spec_data_type": 8, "n_data_per_node": 3, "load_case": 1,
-        "mode_n": number, "node_nums": nodes, "r1": shape[:, 0], "r2": shape[:, 1], "r3": shape[:, 2],
-    }  # fmt: skip
-    if np.iscomplexobj(shape):
-        eigenvalue = 2 * np.pi * frequency * complex(-ratio, np.sqrt(1 - ratio**2))
-        return data | {"analysis_type": _COMPLEX_MODE, "data_type": 5, "eig": eigenvalue, "modal_a": 0j, "modal_b": 0j}
-    return data | {
-        "analysis_type": _NORMAL_MODE, "data_type": 2, "freq": frequency, "modal_m": mass, "modal_damp_vis": ratio,
-        "modal_damp_his": 0.0,
-    }  # fmt: skip
-
-
-def _damping_ratio(mode: dict[str, Any]) -> float:
-    """Return the damping ratio of dataset 55; nan where it says none."""
-    if "eig" in mode:
-        return -mode["eig"].real / abs(mode["eig"]) if mode["eig"].real else np.nan
-    return float(mode.get("modal_damp_vis", np.nan))
-
-
 def _frf_of_universal(file: Path) -> Frf:
-    found = [d for d in _datasets(file) if d["type"] == 58 and d["func_type"] == FRF]
+    found = [d for d in datasets(file) if d["type"] == 58 and d["func_type"] == FRF]
     if not found:
         raise MeasurementError(f"{file}: holds no frequency response (dataset 58, function type {FRF})")
     kinds = {int(d["ordinate_spec_data_type"]) for d in found}
@@ -374,34 +329,3 @@ def _frf_to_universal(frf: Frf, target: Path) -> None:
         for index, (values, label) in enumerate(zip(frf.values, frf.labels, strict=True))
     ]  # fmt: skip
     write_universal(sets, target)
-
-
-def curve_dataset(
-    title: str, x: np.ndarray, values: np.ndarray, function: int, abscissa: int, ordinate: int, per: int = UNKNOWN,
-    **more: Any,
-) -> dict[str, Any]:  # fmt: skip
-    """Return dataset 58 of a curve, values (n,) over x (n,), for `write_universal`.
-
-    function: type of the function; abscissa, ordinate, per: specific data types of x, of the values, and of what they
-    are over, as those of `_AXES`; more: further entries, or others in place of these.
-    """
-    data: dict[str, Any] = {
-        "type": 58, "binary": 0, "func_type": function, "id1": title[:80], "rsp_node": 1, "rsp_dir": 0, "ref_node": 0,
-        "ref_dir": 0, "data": values, "x": x, "abscissa_spacing": 0, "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
-        "ver_num": 0, "load_case_id": 0, "z_axis_value": 0.0,
-    }  # fmt: skip
-    for axis, kind in (("abscissa", abscissa), ("ordinate", ordinate), ("orddenom", per)):
-        data[f"{axis}_spec_data_type"] = kind
-        data[f"{axis}_axis_lab"], data[f"{axis}_axis_units_lab"] = _AXES[kind]
-    return data | more
-
-
-def write_universal(sets: Iterable[Any], target: Path) -> None:
-    """Write datasets as pyuff takes them. Raises MeasurementError without pyuff, StoreError for an unwritable file."""
-    prepare = _pyuff()
-    with replacing(target) as temporary, temporary.open("wb") as whole, tempfile.TemporaryDirectory() as folder:
-        part = Path(folder) / "dataset.uff"
-        for dataset in sets:  # each by itself: pyuff reads all of a file again for every set that it appends
-            prepare.UFF(str(part)).write_sets([dataset], "add")
-            whole.write(part.read_bytes())
-            part.unlink()

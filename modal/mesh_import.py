@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vanedamp.files.foreign import existing
-from vanedamp.modal import abaqus, ansys, msh, nastran, other_formats, universal_file
+from vanedamp.files.formats.meshes.labelled_mesh import KINDS, LabelledMesh, MeshError
+from vanedamp.files.formats.meshes.registry import read_mesh
 from vanedamp.modal import gmsh_on_demand as gmsh
-from vanedamp.modal.labelled_mesh import KINDS, LabelledMesh
-from vanedamp.modal.msh import MeshError, same_rows
+from vanedamp.modal import msh
+from vanedamp.modal.msh import same_rows
 
 # corners of the faces of a cell, and of a quadratic one the nodes between them (VTK's order)
 _FACES: dict[str, list[tuple[int, ...]]] = {
@@ -31,11 +31,6 @@ _CORNERS = {"tetra": 4, "hexahedron": 8}
 # kind -> that of the cells and number of their nodes: a dolfinx geometry knows no 20-node brick, its edges are straight
 _VOLUMES = {"tetra": ("tetra", 4), "tetra10": ("tetra10", 10), "hexahedron": ("hexahedron", 8)}
 _VOLUMES |= dict.fromkeys(("hexahedron20", "hexahedron27"), ("hexahedron", 8))
-_READERS = {".inp": abaqus.read, ".cdb": ansys.read, ".unv": universal_file.read}
-_NASTRAN = (".bdf", ".nas", ".fem", ".dat")
-_READERS |= dict.fromkeys(_NASTRAN, nastran.read)
-# decks that may consist of several files
-_INCLUDING = {".inp": abaqus.files} | dict.fromkeys(_NASTRAN, nastran.files)
 # gmsh's elements by dimension from 0
 _GMSH = {"tetra": (15, 1, 2, 4), "tetra10": (15, 8, 9, 11), "hexahedron": (15, 1, 3, 5)}
 # gmsh's order of a quadratic tetrahedron; it is its own inverse
@@ -77,7 +72,7 @@ def convert(
     Groups must not overlap: name the sets that are wanted where others overlap them. 20-node bricks become 8-node ones
     with straight edges (the displacements have a degree of their own). Raises MeshError.
     """
-    source = _source(Path(path), _read(Path(path)))
+    source = _source(Path(path), read_mesh(Path(path)))
     entities, groups = _grouped(source, volumes, facets)
     for dimension, what in ((2, "facet"), (3, "volume")):
         _check_disjoint(source.path, what, groups[dimension])
@@ -91,17 +86,12 @@ def group_names(
 
     Raises MeshError as `convert` does, for `volumes` and `facets` that are not there, too.
     """
-    source = _source(Path(path), _read(Path(path)))
+    source = _source(Path(path), read_mesh(Path(path)))
     _, wanted = _grouped(source, volumes, facets)
     for dimension, what in ((2, "facet"), (3, "volume")):
         _check_disjoint(source.path, what, wanted[dimension])
     _, groups = _grouped(source, None, None)
     return {dimension: list(named) for dimension, named in groups.items()}, np.unique(source.cells).size
-
-
-def files(path: str | os.PathLike[str]) -> list[Path]:
-    """Return the files that a mesh is read from: itself and those that it includes. Raises MeshError."""
-    return _INCLUDING.get(Path(path).suffix.lower(), lambda file: [file])(Path(path))
 
 
 def _grouped(
@@ -112,11 +102,6 @@ def _grouped(
     groups = {3: _volume_groups(source, volumes), 2: _facet_groups(source, surface, facets)}
     groups[1], groups[0] = _lower_groups(source, edges, groups[2], facets)
     return {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]}, groups
-
-
-def _read(path: Path) -> LabelledMesh:
-    existing(path, MeshError, "mesh file")
-    return _READERS.get(path.suffix.lower(), other_formats.read)(path)
 
 
 def _source(path: Path, mesh: LabelledMesh) -> _Source:

@@ -12,17 +12,13 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from vanedamp.files.errors import VanedampError
 from vanedamp.files.foreign import apart, existing
+from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.files.store import file_stamp, replacing
 from vanedamp.modal import gmsh_on_demand as gmsh
 
 #: stamps of files that this process wrote, which it reads without a trial
 _written: set[int] = set()
-
-
-class MeshError(VanedampError):
-    """A mesh that cannot be read or lacks a group; the message names file, group and remedy."""
 
 
 @contextlib.contextmanager

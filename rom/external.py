@@ -6,28 +6,18 @@ additional static flexibility becomes the model's residual flexibility, a massle
 
 from __future__ import annotations
 
-import os
-import warnings
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import io, linalg, sparse
+from scipy import linalg
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.files.foreign import existing
-from vanedamp.files.matrix_input import read_mat, read_npz, read_table
 from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom import checks
-from vanedamp.rom.abaqus_matrices import is_matrix_market
-from vanedamp.rom.abaqus_matrices import read_matrices as read_abaqus
 from vanedamp.rom.reduced import ReducedModel
 
-#: endings of files that hold several matrices by name, and of those that hold one, but for substructures of Abaqus
-NAMED, SINGLE = (".npz", ".mat", ".op4", ".op2", ".pch", ".dmig"), (".mtx", ".npy", ".csv")
 # of the largest entry or eigenvalue: other codes write 5 to 9 digits, of which the last are not symmetric
 _ASYMMETRY = 1e-6
 _INDEFINITE = 1e-6
@@ -71,35 +61,6 @@ def plain_matrices(model: ReducedModel) -> dict[str, np.ndarray]:
     found["selection"] = np.hstack([found["selection"], vectors[:, kept]])
     found["base_load"] = np.vstack([found["base_load"], np.zeros((int(kept.sum()), 3))])
     return found
-
-
-def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Read the dense matrices of a file by lower-case name; where those clash, by their own names.
-
-    That of .mtx, .npy, .csv or scipy's save_npz is "". Several hold .npz, MATLAB's .mat, Nastran's OP4, OP2 and DMIG
-    entries (.pch, .dmig), of which all have the same rows, by grid point and component, and .mtx of Abaqus, of whose
-    substructures the names are stiffness, mass and damping. Entries of a file that are no numbers are left out. Raises
-    ExternalError for a missing, damaged or unknown file, and for those of Nastran without the package pyyeti.
-    """
-    file = Path(path)
-    if file.suffix.lower() not in NAMED + SINGLE:
-        raise ExternalError(f"{path}: expected a file ending in {', '.join(NAMED + SINGLE)}")
-    existing(path, ExternalError)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            warnings.filterwarnings("error", "Premature end-of-file")  # so pyyeti calls a file that is cut short
-            found = _READERS[file.suffix.lower()](str(file))
-    except (ExternalError, MemoryError):
-        raise
-    except VanedampError as error:
-        raise ExternalError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from error
-    except Exception as error:  # every format has exceptions of its own
-        raise ExternalError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
-    dense = {name: np.asarray(_dense(matrix)) for name, matrix in found.items()}
-    dense = {name: matrix for name, matrix in dense.items() if matrix.dtype.kind in "biufc"}
-    counts = Counter(name.lower() for name in dense)
-    return {name if counts[name.lower()] > 1 else name.lower(): matrix for name, matrix in dense.items()}
 
 
 def external_model(
@@ -198,81 +159,3 @@ def _row(label: str, given: int | Sequence[float] | np.ndarray, size: int) -> np
             raise ExternalError(f"interface {label!r}: coordinate {given} out of 0 to {size - 1}")
         return np.eye(size)[given]
     return np.asarray(given, dtype=float)
-
-
-def _dense(matrix: Any) -> Any:
-    return matrix.toarray() if sparse.issparse(matrix) else matrix
-
-
-def _npz(path: str) -> dict[str, Any]:
-    with np.load(path, allow_pickle=False) as data:
-        if {"format", "shape", "data"} <= set(data.files):
-            return {"": read_npz(path)}
-        return {name: data[name] for name in data.files}
-
-
-def _nastran(path: str) -> Any:
-    """Return the package that reads and writes Nastran's files."""
-    try:
-        from pyyeti import nastran
-    except ImportError as error:
-        raise ExternalError(f"{path}: files of Nastran need the package pyyeti: pip install pyyeti") from error
-    return nastran
-
-
-def _op4(path: str) -> dict[str, Any]:
-    return dict(_nastran(path).op4.read(path))
-
-
-def _op2(path: str) -> dict[str, Any]:
-    nastran = _nastran(path)
-    with nastran.op2.OP2(path) as file:
-        found = dict(file.rdop2mats())
-    found = found or _assembled(nastran.rddmig(path))
-    if not found:
-        raise ExternalError(f"{path}: holds no matrices; OUTPUT2 of DMAP or EXTSEOUT(DMIGOP2) of Nastran write them")
-    return found
-
-
-def _dmig(path: str) -> dict[str, Any]:
-    with open(path, encoding="latin-1") as stream:
-        if not any(line.upper().startswith("DMIG") for line in stream):
-            raise ExternalError(f"{path}: holds no DMIG entries")
-    return _assembled(_nastran(path).rddmig(path))
-
-
-def _assembled(found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the matrices of DMIG entries (pandas.DataFrame), square ones over the freedoms of any of them."""
-    square = {name: frame for name, frame in found.items() if frame.columns.nlevels == 2}
-    freedoms = sorted(
-        {place for frame in found.values() for place in frame.index}
-        | {place for frame in square.values() for place in frame.columns}
-    )
-    places = {place: index for index, place in enumerate(freedoms)}
-    matrices = {}
-    for name, frame in found.items():
-        rows = [places[place] for place in frame.index]
-        columns = [places[place] for place in frame.columns] if name in square else [int(c) - 1 for c in frame.columns]
-        matrix = np.zeros(
-            (len(freedoms), len(freedoms) if name in square else max(columns) + 1), frame.to_numpy().dtype
-        )
-        matrix[np.ix_(rows, columns)] = frame.to_numpy()
-        matrices[name] = matrix
-    return matrices
-
-
-def _mtx(path: str) -> dict[str, Any]:
-    return {"": io.mmread(path)} if is_matrix_market(Path(path)) else read_abaqus(Path(path))
-
-
-_READERS = {
-    ".npz": _npz,
-    ".mat": read_mat,
-    ".op4": _op4,
-    ".csv": lambda path: {"": read_table(path)},
-    ".op2": _op2,
-    ".pch": _dmig,
-    ".dmig": _dmig,
-    ".mtx": _mtx,
-    ".npy": lambda path: {"": np.load(path, allow_pickle=False)},
-}

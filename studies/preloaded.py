@@ -7,31 +7,14 @@ would take a minute in which nobody could interrupt it, and the first worker doe
 from __future__ import annotations
 
 import gc
-from typing import Any
 
-from numba.core import event
-
+from vanedamp.coupling.numerics.compiler.loading import loading_only
 from vanedamp.coupling.sweep.sweep import warm_up
-
-
-class _NotCompiled(Exception):
-    """The disk cache lacks a function."""
-
-
-class _Refusal(event.Listener):
-    """Stops a compilation before it begins."""
-
-    def on_start(self, event: Any) -> None:
-        """Refuse."""
-        raise _NotCompiled
-
-    def on_end(self, event: Any) -> None:
-        """Do nothing."""
 
 
 def _load() -> None:
     try:
-        with event.install_listener("numba:compile", _Refusal()):
+        with loading_only():
             warm_up()
     except Exception:  # whatever it is, a worker meets it as well and can tell it
         return

@@ -1,4 +1,9 @@
-"""Processes: a pool for sweeps, and one for a single task."""
+"""Processes: a pool for sweeps, and one for a single task.
+
+Why not loky: its workers (3.7.0) import and load the compiled engine each by itself. Two of them have 67 MB of their
+own memory each and end eight runs of a small scene after 2.5 s; these are forked from a server that has loaded it
+(`preloaded`): 11 MB and 2.1 s.
+"""
 
 from __future__ import annotations
 

@@ -13,9 +13,9 @@ from vanedamp.coupling.engine import simulate
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.system.onset import NEVER_STICKS, onset, onsets, swing
+from vanedamp.files.formats.meshes.msh_header import read_header
 from vanedamp.files.toml_input import validate
 from vanedamp.files.toml_output import toml
-from vanedamp.modal.msh_header import read_header
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main
 

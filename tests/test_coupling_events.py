@@ -7,7 +7,8 @@ from numba import njit
 from vanedamp.coupling.exact.event_functions import step_or_stop
 from vanedamp.coupling.exact.root_search import DEGREE, _bounds, expand, new_expansion, shift
 from vanedamp.coupling.numerics.codes import FORCE, POSITION, VELOCITY
-from vanedamp.coupling.numerics.exponentials import eighth_root_of_ratio, exp_minus_line, exp_minus_one
+from vanedamp.coupling.numerics.compiler.float_bits import eighth_root_of_ratio
+from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
 
 
 def search(order, k0, k1, k2, g, eigenvalue, end):

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from vanedamp.coupling.numerics.jit import entry, kernel
-from vanedamp.coupling.numerics.record import lengths, record, record_with, sized_type
+from vanedamp.coupling.numerics.compiler.jit import entry, kernel
+from vanedamp.coupling.numerics.compiler.record import lengths, record, record_with, sized_type
 
 
 @record

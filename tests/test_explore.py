@@ -38,8 +38,11 @@ from vanedamp.studies.explore.curves import (
     seen,
     transient_note,
 )
+from vanedamp.studies.explore.sweep_chart import curve_figure
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.report.forced_response import forced_responses, linear_between
+from vanedamp.studies.report.forced_response_charts import responses_figure
+from vanedamp.studies.report.response_curves import LOOKS
 
 TABLES = {
     "structure": {"model": "rigid", "mass": 1.0, "stiffness": 1e4, "damping_ratio": 0.01},
@@ -314,6 +317,24 @@ def test_worker_that_breaks_leaves_a_point_that_says_so():
     assert drawn.status[4] == "error: RuntimeError: out of order"
     figure = response_figure(drawn, *forced_responses(drawn), curve.linear, {})
     assert "out of order" in figure["data"][3]["text"][4]
+
+
+def test_report_and_explorer_draw_the_same_curves():
+    exploration = page.Exploration.of(scene(), "scene.toml")
+    curve = Curve(exploration.seen(exploration.texts), at_once)
+    drawn = curve.sweep()
+    (response,) = forced_responses(drawn)
+    explored = response_figure(drawn, response, curve.linear, {})["data"]
+    reported = responses_figure([response], [curve.linear]).data
+    chosen = curve_figure(drawn, response, {}).data
+    assert [trace["name"] for trace in explored] == [look.title for look in LOOKS.values()]
+    for one, other in zip(explored, reported, strict=True):
+        assert (one["name"], one["line"]["dash"], one["line"]["width"]) == (
+            other["name"], other["line"]["dash"], other["line"]["width"],
+        )  # fmt: skip
+        assert one["y"] == pytest.approx(other["y"], nan_ok=True)
+    ours = {look.title: (look.dash, look.width) for look in LOOKS.values()}
+    assert {t["name"]: (t["line"]["dash"], t["line"]["width"]) for t in chosen if t["name"] in ours} == ours
 
 
 def test_points_that_are_not_ok_are_open_and_say_why():

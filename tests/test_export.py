@@ -14,9 +14,10 @@ import vanedamp as vd
 from tests.tools.input_files import BLOCK, SCENE, changed, rom_scene
 from tests.tools.op2_file import write_op2
 from tests.tools.random_scenes import random_reduced
+from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices.registry import read_matrices
 from vanedamp.files.store import Variable, load, save
 from vanedamp.modal.measurements import read_shapes
-from vanedamp.rom.external import ExternalError, read_matrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main
 from vanedamp.studies.export.export import FORMATS
@@ -512,7 +513,7 @@ def test_output2_in(results, tmp_path, capsys):
     write_op2(tmp_path / "none.op2", {})
     (tmp_path / "damaged.op2").write_bytes((tmp_path / "rom.op2").read_bytes()[:400])
     for name in ("none", "damaged"):
-        with pytest.raises(ExternalError, match=rf"{name}.op2: "):
+        with pytest.raises(MatrixFileError, match=rf"{name}.op2: "):
             read_matrices(tmp_path / f"{name}.op2")
 
 
@@ -577,7 +578,7 @@ def test_abaqus_in(tmp_path):
 )
 def test_damaged_matrices_of_abaqus(tmp_path, text, told):
     (tmp_path / "k.mtx").write_text(text)
-    with pytest.raises(ExternalError, match=r"k\.mtx: ") as refused:
+    with pytest.raises(MatrixFileError, match=r"k\.mtx: ") as refused:
         read_matrices(tmp_path / "k.mtx")
     assert told in str(refused.value)
     assert "\n" not in str(refused.value)

@@ -14,10 +14,12 @@ from vanedamp.files import foreign, store
 from vanedamp.files.csv_input import read_csv
 from vanedamp.files.errors import shortened
 from vanedamp.files.foreign import apart, existing, reading
+from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices.registry import read_matrices
+from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.files.store import StoreError, Variable, decoding
 from vanedamp.files.toml_input import InputError, read_toml
-from vanedamp.modal.msh import MeshError, merge
-from vanedamp.rom.external import ExternalError, read_matrices
+from vanedamp.modal.msh import merge
 from vanedamp.rom.reduced import ReducedModel
 
 
@@ -41,7 +43,7 @@ def test_devices_pipes_and_folders_are_no_input(tmp_path):
     with pytest.raises(InputError, match="/dev/zero: is a device or a pipe"):
         read_csv("/dev/zero", ("x",))
     (tmp_path / "zero.mtx").symlink_to("/dev/zero")
-    with pytest.raises(ExternalError, match=r"zero\.mtx: is a device or a pipe"):
+    with pytest.raises(MatrixFileError, match=r"zero\.mtx: is a device or a pipe"):
         read_matrices(tmp_path / "zero.mtx")
     with pytest.raises(MeshError, match="is a folder"):
         merge(tmp_path)

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from scipy import io, sparse
 
-from vanedamp.files.matrix_input import MatrixFileError, read_mat, read_table
+from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices.matlab import read_mat
+from vanedamp.files.formats.matrices.table import read_table
 
 MATRIX = np.array([[1.5, -2.0, 0.0], [-2.0, 3e-4, 1.0], [0.0, 1.0, 7.0]])
 

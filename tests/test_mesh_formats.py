@@ -7,12 +7,11 @@ import pytest
 
 from tests.tools import fork_mesh
 from tests.tools.archives import ansys_archive, labelled
-from vanedamp.modal import abaqus, ansys, nastran, universal_file
+from vanedamp.files.formats.meshes import abaqus, ansys, nastran, universal
+from vanedamp.files.formats.meshes.labelled_mesh import KINDS, MeshError
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, Solid
-from vanedamp.modal.labelled_mesh import KINDS
 from vanedamp.modal.mesh_import import convert
-from vanedamp.modal.msh import MeshError
 from vanedamp.studies.cli import BAD_INPUT, main
 
 STEEL = Material(young=2e11, poisson=0.3, density=8000.0)
@@ -62,12 +61,12 @@ def forks(tmp_path_factory):
 
 
 def read(path):
-    readers = {"inp": abaqus.read, "bdf": nastran.read, "unv": universal_file.read, "cdb": ansys.read}
+    readers = {"inp": abaqus.read, "bdf": nastran.read, "unv": universal.read, "cdb": ansys.read}
     if path.suffix == ".med":
         pytest.importorskip("meshlane")
-        from vanedamp.modal import other_formats
+        from vanedamp.files.formats.meshes import others
 
-        return other_formats.read(path)
+        return others.read(path)
     return readers[path.suffix[1:]](path)
 
 
@@ -392,7 +391,7 @@ def test_a_group_with_another_number_of_members_is_damaged(tmp_path):
     head, members = ("".join(f"{number:10d}" for number in row) for row in numbers)
     (tmp_path / "group.unv").write_text(f"    -1\n  2467\n{head}\nfeet\n{members}\n    -1\n")
     with pytest.raises(MeshError, match=r"group\.unv: line 3: group feet announces 1 members and has others"):
-        universal_file.read(tmp_path / "group.unv")
+        universal.read(tmp_path / "group.unv")
 
 
 def test_labels_of_any_length(tmp_path):

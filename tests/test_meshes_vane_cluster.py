@@ -5,12 +5,13 @@ import math
 import gmsh
 import pytest
 
+from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.meshes import vane_cluster
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.vane_cluster import SHIPPED, ParameterError, build
 from vanedamp.modal import fenicsx
 from vanedamp.modal.elasticity import Material, assemble
-from vanedamp.modal.msh import MeshError, session
+from vanedamp.modal.msh import session
 
 UNIT_DENSITY = {"default": Material(young=1.0, poisson=0.25, density=1.0)}
 COARSE = {"element_size": 0.008, "airfoils": 2}

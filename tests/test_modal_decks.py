@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import BLOCK
+from vanedamp.files.formats.meshes import abaqus, nastran
+from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.meshes.benchmarks import Block, build
-from vanedamp.modal import abaqus, nastran
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.mesh_import import convert
-from vanedamp.modal.msh import MeshError
 from vanedamp.studies.cli import BAD_INPUT, main
 
 meshlane = pytest.importorskip("meshlane")

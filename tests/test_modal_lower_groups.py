@@ -4,11 +4,12 @@ import gmsh
 import numpy as np
 import pytest
 
+from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticSupport, Material, Solid, assemble
 from vanedamp.modal.matrices import patch_average
 from vanedamp.modal.mesh_import import convert
-from vanedamp.modal.msh import MeshError, session
+from vanedamp.modal.msh import session
 from vanedamp.modal.participation import first_bending
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.studies.cli import BAD_INPUT, main

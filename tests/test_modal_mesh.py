@@ -10,12 +10,13 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from tests.tools.two_cubes_mesh import write_boxes
+from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.modal import fenicsx
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.matrices import patch_average
-from vanedamp.modal.msh import MeshError, session
+from vanedamp.modal.msh import session
 
 UNIT = {"default": Material(young=1.0, poisson=0.25, density=1.0)}
 

@@ -4,11 +4,12 @@ import gmsh
 import numpy as np
 import pytest
 
+from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid, assemble
 from vanedamp.modal.mesh_import import convert
-from vanedamp.modal.msh import MeshError, session
+from vanedamp.modal.msh import session
 from vanedamp.studies.cli import BAD_INPUT, main
 
 meshlane = pytest.importorskip("meshlane")

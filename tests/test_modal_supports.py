@@ -5,11 +5,11 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from tests.tools.two_cubes_mesh import write_boxes
+from vanedamp.files.formats.meshes.labelled_mesh import MeshError
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticityError, ElasticSupport, Material, Solid, assemble
 from vanedamp.modal.matrices import patch_average
-from vanedamp.modal.msh import MeshError
 
 ROLLERS = {"left": "y", "right": "y", "bottom": "z", "top": "z"}
 TAPERED = Block(0.3, 0.2, 0.1, tip_width=0.1, element_size=0.08)

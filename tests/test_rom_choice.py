@@ -163,12 +163,15 @@ def test_a_wide_band_sees_the_collisions_of_the_narrow_one(tmp_path):
     made = scene(str(tmp_path / "beam.h5"), contact=law, structure__modes="auto", damper__restitution=0.7,
                  damper__mass=0.01, cavity__gap=0.6, excitation__force=None,
                  excitation__resonance_amplitude=1.0)  # fmt: skip
-    counts = []
+    found = []
     for band in ([0.97, 0.985, 1.0], [0.83, 0.86, 0.89, 0.92, 0.975, 0.99, 1.02, 1.05]):
         swept = [made.replace({"excitation.frequency": share * first}) for share in band]
-        counts.append(select_model_orders(swept)[0].estimate["modes"])
-    assert counts[0] > 1
-    assert counts[1] >= counts[0]
+        found.append(select_model_orders(swept)[0].estimate)
+    narrow, wide = ([size["collision"] for size in estimate["ladder"][:-1]] for estimate in found)
+    assert narrow[0] > 0.1
+    np.testing.assert_allclose(wide, narrow, rtol=1e-2)
+    # what runs confirm on top of the estimate may differ by modes: these motions are chaotic
+    assert all(estimate["modes"] > 1 for estimate in found)
 
 
 def test_gaps_of_a_sweep_are_tried_apart(file):

@@ -8,7 +8,9 @@ from scipy import io, linalg, sparse
 
 from tests.tools.small_structures import truss
 from vanedamp.coupling.system.modal_basis import modal_basis
-from vanedamp.rom.external import ExternalError, external_model, read_matrices
+from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices.registry import read_matrices
+from vanedamp.rom.external import ExternalError, external_model
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.reduction import reduce
@@ -122,13 +124,13 @@ def test_a_binary_file_cut_short_is_damaged(model, tmp_path):
     whole = (tmp_path / "whole.op4").read_bytes()
     op4.write(str(tmp_path / "first.op4"), {"kaa": model.stiffness})
     (tmp_path / "cut.op4").write_bytes(whole[: (tmp_path / "first.op4").stat().st_size - 8])
-    with pytest.raises(ExternalError, match=r"cannot be read .*Premature"):
+    with pytest.raises(MatrixFileError, match=r"cannot be read .*Premature"):
         read_matrices(tmp_path / "cut.op4")
 
 
 def test_a_damaged_head_is_told_in_a_line(tmp_path):
     (tmp_path / "k.mtx").write_text("%%MatrixMarket matrix array real general\n2\n1.0\n")
-    with pytest.raises(ExternalError, match="cannot be read") as told:
+    with pytest.raises(MatrixFileError, match="cannot be read") as told:
         read_matrices(tmp_path / "k.mtx")
     assert "\n" not in str(told.value)
 
@@ -144,7 +146,7 @@ def test_bad_files(tmp_path, monkeypatch, capsys):
     ):
         (tmp_path / "a.csv").write_text("")
         (tmp_path / "a.txt").write_text("")
-        with pytest.raises(ExternalError, match=message):
+        with pytest.raises(MatrixFileError, match=message):
             read_matrices(tmp_path / name)
     np.savez(tmp_path / "m.npz", M=np.eye(7), K=np.eye(7))
     for table, message in (

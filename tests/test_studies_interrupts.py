@@ -96,7 +96,7 @@ def check(process, folder):
 @pytest.mark.parametrize(
     ("event", "end", "count"),
     [
-        ("import", "vanedamp.studies.commands.support.outputs", 1),
+        ("import", "vanedamp.files.store", 1),
         ("open", "scene.toml", 1),
         ("import", "vanedamp.coupling.sweep.sweep", 1),
         ("import", "numba.core.caching", 1),

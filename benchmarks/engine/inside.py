@@ -18,7 +18,7 @@ from vanedamp.coupling.exact.event_driven import EngineRun, is_common
 from vanedamp.coupling.exact.event_functions import next_event
 from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.numerics.codes import AWAKE, CARRIED, EVENT_BUDGET, EVENTS, PERIOD
-from vanedamp.coupling.numerics.jit import entry
+from vanedamp.coupling.numerics.compiler.jit import entry
 from vanedamp.coupling.scene.scene import Scene
 
 _REPEATS = 20_000

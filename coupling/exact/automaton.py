@@ -65,8 +65,8 @@ from vanedamp.coupling.numerics.codes import (
     UNDECIDED,
     VELOCITY,
 )
+from vanedamp.coupling.numerics.compiler.jit import comparing, entry, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, is_long, long_minus_line, secular
-from vanedamp.coupling.numerics.jit import comparing, entry, inlined, kernel, summing
 from vanedamp.coupling.numerics.vectors import whole_vectors
 from vanedamp.coupling.response.records import FRICTION
 

@@ -156,6 +156,8 @@ def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray
     polished = [_polish(values[batch], shapes[batch], w, damping) for batch in batches]
     values, shapes = (np.concatenate(part) for part in zip(*polished, strict=True))
     pairs = values.imag > 0
+    if len(values) + np.count_nonzero(pairs) != 2 * k:  # a pair has become one real value
+        raise IllConditioned("a mode is critically damped to round-off")
     values, shapes = np.r_[values, values[pairs].conj()], np.vstack([shapes, shapes[pairs].conj()])
     right = np.hstack([shapes, shapes * values[:, None]])
     length = np.linalg.norm(right * np.r_[w, np.ones(k)], axis=1)  # energy

@@ -16,7 +16,7 @@ from vanedamp.coupling.numerics.codes import (
     SLIP_RIGHT,
     SPRUNG,
 )
-from vanedamp.coupling.numerics.jit import kernel
+from vanedamp.coupling.numerics.compiler.jit import kernel
 from vanedamp.coupling.response.records import CONTACT, DETACHES
 
 

@@ -29,8 +29,8 @@ from vanedamp.coupling.numerics.codes import (
     STICK,
     TOUCHING,
 )
+from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
 from vanedamp.coupling.numerics.complementarity import solve_box
-from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
 
 #: forces and accelerations below this share of the terms that they are sums of are round-off
 ROUND_OFF = 1e-12

@@ -18,8 +18,8 @@ from vanedamp.coupling.numerics.codes import (
     SINGLE,
     WORK_MAP,
 )
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular
-from vanedamp.coupling.numerics.jit import inlined, kernel, summing
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, VISCOUS
 
 #: terms of the series for products with driven modes: the remainder is below 1e-16

@@ -31,8 +31,8 @@ from vanedamp.coupling.numerics.codes import (
     STOPS,
     VELOCITY,
 )
+from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import secular_bound
-from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel, summing
 
 #: shortest step in periods: the resolution of a double within a period
 RESOLUTION = 1e-15

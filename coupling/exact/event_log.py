@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD, SPRUNG, STICK
-from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.response.records import DETACHES, IMPACT, RESTS, SLIPS, STICKS
 
 

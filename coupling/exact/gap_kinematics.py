@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.numerics.codes import OPEN
-from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 
 #: gaps closed to this share of the free travel are closed at the same instant
 SIMULTANEOUS = 1e-12

@@ -10,8 +10,8 @@ import numpy as np
 from vanedamp.coupling.exact.event_log import log_impact
 from vanedamp.coupling.exact.gap_kinematics import SIMULTANEOUS, close_gaps, join_speeds, measure_gaps, rigid, slowest
 from vanedamp.coupling.numerics.codes import AT_LOW, CLOSED, COAST, DEPENDENT, FREE, OPEN, SPRUNG, STICK
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.complementarity import solve_box
-from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.response.records import IMPACT_LOSS
 from vanedamp.coupling.system.restitution import restitution_at
 

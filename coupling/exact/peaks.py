@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.numerics.codes import AWAKE
+from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound
-from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel, summing
 from vanedamp.coupling.numerics.vectors import whole_vectors
 
 #: grids of peaks, by steps of an eighth of a period, half of that, and so on, whose factors are known

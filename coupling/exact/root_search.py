@@ -20,8 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import POSITION, VELOCITY
+from vanedamp.coupling.numerics.compiler.float_bits import eighth_root_of_ratio
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.exponentials import (
-    eighth_root_of_ratio,
     exp_minus_line,
     exp_minus_one,
     is_long,
@@ -30,8 +32,6 @@ from vanedamp.coupling.numerics.exponentials import (
     secular,
     secular_bound,
 )
-from vanedamp.coupling.numerics.jit import inlined, kernel, summing
-from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.numerics.vectors import whole_vectors
 
 #: degree of the lower polynomial; its last coefficient is that of the bound

@@ -5,7 +5,7 @@ from __future__ import annotations
 from vanedamp.coupling.exact.compliant_contacts import spring_energy
 from vanedamp.coupling.exact.gap_kinematics import rigid
 from vanedamp.coupling.numerics.codes import AWAKE, FLOW, PERIOD, SPRUNG
-from vanedamp.coupling.numerics.jit import inlined
+from vanedamp.coupling.numerics.compiler.jit import inlined
 from vanedamp.coupling.response.recorder import put_section
 
 

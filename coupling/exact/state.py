@@ -12,8 +12,8 @@ import numpy as np
 
 from vanedamp.coupling.exact.root_search import Expansion, new_expansion
 from vanedamp.coupling.numerics.codes import COAST, COUNTERS, OPEN
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.complementarity import Problem, new_problem
-from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.response.records import ENERGIES
 from vanedamp.coupling.system.line_system import InitialMotion, LineSystem
 

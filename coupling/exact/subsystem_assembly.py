@@ -26,7 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from vanedamp.coupling.exact.complex_modes import LOST, IllConditioned, RealModes, complex_modes, real_modes
 from vanedamp.coupling.exact.peaks import GRIDS
 from vanedamp.coupling.numerics.codes import CALM, DIFFERENCE, SINGLE, SUM, WORK_MAP
-from vanedamp.coupling.numerics.record import record_with
+from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.system.line_system import LineSystem
 
 #: products of modes that change by less than this share over a period have no antiderivative worth having

@@ -23,7 +23,7 @@ from vanedamp.coupling.methods.step_records import (
     row_speed,
 )
 from vanedamp.coupling.numerics.codes import DONE, STEPS
-from vanedamp.coupling.numerics.jit import entry
+from vanedamp.coupling.numerics.compiler.jit import entry
 from vanedamp.coupling.system.line_system import LineSystem
 
 

@@ -21,7 +21,7 @@ from vanedamp.coupling.methods.penalty_forces import PenaltyOptions, first_force
 from vanedamp.coupling.methods.step_records import close_step, copy, end_period, open_step, record_start, row_speed
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, STEPS
-from vanedamp.coupling.numerics.jit import entry, kernel
+from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import Records

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import COUNTERS
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Loads, loads_of
 from vanedamp.coupling.system.line_system import InitialMotion, LineSystem

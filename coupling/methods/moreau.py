@@ -30,8 +30,8 @@ from vanedamp.coupling.methods.step_records import (
 )
 from vanedamp.coupling.methods.time_stepping import SteppedRun
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
 from vanedamp.coupling.numerics.complementarity import new_problem
-from vanedamp.coupling.numerics.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.recorder import plane_of
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units

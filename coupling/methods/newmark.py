@@ -27,7 +27,7 @@ from vanedamp.coupling.methods.step_records import (
     row_speed,
 )
 from vanedamp.coupling.numerics.codes import DONE, SOLVES, STEPS, UNDECIDED
-from vanedamp.coupling.numerics.jit import entry, kernel
+from vanedamp.coupling.numerics.compiler.jit import entry, kernel
 from vanedamp.coupling.system.line_system import LineSystem
 
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from vanedamp.coupling.methods.equations_of_motion import TimeGrid
 from vanedamp.coupling.methods.step_records import damping_force, load_at, row_speed
-from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.coupling.scene.solver_options import SteppingOptions
 from vanedamp.coupling.system.line_system import LineSystem

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.complementarity import solve_box
-from vanedamp.coupling.numerics.jit import inlined, kernel
 
 
 @inlined

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.numerics.codes import DIVERGED, DONE, EVENT_BUDGET, IMPACTS, LOGGED, PENETRATION, PERIOD, STEPS
-from vanedamp.coupling.numerics.jit import inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.response.recorder import note_step, put_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 

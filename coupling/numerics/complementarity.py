@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import AT_HIGH, AT_LOW, DEPENDENT, FREE, OUT
-from vanedamp.coupling.numerics.jit import entry, kernel
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.compiler.jit import entry, kernel
+from vanedamp.coupling.numerics.compiler.record import record
 
 NONE = np.int64(-1)
 _ROUND_OFF = 1e-12

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.jit import entry, kernel
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.compiler.jit import entry, kernel
+from vanedamp.coupling.numerics.compiler.record import record
 
 #: entries of the tableau below this are round-off, for problems scaled to numbers of size one
 _PIVOT = 1e-11

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vanedamp.coupling.numerics.jit import inlined
+from vanedamp.coupling.numerics.compiler.jit import inlined
 
 _LANES = 8
 

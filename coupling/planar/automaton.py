@@ -33,7 +33,7 @@ from vanedamp.coupling.numerics.codes import (
     TOUCHING,
     UNDECIDED,
 )
-from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import (
     AT_REST,
     decide,

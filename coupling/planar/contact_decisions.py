@@ -12,7 +12,7 @@ import math
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.gap_kinematics import ROUND_OFF, SIMULTANEOUS
 from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK, TOUCHING
-from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
 from vanedamp.coupling.numerics.linear_complementarity import solve_lemke
 
 #: what is small beside the largest term, now and a moment later

@@ -19,7 +19,7 @@ from scipy.linalg import eig, null_space, orth
 
 from vanedamp.coupling.exact.complex_modes import DEFECTIVE, LOST, IllConditioned
 from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.system.system import System
 
 #: share of their size below which singular values are zero: rows that depend on each other

@@ -31,7 +31,7 @@ from vanedamp.coupling.numerics.codes import (
     TOUCHING,
     VELOCITY,
 )
-from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import AT_REST, rubs, yields
 
 #: round-off of a sum, relative to the sum of its terms' sizes; what is small beside the bound of a derivative

@@ -7,8 +7,8 @@ conj lambda_k) t): they are found once a segment and serve all products.
 from __future__ import annotations
 
 from vanedamp.coupling.numerics.codes import FLOW, PERIOD, SLIP_LEFT, SLIP_RIGHT
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.exponentials import exp_minus_one
-from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.response.records import EXCITATION, FRICTION, VISCOUS
 
 #: signals: the response, the momentum of the bodies, slip and friction of a contact

@@ -20,7 +20,7 @@ import math
 from vanedamp.coupling.exact.event_functions import CHATTER
 from vanedamp.coupling.exact.impacts import COLLAPSE
 from vanedamp.coupling.numerics.codes import IMPACTS, LOGGED, OPEN, PERIOD, REDUCED
-from vanedamp.coupling.numerics.jit import ZERO, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import (
     AT_REST,
     is_rigid,

@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import FLOW, LEAVING, OPEN, PERIOD, SLIP_LEFT, SLIP_RIGHT
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one
-from vanedamp.coupling.numerics.jit import inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import row_speed, yields
 from vanedamp.coupling.planar.exponential_integrals import integrate, response_after, set_up
 from vanedamp.coupling.planar.recorder import note_tilts

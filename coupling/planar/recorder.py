@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from vanedamp.coupling.numerics.codes import PERIOD
-from vanedamp.coupling.numerics.jit import entry, inlined
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined
 from vanedamp.coupling.response.evaluation import Plane
 from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.records import STORED

@@ -8,8 +8,8 @@ import numpy as np
 
 from vanedamp.coupling.exact.root_search import Expansion, new_expansion
 from vanedamp.coupling.numerics.codes import COUNTERS, OPEN
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.numerics.linear_complementarity import Lemke, new_lemke
-from vanedamp.coupling.numerics.record import record
 from vanedamp.coupling.response.records import ENERGIES, Records
 from vanedamp.coupling.system.assembly import Motion
 from vanedamp.coupling.system.system import System

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vanedamp.coupling.numerics.jit import entry, inlined, summing
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined, summing
 from vanedamp.coupling.response.records import STORED
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.record import record_with
+from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.system.system import System
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.engine import simulate
-from vanedamp.coupling.numerics.jit import CacheError
+from vanedamp.coupling.numerics.compiler.jit import CacheError
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.record import record_with
+from vanedamp.coupling.numerics.compiler.record import record_with
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import BODY, LEFT, RIGHT, Part, System
 from vanedamp.files.toml_input import InputError

@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
-from vanedamp.coupling.numerics.function_address import address_of, call
-from vanedamp.coupling.numerics.jit import inlined
+from vanedamp.coupling.numerics.compiler.function_address import address_of, call
+from vanedamp.coupling.numerics.compiler.jit import inlined
 from vanedamp.coupling.scene.contact_laws.law import ContactLaw
 from vanedamp.files.toml_input import InputError
 

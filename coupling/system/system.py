@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.system.surfaces import SIDES
 
 #: names of what a unit touches

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -27,10 +26,9 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
 
 
 def description(name: str) -> str:
-    """Return what a command does: its summary, and what its module's docstring says beyond the first paragraph."""
-    command = COMMANDS.own()[name]
-    _, _, more = (sys.modules[command.__name__].__doc__ or "").partition("\n\n")
-    return f"{command.SUMMARY[0].upper()}{command.SUMMARY[1:]}.\n\n{more}"
+    """Return what a command does."""
+    summary = COMMANDS.own()[name].SUMMARY
+    return f"{summary[0].upper()}{summary[1:]}.\n"
 
 
 def _lines(name: str, parser: argparse.ArgumentParser) -> Iterator[str]:

@@ -35,6 +35,9 @@ class Part(NamedTuple):
 
 PARTS = (
     Part("vanedamp.files"),
+    Part("vanedamp.files.formats"),
+    Part("vanedamp.files.formats.meshes"),
+    Part("vanedamp.files.formats.matrices"),
     Part("vanedamp.meshes"),
     Part("vanedamp.modal"),
     Part("vanedamp.rom"),

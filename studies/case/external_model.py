@@ -11,10 +11,11 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 from scipy import linalg
 
+from vanedamp.files.formats.matrices.registry import read_matrices
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import STRICT, Direction, InputError, Real, Whole, nearest, read_toml, validate
 from vanedamp.modal.units import model_doubts
-from vanedamp.rom.external import Findings, external_model, read_matrices
+from vanedamp.rom.external import Findings, external_model
 from vanedamp.rom.reduced import ReducedModel
 
 Name = Annotated[str, Field(min_length=1)]
@@ -89,7 +90,7 @@ class External:
     def model(self, path: str | Path) -> tuple[ReducedModel, Findings, tuple[str, ...]]:
         """Return the checked model from the tables of the file `path`, with warnings; file names are relative to it.
 
-        Raises InputError, rom.external.ExternalError and rom.reduced.ReducedModelError.
+        Raises InputError, MatrixFileError, rom.external.ExternalError and rom.reduced.ReducedModelError.
         """
         table = self.matrices
         folder = Path(path).parent

@@ -65,9 +65,9 @@ class MeshFile:
     @property
     def files(self) -> list[str]:
         """The file, and those that it includes. Raises MeshError."""
-        from vanedamp.modal import mesh_import
+        from vanedamp.files.formats.meshes.registry import mesh_files
 
-        return [str(file) for file in mesh_import.files(self.file)]
+        return [str(file) for file in mesh_files(self.file)]
 
 
 class _Generated:

@@ -1,6 +1,6 @@
-"""The commands of the command line: each file of this folder is one, and other packages add theirs.
+"""The commands of the command line: `declarations` lists ours, and other packages add theirs.
 
-A command is a module with
+A command is a module, or an object, with
 
     SUMMARY                 what it does, in a line of --help without a full stop
     add_arguments(parser)   declare its arguments (an argparse.ArgumentParser)
@@ -8,7 +8,8 @@ A command is a module with
     NAME                    if it is not the file's
     ORDER                   place in --help: the steps of the pipeline count up
 
-Import what is heavy inside `run`: `vanedamp --help` loads all commands. What several commands need is in `support/`.
+Ours are `support.declaration.Command`: what they take, read and write, and the name of the function that does it. Each
+has a file of its own here, which is imported when the command runs. What several commands need is in `support/`.
 """
 
 from __future__ import annotations
@@ -32,5 +33,5 @@ class Command(Protocol):
 
 
 COMMANDS = ExtensionPoint(
-    "command", "vanedamp.studies.commands", "vanedamp.commands", ("SUMMARY", "add_arguments", "run")
+    "command", "vanedamp.studies.commands.declarations", "vanedamp.commands", ("SUMMARY", "add_arguments", "run")
 )

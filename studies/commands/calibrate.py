@@ -2,38 +2,19 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
-
-ORDER = 30
-SUMMARY = "tune to measurements; rigid model, damping ratio and excitation"
-
-
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a case, the result files and those to go on with."""
-    add_input(parser, "CASE.toml")
-    add_output(parser, "CALIBRATION.h5")
-    parser.add_argument("--case", metavar="TUNED.toml", help="the case with the tuned numbers")
-    parser.add_argument("--scene", metavar="RIGID.toml", help="a scene of the calibrated rigid model")
-    add_json(parser)
+from vanedamp.studies.case.calibrated_files import save_calibration
+from vanedamp.studies.case.calibration import calibrate
+from vanedamp.studies.case.tables import Case
+from vanedamp.studies.commands.support.messages import print_cavities, print_warnings, write_result
 
 
-def run(arguments: Namespace) -> None:
+def run(arguments: Namespace, case: Case) -> None:
     """Update the model, and find damping, rigid model and excitation."""
-    from vanedamp.studies.case.tables import Case
-    from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
-
-    outputs = check_outputs(arguments, output=RECORD, case=(".toml",), scene=(".toml",))
-    case = Case.load(arguments.input)
-    outputs.keep(case.files)
-    from vanedamp.studies.case.calibrated_files import save_calibration
-    from vanedamp.studies.case.calibration import calibrate
-
     calibration = calibrate(case)
     result = calibration.to_json()
     files = partial(
@@ -47,8 +28,6 @@ def run(arguments: Namespace) -> None:
 
 def _print_summary(result: Mapping[str, Any]) -> None:
     """Print what was tuned, the rigid model and the excitation."""
-    from vanedamp.studies.commands.support.messages import print_cavities
-
     tuning = result["tuning"]
     if tuning:
         print("target/Hz      before         after          MAC")

@@ -3,47 +3,21 @@
 from __future__ import annotations
 
 import time
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
+from vanedamp.modal.campbell import Campbell
+from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
+from vanedamp.studies.case.tables import Case
+from vanedamp.studies.commands.support.messages import print_warnings, write_result
 from vanedamp.studies.terminal import progress
 
-if TYPE_CHECKING:
-    from vanedamp.modal.campbell import Campbell
-
-ORDER = 25
-SUMMARY = "natural frequencies over the speed of rotation, and where engine orders meet them"
 #: columns of modes beside each other, and speeds below each other
 _MOST_COLUMNS, _MOST_ROWS = 12, 25
 
 
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a case, the result files and one for a picture."""
-    add_input(parser, "CASE.toml")
-    add_output(parser, "CAMPBELL.h5")
-    add_json(parser)
-    parser.add_argument("--picture", metavar="FILE.png", help="the diagram as a picture")
-
-
-def run(arguments: Namespace) -> None:
+def run(arguments: Namespace, case: Case) -> None:
     """Compute the diagram."""
-    from vanedamp.files.toml_input import InputError
-    from vanedamp.studies.case.tables import Case
-    from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
-
-    outputs = check_outputs(arguments, output=RECORD, picture=(".png",))
-    case = Case.load(arguments.input)
-    outputs.keep(case.files)
-    if case.campbell is None:
-        raise InputError(
-            f"{arguments.input}: campbell: missing; give its speeds and engine orders, such as "
-            "rpm = {start = 0, stop = 6000, num = 31} and engine_orders = [1, 2, 3]"
-        )
-    from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
-
     started = time.perf_counter()
     structure = assemble(case)
     with progress("campbell") as report:
@@ -55,7 +29,7 @@ def run(arguments: Namespace) -> None:
         if arguments.output:
             diagram.save(arguments.output)
         if arguments.picture:
-            from vanedamp.studies.report.campbell_picture import campbell_picture
+            from vanedamp.studies.report.campbell_picture import campbell_picture  # matplotlib, for this file only
 
             campbell_picture(diagram, Path(arguments.picture))
 

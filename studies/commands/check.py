@@ -2,36 +2,20 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from importlib import import_module
+from typing import Any
 
-from vanedamp.studies.commands.support.arguments import add_input, add_json
-
-if TYPE_CHECKING:
-    from vanedamp.studies.commands.support.facts import Fact
-
-ORDER = 4
-SUMMARY = "say what an input file means, without running it"
-
-
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a file of any kind."""
-    add_input(parser, "FILE.toml")
-    add_json(parser)
+from vanedamp.files.toml_input import read_toml
+from vanedamp.studies.commands.support import facts
+from vanedamp.studies.commands.support.facts import Fact
+from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.file_kinds import a, kind_of
 
 
 def run(arguments: Namespace) -> None:
     """Print the facts."""
-    from importlib import import_module
-
-    from vanedamp.files.toml_input import read_toml
-    from vanedamp.studies.commands.support import facts
-    from vanedamp.studies.commands.support.messages import write_result
-    from vanedamp.studies.commands.support.outputs import check_outputs
-    from vanedamp.studies.file_kinds import a, kind_of
-
-    check_outputs(arguments)
     tables = read_toml(arguments.input)
     kind = kind_of(tables, arguments.input)
     found = import_module(f"{facts.__name__}.{kind.name}").facts(arguments.input)

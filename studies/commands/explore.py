@@ -2,49 +2,29 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from vanedamp.studies.commands.support.arguments import add_output, add_workers, count
-
-if TYPE_CHECKING:
-    from vanedamp.coupling.sweep.record import Sweep
-    from vanedamp.studies.commands.support.outputs import Outputs
-    from vanedamp.studies.explore.page import Exploration
-
-ORDER = 85
-SUMMARY = "sliders, and a forced response that follows them, in the browser"
-
-
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a scene, sweeps or a folder of them, and the address."""
-    parser.add_argument(
-        "inputs", nargs="*", metavar="SCENE.toml|SWEEP.h5|DIR",
-        help="a scene, or files of sweeps and folders of such; default: the rigid model of the shipped cluster",
-    )  # fmt: skip
-    add_output(parser, "SCENE.toml")
-    parser.add_argument("--port", type=count, default=0, metavar="N", help="port of 127.0.0.1 (default: a free one)")
-    parser.add_argument("--no-browser", action="store_true", help="only print the address")
-    add_workers(parser)
+from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.commands.support.messages import print_note
+from vanedamp.studies.commands.support.outputs import Outputs
+from vanedamp.studies.commands.support.scenes import load_scene
+from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
+from vanedamp.studies.explore.page import Exploration
+from vanedamp.studies.explore.server import serve
+from vanedamp.studies.explore.sweep_files import open_sweeps
+from vanedamp.studies.workers import available_cores
 
 
 def run(arguments: Namespace) -> None:
     """Serve the page until Ctrl-C."""
-    from vanedamp.files.toml_input import InputError
-    from vanedamp.studies.commands.support.messages import print_note
-    from vanedamp.studies.commands.support.outputs import check_outputs
-
-    outputs = check_outputs(arguments, output=(".toml",))
-    from vanedamp.studies.explore.server import serve
-    from vanedamp.studies.workers import available_cores
-
     sources = [Path(source) for source in arguments.inputs]
     scenes = [source for source in sources if source.suffix == ".toml"]
     if scenes and len(sources) > 1:
         raise InputError(f"{scenes[0]}: a scene is explored on a page of its own; name nothing beside it")
     sweeps = _sweeps(sources) if sources and not scenes else {}
-    exploration = None if sweeps else _exploration(scenes[0] if scenes else None, arguments.output, outputs)
+    exploration = None if sweeps else _exploration(scenes[0] if scenes else None, arguments.output, arguments.outputs)
     if sweeps and arguments.output:
         raise InputError("--output: a scene is written from the page of a scene; leave it out, or name a scene")
     if exploration is not None and exploration.output is not None and exploration.output.exists():
@@ -54,10 +34,6 @@ def run(arguments: Namespace) -> None:
 
 def _exploration(source: Path | None, output: str | None, outputs: Outputs) -> Exploration:
     """Return the exploration of a scene's file, or of the shipped rigid model. Raises InputError."""
-    from vanedamp.studies.commands.support.scenes import load_scene
-    from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
-    from vanedamp.studies.explore.page import Exploration
-
     if source is None:
         figure, name = (
             FigureScenes.load(FOLDER / "fig9.toml", Structure.shipped()),
@@ -71,9 +47,6 @@ def _exploration(source: Path | None, output: str | None, outputs: Outputs) -> E
 
 def _sweeps(sources: list[Path]) -> dict[str, Sweep]:
     """Return the sweeps in files and folders, by their short names. Raises InputError where there is none."""
-    from vanedamp.files.toml_input import InputError
-    from vanedamp.studies.explore.sweep_files import open_sweeps
-
     sweeps = open_sweeps(sources)
     if not sweeps:
         named = ", ".join(map(str, sources))

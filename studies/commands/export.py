@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from typing import TYPE_CHECKING
 
 from vanedamp.studies.commands.support.arguments import add_output
-
-if TYPE_CHECKING:
-    from vanedamp.studies.export.options import Option
-
-ORDER = 110
-SUMMARY = "a result in a file of another program: ParaView, MATLAB, test systems, Abaqus, Nastran, tables"
+from vanedamp.studies.commands.support.messages import print_warnings
+from vanedamp.studies.commands.support.outputs import check_outputs
+from vanedamp.studies.export.export import FORMATS, format_of, write
+from vanedamp.studies.export.options import INPUT, OUTPUT, Option
+from vanedamp.studies.export.record import read_record
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Take a result, the file whose ending names the format, and the options of all formats."""
-    from vanedamp.studies.export.export import FORMATS
-
     parser.add_argument("input", metavar="RESULT.h5", help="result of a command")
     formats = FORMATS.all().values()
     endings = "; ".join(f"{' or '.join(part.ENDINGS)}: {part.SUMMARY}" for part in formats)
@@ -32,12 +28,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> None:
     """Write the file."""
-    from vanedamp.studies.commands.support.messages import print_warnings
-    from vanedamp.studies.commands.support.outputs import check_outputs
-    from vanedamp.studies.export.export import format_of, write
-    from vanedamp.studies.export.options import INPUT, OUTPUT
-    from vanedamp.studies.export.record import read_record
-
     named = {option.name: option for option in _options()}
     given = {name: getattr(arguments, name) for name in named if getattr(arguments, name) is not None}
     endings = {name: option.endings for name, option in named.items() if option.role == OUTPUT}
@@ -51,6 +41,4 @@ def run(arguments: Namespace) -> None:
 
 def _options() -> list[Option]:
     """Return the options of all formats, each once."""
-    from vanedamp.studies.export.export import FORMATS
-
     return list({option.name: option for part in FORMATS.all().values() for option in part.OPTIONS}.values())

@@ -4,36 +4,19 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Mapping
 from typing import Any
 
-from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
-
-ORDER = 20
-SUMMARY = "natural frequencies, effective masses, rigid model of the first bending"
-
-
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a case, the result files and one for ParaView."""
-    add_input(parser, "CASE.toml")
-    add_output(parser, "MODES.h5")
-    add_json(parser)
-    parser.add_argument("--vtk", metavar="FILE.vtu", help="the mode shapes for ParaView (.vtu or .vtk)")
+from vanedamp.studies.case.stages import assemble, modal_analysis
+from vanedamp.studies.case.tables import Case
+from vanedamp.studies.commands.support.messages import print_cavities, print_warnings, write_result
 
 
-def run(arguments: Namespace) -> None:
+def run(arguments: Namespace, case: Case) -> None:
     """Compute the modes, and what follows from them."""
-    from vanedamp.studies.case.tables import Case
-    from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
-
-    outputs = check_outputs(arguments, output=RECORD, vtk=(".vtu", ".vtk"))
     if arguments.vtk and importlib.util.find_spec("pyvista") is None:  # before the work
         raise ModuleNotFoundError("--vtk writes with it", name="pyvista")
-    case = Case.load(arguments.input)
-    outputs.keep(case.files)
-    from vanedamp.studies.case.stages import assemble, modal_analysis
 
     analysis = modal_analysis(assemble(case))
     result = analysis.to_json()
@@ -42,7 +25,7 @@ def run(arguments: Namespace) -> None:
         if arguments.output:
             analysis.save(arguments.output)
         if arguments.vtk:
-            from vanedamp.studies.report.pictures import save_vtk
+            from vanedamp.studies.report.pictures import save_vtk  # pyvista, for this file only
 
             mesh, cell_type = analysis.mesh()
             save_vtk(analysis.modes, mesh["coordinates"].values, mesh["cell"].values, cell_type, arguments.vtk)
@@ -55,8 +38,6 @@ def run(arguments: Namespace) -> None:
 
 def _print_summary(result: Mapping[str, Any]) -> None:
     """Print modes, effective masses and the rigid model."""
-    from vanedamp.studies.commands.support.messages import print_cavities
-
     if "speed" in result:
         print(f"at {result['speed']:.6g} rad/s ({result['speed'] * 30 / math.pi:.6g} rpm)")
     print("mode  frequency/Hz   effective mass x, y, z / kg        residual")

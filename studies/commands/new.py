@@ -2,30 +2,18 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from pathlib import Path
 
-from vanedamp.studies.commands.support.arguments import add_output
-
-ORDER = 2
-SUMMARY = "write a commented scene, case or study to start from"
-
-
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a kind of files, the file, and the reduced model of a scene or study."""
-    parser.add_argument("kind", metavar="KIND", choices=["scene", "case", "study"], help="scene, case or study")
-    add_output(parser, "FILE.toml")
-    parser.add_argument("--rom", metavar="ROM.h5", help="reduced model that a scene or study is to have")
+from vanedamp.files.toml_input import InputError
+from vanedamp.files.toml_output import schema_name, write_commented
+from vanedamp.studies import templates
+from vanedamp.studies.commands.support.outputs import check_outputs
+from vanedamp.studies.file_kinds import KINDS
 
 
 def run(arguments: Namespace) -> None:
     """Write the file and the schema of its kind."""
-    from vanedamp.files.toml_input import InputError
-    from vanedamp.files.toml_output import schema_name, write_commented
-    from vanedamp.studies import templates
-    from vanedamp.studies.commands.support.outputs import check_outputs
-    from vanedamp.studies.file_kinds import KINDS
-
     kind = arguments.kind
     arguments.output = arguments.output or f"{kind}.toml"
     path = Path(arguments.output)

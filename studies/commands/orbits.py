@@ -3,57 +3,35 @@
 from __future__ import annotations
 
 import time
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from functools import partial
-from typing import TYPE_CHECKING
 
-from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output, add_resume
+from vanedamp.coupling.orbits.branch import Branches
+from vanedamp.coupling.orbits.orbits import orbits
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.files.checkpoint_file import clear
+from vanedamp.files.provenance import versions
+from vanedamp.files.store import clear_leftovers
+from vanedamp.studies.commands.support.budget import check_run
+from vanedamp.studies.commands.support.messages import print_warnings, write_result
+from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.terminal import progress
 
-if TYPE_CHECKING:
-    from vanedamp.coupling.orbits.branch import Branches
 
-ORDER = 85
-SUMMARY = "branches of periodic orbits, their stability and bifurcations, as the scene's [orbit] table says"
-
-
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a scene and the result files."""
-    add_input(parser, "SCENE.toml")
-    add_output(parser, "BRANCH.h5")
-    add_json(parser)
-    add_resume(parser)
-
-
-def run(arguments: Namespace) -> None:
+def run(arguments: Namespace, scene: Scene) -> None:
     """Follow the branches."""
-    from vanedamp.files.store import clear_leftovers
-    from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs, check_resume, checkpoint_file
-
-    checkpoint = checkpoint_file(arguments.output)
-    outputs = check_outputs(arguments, beside=checkpoint, output=RECORD)
-    check_resume(arguments, checkpoint)
-    from vanedamp.studies.commands.support.scenes import load_scene, print_resonance
-
-    scene = load_scene(arguments.input, outputs)
-    from vanedamp.coupling.orbits.orbits import orbits
-    from vanedamp.files.checkpoint_file import clear
-    from vanedamp.files.provenance import versions
-    from vanedamp.studies.commands.support.budget import check_run
-
     check_run(scene)
     resonance = print_resonance(arguments.input, scene)
     started = time.perf_counter()
     with progress("orbits") as report:
-        result = orbits(scene, report, checkpoint, {"versions": versions()})
+        result = orbits(scene, report, arguments.checkpoint, {"versions": versions()})
     seconds = time.perf_counter() - started
     print_warnings(arguments.input, result.warnings)
     # times are not kept in the result, which is the same however it came about
     files = partial(result.save, arguments.output) if arguments.output else None
     write_result(arguments.json, result.to_json() | {"wall_time_s": seconds} | resonance, files)
-    if checkpoint is not None:
-        clear(checkpoint)
+    if arguments.checkpoint is not None:
+        clear(arguments.checkpoint)
         clear_leftovers(arguments.output)
     if arguments.json != "-":
         _print_summary(result)

@@ -3,40 +3,21 @@
 from __future__ import annotations
 
 import time
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from functools import partial
-from typing import TYPE_CHECKING
 
-from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.transients.ramp import ramp
+from vanedamp.coupling.transients.ramp_course import ramped
+from vanedamp.coupling.transients.ramp_record import Ramp
+from vanedamp.files.provenance import versions
+from vanedamp.studies.commands.support.messages import print_warnings, write_result
+from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.terminal import progress
 
-if TYPE_CHECKING:
-    from vanedamp.coupling.transients.ramp_record import Ramp
 
-ORDER = 87
-SUMMARY = "run-up and run-down through resonance, as the scene's [ramp] table says"
-
-
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a scene and the result files."""
-    add_input(parser, "SCENE.toml")
-    add_output(parser, "RAMP.h5")
-    add_json(parser)
-
-
-def run(arguments: Namespace) -> None:
+def run(arguments: Namespace, scene: Scene) -> None:
     """Run the scene up and down."""
-    from vanedamp.studies.commands.support.messages import print_warnings, write_result
-    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
-
-    outputs = check_outputs(arguments, output=RECORD)
-    from vanedamp.studies.commands.support.scenes import load_scene, print_resonance
-
-    scene = load_scene(arguments.input, outputs)
-    from vanedamp.coupling.transients.ramp import ramp
-    from vanedamp.coupling.transients.ramp_course import ramped
-    from vanedamp.files.provenance import versions
-
     resonance = print_resonance(arguments.input, ramped(scene))
     started = time.perf_counter()
     with progress("ramp") as report:

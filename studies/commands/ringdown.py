@@ -2,43 +2,25 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from functools import partial
-from typing import TYPE_CHECKING
 
-from vanedamp.studies.commands.support.arguments import add_input, add_json, add_output
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.transients.ring_down import ring_down
+from vanedamp.coupling.transients.ring_down_record import RingDown
+from vanedamp.coupling.transients.ring_down_start import free_scene, table_of
+from vanedamp.files.provenance import versions
+from vanedamp.studies.commands.support.budget import check_run
+from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.terminal import progress
 
-if TYPE_CHECKING:
-    from vanedamp.coupling.transients.ring_down_record import RingDown
-
-ORDER = 88
-SUMMARY = "ring-down or hammer blow as the scene's [ring_down] table says: frequency and damping over the amplitude"
 #: rows of the table that is printed
 _ROWS = 10
 
 
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a scene and the result files."""
-    add_input(parser, "SCENE.toml")
-    add_output(parser, "RINGDOWN.h5")
-    add_json(parser)
-
-
-def run(arguments: Namespace) -> None:
+def run(arguments: Namespace, scene: Scene) -> None:
     """Let the scene ring down."""
-    from vanedamp.studies.commands.support.messages import write_result
-    from vanedamp.studies.commands.support.outputs import RECORD, check_outputs
-
-    outputs = check_outputs(arguments, output=RECORD)
-    from vanedamp.studies.commands.support.scenes import load_any_scene, print_choices, print_resonance
-
-    scene = load_any_scene(arguments.input, outputs)
-    from vanedamp.coupling.transients.ring_down import ring_down
-    from vanedamp.coupling.transients.ring_down_start import free_scene, table_of
-    from vanedamp.files.provenance import versions
-    from vanedamp.studies.commands.support.budget import check_run
-
     table = table_of(scene)
     check_run(free_scene(scene, table))
     if table.start == "steady":

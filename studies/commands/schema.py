@@ -5,27 +5,17 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from vanedamp.studies.commands.support.arguments import add_output
-
-ORDER = 5
-SUMMARY = "JSON Schema of a kind of input file, for editors"
+from vanedamp.files.toml_output import schema_text, write_schema
+from vanedamp.studies.file_kinds import KINDS
 
 
-def add_arguments(parser: ArgumentParser) -> None:
-    """Take a kind of files, and the schema file."""
-    from vanedamp.studies.file_kinds import KINDS
-
+def add_kind(parser: ArgumentParser) -> None:
+    """Take a kind of files."""
     parser.add_argument("kind", metavar="KIND", choices=sorted(KINDS), help=", ".join(sorted(KINDS)))
-    add_output(parser, "FILE.json")
 
 
 def run(arguments: Namespace) -> None:
     """Print the schema, or write it."""
-    from vanedamp.files.toml_output import schema_text, write_schema
-    from vanedamp.studies.commands.support.outputs import check_outputs
-    from vanedamp.studies.file_kinds import KINDS
-
-    check_outputs(arguments)
     schema = KINDS[arguments.kind].schema
     if arguments.output is None:
         print(schema_text(schema), end="")

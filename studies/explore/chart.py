@@ -14,6 +14,7 @@ from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
 from vanedamp.studies.report.forced_response import ForcedResponse, LinearCurves
+from vanedamp.studies.report.response_curves import LOOKS, RELATIVE, trace
 
 _FREE, _FIXED, _MEAN, _MAXIMUM = COLOURS[7], COLOURS[2], COLOURS[0], COLOURS[1]
 _HEIGHT = 480
@@ -30,24 +31,19 @@ def response_figure(
     """
     reference = response.reference
     lines = [
-        {
-            "x": linear.x, "y": np.where(np.isfinite(values), values / reference, np.nan), "name": name,
-            "mode": "lines", "line": {"color": colour, "dash": dash, "width": 1.8}, "hoverinfo": "skip",
-        }
-        for values, name, dash, colour in (
-            (linear.undamped, "undamped", "dot", _FREE), (linear.fixed, "bodies fixed", "dash", _FIXED),
-        )
-    ]  # fmt: skip
+        trace("undamped", linear.x, linear.undamped / reference, _FREE, hoverinfo="skip"),
+        trace("fixed", linear.x, linear.fixed / reference, _FIXED, hoverinfo="skip"),
+    ]
     points = [
-        {
-            "x": response.x, "y": values / reference, "name": name, "mode": "lines+markers", "line": line,
-            "marker": {"size": size, "symbol": [f"{symbol}{_open(state)}" for state in sweep.status]},
-            "customdata": response.x, "text": [_hover(*point) for point in zip(values, sweep.status, strict=True)],
-            "hovertemplate": f"{name}: %{{y:.3f}}, %{{text}}, at %{{x:.6g}} Hz<extra></extra>",
-        }
-        for values, name, line, symbol, size in (
-            (sweep.amplitude_max_dynamic, "damped, maximum", {"color": _MAXIMUM, "width": 0.9}, "diamond", 5),
-            (sweep.amplitude_mean_dynamic, "damped, mean of peaks", {"color": _MEAN, "width": 2.6}, "circle", 7),
+        trace(
+            curve, response.x, values / reference, colour, mode="lines+markers", customdata=response.x,
+            marker={"size": size, "symbol": [f"{symbol}{_open(state)}" for state in sweep.status]},
+            text=[_hover(*point) for point in zip(values, sweep.status, strict=True)],
+            hovertemplate=f"{LOOKS[curve].title}: %{{y:.3f}}, %{{text}}, at %{{x:.6g}} Hz<extra></extra>",
+        )
+        for curve, values, colour, symbol, size in (
+            ("damped_max", sweep.amplitude_max_dynamic, _MAXIMUM, "diamond", 5),
+            ("damped_mean", sweep.amplitude_mean_dynamic, _MEAN, "circle", 7),
         )
     ]  # fmt: skip
     return {"data": lines + points, "layout": _layout() | {"meta": dict(marks)}}
@@ -57,7 +53,7 @@ def response_figure(
 def _layout() -> dict[str, Any]:
     figure = dressed(go.Figure(), _HEIGHT)
     figure.update_xaxes(title_text=axis_title(FREQUENCY, "Hz"))
-    figure.update_yaxes(title_text="amplitude / undamped maximum", rangemode="tozero")
+    figure.update_yaxes(title_text=RELATIVE, rangemode="tozero")
     figure.update_layout(
         legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0}, hovermode="closest", uirevision="kept",
         margin={"t": 30, "r": 12, "l": 60, "b": 50}, plot_bgcolor="white", template="none",

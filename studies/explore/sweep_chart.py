@@ -23,6 +23,7 @@ from vanedamp.studies.report.forced_response import (
     response_along,
     setting,
 )
+from vanedamp.studies.report.response_curves import LOOKS, trace
 
 #: curves behind the chosen one at most; of more, evenly chosen ones are drawn
 _MOST_BEHIND = 60
@@ -138,19 +139,16 @@ def curve_figure(sweep: Sweep, response: ForcedResponse, places: Mapping[str, in
         )  # fmt: skip
     linear = linear_curves(sweep, response)
     between = linear.x if text else factor * linear.x
-    curves: list[tuple[str, np.ndarray, np.ndarray, dict[str, Any], str]] = [
-        ("undamped", between, linear.undamped, {"dash": "dot", "width": 1.8, "color": _LINEAR}, "lines"),
-        ("bodies fixed", between, linear.fixed, {"dash": "dash", "width": 1.8, "color": _LINEAR}, "lines"),
-        ("damped, maximum", x, response.damped_max, {"width": 0.8, "color": _CHOSEN}, "lines"),
-        ("damped, mean of peaks", x, response.damped_mean, {"width": 2.8, "color": _CHOSEN}, "lines+markers"),
-    ]
-    for title, at, values, line, mode in curves:
+    at_points = {"customdata": response.x.tolist(), "marker": {"size": 5}}
+    for curve, at, values, colour, more in (
+        ("undamped", between, linear.undamped, _LINEAR, {}),
+        ("fixed", between, linear.fixed, _LINEAR, {}),
+        ("damped_max", x, response.damped_max, _CHOSEN, at_points),
+        ("damped_mean", x, response.damped_mean, _CHOSEN, at_points | {"mode": "lines+markers"}),
+    ):
         if np.isfinite(values).any():
-            figure.add_scatter(
-                x=at, y=1e6 * np.where(np.isfinite(values), values, np.nan), name=title, mode=mode, line=line,
-                marker={"size": 5}, hovertemplate=f"{title}: %{{y:.4g}} µm<extra></extra>",
-                customdata=response.x.tolist() if at is x else None,
-            )  # fmt: skip
+            hover = f"{LOOKS[curve].title}: %{{y:.4g}} µm<extra></extra>"
+            figure.add_scatter(**trace(curve, at, 1e6 * values, colour, hovertemplate=hover, **more))
     _add_troubles(figure, sweep, along, places, x)
     _add_best(figure, sweep, along, places, factor)
     figure.update_xaxes(title_text=axis_title(along, unit, response.hertz), hoverformat=".6g")

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from vanedamp.files.formats.matrices.registry import read_matrices
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.external import external_model, plain_matrices, read_matrices
+from vanedamp.rom.external import external_model, plain_matrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.export.options import OUTPUT, Option
 from vanedamp.studies.export.record import Record

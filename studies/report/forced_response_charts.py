@@ -13,6 +13,7 @@ from plotly.subplots import make_subplots
 from vanedamp.coupling.sweep.sweep import LOSSES
 from vanedamp.studies.report.charts import COLOURS, DASHES, axis_title, dressed
 from vanedamp.studies.report.forced_response import ForcedResponse, LinearCurves
+from vanedamp.studies.report.response_curves import RELATIVE, trace
 
 _LOSS_COLOURS = {"viscous": "#94a3b8", "friction": "#eab308", "impact": "#dc2626", "contact": "#2563eb"}
 _SHARED = "#475569"  # linear curves of several responses
@@ -32,33 +33,32 @@ def responses_figure(
     """
     figure = go.Figure()
     colours = cycle(len(responses))
-    for curve, title, dash in (("undamped", "undamped", "dot"), ("fixed", "bodies fixed", "dash")):
+    for curve in ("undamped", "fixed"):
         for owners, response, curves in _distinct(responses, linear or [each.linear for each in responses], curve):
             colour = _SHARED if len(owners) > 1 else colours[responses.index(response)]
             group = "without loose bodies" if len(owners) > 1 else response.name
-            look: dict[str, Any] = {"mode": "lines", "line": {"dash": dash, "width": 1.6, "color": colour}}
-            _add_amplitude(figure, owners, shown, group, title, response, curves.x, getattr(curves, curve), look)
+            _add_amplitude(
+                figure, owners, shown, group, response, trace(curve, curves.x, getattr(curves, curve), colour)
+            )
     for response, colour in zip(responses, colours, strict=True):
-        for values, title, mode, width in (
-            (response.damped_max, "damped, maximum", "lines+markers", 0.8),
-            (response.damped_mean, "damped, mean of peaks", "lines", 2.8),
+        for drawn in (
+            trace("damped_max", response.x, response.damped_max, colour, mode="lines+markers", marker={"size": 4}),
+            trace("damped_mean", response.x, response.damped_mean, colour, marker={"size": 4}),
         ):
-            look = {"mode": mode, "line": {"width": width, "color": colour}, "marker": {"size": 4}}
-            _add_amplitude(figure, [response.name], shown, response.name, title, response, response.x, values, look)
-    figure.update_yaxes(title_text="amplitude / undamped maximum", rangemode="tozero")
+            _add_amplitude(figure, [response.name], shown, response.name, response, drawn)
+    figure.update_yaxes(title_text=RELATIVE, rangemode="tozero")
     return _finish(figure, responses, height=560)
 
 
 def _add_amplitude(
-    figure: go.Figure, owners: Sequence[str], shown: Collection[str] | None, group: str, title: str,
-    response: ForcedResponse, x: np.ndarray, values: np.ndarray, look: Mapping[str, Any],
+    figure: go.Figure, owners: Sequence[str], shown: Collection[str] | None, group: str, response: ForcedResponse,
+    drawn: Mapping[str, Any],
 ) -> None:  # fmt: skip
-    """Draw amplitudes (k,), m, over the undamped maximum of a response; `group` heads them in a legend."""
+    """Draw a trace of amplitudes (k,), m, over the undamped maximum of a response; `group` heads it in a legend."""
     legend = {"legendgroup": group, "legendgrouptitle_text": group} if shown is None else {"showlegend": False}
-    _add(
-        figure, owners, shown, x=x, y=values / response.reference, name=title, customdata=values * 1e6,
-        hovertemplate=f"{group}, {title}: %{{y:.3f}} (%{{customdata:.3g}} µm)<extra></extra>", **legend, **look,
-    )  # fmt: skip
+    values, hover = drawn["y"], f"{group}, {drawn['name']}: %{{y:.3f}} (%{{customdata:.3g}} µm)<extra></extra>"
+    look = {**drawn, "y": values / response.reference, "customdata": values * 1e6, "hovertemplate": hover}
+    _add(figure, owners, shown, **legend, **look)
 
 
 def _distinct(

@@ -17,8 +17,7 @@ _FOLDER = Path(__file__).parent
 
 def motion_page(motion: Motion, remark: str = "") -> str:
     """Return the document that plays a motion, with a remark below it."""
-    template = _environment().get_template("motion_page.html")
-    return template.render(motion=motion, data=motion.to_json(), script=_script(), remark=remark)
+    return _template().render(motion=motion, data=motion.to_json(), script=_script(), remark=remark)
 
 
 def script_source() -> str:
@@ -35,11 +34,16 @@ def _script() -> str:
     return (_FOLDER / "motion.js").read_text(encoding="utf-8")
 
 
-@cache
-def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
+def environment() -> jinja2.Environment:
+    """Return the templates of this folder, whose values are escaped, with the filter `shown`."""
+    templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True, trim_blocks=True, lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )  # fmt: skip
-    environment.filters["shown"] = format_value
-    return environment
+    templates.filters["shown"] = format_value
+    return templates
+
+
+@cache
+def _template() -> jinja2.Template:
+    return environment().get_template("motion_page.html")

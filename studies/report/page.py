@@ -15,10 +15,10 @@ import plotly.offline
 
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import csv_text, decoding, digest, replacing
-from vanedamp.studies.headline import format_value
 from vanedamp.studies.report.body_advice import body_note_of_run
 from vanedamp.studies.report.charts import Chart, chart
 from vanedamp.studies.report.motion import Motion
+from vanedamp.studies.report.motion_page import environment
 from vanedamp.studies.report.results import Results, Section, sections
 
 _FOLDER = Path(__file__).parent
@@ -102,18 +102,11 @@ def _html(results: Results) -> str:
 
 def _environment(names: Mapping[str, str]) -> jinja2.Environment:
     """Return what all templates share: filters, and the macro `plot` of a chart."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True, trim_blocks=True, lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )  # fmt: skip
-    environment.filters |= {
-        "shown": format_value,
-        "name": names.__getitem__,
-        "anchor": lambda file: _anchor(names[file]),
-    }
-    environment.filters["body_note"] = body_note_of_run
-    environment.globals["plot"] = environment.get_template("plot.html").make_module().plot  # type: ignore[attr-defined]
-    return environment
+    shared = environment()
+    shared.filters |= {"name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
+    shared.filters["body_note"] = body_note_of_run
+    shared.globals["plot"] = shared.get_template("plot.html").make_module().plot  # type: ignore[attr-defined]
+    return shared
 
 
 def _anchor(name: str) -> str:

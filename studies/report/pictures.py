@@ -13,6 +13,7 @@ import numpy as np
 from vanedamp.files.interrupts import uninterrupted
 from vanedamp.files.store import load, replacing
 from vanedamp.studies.report.mode_chart import viewpoint
+from vanedamp.studies.report.response_curves import RELATIVE
 from vanedamp.studies.workers import run_module
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path
     for amplitude, label, look in curves:
         right.plot(response.x, amplitude / response.reference, label=label, **look)
     right.set_xlabel("excitation frequency, Hz")
-    right.set_ylabel("amplitude / undamped maximum")
+    right.set_ylabel(RELATIVE)
     right.set_title(f"forced response, {response.name}", fontsize=11)
     right.set_ylim(bottom=0.0)
     draw_grid(right)

@@ -33,6 +33,11 @@ class Result:
     scene: Mapping[str, Any] | None = None
     parts: tuple[str, ...] = ()
 
+    @classmethod
+    def of(cls, record: Any, scene: Mapping[str, Any] | None = None) -> Result:
+        """Return the result of a record with a provenance, whose scene the page shows by itself."""
+        return cls(record, {key: value for key, value in record.provenance.items() if key != "scene"}, scene)
+
 
 class Section(Protocol):
     """The contract of a section; the folder `sections` says more."""

@@ -3,7 +3,7 @@
 import gmsh
 import numpy as np
 
-from vanedamp.modal.labelled_mesh import LabelledMesh
+from vanedamp.files.formats.meshes.labelled_mesh import LabelledMesh
 from vanedamp.modal.msh import groups, session
 
 # gmsh's elements and the places of their nodes in VTK's order

@@ -21,7 +21,7 @@ from vanedamp.coupling.methods.planar.step_records import (
     record_start,
 )
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD, SOLVES, STEPS, UNDECIDED
-from vanedamp.coupling.numerics.jit import entry, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined, kernel
 from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
 from vanedamp.coupling.system.restitution import restitution_at
 from vanedamp.coupling.system.system import System

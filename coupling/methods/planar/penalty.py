@@ -19,8 +19,8 @@ from vanedamp.coupling.methods.planar.step_records import (
     record_start,
 )
 from vanedamp.coupling.numerics.codes import DONE, EVENT_BUDGET, IMPACTS, PERIOD, STEPS
-from vanedamp.coupling.numerics.jit import entry, inlined
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.compiler.jit import entry, inlined
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.planar.contact_decisions import elongation, gap, row_speed
 from vanedamp.coupling.system.system import STOP, System
 from vanedamp.files.toml_input import InputError

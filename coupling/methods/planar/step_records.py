@@ -16,8 +16,8 @@ from vanedamp.coupling.numerics.codes import (
     PERIOD,
     STEPS,
 )
-from vanedamp.coupling.numerics.jit import inlined
-from vanedamp.coupling.numerics.record import record
+from vanedamp.coupling.numerics.compiler.jit import inlined
+from vanedamp.coupling.numerics.compiler.record import record
 from vanedamp.coupling.planar.contact_decisions import elongation, gap
 from vanedamp.coupling.planar.recorder import note_tilts, put_sample, record_section
 from vanedamp.coupling.response.recorder import note_step

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
+from functools import partial
 
 #: processes: more than any machine has cores
 _MOST_WORKERS = 1024
+#: hot spots are 2 % of the structure's size apart, and each is six outputs of the model
+_MOST_SPOTS = 1000
 
 
 def add_input(parser: ArgumentParser, source: str) -> None:
@@ -15,9 +18,19 @@ def add_input(parser: ArgumentParser, source: str) -> None:
     parser.add_argument("input", metavar=source, help="input file, SI units")
 
 
-def add_output(parser: ArgumentParser, output: str, required: bool = False) -> None:
+def input_file(source: str) -> Callable[[ArgumentParser], None]:
+    """Return the argument of an input file, for a declaration."""
+    return partial(add_input, source=source)
+
+
+def add_output(parser: ArgumentParser, output: str, required: bool = False, default: str | None = None) -> None:
     """Take `-o`: a file or a folder to write."""
-    parser.add_argument("-o", "--output", metavar=output, required=required, help="result file")
+    parser.add_argument("-o", "--output", metavar=output, required=required, default=default, help="result file")
+
+
+def output_file(output: str, required: bool = False, default: str | None = None) -> Callable[[ArgumentParser], None]:
+    """Return the argument `-o`, for a declaration."""
+    return partial(add_output, output=output, required=required, default=default)
 
 
 def add_json(parser: ArgumentParser) -> None:
@@ -58,6 +71,18 @@ def worker_count(text: str) -> int:
     """Return a number of processes."""
     if positive_count(text) > _MOST_WORKERS:
         raise ArgumentTypeError(f"expected at most {_MOST_WORKERS}, not {text}")
+    return int(text)
+
+
+def mode_count(text: str) -> int | None:
+    """Return a number of modes, None for `auto`."""
+    return None if text == "auto" else count(text)
+
+
+def spot_count(text: str) -> int:
+    """Return a number of hot spots."""
+    if count(text) > _MOST_SPOTS:
+        raise ArgumentTypeError(f"expected at most {_MOST_SPOTS}, not {text}")
     return int(text)
 
 

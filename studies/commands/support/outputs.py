@@ -7,15 +7,12 @@ import itertools
 import os
 import stat
 from argparse import Namespace
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from vanedamp.files.store import destination
 from vanedamp.files.toml_input import InputError
-
-#: endings of a result, which is HDF5; a device has none
-RECORD = (".h5", ".hdf5", ".nc", "")
 
 
 class Outputs(NamedTuple):
@@ -27,6 +24,21 @@ class Outputs(NamedTuple):
         """Refuse outputs that would take the place of an input. Raises InputError."""
         for option, path in self.files:
             refuse_input(option, path, inputs)
+
+
+def prepare(arguments: Namespace, endings: Mapping[str, tuple[str, ...]], checkpoint: bool) -> None:
+    """Check the files of a command, and keep them as `outputs`, `folder` and `checkpoint` of the arguments.
+
+    endings: of the options that name files, "/" of a folder; checkpoint: whether one lies beside the result. Raises
+    InputError.
+    """
+    if endings.get("output") == ("/",):
+        arguments.folder, arguments.outputs = output_folder(arguments), Outputs(())
+        return
+    arguments.checkpoint = checkpoint_file(arguments.output) if checkpoint else None
+    arguments.outputs = check_outputs(arguments, arguments.checkpoint, **endings)
+    if checkpoint:
+        check_resume(arguments, arguments.checkpoint)
 
 
 def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: tuple[str, ...]) -> Outputs:

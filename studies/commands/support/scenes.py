@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -12,6 +13,16 @@ from vanedamp.coupling.system.resonance import chosen_resonance
 from vanedamp.studies.commands.support.messages import print_note, print_warnings
 from vanedamp.studies.commands.support.outputs import Outputs
 from vanedamp.studies.scene_checks import check_model, check_moved
+
+
+def read_scene(arguments: Namespace) -> Scene:
+    """Load the scene of a command; as load_scene."""
+    return load_scene(arguments.input, arguments.outputs)
+
+
+def read_any_scene(arguments: Namespace) -> Scene:
+    """Load the scene of a command; as load_any_scene."""
+    return load_any_scene(arguments.input, arguments.outputs)
 
 
 def load_scene(path: str, outputs: Outputs) -> Scene:

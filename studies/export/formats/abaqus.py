@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from vanedamp.files.formats.matrices.abaqus import write_substructure
 from vanedamp.files.store import replacing
-from vanedamp.rom.abaqus_matrices import write_substructure
 from vanedamp.rom.external import plain_matrices
 from vanedamp.studies.export.record import Record
 from vanedamp.studies.export.reduced_matrices import (

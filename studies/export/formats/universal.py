@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.files.toml_input import InputError
-from vanedamp.modal.measurements import (
+from vanedamp.files.formats.universal_datasets import (
     DISPLACEMENT,
     FORCE,
     FREQUENCY,
@@ -28,6 +27,7 @@ from vanedamp.modal.measurements import (
     mode_dataset,
     write_universal,
 )
+from vanedamp.files.toml_input import InputError
 from vanedamp.studies.export.formats.vtkhdf import shapes_of
 from vanedamp.studies.export.options import Option
 from vanedamp.studies.export.record import Record

@@ -18,9 +18,7 @@ KIND = "optimisation"
 
 def load(path: Path) -> Result:
     """Read what `vanedamp optimise` wrote."""
-    optimisation = Optimisation.load(path)
-    provenance = {key: value for key, value in optimisation.provenance.items() if key != "scene"}
-    return Result(optimisation, provenance)
+    return Result.of(Optimisation.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -44,8 +44,7 @@ _LISTED = (*_BIFURCATIONS, "grazing")
 def load(path: Path) -> Result:
     """Read what `vanedamp orbits` wrote."""
     branches = Branches.load(path)
-    provenance = {key: value for key, value in branches.provenance.items() if key != "scene"}
-    return Result(branches, provenance, branches.scene.to_dict())
+    return Result.of(branches, branches.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -28,8 +28,7 @@ KIND = "ramp"
 def load(path: Path) -> Result:
     """Read what `vanedamp ramp` wrote."""
     ramp = Ramp.load(path)
-    provenance = {key: value for key, value in ramp.provenance.items() if key != "scene"}
-    return Result(ramp, provenance, ramp.scene.to_dict())
+    return Result.of(ramp, ramp.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

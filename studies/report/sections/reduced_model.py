@@ -16,8 +16,7 @@ KIND = "reduced-model"
 
 def load(path: Path) -> Result:
     """Read what `vanedamp reduce` or `vanedamp import` wrote."""
-    model = ReducedModel.load(path)
-    return Result(model, {key: value for key, value in model.provenance.items() if key != "scene"})
+    return Result.of(ReducedModel.load(path))
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

@@ -20,8 +20,7 @@ KIND = "response"
 def load(path: Path) -> Result:
     """Read what `vanedamp run` wrote."""
     history = History.load(path)
-    provenance = {key: value for key, value in history.provenance.items() if key != "scene"}
-    return Result(history, provenance, None if history.scene is None else history.scene.to_dict())
+    return Result.of(history, None if history.scene is None else history.scene.to_dict())
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:

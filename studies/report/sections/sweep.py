@@ -59,8 +59,7 @@ _COLUMNS = {
 def load(path: Path) -> Result:
     """Read what `vanedamp sweep` wrote."""
     sweep = Sweep.load(path)
-    provenance = {key: value for key, value in sweep.provenance.items() if key != "scene"}
-    return Result(sweep, provenance, _scene(sweep))
+    return Result.of(sweep, _scene(sweep))
 
 
 def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:

@@ -20,8 +20,8 @@ _SEED = os.environ.get("VANEDAMP_LAST_BITS", "0")
 _EPS = np.finfo(float).eps
 # up to so many products are rounded one by one, without fused multiplication and addition
 _SMALL = 4096
-# rows whose sizes are farther apart stay in their order
-_GRADED = 1e3
+# rows whose sizes are farther apart stay in their order: products and factors of others are known to that factor only
+_GRADED = 30.0
 # eigenvalues at most this many units in the last place of the largest one apart are one
 _SAME = 4.0
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from vanedamp.files.formats.meshes.msh_header import read_header
 from vanedamp.meshes.parameters import expected_elements
 from vanedamp.modal.mesh_import import group_names
-from vanedamp.modal.msh_header import read_header
 from vanedamp.studies.case.tables import Case, MaterialTable, MeshFile, VaneClusterMesh
 from vanedamp.studies.commands.support.facts import Fact
 

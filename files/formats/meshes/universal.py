@@ -2,6 +2,9 @@
 
 Read are the datasets 2411, 781 and 15 (nodes), 2412 and 780 (elements), and those of groups. Sources: SDRC, I-deas
 universal file datasets; Salome's SMESH, UNV drivers (groups of one pair or of two quadruples of numbers).
+
+Why not pyuff, which reads measurements: version 2.5.8 gives no members of groups (dataset 2477) and fails at the
+elements (2412) of a mesh of 10-node tetrahedra. meshlane 5.5.0 does not know the format.
 """
 
 from __future__ import annotations
@@ -12,8 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.modal.labelled_mesh import LabelledMesh, text_lines
-from vanedamp.modal.msh import MeshError
+from vanedamp.files.formats.meshes.labelled_mesh import LabelledMesh, MeshError, text_lines
 
 _NODES, _ELEMENTS, _SYSTEMS = (2411, 781, 15), (2412, 780), (2420,)
 # numbers that each member of a group has

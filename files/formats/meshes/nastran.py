@@ -3,6 +3,9 @@
 A property number is a set of elements of that name. A SET of the case control, a SET1, a SET3 or OptiStruct's SET holds
 numbers: `set 7 grids` are the grid points among them, `set 7 elements` the elements. The systems of displacements (CD)
 and of material axes say nothing about the mesh: supports and materials are the case's, in global axes.
+
+Why not pyNastran: version 1.4.1 takes 47 MB and needs matplotlib and numpy below 2. meshlane 5.5.0 refuses a deck
+without BEGIN BULK, as gmsh writes it.
 """
 
 from __future__ import annotations
@@ -14,9 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.modal.frames import Frame, through
-from vanedamp.modal.labelled_mesh import LINES, SHELLS, SOLIDS, LabelledMesh, text_lines
-from vanedamp.modal.msh import MeshError
+from vanedamp.files.formats.meshes.frames import Frame, through
+from vanedamp.files.formats.meshes.labelled_mesh import LINES, SHELLS, SOLIDS, LabelledMesh, MeshError, text_lines
 
 _KINDS = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
 # number of corners, and of all nodes where those between the corners are given

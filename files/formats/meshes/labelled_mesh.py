@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vanedamp.modal.msh import MeshError
+from vanedamp.files.errors import VanedampError
 
 #: kinds of elements, by VTK's names (whose order their nodes have): dimension and number of corners
 KINDS = {
@@ -22,6 +22,10 @@ SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 
 SOLIDS |= {20: "hexahedron20", 27: "hexahedron27"}
 SHELLS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 LINES = {2: "line", 3: "line3"}
+
+
+class MeshError(VanedampError):
+    """A mesh that cannot be read or lacks a group; the message names file, group and remedy."""
 
 
 @dataclass(eq=False)

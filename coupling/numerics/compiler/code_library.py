@@ -22,7 +22,7 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
 
-from vanedamp.coupling.numerics.record import Record
+from vanedamp.coupling.numerics.compiler.record import Record
 
 _METHODS = (
     "finalize", "get_pointer_to_function", "serialize_using_object_code", "_get_compiled_object",

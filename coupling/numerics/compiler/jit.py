@@ -18,9 +18,9 @@ import numpy as np
 from numba import config, njit, typeof, types
 from numba.extending import typeof_impl
 
-from vanedamp.coupling.numerics.code_file import CodeFile
-from vanedamp.coupling.numerics.code_library import ENTRY, INLINED, KERNEL, LOOPS
-from vanedamp.coupling.numerics.record import is_record, lengths, sized_type
+from vanedamp.coupling.numerics.compiler.code_file import CodeFile
+from vanedamp.coupling.numerics.compiler.code_library import ENTRY, INLINED, KERNEL, LOOPS
+from vanedamp.coupling.numerics.compiler.record import is_record, lengths, sized_type
 from vanedamp.files.errors import VanedampError
 
 #: start of a counter: numba would compile the callees of a literal 0 again
@@ -33,7 +33,7 @@ _NOT_FROM_PYTHON = _OPTIONS | {"no_cpython_wrapper": True}
 
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
 _MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@comparing", "@intrinsic", "(NamedTuple)")
-_PACKAGE = Path(__file__).parents[2]
+_PACKAGE = Path(__file__).parents[3]
 
 
 class CacheError(VanedampError):

@@ -13,15 +13,11 @@ from typing import TextIO
 
 import numpy as np
 
-from vanedamp.files.errors import VanedampError
+from vanedamp.files.formats.matrices.errors import MatrixFileError
 
 #: entries of a line, and columns of a number, that Abaqus reads
 _ENTRIES = 4
 _NAMES = {"stiffness": "stiffness", "mass": "mass", "viscousdamping": "damping", "damping": "damping"}
-
-
-class AbaqusMatrixError(VanedampError):
-    """A matrix file of Abaqus that cannot be read; the message says which line, or which matrix."""
 
 
 def is_matrix_market(path: Path) -> bool:
@@ -56,7 +52,7 @@ def read_matrices(path: Path) -> dict[str, np.ndarray]:
     """Read stiffness, mass and damping of a substructure by name; one global matrix has the name "".
 
     Global matrices are those of *MATRIX OUTPUT: FORMAT=MATRIX INPUT (node, freedom, node, freedom, entry), of nodes
-    that all have the same freedoms, and FORMAT=COORDINATE (row, column, entry). Raises AbaqusMatrixError.
+    that all have the same freedoms, and FORMAT=COORDINATE (row, column, entry). Raises MatrixFileError.
     """
     lines = list(_lines(path))
     if any(line.startswith("*USER ELEMENT") for _, line in lines):
@@ -64,14 +60,14 @@ def read_matrices(path: Path) -> dict[str, np.ndarray]:
     rows = [_numbers(number, line) for number, line in lines if not line.startswith("*")]
     widths = {len(row) for row in rows}
     if widths not in ({3}, {5}):
-        raise AbaqusMatrixError(
+        raise MatrixFileError(
             "expected Matrix Market, a *USER ELEMENT with *MATRIX, or lines of node, freedom, node, freedom, entry or "
             "of row, column, entry"
         )
     table = np.array(rows)
     places = table[:, :-1]
     if np.any(places != np.round(places)):
-        raise AbaqusMatrixError("nodes, freedoms, rows and columns are whole numbers")
+        raise MatrixFileError("nodes, freedoms, rows and columns are whole numbers")
     return {"": _global(places.astype(int), table[:, -1])}
 
 
@@ -88,7 +84,7 @@ def _numbers(number: int, line: str) -> list[float]:
     try:
         return [float(word.replace("D", "E").replace("d", "e")) for word in re.split(r"[,\s]+", line) if word]
     except ValueError as error:
-        raise AbaqusMatrixError(f"line {number}: expected numbers ({error})") from error
+        raise MatrixFileError(f"line {number}: expected numbers ({error})") from error
 
 
 def _substructure(lines: list[tuple[int, str]]) -> dict[str, np.ndarray]:
@@ -102,7 +98,7 @@ def _substructure(lines: list[tuple[int, str]]) -> dict[str, np.ndarray]:
             kind = re.search(r"TYPE=([A-Z ]+)", line)
             name = _NAMES.get(kind[1].replace(" ", "").lower()) if kind else None
             if name in entries:
-                raise AbaqusMatrixError(
+                raise MatrixFileError(
                     f"line {number}: a second matrix of {name}; a file holds one substructure, not several elements"
                 )
             if name is not None:
@@ -112,7 +108,7 @@ def _substructure(lines: list[tuple[int, str]]) -> dict[str, np.ndarray]:
         elif name is not None:
             entries[name] += _numbers(number, line)
     if not entries:
-        raise AbaqusMatrixError("holds no *MATRIX of stiffness or mass")
+        raise MatrixFileError("holds no *MATRIX of stiffness or mass")
     return {name: _unpacked(name, np.array(values), whole) for name, values in entries.items()}
 
 
@@ -121,7 +117,7 @@ def _unpacked(name: str, entries: np.ndarray, whole: bool) -> np.ndarray:
     count = len(entries)
     size = round(count**0.5) if whole else round(((1 + 8 * count) ** 0.5 - 1) / 2)
     if size == 0 or count != (size**2 if whole else size * (size + 1) // 2):
-        raise AbaqusMatrixError(f"{name}: {count} entries fill no {'square' if whole else 'triangle'}")
+        raise MatrixFileError(f"{name}: {count} entries fill no {'square' if whole else 'triangle'}")
     if whole:
         return entries.reshape(size, size).T
     matrix = np.zeros((size, size))
@@ -134,14 +130,14 @@ def _global(places: np.ndarray, values: np.ndarray) -> np.ndarray:
         freedoms, index = np.unique(places.reshape(-1, 2), axis=0, return_inverse=True)
         nodes, kinds = (len(np.unique(freedoms[:, column])) for column in (0, 1))
         if len(freedoms) != nodes * kinds:
-            raise AbaqusMatrixError(
+            raise MatrixFileError(
                 "nodes have different freedoms, so that the places of two matrices need not agree; write them by "
                 "FORMAT=COORDINATE"
             )
         rows, columns = index.reshape(-1, 2).T
     else:
         if places.min() < 1:
-            raise AbaqusMatrixError("rows and columns count from 1")
+            raise MatrixFileError("rows and columns count from 1")
         rows, columns = places.T - 1
     size = int(max(rows.max(), columns.max())) + 1
     matrix = np.zeros((size, size))

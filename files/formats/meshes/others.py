@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.files.foreign import apart
-from vanedamp.modal.labelled_mesh import LabelledMesh
-from vanedamp.modal.msh import MeshError
+from vanedamp.files.formats.meshes.labelled_mesh import LabelledMesh, MeshError
 
 
 def read(path: Path) -> LabelledMesh:

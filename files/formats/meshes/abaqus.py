@@ -3,6 +3,9 @@
 Every keyword that gives or moves nodes and elements is followed or refused. Others say nothing about the mesh: their
 meaning for the structure (materials and their *ORIENTATION, supports and the *TRANSFORM of their axes, loads, steps)
 is said in the case, in global axes.
+
+Why not meshlane: version 5.5.0 skips six- and eight-node shells (CPS6, CPS8), so that the sets of facets that they
+cover are empty.
 """
 
 from __future__ import annotations
@@ -16,9 +19,16 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from vanedamp.modal.frames import Frame, rotation, through
-from vanedamp.modal.labelled_mesh import KINDS, LINES, SHELLS, SOLIDS, LabelledMesh, text_lines
-from vanedamp.modal.msh import MeshError
+from vanedamp.files.formats.meshes.frames import Frame, rotation, through
+from vanedamp.files.formats.meshes.labelled_mesh import (
+    KINDS,
+    LINES,
+    SHELLS,
+    SOLIDS,
+    LabelledMesh,
+    MeshError,
+    text_lines,
+)
 
 _ELEMENTS = (
     (re.compile(r"C3D(\d+)[A-Z]*"), SOLIDS),

@@ -1,0 +1,1 @@
+"""Formats of other programs: `meshes`, `matrices`, and datasets of universal files of test systems."""

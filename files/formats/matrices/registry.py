@@ -1,0 +1,73 @@
+"""Which reader takes a matrix file: by its ending."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import io, sparse
+
+from vanedamp.files.errors import VanedampError
+from vanedamp.files.foreign import existing
+from vanedamp.files.formats.matrices.abaqus import is_matrix_market
+from vanedamp.files.formats.matrices.abaqus import read_matrices as read_abaqus
+from vanedamp.files.formats.matrices.errors import MatrixFileError
+from vanedamp.files.formats.matrices.matlab import read_mat
+from vanedamp.files.formats.matrices.nastran import read_dmig, read_op2, read_op4
+from vanedamp.files.formats.matrices.numpy_files import read_archive
+from vanedamp.files.formats.matrices.table import read_table
+
+
+def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
+    """Read the dense matrices of a file by lower-case name; where those clash, by their own names.
+
+    That of .mtx, .npy, .csv or scipy's save_npz is "". Several hold .npz, MATLAB's .mat, Nastran's OP4, OP2 and DMIG
+    entries (.pch, .dmig), of which all have the same rows, by grid point and component, and .mtx of Abaqus, of whose
+    substructures the names are stiffness, mass and damping. Entries of a file that are no numbers are left out. Raises
+    MatrixFileError for a missing, damaged or unknown file, and for those of Nastran without the package pyyeti.
+    """
+    file = Path(path)
+    if file.suffix.lower() not in _READERS:
+        raise MatrixFileError(f"{path}: expected a file ending in {', '.join(_READERS)}")
+    existing(path, MatrixFileError)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.filterwarnings("error", "Premature end-of-file")  # so pyyeti calls a file that is cut short
+            found = _READERS[file.suffix.lower()](str(file))
+    except MemoryError:
+        raise
+    except VanedampError as error:
+        raise MatrixFileError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from error
+    except Exception as error:  # every format has exceptions of its own
+        raise MatrixFileError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
+    dense = {name: np.asarray(_dense(matrix)) for name, matrix in found.items()}
+    dense = {name: matrix for name, matrix in dense.items() if matrix.dtype.kind in "biufc"}
+    counts = Counter(name.lower() for name in dense)
+    return {name if counts[name.lower()] > 1 else name.lower(): matrix for name, matrix in dense.items()}
+
+
+def _dense(matrix: Any) -> Any:
+    return matrix.toarray() if sparse.issparse(matrix) else matrix
+
+
+def _mtx(path: str) -> dict[str, Any]:
+    return {"": io.mmread(path)} if is_matrix_market(Path(path)) else read_abaqus(Path(path))
+
+
+#: the first six hold several matrices by name; the others one, but for substructures of Abaqus
+_READERS = {
+    ".npz": read_archive,
+    ".mat": read_mat,
+    ".op4": read_op4,
+    ".op2": read_op2,
+    ".pch": read_dmig,
+    ".dmig": read_dmig,
+    ".mtx": _mtx,
+    ".npy": lambda path: {"": np.load(path, allow_pickle=False)},
+    ".csv": lambda path: {"": read_table(path)},
+}

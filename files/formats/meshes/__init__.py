@@ -1,0 +1,1 @@
+"""Meshes of other programs: a reader for each format gives a `labelled_mesh`; `registry` chooses it."""

@@ -1,0 +1,26 @@
+"""Which reader takes a mesh file: by its ending."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from vanedamp.files.foreign import existing
+from vanedamp.files.formats.meshes import abaqus, ansys, nastran, others, universal
+from vanedamp.files.formats.meshes.labelled_mesh import LabelledMesh, MeshError
+
+_NASTRAN = (".bdf", ".nas", ".fem", ".dat")
+_READERS = {".inp": abaqus.read, ".cdb": ansys.read, ".unv": universal.read} | dict.fromkeys(_NASTRAN, nastran.read)
+# decks that may consist of several files
+_INCLUDING = {".inp": abaqus.files} | dict.fromkeys(_NASTRAN, nastran.files)
+
+
+def read_mesh(path: Path) -> LabelledMesh:
+    """Return the mesh of a file. Raises MeshError in one line."""
+    existing(path, MeshError, "mesh file")
+    return _READERS.get(path.suffix.lower(), others.read)(path)
+
+
+def mesh_files(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the files that a mesh is read from: itself and those that it includes. Raises MeshError."""
+    return _INCLUDING.get(Path(path).suffix.lower(), lambda file: [file])(Path(path))

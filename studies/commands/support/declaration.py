@@ -1,0 +1,75 @@
+"""A command as it is declared: what it takes, reads and writes, and the function that does it, which is loaded last.
+
+So whatever a user gets wrong is said before the work's packages are imported, and `--help` loads none of them.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
+
+#: an argument: a function that declares it to a parser
+Argument = Callable[[ArgumentParser], object]
+
+
+def argument(*names: str, **options: Any) -> Argument:
+    """Return an argument of one command, as `ArgumentParser.add_argument` takes it."""
+    return lambda parser: parser.add_argument(*names, **options)
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function at a place, module:name, below studies.commands, which is imported when it is called."""
+
+    place: str
+
+    def load(self) -> Callable[..., Any]:
+        """Return the function."""
+        module, _, name = self.place.partition(":")
+        loaded: Callable[..., Any] = getattr(import_module(f"vanedamp.studies.commands.{module}"), name)
+        return loaded
+
+    def __call__(self, *given: Any) -> Any:
+        """Call it."""
+        return self.load()(*given)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of our own.
+
+    NAME, SUMMARY, ORDER  as `studies.commands` says of all commands
+    arguments             in the order of --help
+    work                  the function of the arguments, and of what `reads` returns
+    writes                files of options, each with the endings that they may have: checked before anything is read;
+                          None: the work checks
+    checkpoint            whether the result has a checkpoint beside it, by which `--resume` goes on
+    reads                 a function of the arguments that loads and checks the input, before the work is loaded
+    """
+
+    NAME: str
+    SUMMARY: str
+    ORDER: int
+    arguments: Sequence[Argument]
+    work: Callable[..., None]
+    writes: Mapping[str, tuple[str, ...]] | None = field(default_factory=dict)
+    checkpoint: bool = False
+    reads: Callable[[Namespace], Any] | None = None
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Declare the arguments."""
+        for add in self.arguments:
+            add(parser)
+
+    def run(self, arguments: Namespace) -> None:
+        """Check the files, read the input, and do the work. Raises InputError.
+
+        The arguments get `outputs`, the files that are written, and `checkpoint`, one of them or None.
+        """
+        if self.writes is not None:
+            Function("support.outputs:prepare")(arguments, self.writes, self.checkpoint)
+        given = () if self.reads is None else (self.reads(arguments),)
+        self.work(arguments, *given)
